@@ -20,22 +20,22 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 
-# smallest elapsed time [s] between two checkpoints; less is soon computed again
+# smallest elapsed time [s] between two checkpoints; a shorter part of a march is inexpensive to repeat
 MIN_WRITE_INTERVAL = 20.0
-# largest fraction of the elapsed time that writing checkpoints may take
+# largest fraction of the elapsed time for writing checkpoints, so that they do not slow a march
 MAX_WRITE_FRACTION = 0.02
-# largest number of samples that are kept from before the last cycles, which bounds the file
+# largest number of samples that are kept from before the last cycles; it bounds the size of the file
 MAX_EARLY_SAMPLES = 400_000
-# attributes of a Run that are not stored, because a new Run computes them or a step overwrites them
+# attributes of a Run that are not stored, because a new Run computes them or each step overwrites them
 UNSTORED_ATTRIBUTES = "periodic", "workspace"
-# attributes that a new Run has not filled yet, so that they do not identify a march
+# attributes of a Run that are filled during the march, so that they cannot identify it at its start
 UNFILLED_ATTRIBUTES = ("sets",)
 RETRY_ADVICE = "run without --resume"
 _FILES = ContextVar("checkpoint_files", default=None)
 
 
 class CheckpointFiles:
-    """Files in which the marches of a run store their checkpoints.
+    """Checkpoint files of a run, one for each of its marches.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ class CheckpointFiles:
 
 @contextmanager
 def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
-    """Let the marches in this context store checkpoints in files, or store nothing for None."""
+    """Set the checkpoint files of all marches in this context; None disables checkpoints."""
     token = _FILES.set(files)
     try:
         yield
@@ -65,9 +65,9 @@ def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
 
 
 class MarchedCycle(NamedTuple):
-    """A cycle of a march, or a part of one.
+    """Samples and friction work of a marched cycle, or of a part of a cycle.
 
-    - first_step: number of the step with which it begins
+    - first_step: number of the first step of the cycle
     - rows: (steps + 1, width) samples
     - work: friction work [J]
     """
@@ -86,7 +86,7 @@ class MarchSamples:
     - extremes: smallest and largest output [m] of every cycle
     - phasors: phasor [m] of every cycle
     - is_restarted: whether the march was started a second time, cycle by cycle
-    - marks: for each mark that was passed the march at that time, the cycles before it and their
+    - marks: for each mark that was passed, the march at that time, the cycles before it and their
       extremes
     """
 
@@ -101,7 +101,7 @@ class MarchSamples:
 
     @property
     def capacity(self) -> int:
-        """Number of samples from before the last cycles that may still be kept."""
+        """Remaining number of samples from before the last cycles that may be kept."""
         return MAX_EARLY_SAMPLES - sum(map(len, self.early_numbers))
 
     def keep_early(self, rows, numbers) -> None:
@@ -110,7 +110,7 @@ class MarchSamples:
         self.early_numbers.append(numbers)
 
     def to_arrays(self) -> dict:
-        """Return all samples as arrays by name."""
+        """Return all samples of the march as arrays by name, for storage in a checkpoint."""
         out = _cycles_to_arrays("last", self.last, self.extremes)
         if self.early_rows:
             out |= {
@@ -127,7 +127,11 @@ class MarchSamples:
         }
 
     def restore(self, arrays: dict, start_march) -> None:
-        """Restore the samples from the arrays of `to_arrays`; `start_march` returns a new march."""
+        """Restore the samples of a march from the arrays of a checkpoint (`to_arrays`).
+
+        start_march: function that returns a new march at its start.
+
+        """
         cycles, self.extremes = _cycles_from_arrays("last", arrays)
         self.last.extend(cycles)
         if "kept" in arrays:
@@ -152,7 +156,7 @@ def _cycles_to_arrays(name: str, cycles, extremes) -> dict:
 
 
 def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
-    """Return the cycles and extremes that `_cycles_to_arrays` stored."""
+    """Return marched cycles and their extremes from the arrays of `_cycles_to_arrays`."""
     firsts = arrays[f"{name}.first"].tolist()
     works = arrays[f"{name}.work"].tolist()
     cycles = []
@@ -162,7 +166,7 @@ def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
 
 
 class MarchCheckpoint:
-    """Checkpoint file of one march; without a path nothing is stored."""
+    """Writer of the checkpoint file of one march; it stores nothing without a path."""
 
     def __init__(self, path: Path | None, key: str):
         self.path = path
@@ -170,10 +174,14 @@ class MarchCheckpoint:
         self.next_write = perf_counter() + MIN_WRITE_INTERVAL
 
     def write_if_due(self, run, samples: MarchSamples) -> None:
-        """Write a checkpoint between two cycles if it is due; a full disk ends the checkpoints."""
+        """Write a checkpoint of a march between two cycles if the time since the last one suffices.
+
+        A failure to write, as on a full disk, ends the checkpoints of this march.
+
+        """
         if self.path is None or perf_counter() < self.next_write or run.outcome is not None:
             return
-        begin = perf_counter()
+        start = perf_counter()
         try:
             save_checkpoint(self.path, self.key, run, samples)
         except Missing:
@@ -181,11 +189,11 @@ class MarchCheckpoint:
                 self.path.unlink(missing_ok=True)
             self.path = None
         end = perf_counter()
-        self.next_write = end + max(MIN_WRITE_INTERVAL, (end - begin) / MAX_WRITE_FRACTION)
+        self.next_write = end + max(MIN_WRITE_INTERVAL, (end - start) / MAX_WRITE_FRACTION)
 
 
 def open_checkpoint(run, request: tuple, samples: MarchSamples, start_march) -> MarchCheckpoint:
-    """Open the checkpoint of a march that begins; a file that exists is loaded into the march.
+    """Open the checkpoint file of a new march, and resume the march from an existing file.
 
     Parameters
     ----------
@@ -195,7 +203,7 @@ def open_checkpoint(run, request: tuple, samples: MarchSamples, start_march) -> 
         Numbers that identify what is marched; the first one is the number of steps.
     samples : MarchSamples
     start_march : callable
-        start_march() -> another march at its start.
+        start_march() -> a second march at its start.
 
     Returns
     -------
@@ -218,7 +226,7 @@ def open_checkpoint(run, request: tuple, samples: MarchSamples, start_march) -> 
 
 
 def _make_key(key: str, run, request: tuple) -> str:
-    """Return a digest of the new Run, its drive and its request, which identifies a checkpoint."""
+    """Return the hash that identifies the checkpoint of a march: its start, drive and request."""
     digest = hashlib.sha256(f"{key} {type(run).__name__} {request}".encode())
     for name, array in _collect_arrays(run, UNFILLED_ATTRIBUTES).items():
         digest.update(f"{name} {array.shape} ".encode() + array.tobytes())
@@ -228,7 +236,11 @@ def _make_key(key: str, run, request: tuple) -> str:
 
 
 def _collect_arrays(run, omitted=()) -> dict:
-    """Return the arrays of a Run and of its tuples by name, without the attributes `omitted`."""
+    """Return the arrays of a march and of its nested tuples by name.
+
+    omitted: names of attributes to leave out.
+
+    """
     out = {}
 
     def collect(name: str, value) -> None:
@@ -245,7 +257,7 @@ def _collect_arrays(run, omitted=()) -> dict:
 
 
 def _run_to_arrays(prefix: str, run) -> dict:
-    """Return the arrays and numbers of a Run by name."""
+    """Return the arrays and scalar attributes of a march by name, for a checkpoint."""
     numbers = {
         name: value for name, value in vars(run).items() if type(value) in (int, float, bool, str)
     }
@@ -254,7 +266,7 @@ def _run_to_arrays(prefix: str, run) -> dict:
 
 
 def _restore_run(run, prefix: str, arrays: dict) -> None:
-    """Copy the arrays and numbers of `_run_to_arrays` into a new Run."""
+    """Restore the state of a march from the arrays of a checkpoint (`_run_to_arrays`)."""
     numbers = json.loads(str(arrays[f"{prefix}:"]))
     for name, value in list(vars(run).items()):
         if name not in UNSTORED_ATTRIBUTES:
@@ -287,14 +299,14 @@ def save_checkpoint(path: Path, key: str, run, samples: MarchSamples) -> None:
 
 
 def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_march) -> None:
-    """Load a checkpoint into a new march and its samples.
+    """Load a checkpoint file into a new march and its samples.
 
     Parameters
     ----------
     path, key, run, samples
         See `save_checkpoint`; `run` and `samples` are overwritten.
     start_march : callable
-        start_march() -> another march at its start.
+        start_march() -> a second march at its start.
 
     Raises
     ------
@@ -320,9 +332,9 @@ def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_marc
 
 
 def _restore_value(value, name: str, arrays: dict, number):
-    """Return the stored value of an attribute; an array of equal shape is overwritten in place.
+    """Return the stored value of an attribute of a march from the arrays of a checkpoint.
 
-    Other objects may refer to the array of the new march.
+    An array of equal shape is overwritten in place, because other objects may refer to it.
     """
     if isinstance(value, np.ndarray):
         stored = arrays[name]

@@ -1,8 +1,8 @@
-"""Adaptive points of a curve, denser where its curvature is larger.
+"""Adaptive sampling of a curve, denser where its curvature is larger.
 
 If the middle point b of three points a, b, c deviates by e from the line from a to c, a parabola
 through them deviates by e h_ab^2/(4 h_ab h_bc) from its chord in the middle of ab. An interval is
-halved while this exceeds three quarters of the permitted error of the largest of the three values,
+halved while this exceeds three quarters of the tolerance times the largest of the three values,
 because a curve may bend more on one side of b than on the other. A peak is found if its flanks show
 at the first points.
 """
@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-# errors of values below this fraction of the largest one are relative to this fraction, because a
+# smallest reference of relative errors, over the largest value of the curve, because a
 # curve may start from 0
 MIN_VALUE_RATIO = 1e-3
-# smallest interval over its abscissa; at a jump of the curve the refinement ends there
+# smallest interval over its abscissa, at which the refinement ends at a jump of the curve
 MIN_INTERVAL_RATIO = 1e-6
 
 
 class CurvePoints(NamedTuple):
-    """Abscissas (k,) of a curve in order, and what was computed at each of them."""
+    """Abscissas (k,) of a sampled curve in order, and the result of the computation at each."""
 
     abscissas: np.ndarray
     results: list
@@ -29,17 +29,17 @@ class CurvePoints(NamedTuple):
 def sample_adaptively(
     compute: Callable, abscissas, tolerance: float = 0.01, max_points: int = 2000
 ) -> CurvePoints:
-    """Compute a curve at adaptive points.
+    """Sample a curve at adaptive points until linear interpolation meets a tolerance.
 
     Parameters
     ----------
     compute : callable
-        compute(abscissa, previous) -> (value, ...), where `previous` is what it returned at the
-        neighbouring point, None at the first point.
+        compute(abscissa, previous) -> (value, ...), where `previous` is the result at the
+        neighbouring point, or None at the first point.
     abscissas : sequence of float
-        First points in increasing or decreasing order; all of them are kept.
+        Initial points in increasing or decreasing order; all of them are kept.
     tolerance : float, optional
-        Largest error of a straight line between two points over the larger of their values, or over
+        Largest error of linear interpolation between two points, over the larger of their values or over
         MIN_VALUE_RATIO of the largest value.
     max_points : int, optional
         Largest number of points.
@@ -58,7 +58,7 @@ def sample_adaptively(
         intervals = find_coarse_intervals(np.array(abscissas), values, tolerance)
         if not intervals.size or len(abscissas) >= max_points:
             return CurvePoints(np.array(abscissas), results)
-        # from the last interval to the first, so that the indices before it stay valid
+        # intervals are split from the last to the first, so that the indices of the others stay valid
         for k in intervals[::-1][: max_points - len(abscissas)]:
             middle = 0.5 * (abscissas[k] + abscissas[k + 1])
             abscissas.insert(k + 1, middle)
@@ -66,7 +66,7 @@ def sample_adaptively(
 
 
 def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
-    """Return the indices k of the intervals from point k to k + 1 that must be halved.
+    """Return the indices k of the intervals (k, k + 1) of a sampled curve that must be halved.
 
     Parameters
     ----------
@@ -87,10 +87,10 @@ def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
         curvature = np.abs(values[1:-1] - line) / (4 * h[:-1] * h[1:])
         largest = np.maximum(np.maximum(values[:-2], values[1:-1]), values[2:])
         floor = MIN_VALUE_RATIO * np.max(values, initial=0.0, where=np.isfinite(values))
-        # 0.75, because on the worst flank of a peak the error of a straight line is 1.25 times the
+        # factor 0.75, because on the worst flank of a peak the error of linear interpolation is 1.25 times the
         # estimate
         max_error = 0.75 * tolerance * np.maximum(largest, floor)
-        # a comparison with nan is false, so no point is added there
+        # a comparison with nan is false, so no point is added next to nan
         is_left_coarse = curvature * h[:-1] ** 2 > max_error
         is_right_coarse = curvature * h[1:] ** 2 > max_error
     is_coarse = np.zeros(h.size, bool)

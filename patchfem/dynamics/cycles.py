@@ -1,4 +1,4 @@
-"""Samples to keep, extremes and phasors of the cycles of a march."""
+"""Extremes, phasors and selected samples of the cycles of a march."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -7,19 +7,21 @@ import numpy as np
 
 from ..core import STICK_SPEED_RATIO
 
-ROOT_SIGNS = np.array([[1.0], [-1.0]])  # signs of both roots of a quadratic equation
-# product of two rates over the square of the largest rate of the cycle, below which it is round-off
+ROOT_SIGNS = np.array(
+    [[1.0], [-1.0]]
+)  # signs of the square root in both solutions of a quadratic equation
+# product of two successive rates over the square of the largest rate, below which it is round-off, as at rest
 REST_RATIO = 1e-12
-# speed over the largest speed of some cycles, and slip over the largest output, that is round-off
+# round-off level of speeds over the largest speed, and of slip increments over the largest output
 ROUND_OFF_RATIO = 1e-13
-# largest number of samples that are kept of a cycle from before the last cycles
+# largest number of samples that are kept of a cycle before the last cycles, which bounds the memory
 MAX_SAMPLES_PER_CYCLE = 100
 
 
 def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
-    """Return the indices of the samples to keep of each cycle.
+    """Return the indices of the samples to keep in each marched cycle.
 
-    They are the first sample, every reversal of the output and of an interface, and every stop and
+    These are the first sample, every reversal of the output and of an interface, and every stop and
     release, where the slip speed falls below or exceeds STICK_SPEED_RATIO of its maximum in the
     cycle.
 
@@ -62,7 +64,7 @@ def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
 
 
 def find_cycle_extremes(rows, modes, dt) -> list:
-    """Return the smallest and largest output [m] of each cycle, by cubics between the samples.
+    """Return the smallest and largest output [m] of each cycle by cubic Hermite interpolation.
 
     Parameters
     ----------
@@ -84,7 +86,9 @@ def find_cycle_extremes(rows, modes, dt) -> list:
 
 
 def find_cycle_phasors(rows, modes, first: int, steps_per_cycle: int) -> list:
-    """Return the phasor c [m] of the output Re(c exp(i omega t)) in each cycle of the drive.
+    """Return the phasor [m] of the output at the drive frequency in each cycle.
+
+    The phasor is c in the output Re(c exp(i omega t)).
 
     Parameters
     ----------
@@ -108,24 +112,24 @@ def find_cycle_phasors(rows, modes, first: int, steps_per_cycle: int) -> list:
 
 @lru_cache(maxsize=4)
 def _make_carrier(first: int, n_samples: int, steps_per_cycle: int) -> np.ndarray:
-    """Return exp(-i phase) of samples from number `first` on."""
+    """Return exp(-i phase) of the drive at successive samples, from step number `first` on."""
     return np.exp(-2j * np.pi * (first + np.arange(n_samples)) / steps_per_cycle)
 
 
 class Extremes(NamedTuple):
-    """Minimum and maximum (...) of a function."""
+    """Minima and maxima (...) of sampled functions."""
 
     minimum: np.ndarray
     maximum: np.ndarray
 
 
 def find_hermite_extremes(values, rates, dt) -> Extremes:
-    """Return the minimum and maximum of the piecewise cubic through samples of a function.
+    """Return the extremes of the piecewise cubic Hermite interpolant of sampled functions.
 
     Parameters
     ----------
     values, rates : ndarray
-        (..., k) of the function and of its derivative.
+        (..., k) samples of the functions and of their derivatives.
     dt : float
         Time between two samples [s].
 
@@ -138,8 +142,8 @@ def find_hermite_extremes(values, rates, dt) -> Extremes:
     rates = rates.reshape(-1, values.shape[-1])
     minimum = values.min(axis=1)
     maximum = values.max(axis=1)
-    # where a rate is zero within round-off, as at a stop, its sign is no reversal, and the cubic
-    # would overshoot
+    # a change of sign of a rate that is zero within round-off, as at a stop, is no reversal; the cubic
+    # would overshoot there
     max_square = (rates**2).max(axis=1, keepdims=True)
     row, column = np.nonzero(rates[:, :-1] * rates[:, 1:] < -REST_RATIO * max_square)
     if column.size:
@@ -147,7 +151,7 @@ def find_hermite_extremes(values, rates, dt) -> Extremes:
         b = values[row, column + 1]
         p = rates[row, column] * dt
         q = rates[row, column + 1] * dt
-        # the cubic a + p s + quadratic s^2 + cubic s^3 of the fraction s of the step has the
+        # the interpolant a + p s + quadratic s^2 + cubic s^3 of the fraction s of the step has the
         # derivative 3 cubic s^2 + 2 quadratic s + p
         cubic = 2 * (a - b) + p + q
         quadratic = 3 * (b - a) - 2 * p - q

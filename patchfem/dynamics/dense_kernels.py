@@ -1,4 +1,4 @@
-"""Small dense systems: Cholesky factors of symmetric ones, and elimination (compiled)."""
+"""Cholesky factorisation and Gaussian elimination of small dense systems (compiled)."""
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def factorise(a):
-    """Compute the Cholesky factor of a (n, n) in its lower triangle.
+    """Compute the Cholesky factor of a symmetric matrix a (n, n) in its lower triangle.
 
-    Returns False if it is not positive definite.
+    Returns False if the matrix is not positive definite.
 
-    The diagonal holds the reciprocals of the diagonal of the factor.
+    The diagonal then holds the reciprocals of the diagonal of the factor.
     """
     n = a.shape[0]
     for j in range(n):
@@ -33,9 +33,9 @@ def factorise(a):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def solve_factorised(a, b):
-    """Solve (l l^T) x = b in place of b (n,), with the factor of `factorise`; return b . x.
+    """Solve a x = b in place of b (n,) with the Cholesky factor of `factorise`; return b . x.
 
-    By columns, so that the unknowns below one do not wait for each other.
+    The substitution goes by columns, whose operations are independent and vectorise.
     """
     n = b.size
     product = 0.0
@@ -55,9 +55,9 @@ def solve_factorised(a, b):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_by_elimination(a, b):
-    """Solve a x = b in place of b (n,) by elimination without row exchanges.
+    """Solve a x = b in place of b (n,) by Gaussian elimination without pivoting.
 
-    Returns False where one is below 1e-12.
+    Returns False if a pivot is below 1e-12.
     """
     n = b.size
     for i in range(n):

@@ -1,7 +1,7 @@
-"""Exact step of modes much faster than the step, by repeated doubling of a short step.
+"""Exact step of modes that are much faster than the step, by doubling of a short step.
 
 Numerical integration over a step does not resolve a motion that decays in a millionth of it. Over a
-short step it is exact to round-off. Two successive steps make one of twice the length, whose motion
+short step it is exact to round-off. Two successive steps make a step of twice the length, whose motion
 is a product and whose energies are a sum. The map is stored as its difference from the identity, so
 slow modes lose no digits in the doublings.
 """
@@ -13,13 +13,13 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StepMap:
-    """Linear map and energies of a step as functions of y = (z, z', f, a).
+    """Linear map of a modal time step, and its energies as quadratic forms.
 
-    The entries of y are coordinates, rates and constant accelerations (n,), and the drive (m,) at
+    Both are functions of y = (z, z', f, a): coordinates, rates and constant accelerations (n,), and the drive (m,) at
     nodes.
 
     - change: (2 n, 2 n) change of (z, z') per (z, z') at the start
-    - push, drive: (2 n, n), (2 n, m) change of (z, z') per f and per a
+    - push, drive: (2 n, n), (2 n, m) change of (z, z') per acceleration f and per drive a
     - work, lost: (3 n + m, 3 n + m) work of the drive and viscous loss [J] as quadratic forms of y
     """
 
@@ -31,75 +31,85 @@ class StepMap:
 
 
 def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
-    """Return the Step of a short step, from the numbers of `propagator`.
+    """Return the step map of a step that is short compared to the periods of the modes.
 
     Parameters
     ----------
     square, damping : ndarray
         (n, n) omega^2 and D.
     push : tuple
-        Two (n, n): z and z' per constant acceleration.
+        Two (n, n): z and z' at the end of the step per constant acceleration.
     parts, quadratic
-        As `propagator._drive_weights` gives them where damping couples the modes.
+        Results of `propagator._compute_drive_weights` for coupled damping.
 
     Returns
     -------
     Step
     """
-    far, near = push
-    stay = -far @ square  # z keeps 1 + stay of its value; computed without cancellation
-    change = np.block([[stay, near], [-near @ square, stay - near @ damping]])
-    n = len(far)
+    position_push, rate_push = push
+    # free motion of z minus identity, computed without cancellation
+    position_change = -position_push @ square
+    change = np.block(
+        [[position_change, rate_push], [-rate_push @ square, position_change - rate_push @ damping]]
+    )
+    n = len(position_push)
     m = len(parts["z"])
-    work, lost = np.zeros((2, 3 * n + m, 3 * n + m))
-    for form, names, own in (
+    work, loss = np.zeros((2, 3 * n + m, 3 * n + m))
+    for form, names, drive_part in (
         (work, ("wz", "wv", "wf"), "work"),
-        (lost, ("dz", "dv", "df"), "lost"),
+        (loss, ("dz", "dv", "df"), "lost"),
     ):
         form[3 * n :, : 3 * n] = np.concatenate([parts[name] for name in names], axis=1) / 2
         form[: 3 * n, 3 * n :] = form[3 * n :, : 3 * n].T
-        form[3 * n :, 3 * n :] = (parts[own] + parts[own].T) / 2
-    lost[: 3 * n, : 3 * n] = (quadratic + quadratic.T) / 2
+        form[3 * n :, 3 * n :] = (parts[drive_part] + parts[drive_part].T) / 2
+    loss[: 3 * n, : 3 * n] = (quadratic + quadratic.T) / 2
     return StepMap(
-        change, np.concatenate(push), np.concatenate([parts["z"].T, parts["v"].T]), work, lost
+        change, np.concatenate(push), np.concatenate([parts["z"].T, parts["v"].T]), work, loss
     )
 
 
 def double_step(step: StepMap, halves) -> StepMap:
-    """Return the Step of twice the length.
+    """Return the step map of two successive equal steps.
 
-    halves: two (m, m), the drive at the nodes of each half from that at those of the whole.
+    halves: two (m, m), interpolation of the drive from the nodes of the double step to those of each half.
     """
     first, second = halves
     size = len(step.change)
     n = step.push.shape[1]
     m = len(first)
-    one = np.eye(size + n + m)
-    two = np.eye(size + n + m)
-    one[size + n :, size + n :] = first
-    two[size + n :, size + n :] = second
-    begun = step.drive @ first
-    two[:size, :size] += step.change
-    two[:size, size : size + n] = step.push
-    two[:size, size + n :] = begun
+    first_state = np.eye(size + n + m)
+    second_state = np.eye(size + n + m)
+    first_state[size + n :, size + n :] = first
+    second_state[size + n :, size + n :] = second
+    first_drive = step.drive @ first
+    second_state[:size, :size] += step.change
+    second_state[:size, size : size + n] = step.push
+    second_state[:size, size + n :] = first_drive
     return StepMap(
         2 * step.change + step.change @ step.change,
         2 * step.push + step.change @ step.push,
-        begun + step.change @ begun + step.drive @ second,
-        *(one.T @ form @ one + two.T @ form @ two for form in (step.work, step.lost)),
+        first_drive + step.change @ first_drive + step.drive @ second,
+        *(
+            first_state.T @ form @ first_state + second_state.T @ form @ second_state
+            for form in (step.work, step.lost)
+        ),
     )
 
 
 def split_step(step: StepMap) -> tuple:
-    """Return parts and quadratic form of a Step, like `propagator._drive_weights` for coupled modes."""
+    """Return the drive weights and the loss form of a step map.
+
+    They are those of `propagator._compute_drive_weights` for coupled damping.
+
+    """
     n = step.push.shape[1]
-    cut = 3 * n
+    n_states = 3 * n
     parts = {
         "z": step.drive[:n].T,
         "v": step.drive[n:].T,
-        "work": step.work[cut:, cut:],
-        "lost": step.lost[cut:, cut:],
+        "work": step.work[n_states:, n_states:],
+        "lost": step.lost[n_states:, n_states:],
     }
     for form, names in ((step.work, ("wz", "wv", "wf")), (step.lost, ("dz", "dv", "df"))):
-        parts |= {name: 2 * form[cut:, k * n : (k + 1) * n] for k, name in enumerate(names)}
-    return parts, step.lost[:cut, :cut]
+        parts |= {name: 2 * form[n_states:, k * n : (k + 1) * n] for k, name in enumerate(names)}
+    return parts, step.lost[:n_states, :n_states]

@@ -1,6 +1,6 @@
-"""Run of an engine: its histories, made from modal coordinates.
+"""Result of a time integration: histories from modal coordinates, energies and outcome.
 
-What an engine integrated over the last cycles itself is a `core.IntegratedMeasures`.
+Measures that an engine integrates over the last cycles itself are a `core.IntegratedMeasures`.
 """
 
 from dataclasses import dataclass, field
@@ -9,20 +9,20 @@ import numpy as np
 
 from ..core import ModalBasis, Outcome, Response
 
-# length of the mean of unit vectors at twice the phases of the starts of slip, above which they have one phase
+# smallest mean resultant length of twice the phases of slip onsets, at which they count as one common phase
 MIN_ALIGNMENT = 0.95
 
 
 def mean_slip_phase(count, cosine, sine):
-    """Return the mean phase [rad] modulo pi of the starts of slip, of one run or of (n,) runs.
+    """Return the mean phase [rad] modulo pi of the slip onsets of one run or of (n,) runs.
 
-    It is NaN without a start, and where the starts differ by more than MIN_ALIGNMENT allows: the
-    mean of several slips in half a cycle is the phase of none.
+    It is NaN without an onset, and where the onsets differ by more than MIN_ALIGNMENT allows: the
+    mean of several slip phases in a half cycle is the phase of none.
 
     Parameters
     ----------
     count, cosine, sine : array_like
-        Number of starts, and sums of cosine and sine of twice their phases.
+        Number of slip onsets, and sums of cosine and sine of twice their phases.
 
     Returns
     -------
@@ -34,13 +34,13 @@ def mean_slip_phase(count, cosine, sine):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EngineResult:
-    """A run of an engine.
+    """Result of a simulation run of a time integrator.
 
-    - response, window: histories of the run and of its last cycles
+    - response, window: time histories of the run and of its last cycles
     - amplitudes: (c, 2) smallest and largest output of every cycle [m]
-    - phasors: (c,) output at the frequency of the drive [m]
+    - phasors: (c,) phasor of the output at the drive frequency in every cycle [m]
     - ledger: energies [J] by name
-    - outcome: how it ended, None where its amplitudes tell
+    - outcome: how the run ended; None if it follows from the amplitudes
     """
 
     response: Response
@@ -53,17 +53,17 @@ class EngineResult:
     snapshots: list = field(default_factory=list)
 
 
-def find_accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
-    """Return the modal accelerations (k, n) [m s-2] relative to the base, eq. 3.4.
+def find_accelerations(modes: ModalBasis, drive_acceleration, z, rate, friction) -> np.ndarray:
+    """Return the modal accelerations (k, n) [m s-2] relative to the base from eq. 3.4.
 
     Parameters
     ----------
     modes : ModalBasis
-    push : ndarray
-        (k,) drive [m s-2].
+    drive_acceleration : ndarray
+        (k,) acceleration of the drive [m s-2].
     z, rate : ndarray
-        (k, n) [m], [m/s].
-    pull : ndarray
+        (k, n) modal coordinates [m] and rates [m/s].
+    friction : ndarray
         (k, n) friction forces on the coordinates [N].
 
     Returns
@@ -73,24 +73,29 @@ def find_accelerations(modes: ModalBasis, push, z, rate, pull) -> np.ndarray:
     damped = (
         rate * (2 * modes.zeta * modes.omega) if modes.damping is None else rate @ modes.damping.T
     )
-    return -np.outer(push, modes.base) - damped - z * modes.omega**2 - pull / modes.mass
+    return (
+        -np.outer(drive_acceleration, modes.base)
+        - damped
+        - z * modes.omega**2
+        - friction / modes.mass
+    )
 
 
 def make_histories(
-    modes: ModalBasis, drive, time, motion: tuple, face: tuple, extra: dict
+    modes: ModalBasis, drive, time, motion: tuple, interface: tuple, extra: dict
 ) -> Response:
-    """Return the histories of a motion and of the first interface.
+    """Return the time histories of output, drive and first interface from a modal motion.
 
     Parameters
     ----------
     modes : ModalBasis
     drive
     time : ndarray
-        (k,) [s].
+        (k,) times [s].
     motion : tuple
-        Coordinates and rates (k, n).
-    face : tuple
-        Relative displacement, velocity, force and slip (k,).
+        Modal coordinates and rates (k, n).
+    interface : tuple
+        Relative displacement, velocity, friction force and slip (k,) of the first interface.
     extra : dict
 
     Returns
@@ -98,10 +103,10 @@ def make_histories(
     Response
     """
     z, rate = motion
-    slide, speed, force, slip = face
-    push = drive.values(time)
-    base = push if drive.moving else np.zeros_like(push)
-    accel = find_accelerations(modes, push, z, rate, np.outer(force, modes.slide))
+    slide, speed, force, slip = interface
+    drive_acceleration = drive.values(time)
+    base = drive_acceleration if drive.moving else np.zeros_like(drive_acceleration)
+    accel = find_accelerations(modes, drive_acceleration, z, rate, np.outer(force, modes.slide))
     return Response(
         time,
         z,

@@ -1,16 +1,16 @@
-"""Positions in the ledger and in the samples of a march, which the compiled loops write."""
+"""Indices into the energy sums and sample rows that the compiled loops of a march write."""
 
 from enum import IntEnum
 
 
 class Ledger(IntEnum):
-    """Positions in the ledger of a march.
+    """Indices into the ledger of a march: energy sums and counters since its start.
 
     - DRIVE_WORK, VISCOUS_LOSS: energies since the start [J]
     - DRIVE_POWER: sum of the absolute works of the drive in the steps [J]
     - FRICTION_LOSS: energy dissipated by friction [J]
     - MAX_STORED: largest stored energy [J]
-    - N_ITERATIONS, MAX_ITERATIONS: iterations of all steps, and of the step that took most
+    - N_ITERATIONS, MAX_ITERATIONS: iterations of all steps, and largest number in a step
     - N_UNCONVERGED: number of steps without convergence
     - FRICTION_WORK: work of the friction forces [J]
     """
@@ -27,16 +27,16 @@ class Ledger(IntEnum):
 
 
 class SampleColumn(IntEnum):
-    """Columns of a sample of a march, behind the coordinates and rates of the modes.
+    """Columns of a march sample for the first interface, after the modal coordinates and rates.
 
-    They belong to the contact, or else to the first element.
+    They belong to the contact, or to the first element of a rig without a contact.
 
     - SLIDE, SPEED: slide [m] and its speed [m/s]
     - FORCE: friction force [N]
     - SLIP: irreversible part of the slide [m]
-    - MEAN_FORCE: mean force of the step that follows [N]
-    - ENERGY: energy of the interface [J]
-    - STEP_WORK: friction work of the step that follows [J]
+    - MEAN_FORCE: mean force of the following step [N]
+    - ENERGY: energy stored in the interface [J]
+    - STEP_WORK: friction work of the following step [J]
     """
 
     SLIDE = 0

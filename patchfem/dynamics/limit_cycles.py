@@ -1,13 +1,13 @@
-"""Limit cycles of modes with negative damping and friction, without a drive.
+"""Limit cycles of modes with negative damping and friction, without drive.
 
-Friction of at most F takes up to 4 F A of a cycle of amplitude A, and a damping c < 0 gives pi |c|
-omega A^2. Where both are equal a motion repeats: one mode under Coulomb friction at A = 4 F/(pi
+Friction of at most F dissipates up to 4 F A in a cycle of amplitude A, and a damping c < 0 supplies pi |c|
+omega A^2. Where both are equal the motion is periodic: one mode under Coulomb friction at A = 4 F/(pi
 |c| omega), to first order in the damping (den Hartog's balance). Beyond the largest of these
-amplitudes friction no longer holds the motion: flutter. Below it the motion decays, to rest or to
+amplitudes friction no longer bounds the motion: flutter. Below it the motion decays, to rest or to
 a smaller limit cycle that is stable.
 
 `find_relay_cycles` is exact for rigid friction, which is a relay of the sliding velocity (Tsypkin
-1984, ch. 6); `find_balance_cycles` serves every law of harmonic balance: it is the motion of
+1984, ch. 6); `find_balance_cycles` applies to every law of harmonic balance: a limit cycle is a motion of
 `harmonic.backbone` whose damping is 0.
 """
 
@@ -24,36 +24,34 @@ from .harmonic.forces import LawGroup
 from .harmonic.harmonic import pack_harmonics
 from .harmonic.point import make_balance
 
-N_SAMPLES = 4096  # samples of a cycle from which its largest motion is found
-N_AMPLITUDES = 48  # number of amplitudes at which the damping of a free motion is evaluated
-# smallest and largest of these amplitudes over 4 F/(pi |c| omega)
+N_SAMPLES = 4096  # number of samples of a cycle for its amplitude; parabolas between samples make the error negligible
+N_AMPLITUDES = 48  # number of amplitudes at which the damping of a free motion is evaluated to bracket its sign changes
+# smallest and largest of these amplitudes over the amplitude 4 F/(pi |c| omega) of den Hartog's balance
 MIN_AMPLITUDE_RATIO = 1e-6
 MAX_AMPLITUDE_RATIO = 4.0
-# the same where motions in micro-slip cannot be followed: smallest ratio, and number of amplitudes
+# smallest amplitude ratio and number of amplitudes if the free motions in micro-slip cannot be followed
 MIN_SLIDING_RATIO = 0.02
 N_SLIDING_AMPLITUDES = 16
 NOT_FOLLOWED_MESSAGE = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
 )
-# relative error that round-off and the tolerances of the solvers leave in an amplitude
+# relative error of an amplitude due to round-off and the tolerances of the solvers
 AMPLITUDE_TOL = 1e-9
-# velocity of a reversal times half the period over the range of the slide, which counts as rest
+# largest slide velocity at a reversal times the half period, over the slide, that counts as zero
 REST_TOL = 1e-8
-MAX_SECANT_STEPS = 12  # largest number of secant steps to the damping that balances an amplitude
-MAX_FIRST_RATIO = 2.0  # damping ratio of friction by den Hartog's balance; where it is larger, friction is 3 times
-# the elastic force at the reversal or more, and the interface sticks there
-N_HARMONICS = (
-    9  # harmonics of the first solution; a second one with twice as many estimates its error
-)
+MAX_SECANT_STEPS = 12  # largest number of secant steps for the damping that balances an amplitude
+MAX_FIRST_RATIO = 2.0  # largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times
+# the elastic force at the reversal, so the interface sticks there
+N_HARMONICS = 9  # number of harmonics of the first solution; a second one with twice as many estimates its error
 
 
 class LimitCycle(NamedTuple):
-    """A limit cycle.
+    """Limit cycle of a self-excited mode: amplitude, frequency and stability.
 
-    - amplitude, error: half the range at the output and its error [m]
-    - omega: [rad/s]
-    - is_stable: whether disturbances of it decay
+    - amplitude, error: half the range of the output, and its error [m]
+    - omega: angular frequency [rad/s]
+    - is_stable: whether perturbations decay
     """
 
     amplitude: float
@@ -63,12 +61,14 @@ class LimitCycle(NamedTuple):
 
 
 def find_unstable_modes(modes: ModalBasis) -> np.ndarray:
-    """Return the numbers (k,) of the coordinates with negative damping."""
+    """Return the indices (k,) of the modal coordinates with negative damping."""
     return np.flatnonzero(np.diagonal(modes.damping_matrix) < 0)
 
 
 def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
-    """Return the amplitude 4 F s/(pi |d| omega m) [m] of a coordinate by den Hartog's balance.
+    """Estimate the limit-cycle amplitude [m] of a modal coordinate by den Hartog's balance.
+
+    It is 4 F s/(pi |d| omega m).
 
     Parameters
     ----------
@@ -76,9 +76,9 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     row : ndarray
         (n,) slide per coordinate.
     limit : float
-        Friction F [N].
+        Friction force F [N].
     mode : int
-        Number of the coordinate, whose damping d is negative.
+        Index of the coordinate, whose damping d is negative.
 
     Returns
     -------
@@ -88,21 +88,21 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
     return 4 * limit * abs(row[mode]) / (np.pi * gives)
 
 
-def find_relay_cycles(modes: ModalBasis, row, slides: float, holds: float) -> list:
-    """Find the limit cycles under rigid friction on an interface that never sticks.
+def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: float) -> list:
+    """Find the limit cycles under rigid friction whose interface never sticks.
 
     After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
-    period T/2. It is a limit cycle if the interface comes to rest there, slides in one direction in
-    between, and needs more than `holds` to stick.
+    period T/2. It is a limit cycle if the interface stops at the reversal, slides in one direction in
+    between, and would need more than the static friction to stick.
 
     Parameters
     ----------
     modes : ModalBasis
-        None of them rigid.
+        Modes, none of which is rigid.
     row : ndarray
         (n,) slide per coordinate.
     slides, holds : float
-        Friction in slip, and largest friction in stick [N].
+        Kinetic and static friction force [N].
 
     Returns
     -------
@@ -112,37 +112,40 @@ def find_relay_cycles(modes: ModalBasis, row, slides: float, holds: float) -> li
     return sorted(
         mode_relay_cycle
         for mode in find_unstable_modes(modes)
-        for mode_relay_cycle in _find_mode_relay_cycles(modes, row, (slides, holds), mode)
+        for mode_relay_cycle in _find_mode_relay_cycles(modes, row, (slip_force, stick_force), mode)
     )
 
 
 def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
-    """Return the cycles of `find_relay_cycles` with a frequency near that of a coordinate.
+    """Return the limit cycles under rigid friction with a frequency near that of a mode.
 
-    forces: (2,) as there [N].
+    forces: kinetic and static friction [N].
     """
-    out = []
-    half = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
-    rest = _reversal_speed_ratios(modes, row, forces[0], half)
-    for k in np.flatnonzero(rest[:-1] * rest[1:] <= 0):
-        t = brentq(
-            lambda t: _find_reversal(modes, row, forces[0], t)[1],
-            half[k],
-            half[k + 1],
+    cycles = []
+    half_periods = np.pi / modes.omega[mode] * np.geomspace(0.6, 1.7, 400)
+    speed_ratios = _reversal_speed_ratios(modes, row, forces[0], half_periods)
+    for k in np.flatnonzero(speed_ratios[:-1] * speed_ratios[1:] <= 0):
+        half_period = brentq(
+            lambda half_period: _find_reversal(modes, row, forces[0], half_period)[1],
+            half_periods[k],
+            half_periods[k + 1],
             xtol=1e-16,
             rtol=1e-14,
         )
-        # this does not hold where a mode without damping is in resonance
-        shut = abs(_find_reversal(modes, row, forces[0], t)[1]) < REST_TOL
-        if shut and (found := _make_relay_cycle(modes, row, forces, t)) is not None:
-            out.append(found)
-    return out
+        # the interface does not stop at the reversal where an undamped mode is in resonance
+        is_reversal = abs(_find_reversal(modes, row, forces[0], half_period)[1]) < REST_TOL
+        if (
+            is_reversal
+            and (limit_cycle := _make_relay_cycle(modes, row, forces, half_period)) is not None
+        ):
+            cycles.append(limit_cycle)
+    return cycles
 
 
 def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int) -> list:
-    """Find the free motions at given amplitudes under rigid friction, with their damping.
+    """Compute the backbone of a mode under rigid friction at prescribed amplitudes.
 
-    A damping -g of every coordinate keeps the motion of `mode` up (extended periodic motion: Krack
+    A damping -g of every coordinate sustains the motion of `mode` (extended periodic motion: Krack
     2015); its ratio is g/(2 omega).
 
     Parameters
@@ -150,130 +153,161 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     modes : ModalBasis
     row : ndarray
     forces : tuple
-        Friction in slip and in stick [N], see `find_relay_cycles`.
+        Kinetic and static friction [N], see `find_relay_cycles`.
     amplitudes : array_like
-        (k,) [m].
+        (k,) amplitudes [m].
     mode : int
 
     Returns
     -------
     list
-        (LimitCycle, damping ratio), or None where the interface would stick on the way.
+        (LimitCycle, damping ratio) at each amplitude, or None where the interface would stick.
     """
 
-    def cycle(log_more: float):
-        lifted = replace(
+    def cycle(log_rate: float):
+        undamped_modes = replace(
             modes,
-            damping=modes.damping_matrix - (own + np.exp(log_more)) * np.eye(modes.omega.size),
+            damping=modes.damping_matrix
+            - (modal_rate + np.exp(log_rate)) * np.eye(modes.omega.size),
         )
-        found = [
+        cycles = [
             mode_relay_cycle
-            for mode_relay_cycle in _find_mode_relay_cycles(lifted, row, forces, mode)
+            for mode_relay_cycle in _find_mode_relay_cycles(undamped_modes, row, forces, mode)
             if mode_relay_cycle.amplitude > 0
         ]
-        return min(found, key=lambda one: abs(one.omega - modes.omega[mode]), default=None)
+        return min(
+            cycles, key=lambda candidate: abs(candidate.omega - modes.omega[mode]), default=None
+        )
 
-    own = float(modes.damping_matrix[mode, mode])
-    first = (
+    modal_rate = float(modes.damping_matrix[mode, mode])
+    rate_at_1_m = (
         4
         * forces[0]
         * abs(row[mode] * modes.output[mode])
         / (np.pi * modes.mass * modes.omega[mode])
     )
-    rates = first / np.asarray(amplitudes, float)
+    rates = rate_at_1_m / np.asarray(amplitudes, float)
     max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
     return [
-        _solve_damping_at(cycle, float(a), own, float(rate)) if 0 < rate <= max_rate else None
+        _solve_damping_at(cycle, float(a), modal_rate, float(rate))
+        if 0 < rate <= max_rate
+        else None
         for a, rate in zip(amplitudes, rates)
     ]
 
 
-def _solve_damping_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:
-    """Return LimitCycle and damping ratio at an amplitude [m], by secants of logarithms.
+def _solve_damping_at(
+    cycle, amplitude: float, modal_rate: float, friction_rate: float
+) -> tuple | None:
+    """Return the limit cycle and damping ratio of an amplitude [m] by the secant method.
 
-    own: rate of the mode [1/s]; more: guess of what friction takes [1/s].
+    modal_rate: damping rate of the mode [1/s]; friction_rate: guess of the damping rate of friction [1/s].
     """
-    g = np.log([more, 1.01 * more])
-    found = [cycle(one) for one in g]
+    log_rates = np.log([friction_rate, 1.01 * friction_rate])
+    cycles = [cycle(limit_cycle) for limit_cycle in log_rates]
     for _ in range(MAX_SECANT_STEPS):
-        if None in found:
+        if None in cycles:
             return None
-        off = [np.log(one.amplitude / amplitude) for one in found]
-        if abs(off[1]) < AMPLITUDE_TOL or off[0] == off[1]:
-            return found[1], float((own + np.exp(g[1])) / (2 * found[1].omega))
-        g = np.array([g[1], g[1] - off[1] * (g[1] - g[0]) / (off[1] - off[0])])
-        found = [found[1], cycle(g[1])]
+        log_errors = [np.log(limit_cycle.amplitude / amplitude) for limit_cycle in cycles]
+        if abs(log_errors[1]) < AMPLITUDE_TOL or log_errors[0] == log_errors[1]:
+            return cycles[1], float((modal_rate + np.exp(log_rates[1])) / (2 * cycles[1].omega))
+        log_rates = np.array(
+            [
+                log_rates[1],
+                log_rates[1]
+                - log_errors[1] * (log_rates[1] - log_rates[0]) / (log_errors[1] - log_errors[0]),
+            ]
+        )
+        cycles = [cycles[1], cycle(log_rates[1])]
     return None
 
 
 def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
-    """Return the free motion (k, 2n, 2n) of (z, z') over times (k,)."""
+    """Return the transition matrices (k, 2n, 2n) of the modal state (z, z') over times (k,)."""
     blocks = propagator.free_motion(modes, t)
     if modes.damping is None:
         blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
     return np.block([[blocks[0], blocks[1]], [blocks[2], blocks[3]]])
 
 
-def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half) -> np.ndarray:
-    """Return velocity at the reversal times half period over the swing (k,), for half periods.
+def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -> np.ndarray:
+    """Return the relative slide velocity (k,) at the reversal for assumed half periods.
 
-    See `_find_reversal`.
+    It is the velocity times the half period over the slide; see `_find_reversal`.
     """
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
-    rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    flow = _free_motion_matrices(modes, half)
-    y = np.einsum("kab,kb->ka", np.linalg.pinv(flow + eye, rcond=1e-14), (flow - eye) @ rest)
-    return y[:, n:] @ row * half / np.maximum(np.abs(y[:, :n]) @ np.abs(row), 1e-300)
+    equilibrium = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
+    flow = _free_motion_matrices(modes, half_periods)
+    y = np.einsum("kab,kb->ka", np.linalg.pinv(flow + eye, rcond=1e-14), (flow - eye) @ equilibrium)
+    return y[:, n:] @ row * half_periods / np.maximum(np.abs(y[:, :n]) @ np.abs(row), 1e-300)
 
 
-def _find_reversal(modes: ModalBasis, row, force: float, t: float) -> tuple:
-    """Return the state at the reversal, its velocity times t over the swing, and the rest state.
+def _find_reversal(modes: ModalBasis, row, force: float, half_period: float) -> tuple:
+    """Return the state of a periodic motion at its reversal, for an assumed half period.
 
-    t: half period [s].
+    Also returns the slide velocity there times the half period over the slide, and the equilibrium.
+    half_period: assumed half period [s].
     """
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
-    rest = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
-    flow = _free_motion_matrices(modes, [t])[0]
-    y = np.linalg.lstsq(flow + eye, (flow - eye) @ rest, rcond=None)[0]
-    return y, float(row @ y[n:]) * t / max(float(np.abs(row) @ np.abs(y[:n])), 1e-300), rest
+    equilibrium = np.concatenate([row * force / (modes.mass * modes.omega**2), np.zeros(n)])
+    flow = _free_motion_matrices(modes, [half_period])[0]
+    y = np.linalg.lstsq(flow + eye, (flow - eye) @ equilibrium, rcond=None)[0]
+    return (
+        y,
+        float(row @ y[n:]) * half_period / max(float(np.abs(row) @ np.abs(y[:n])), 1e-300),
+        equilibrium,
+    )
 
 
-def _make_relay_cycle(modes: ModalBasis, row, forces: tuple, t: float) -> LimitCycle | None:
-    """Return the LimitCycle of half period t [s], None where the interface reverses or sticks."""
-    slides, holds = forces
+def _make_relay_cycle(
+    modes: ModalBasis, row, forces: tuple, half_period: float
+) -> LimitCycle | None:
+    """Return the limit cycle of a half period [s].
+
+    The result is None if the interface reverses or sticks within the half period.
+
+    """
+    slip_force, stick_force = forces
     n = modes.omega.size
-    y, _, rest = _find_reversal(modes, row, slides, t)
-    times = np.linspace(0, t, N_SAMPLES // 2 + 1)
-    path = rest + _free_motion_matrices(modes, times) @ (y - rest)
+    y, _, equilibrium = _find_reversal(modes, row, slip_force, half_period)
+    times = np.linspace(0, half_period, N_SAMPLES // 2 + 1)
+    path = equilibrium + _free_motion_matrices(modes, times) @ (y - equilibrium)
     rate = path[:, n:] @ row
-    swing = float(np.abs(row) @ np.abs(y[:n]))
-    pull = -modes.mass * (modes.omega**2 * y[:n] + modes.damping_matrix @ y[n:]) @ row / (row @ row)
-    if rate[1:-1].max() > 1e-9 * swing / t or -pull <= holds:
+    slide_scale = float(np.abs(row) @ np.abs(y[:n]))
+    static_force = (
+        -modes.mass * (modes.omega**2 * y[:n] + modes.damping_matrix @ y[n:]) @ row / (row @ row)
+    )
+    if rate[1:-1].max() > 1e-9 * slide_scale / half_period or -static_force <= stick_force:
         return None
     motion = path[:, :n] @ modes.output
     cycle = np.concatenate([motion, -motion[1:]])
-    found = _find_maximum(cycle)
-    coarse = _find_maximum(cycle[::2])
-    # a shift of the reversal in time absorbs part of the deviation, so the map goes from reversal to reversal
-    speed = np.concatenate([path[-1, n:], _find_accelerations(modes, path[-1], row, slides)])
+    amplitude = _find_maximum(cycle)
+    coarse_amplitude = _find_maximum(cycle[::2])
+    # a shift of the reversal in time absorbs part of a perturbation, so the map is from reversal to reversal
+    speed = np.concatenate([path[-1, n:], _find_accelerations(modes, path[-1], row, slip_force)])
     face = np.concatenate([np.zeros(n), row])
-    turned = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _free_motion_matrices(
-        modes, [t]
+    reversal_map = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _free_motion_matrices(
+        modes, [half_period]
     )[0]
-    is_stable = bool(np.abs(np.linalg.eigvals(turned)).max() < 1)
-    return LimitCycle(found, abs(found - coarse) + AMPLITUDE_TOL * found, np.pi / t, is_stable)
+    is_stable = bool(np.abs(np.linalg.eigvals(reversal_map)).max() < 1)
+    return LimitCycle(
+        amplitude,
+        abs(amplitude - coarse_amplitude) + AMPLITUDE_TOL * amplitude,
+        np.pi / half_period,
+        is_stable,
+    )
 
 
 def _find_accelerations(modes: ModalBasis, y, row, force: float) -> np.ndarray:
-    """Return the accelerations (n,) in a state (2 n,) under a force [N] along `row`."""
+    """Return the modal accelerations (n,) of a state (2 n,) under a force [N] along a row."""
     n = modes.omega.size
     return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
 
 
 def _find_maximum(samples) -> float:
-    """Return the maximum of a motion sampled at (k,), between samples by a parabola.
+    """Return the maximum of a sampled motion (k,), interpolated by a parabola.
 
     The motion changes sign after half a period.
     """
@@ -286,10 +320,10 @@ def _find_maximum(samples) -> float:
 
 
 def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -> tuple:
-    """Find the limit cycles of the laws of a LawGroup on one interface, by harmonic balance.
+    """Find the limit cycles of modes with one friction interface by harmonic balance.
 
-    Each is found with harmonics and samples twice as many. A law that weakens may have no free
-    motion in micro-slip; the path then starts where the interface slides, at the mode without
+    Each is solved again with twice the harmonics and samples. A law whose force decreases with the slide may have no free
+    motion in micro-slip; the backbone then starts where the interface slides, at the mode without
     friction.
 
     Parameters
@@ -305,27 +339,27 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
     -------
     cycles : list of LimitCycle
     min_amplitude : float
-        Smallest amplitude of the output that was looked at [m], 0 where all were.
+        Smallest amplitude of the output that was examined [m]; 0 if all were.
 
     Raises
     ------
     NotConverged
-        If no free motion is found in either way.
+        If no free motion is found from either start.
     """
-    out = []
-    least = 0.0
+    cycles = []
+    min_amplitude = 0.0
     for mode in find_unstable_modes(modes):
         if limit * abs(row[mode]) > 0:
-            found, low = _find_mode_cycles(
+            mode_cycles, min_mode_amplitude = _find_mode_cycles(
                 modes, group, int(mode), estimate_amplitude(modes, row, limit, mode)
             )
-            out = out + found
-            least = max(least, low * abs(modes.output[mode]))
-    return sorted(out), least
+            cycles = cycles + mode_cycles
+            min_amplitude = max(min_amplitude, min_mode_amplitude * abs(modes.output[mode]))
+    return sorted(cycles), min_amplitude
 
 
 def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float) -> tuple:
-    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
+    """Return the limit cycles of one mode and the smallest amplitude [m] examined."""
     shape = np.eye(modes.omega.size)[mode]
     paths = (
         (
@@ -339,32 +373,33 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
             MIN_SLIDING_RATIO * size,
         ),
     )
-    for amplitudes, start, least in paths:
+    for amplitudes, start, min_amplitude in paths:
         try:
-            few, many = (
+            coarse_cycles, fine_cycles = (
                 _find_undamped_motions(modes, group, mode, (amplitudes, start), harmonics)
                 for harmonics in (N_HARMONICS, 2 * N_HARMONICS + 1)
             )
         except NotConverged:
             continue
-        if len(few) != len(many):
+        if len(coarse_cycles) != len(fine_cycles):
             raise NotConverged(
-                f"{len(few)} limit cycles were found with {N_HARMONICS} harmonics but {len(many)} limit cycles "
-                f"with {2 * N_HARMONICS + 1} harmonics"
+                f"{len(coarse_cycles)} limit cycles were found with {N_HARMONICS} harmonics but {len(fine_cycles)} limit "
+                f"cycles with {2 * N_HARMONICS + 1} harmonics"
             )
         return [
-            better._replace(
-                error=2 * abs(one.amplitude - better.amplitude) + AMPLITUDE_TOL * better.amplitude
+            fine_cycle._replace(
+                error=2 * abs(coarse_cycle.amplitude - fine_cycle.amplitude)
+                + AMPLITUDE_TOL * fine_cycle.amplitude
             )
-            for one, better in zip(few, many)
-        ], least
+            for coarse_cycle, fine_cycle in zip(coarse_cycles, fine_cycles)
+        ], min_amplitude
     raise NotConverged(NOT_FOLLOWED_MESSAGE)
 
 
 def _find_undamped_motions(
     modes: ModalBasis, group: LawGroup, mode: int, path: tuple, harmonics: int
 ) -> list:
-    """Return the cycles along the free motions of a mode, where their damping changes sign.
+    """Return the limit cycles of a mode: free motions at which the damping changes sign.
 
     path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
     """
@@ -373,41 +408,46 @@ def _find_undamped_motions(
     balance = make_balance(modes, group, group.samples_for(harmonics, slides))
     equations = FreeBalance(balance, mode, harmonics, omega)
     path = trace_free_motions(equations, amplitudes, omega, shape)
-    zeta = np.array([one.zeta for one in path])
-    out = []
+    zeta = np.array([free_motion.zeta for free_motion in path])
+    cycles = []
     for k in np.flatnonzero(np.sign(zeta[:-1]) * np.sign(zeta[1:]) < 0):
-        found = _solve_undamped_between(equations, path[k], path[k + 1])
+        undamped_motion = _solve_undamped_between(equations, path[k], path[k + 1])
         wave = np.exp(
-            1j * np.outer(np.linspace(0, 2 * np.pi, N_SAMPLES + 1), np.arange(len(found.modal)))
+            1j
+            * np.outer(
+                np.linspace(0, 2 * np.pi, N_SAMPLES + 1), np.arange(len(undamped_motion.modal))
+            )
         )
-        motion = (wave @ (found.modal @ modes.output)).real
-        half = (_find_maximum(motion) + _find_maximum(-motion)) / 2
-        out.append(LimitCycle(half, 0.0, found.omega, bool(zeta[k + 1] > 0)))
-    return out
+        motion = (wave @ (undamped_motion.modal @ modes.output)).real
+        amplitude = (_find_maximum(motion) + _find_maximum(-motion)) / 2
+        cycles.append(LimitCycle(amplitude, 0.0, undamped_motion.omega, bool(zeta[k + 1] > 0)))
+    return cycles
 
 
-def _pack_unknowns(equations: FreeBalance, one: FreeMotion) -> np.ndarray:
-    """Return the unknowns of `FreeBalance.solve` at a free motion."""
-    y = equations.balance.lift.T @ one.slides[:, : equations.h + 1]
-    return np.append(pack_harmonics(y) / one.amplitude, [one.omega / equations.scale, one.zeta])
+def _pack_unknowns(equations: FreeBalance, motion: FreeMotion) -> np.ndarray:
+    """Return the unknowns of a free motion for `FreeBalance.solve`."""
+    y = equations.balance.lift.T @ motion.slides[:, : equations.h + 1]
+    return np.append(
+        pack_harmonics(y) / motion.amplitude, [motion.omega / equations.scale, motion.zeta]
+    )
 
 
 def _solve_undamped_between(
     equations: FreeBalance, low: FreeMotion, high: FreeMotion
 ) -> FreeMotion:
-    """Return the free motion without damping between two of opposite sign (Illinois method)."""
-    ends = [(np.log(one.amplitude), one.zeta, one) for one in (low, high)]
+    """Return the undamped free motion between two of opposite damping by the Illinois method."""
+    ends = [(np.log(motion.amplitude), motion.zeta, motion) for motion in (low, high)]
     last = 0
     for _ in range(60):
         (a, below, start), (b, above, _) = ends
         at = (a * above - b * below) / (above - below)
-        _, found = equations.solve(_pack_unknowns(equations, start), float(np.exp(at)))
-        if abs(found.zeta) < 1e-13 or abs(b - a) < 1e-13:
-            return found
-        side = int(np.sign(found.zeta) == np.sign(above))
-        ends[side] = (at, found.zeta, found)
-        if side == last:  # Illinois rule: the value at the end that stays is halved
+        _, middle = equations.solve(_pack_unknowns(equations, start), float(np.exp(at)))
+        if abs(middle.zeta) < 1e-13 or abs(b - a) < 1e-13:
+            return middle
+        side = int(np.sign(middle.zeta) == np.sign(above))
+        ends[side] = (at, middle.zeta, middle)
+        if side == last:  # Illinois rule: the value at the retained end is halved
             k = 1 - side
             ends[k] = (ends[k][0], ends[k][1] / 2, ends[k][2])
         last = side
-    return found
+    return middle

@@ -1,12 +1,12 @@
-"""Compiled motion of the modes over a step of the march, and the energies of the step.
+"""Motion and energies of the modes over a step of a march (compiled).
 
 Parameters that the functions share:
 
 - motion: (2, n) coordinates and rates of the modes
 - modal_system: `interfaces.arrays.ModalArrays`
-- table, i: table[i] is the row of `propagator.Propagator.tables` of the step
+- table, i: table[i] is the row of `propagator.Propagator.tables` for the step
 - accel: (n,) modal accelerations [m s-2] due to interface forces, which are constant over the step
-- ledger: sums over a march, see `ledger.Ledger`
+- ledger: energy sums and counters of a march, see `ledger.Ledger`
 """
 
 from typing import NamedTuple
@@ -17,14 +17,18 @@ from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .ledger import Ledger, SampleColumn
 
-# values that `write_interface` returns
+# status values that `write_interface_sample` returns
 WITHIN_TRAVEL = 0
 EXCEEDS_TRAVEL = 1
 NOT_FINITE = 3
 
 
 class Bracket(NamedTuple):
-    """Interval with a root, infinite where no bound is known, and the point at which the function is next evaluated."""
+    """Bracket of a root, and the point at which the function is evaluated next.
+
+    An end is infinite while no bound is known.
+
+    """
 
     low: float
     high: float
@@ -32,7 +36,7 @@ class Bracket(NamedTuple):
 
 
 class ModalSample(NamedTuple):
-    """Slide [m] and its speed [m/s] of the first interface, and displacement of the output [m]."""
+    """Slide [m] and slide speed [m/s] of the first interface, and output displacement [m]."""
 
     slide: float
     speed: float
@@ -41,7 +45,7 @@ class ModalSample(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def project_modes(row, values):
-    """Return the sum of row (n,) times values (n,): the slide or speed of a port.
+    """Return the slide or slide speed of a port from modal coordinates or rates.
 
     Parameters
     ----------
@@ -62,7 +66,7 @@ def project_modes(row, values):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_increment(motion, modal_system, port, table, i):
-    """Return the increment of the slide of a port in a step without interface forces [m].
+    """Return the slide increment [m] of a port in a step without interface forces.
 
     Parameters
     ----------
@@ -84,7 +88,7 @@ def free_increment(motion, modal_system, port, table, i):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_rate(motion, slide_row, modal_system, table, i):
-    """Return the rate [m/s] of a slide at the end of a step without interface forces.
+    """Return the slide speed [m/s] at the end of a step without interface forces.
 
     Parameters
     ----------
@@ -114,18 +118,18 @@ def free_rate(motion, slide_row, modal_system, table, i):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def write_friction_accelerations(force, slide_row, mass, accel):
-    """Write the modal accelerations of a force that resists a slide.
+    """Write the modal accelerations due to a friction force that resists a slide.
 
     Parameters
     ----------
     force : float
-        [N].
+        Friction force [N].
     slide_row : ndarray
         (n,) slide per coordinate.
     mass : float
         Modal mass [kg].
     accel : ndarray
-        (n,) accelerations [m s-2], which are written.
+        (n,) modal accelerations [m s-2]; output.
     """
     for k in range(accel.size):
         accel[k] = -slide_row[k] * force / mass
@@ -133,7 +137,7 @@ def write_friction_accelerations(force, slide_row, mass, accel):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def move_modes(motion, modal_system, table, i, accel, ledger):
-    """Move the modes by one step, and add its energies to the ledger.
+    """Advance the modes by one step, and add drive work and viscous loss to the ledger.
 
     Parameters
     ----------
@@ -173,7 +177,7 @@ def move_modes(motion, modal_system, table, i, accel, ledger):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _move_coupled_modes(motion, modal_system, table, row_index, accel):
-    """Move modes whose damping couples the coordinates, as `move_modes` does.
+    """Advance modes with coupled damping by one step.
 
     Returns the quadratic part of the viscous loss [J].
     """
@@ -207,7 +211,7 @@ def _move_coupled_modes(motion, modal_system, table, row_index, accel):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def modal_energy(motion, modal_system):
-    """Return the kinetic and elastic energy [J] of the modes."""
+    """Return the sum of kinetic and elastic energy [J] of the modes."""
     omega = modal_system.omega
     energy = 0.0
     for k in range(omega.size):
@@ -217,7 +221,7 @@ def modal_energy(motion, modal_system):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_accelerations(motion, modal_system, drive, accel, out):
-    """Write the modal accelerations at an instant, relative to the base, into out[0].
+    """Write the modal accelerations relative to the base at an instant.
 
     Parameters
     ----------
@@ -226,7 +230,7 @@ def write_accelerations(motion, modal_system, drive, accel, out):
     drive : float
         Acceleration of the base [m s-2].
     out : ndarray
-        (1, n) or larger.
+        (1, n) or larger; its first row is the output.
     """
     omega = modal_system.omega
     damping = modal_system.damping
@@ -240,13 +244,13 @@ def write_accelerations(motion, modal_system, drive, accel, out):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def safe_point(low, high, guess):
-    """Return `guess` if it lies inside (low, high), else the midpoint.
+def choose_point_in_bracket(low, high, guess):
+    """Return a guess if it lies inside a bracket, otherwise the midpoint of the bracket.
 
     Parameters
     ----------
     low, high : float
-        Interval.
+        Ends of the bracket.
     guess : float
 
     Returns
@@ -260,14 +264,14 @@ def safe_point(low, high, guess):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def narrow_bracket(bracket, residual, slope, n_late):
-    """Take a bracketed Newton step towards the root of an increasing function.
+    """Take a safeguarded Newton step towards the root of an increasing function.
 
     Parameters
     ----------
     bracket : Bracket
         Its point is the one at which the function was evaluated.
     residual, slope : float
-        Value of the function there, and its slope or an approximation of it.
+        Value of the function at this point, and its slope or an approximation of it.
     n_late : int
         Number of evaluations beyond those that usually suffice. From 1 on every other step is a
         bisection, because kinks can make the steps alternate; without a bracket the steps grow.
@@ -285,7 +289,7 @@ def narrow_bracket(bracket, residual, slope, n_late):
         low = bracket.point
     following = bracket.point - residual / slope
     if low > -np.inf and high < np.inf:
-        following = safe_point(low, high, following)
+        following = choose_point_in_bracket(low, high, following)
         if n_late > 0 and n_late % 2:
             following = 0.5 * (low + high)
     elif n_late > 0:
@@ -294,8 +298,10 @@ def narrow_bracket(bracket, residual, slope, n_late):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def write_modes(row, motion, modal_system):
-    """Write coordinates, rates, slide and slide speed into the first 2 n + 2 entries of a row.
+def write_modal_sample(row, motion, modal_system):
+    """Write modal coordinates, rates, slide and slide speed into a sample row of a march.
+
+    They are its first 2 n + 2 entries.
 
     Returns
     -------
@@ -318,17 +324,19 @@ def write_modes(row, motion, modal_system):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def write_interface(row, reading, output, travel, stored, ledger):
-    """Write force, slip and energy of the interface into a row, and the stored energy into the ledger.
+def write_interface_sample(row, reading, output, travel, stored, ledger):
+    """Write force, slip and energy of the interface into a sample row of a march.
+
+    The largest stored energy of the ledger is updated.
 
     Parameters
     ----------
     row : ndarray
-        (2 n + 6,) row of `loop_kernels.march`.
+        (2 n + 6,) sample row of `loop_kernels.march`.
     reading : friction.protocol_kernels.Reading
         Force [N], energy [J] and slip [m] of the interface.
     output, travel : float
-        Displacement of the output, and its largest permitted magnitude [m].
+        Displacement of the output, and the largest permitted magnitude [m].
     stored : float
         Stored energy of modes and interfaces [J].
     ledger : ndarray
@@ -351,7 +359,7 @@ def write_interface(row, reading, output, travel, stored, ledger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def count_iterations(n_iterations, work, ledger):
-    """Add the iterations of a step and its friction work to the ledger.
+    """Add the iterations and the friction work of a step to the ledger of a march.
 
     Parameters
     ----------
@@ -370,7 +378,7 @@ def count_iterations(n_iterations, work, ledger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_end_state(motion, modal_system, table, row_index, accel, end):
-    """Write coordinates and rates at the end of a step into end (2, n).
+    """Write the modal coordinates and rates at the end of a step without taking the step.
 
     The motion and the ledger do not change.
 
@@ -381,7 +389,7 @@ def write_end_state(motion, modal_system, table, row_index, accel, end):
     row_index : int
         Row of the table for the step.
     end : ndarray
-        (2, n), which is written.
+        (2, n) output.
     """
     n = motion.shape[1]
     free = modal_system.free

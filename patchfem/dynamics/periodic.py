@@ -1,9 +1,9 @@
-"""Periodic motions by Newton's method on the map of an engine over a period (shooting).
+"""Periodic motions by the shooting method: Newton's method on the map over a period.
 
 A motion with the numbers x at phase 0 of the drive is periodic where P(x) = x, with the map P over
 a period, or over half a period with the sign changed. Newton's step solves (P' - 1) dx = x - P(x)
 with every number over its size, and is shortened until the residual decreases. Where no fraction
-of the step reduces it, the engine runs on, longer every time, and the search continues from the end
+of the step reduces it, the engine integrates the motion further, longer every time, and the search continues from the end
 of the run. The eigenvalues of P' are the Floquet multipliers: the factors by which a period
 multiplies a small disturbance.
 
@@ -19,37 +19,37 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..core import NotConverged
 
-# fractions of Newton's step that are tried
+# fractions of the Newton step that are tried in turn until the residual decreases
 STEP_FRACTIONS = 1.0, 0.5, 0.2, 0.05
-# largest number of steps of Newton's method
+# largest number of Newton steps
 MAX_STEPS = 40
-# largest residual of a periodic motion, over the motion of a free mass under the drive
+# largest residual of a periodic motion, relative to the motion of a free mass under the drive
 MAX_FREE_MASS_RESIDUAL = 1e-6
-# largest size of a motion to which a step may lead: that of a mode with a damping ratio of 5e-10
+# largest motion over that of a free mass that a step may lead to: a resonance with a damping ratio of 5e-10
 MAX_SIZE = 1e9
-# periods of each run that shows whether the motion grows
+# number of periods of each of two runs by which growth of the motion is tested
 N_GROWTH_PERIODS = 60
-# distance of the largest multiplier from 1, below which nothing is damped: a size of MAX_SIZE
+# distance of the largest multiplier from 1, below which the motion counts as undamped (cf. MAX_SIZE)
 UNDAMPED_TOL = 2e-9
-# residual that a further step would not reduce
+# residual at the level of round-off, which a further step would not reduce
 ROUND_OFF_RESIDUAL = 1e-14
-# excess of a multiplier over 1 that is round-off
+# excess of the magnitude of a multiplier over 1 that may be due to round-off
 UNIT_CIRCLE_TOL = 1e-5
 
 
 @dataclass(eq=False, slots=True)
 class MappedPoint:
-    """A point and its image under the map of a period.
+    """State of a motion and its image under the map over a period.
 
-    - point, image: of the kind that the engine uses
+    - point, image: state at the start and at the end of the period, of the class that the engine uses
     - slope: (m, m) derivative of the numbers at the end with respect to those at the start
     - scale: (m,) sizes of the numbers
-    - residual: (m,) start minus end, over `scale`
+    - residual: (m,) numbers at the start minus those at the end, over `scale`
     - size: size of the motion over the motion of a free mass under the drive
     - has_same_numbers: whether start and end have the same numbers; if not, `residual` belongs to
-      the numbers that they share, and no Newton step follows from `slope`
+      the common numbers, and `slope` gives no Newton step
     - has_same_elements: whether start and end also have the same state of their elements
-    - fixed: (k,) indices of the numbers that no step changes
+    - fixed: (k,) indices of the numbers that a Newton step must not change
     - max_residual: largest magnitude of `residual`
     """
 
@@ -68,7 +68,7 @@ class MappedPoint:
         self.max_residual = float(np.abs(self.residual).max())
 
     def is_periodic(self, tolerance: float) -> bool:
-        """Return whether the motion repeats to a tolerance of its size."""
+        """Return whether the motion is periodic within a tolerance relative to its size."""
         return (
             self.max_residual <= tolerance
             and self.max_residual * self.size <= MAX_FREE_MASS_RESIDUAL
@@ -77,7 +77,11 @@ class MappedPoint:
         )
 
     def newton_step(self) -> np.ndarray:
-        """Return Newton's step (m,), in least squares where an interface may rest anywhere."""
+        """Return the Newton step (m,) towards the fixed point of the map.
+
+        It is a least-squares step where the rest position of an interface is not unique.
+
+        """
         scale = self.scale
         step = np.zeros(scale.size)
         matrix = (self.slope - np.eye(scale.size)) * scale / scale[:, None]
@@ -88,7 +92,7 @@ class MappedPoint:
         return step * scale
 
     def multipliers(self) -> np.ndarray:
-        """Return the Floquet multipliers of the free numbers in decreasing order of magnitude."""
+        """Return the Floquet multipliers of the state in decreasing order of magnitude."""
         is_free = self._find_free_numbers()
         return find_multipliers(self.slope[np.ix_(is_free, is_free)])
 
@@ -99,9 +103,9 @@ class MappedPoint:
 
 
 class MotionGrows(NotConverged):
-    """Error: the motion gains as much in every period, so that it never becomes periodic.
+    """Error: the motion grows by the same amount in every period and never becomes periodic.
 
-    - mapped_point: the last MappedPoint
+    - mapped_point: last MappedPoint of the search
     - n_steps: number of Newton steps
     """
 
@@ -114,29 +118,37 @@ class MotionGrows(NotConverged):
 
 
 class PeriodicPoint(NamedTuple):
-    """A periodic motion and the number of Newton steps that led to it."""
+    """Periodic motion found by shooting, and the number of Newton steps."""
 
     mapped_point: MappedPoint
     n_steps: int
 
 
 class Shooting:
-    """Map of an engine over a period; `find_periodic_point` finds its fixed point."""
+    """Shooting method for the periodic motion of an engine, based on its map over a period."""
 
     def map_point(self, point) -> MappedPoint:
-        """Map a point; raise NotConverged where the engine does not reach the end of the period."""
+        """Integrate a state over a period; return the state with its image and derivative.
+
+        Raises NotConverged if the engine does not reach the end of the period.
+
+        """
         raise NotImplementedError
 
     def step_from(self, mapped_point: MappedPoint, step):
-        """Return the point that lies a step (m,) away from a mapped point."""
+        """Return the state that lies a Newton step (m,) away from a mapped point."""
         raise NotImplementedError
 
     def run_from(self, mapped_point: MappedPoint, n_periods: int):
-        """Return the point that a run from the end of a map reaches after some periods."""
+        """Return the state after integrating some periods from the image of a mapped point."""
         raise NotImplementedError
 
     def is_growing(self, mapped_point: MappedPoint) -> bool:
-        """Return whether no disturbance decays and two runs add the same size to the motion."""
+        """Return whether the motion grows without bound.
+
+        This is the case if no perturbation decays and two runs increase the motion by the same amount.
+
+        """
         if not mapped_point.has_same_numbers:
             return False
         if np.abs(mapped_point.multipliers()).max(initial=0.0) < 1 - UNDAMPED_TOL:
@@ -151,16 +163,16 @@ class Shooting:
     def find_periodic_point(
         self, point, n_periods: tuple = (10, 160), tolerance: float = 1e-12
     ) -> PeriodicPoint:
-        """Find the periodic motion near a point.
+        """Find the periodic motion near a state by damped Newton iteration.
 
         Parameters
         ----------
         point
-            Start of the search.
+            Initial guess of the state.
         n_periods : tuple, optional
-            Periods of the first run, and of the longest run, where Newton's method leads away.
+            Number of periods of the first and of the longest integration after a failed Newton step.
         tolerance : float, optional
-            Residual over the size of the motion.
+            Largest residual over the size of the motion.
 
         Returns
         -------
@@ -180,7 +192,9 @@ class Shooting:
                 return PeriodicPoint(mapped_point, n_steps)
             fractions = STEP_FRACTIONS[:1] if is_periodic else STEP_FRACTIONS
             better = self._damped_newton_step(mapped_point, fractions)
-            if is_periodic:  # the last step squares the residual, where it keeps the numbers
+            if (
+                is_periodic
+            ):  # a last full step squares the residual, unless it changes the set of numbers
                 if better is None or not better.has_same_numbers:
                     better = mapped_point
                 return PeriodicPoint(better, n_steps)
@@ -197,7 +211,11 @@ class Shooting:
         )
 
     def _damped_newton_step(self, mapped_point: MappedPoint, fractions) -> MappedPoint | None:
-        """Return a better point by a fraction of Newton's step, None where no fraction leads to one."""
+        """Return the mapped point after the largest fraction of a Newton step that helps.
+
+        The result is None if no fraction reduces the residual.
+
+        """
         if not mapped_point.has_same_numbers:
             return None
         step = mapped_point.newton_step()
@@ -206,7 +224,7 @@ class Shooting:
                 trial = self.map_point(self.step_from(mapped_point, fraction * step))
             except NotConverged:
                 continue
-            # the relative residual of an unbounded motion decreases as a step leads farther, so the
+            # the relative residual of an unbounded motion decreases as the step grows, so the
             # size is limited
             max_residual = (1 - 0.4 * fraction) * mapped_point.max_residual
             if trial.max_residual < max_residual and trial.size <= MAX_SIZE:
@@ -215,9 +233,10 @@ class Shooting:
 
 
 def solve_linear(matrix):
-    """Return a function b -> matrix^-1 b; least squares where the matrix (n, n) is singular.
+    """Return a function that solves a linear system with a matrix (n, n) for right sides b.
 
-    The matrix is singular where nothing determines a mean displacement or a position at rest.
+    The solution is that of least squares if the matrix is singular, as where nothing determines a mean
+    displacement or a rest position.
     """
     factors, pivots, _ = dgetrf(matrix)
     sizes = np.abs(factors.diagonal())
@@ -229,20 +248,20 @@ def solve_linear(matrix):
 
 
 def bound_error(residual: float, multipliers) -> float:
-    """Return the relative error that a residual leaves in a periodic motion.
+    """Return a bound of the relative error of a periodic motion from its residual.
 
-    It grows as one of the multipliers (m,) approaches 1.
+    It grows as one of the Floquet multipliers (m,) approaches 1.
     """
     distance = float(np.abs(1 - np.asarray(multipliers)).min(initial=1.0))
     return residual / max(distance, 1e-12)
 
 
 def find_multipliers(matrix) -> np.ndarray:
-    """Return the Floquet multipliers (s,) of the map of a period (s, s) in decreasing magnitude."""
+    """Return the Floquet multipliers (s,) of a monodromy matrix in decreasing magnitude."""
     multipliers = np.linalg.eigvals(matrix)
     return multipliers[np.argsort(-np.abs(multipliers))]
 
 
 def is_stable(multipliers) -> bool:
-    """Return whether no multiplier (s,) exceeds 1 in magnitude, apart from round-off."""
+    """Return whether a motion is stable: no Floquet multiplier (s,) exceeds 1 in magnitude."""
     return bool(np.abs(multipliers).max(initial=0.0) <= 1 + UNIT_CIRCLE_TOL)

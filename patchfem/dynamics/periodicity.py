@@ -1,26 +1,26 @@
-"""Check whether a motion under a periodic drive has become periodic.
+"""Schedule and error bound for the check whether a marched motion has become periodic.
 
-If it has, the remaining cycles equal the last one and need not be computed.
+The remaining cycles of a periodic motion equal the last one and need not be computed.
 
 The motion is checked after FIRST_CHECK cycles, then after twice as many each time. The changes
 between three checks bound the change in the remaining cycles: either the changes decrease by a
-constant factor, as in a decaying transient, or they stay equal, as in a creeping motion. A period
+constant factor, as in a decaying transient, or they stay equal, as in a ratchetting motion. A period
 of two cycles shows only in the change over the last cycle.
 """
 
 import numpy as np
 
-# cycles after which a motion is first checked; the later checks are at 8, 16, 32, ... cycles
+# number of cycles before the first check; the later checks are at 8, 16, 32, ... cycles
 FIRST_CHECK = 4
 
 
 def is_checked_after(n_cycles: int) -> bool:
-    """Return whether a motion is checked after this number of cycles."""
+    """Return whether the motion is checked for periodicity after a number of cycles."""
     return n_cycles >= FIRST_CHECK and n_cycles & (n_cycles - 1) == 0
 
 
 def cycles_to_next_check(n_cycles: int) -> int:
-    """Return the cycles from the end of cycle `n_cycles` to one cycle before the next check."""
+    """Return the number of cycles from now to one cycle before the next periodicity check."""
     check = FIRST_CHECK
     while check <= n_cycles:
         check *= 2
@@ -30,7 +30,7 @@ def cycles_to_next_check(n_cycles: int) -> int:
 def bound_remaining_change(
     change: float, previous_change: float, n_remaining: int, n_checked: int
 ) -> float:
-    """Return a bound of the relative change of a motion in the remaining cycles.
+    """Return a bound of the relative change of a marched motion in its remaining cycles.
 
     Parameters
     ----------

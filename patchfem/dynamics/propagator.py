@@ -1,4 +1,4 @@
-"""Exact step of damped modes under any drive and interface forces constant over the step.
+"""Exact time step of damped modes under a drive and constant interface forces.
 
 The step is computed from the matrix exponential of each mode, or of all modes together where
 damping couples them, so resonance without damping, rigid modes and overdamped modes need no special
@@ -15,21 +15,21 @@ import numpy as np
 from ..core import ModalBasis
 from . import doubling
 
-# smallest and largest number of Gauss points of a step; 48 resolve 20 radians of the fastest motion
+# smallest and largest number of Gauss points in a step; 48 resolve 20 radians of the fastest motion
 MIN_GAUSS_POINTS = 8
 MAX_GAUSS_POINTS = 48
-# number of propagators that are cached, and largest number of coordinates of a cached one, which
+# number of propagators in the cache, and largest number of coordinates of a cached one, which
 # bound the memory
 MAX_CACHED = 4
 MAX_CACHED_COORDINATES = 32
-# fastest rate times step length, above which MOST Gauss points do not resolve the motion
+# largest fastest rate times step length [rad] that MAX_GAUSS_POINTS Gauss points resolve
 MAX_RATE_TIME = 20.0
-SHORT_STEP_RATE_TIME = 4.0  # fastest rate times length of the short step that is then doubled
+SHORT_STEP_RATE_TIME = 4.0  # fastest rate times length of the short step that is doubled [rad]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Propagator:
-    """Coefficients of a step of dt [s] for n coordinates and p ports.
+    """Coefficients of the exact time step of n modal coordinates with p interface ports.
 
     free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both
     per modal acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z',
@@ -53,7 +53,7 @@ class Propagator:
     parts: dict
 
     def tables(self, drive, first: int, count: int) -> np.ndarray:
-        """Return a row of coefficients for each of some steps.
+        """Return the coefficients of the drive for successive steps, one row per step.
 
         The columns are the contribution of the drive to z and z' (n, n); linear forms in (z, z',
         acceleration) of the work of the drive (3 n) and of the viscous loss (3 n) [J]; the constant
@@ -73,34 +73,34 @@ class Propagator:
         ndarray
             (count, 8 n + 3 + p).
         """
-        start = (first + np.arange(count)) * self.dt
-        a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)
-        p = self.parts
-        moved = a @ p["z"]
-        # the quadratic form is a product and a sum, because an einsum of three factors takes four times as long
-        rest = np.stack(
+        start_times = (first + np.arange(count)) * self.dt
+        drive_values = drive.values((start_times[:, None] + self.nodes).ravel()).reshape(count, -1)
+        weights = self.parts
+        driven_motion = drive_values @ weights["z"]
+        # the quadratic form is computed as a product and a sum, because an einsum of three factors is four times slower
+        scalars = np.stack(
             [
-                ((a @ p["work"]) * a).sum(axis=1),
-                ((a @ p["lost"]) * a).sum(axis=1),
-                drive.values(start + self.dt),
+                ((drive_values @ weights["work"]) * drive_values).sum(axis=1),
+                ((drive_values @ weights["lost"]) * drive_values).sum(axis=1),
+                drive.values(start_times + self.dt),
             ],
             axis=1,
         )
         return np.concatenate(
             [
-                moved,
-                *(a @ p[key] for key in ("v", "wz", "wv", "wf", "dz", "dv", "df")),
-                rest,
-                moved @ self.rows.T,
+                driven_motion,
+                *(drive_values @ weights[key] for key in ("v", "wz", "wv", "wf", "dz", "dv", "df")),
+                scalars,
+                driven_motion @ self.rows.T,
             ],
             axis=1,
         )
 
 
 def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
-    """Return the propagator of equal steps of the period of a drive.
+    """Return the propagator of the modes for equal steps of a drive period.
 
-    Steps of large omega dt take up to MAX_GAUSS_POINTS Gauss points; where these do not suffice, a
+    Steps of large omega dt use up to MAX_GAUSS_POINTS Gauss points; where these do not suffice, a
     short step is doubled. The last few propagators are cached, because the runs that estimate
     errors use the same ones again.
 
@@ -110,15 +110,15 @@ def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -
     drive
     steps_per_cycle : int
     rows : array_like, optional
-        (p, n) ports, slide per coordinate; the interfaces by default.
+        (p, n) slide of each port per coordinate; the interfaces by default.
 
     Returns
     -------
     Propagator
     """
     if rows is None and modes.omega.size <= MAX_CACHED_COORDINATES:
-        return _make_for_interfaces(_Basis(modes), drive.period, steps_per_cycle)
-    return _make(
+        return _make_interface_propagator(_HashableBasis(modes), drive.period, steps_per_cycle)
+    return _make_propagator(
         modes,
         drive.period,
         steps_per_cycle,
@@ -126,8 +126,8 @@ def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -
     )
 
 
-class _Basis:
-    """ModalBasis that is compared and hashed by its numbers, as a key of the cache."""
+class _HashableBasis:
+    """Modal basis that is compared and hashed by its numbers, as a key of the cache."""
 
     def __init__(self, modes: ModalBasis):
         self.modes = modes
@@ -151,18 +151,22 @@ class _Basis:
 
 
 @lru_cache(maxsize=MAX_CACHED)
-def _make_for_interfaces(basis: _Basis, period: float, steps_per_cycle: int) -> Propagator:
-    return _make(basis.modes, period, steps_per_cycle, np.array(basis.modes.interfaces, float))
+def _make_interface_propagator(
+    basis: _HashableBasis, period: float, steps_per_cycle: int
+) -> Propagator:
+    return _make_propagator(
+        basis.modes, period, steps_per_cycle, np.array(basis.modes.interfaces, float)
+    )
 
 
-def _make(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propagator:
+def _make_propagator(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propagator:
     dt = period / steps_per_cycle
-    fastest = max(bound_fastest_rate(modes), 2 * np.pi / period)
+    fastest_rate = max(bound_fastest_rate(modes), 2 * np.pi / period)
     n = modes.omega.size
-    coupled = modes.damping is not None
-    if fastest * dt > MAX_RATE_TIME:
-        (at_end, push, parts, quadratic), nodes = _integrate_by_doubling(
-            modes, dt, fastest, 2 * np.pi / period
+    is_coupled = modes.damping is not None
+    if fastest_rate * dt > MAX_RATE_TIME:
+        (end_blocks, motion_per_acceleration, drive_weights, loss_form), nodes = (
+            _integrate_by_doubling(modes, dt, fastest_rate, 2 * np.pi / period)
         )
     else:
         # two more Gauss points for each radian of the fastest motion
@@ -170,65 +174,67 @@ def _make(modes: ModalBasis, period: float, steps_per_cycle: int, rows) -> Propa
             dt,
             int(
                 np.clip(
-                    MIN_GAUSS_POINTS + 2 * np.ceil(fastest * dt), MIN_GAUSS_POINTS, MAX_GAUSS_POINTS
+                    MIN_GAUSS_POINTS + 2 * np.ceil(fastest_rate * dt),
+                    MIN_GAUSS_POINTS,
+                    MAX_GAUSS_POINTS,
                 )
             ),
         )
-        at_end = [part[0] for part in free_motion(modes, np.array([dt]))]
-        inside = free_motion(modes, nodes)
-        push = _motion_per_acceleration(modes, dt, nodes, weight)
-        parts, quadratic = _drive_weights(modes, dt, nodes, weight, inside)
-    if coupled:
-        block = np.block([[at_end[0], at_end[1]], [at_end[2], at_end[3]]])
-        dense = np.concatenate([block, np.concatenate(push)], axis=1)
+        end_blocks = [part[0] for part in free_motion(modes, np.array([dt]))]
+        node_blocks = free_motion(modes, nodes)
+        motion_per_acceleration = _motion_per_acceleration(modes, dt, nodes, weight)
+        drive_weights, loss_form = _compute_drive_weights(modes, dt, nodes, weight, node_blocks)
+    if is_coupled:
+        block = np.block([[end_blocks[0], end_blocks[1]], [end_blocks[2], end_blocks[3]]])
+        dense = np.concatenate([block, np.concatenate(motion_per_acceleration)], axis=1)
         reach = rows @ (block - np.eye(2 * n))[:n]
-        beta = rows @ push[0] @ rows.T / modes.mass
+        beta = rows @ motion_per_acceleration[0] @ rows.T / modes.mass
         free = np.zeros((4, n))
         loss = np.zeros((6, n))
-        short = np.zeros((2, n))
+        uncoupled_push = np.zeros((2, n))
     else:
         dense = np.zeros((0, 0))
-        short = np.array(push)
-        free = np.array(at_end)
-        loss = quadratic
-        reach = np.concatenate([rows * (at_end[0] - 1), rows * at_end[1]], axis=1)
-        beta = (rows * push[0]) @ rows.T / modes.mass
+        uncoupled_push = np.array(motion_per_acceleration)
+        free = np.array(end_blocks)
+        loss = loss_form
+        reach = np.concatenate([rows * (end_blocks[0] - 1), rows * end_blocks[1]], axis=1)
+        beta = (rows * motion_per_acceleration[0]) @ rows.T / modes.mass
     return Propagator(
         dt,
         steps_per_cycle,
         rows,
         free,
-        short,
+        uncoupled_push,
         np.ascontiguousarray(dense),
         np.ascontiguousarray(reach),
         np.ascontiguousarray(beta),
         loss,
-        quadratic if coupled else np.zeros((0, 0)),
+        loss_form if is_coupled else np.zeros((0, 0)),
         nodes,
-        parts,
+        drive_weights,
     )
 
 
 def bound_fastest_rate(modes: ModalBasis) -> float:
-    """Return an upper bound [1/s] of the rates at which modes oscillate or decay."""
+    """Return an upper bound [1/s] of the oscillation and decay rates of the modes."""
     if modes.damping is None:
         return float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0))
     return max(float(modes.omega.max(initial=0.0)), float(np.linalg.norm(modes.damping, 2)))
 
 
 def _gauss_rule(dt: float, count: int) -> tuple:
-    """Return Gauss points and weights on [0, dt]."""
+    """Return the points and weights of Gauss quadrature on [0, dt]."""
     x, w = np.polynomial.legendre.leggauss(count)
     return dt * (1 + x) / 2, dt * w / 2
 
 
 def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
-    """Compute a step that is long compared to the periods of the modes, by doubling.
+    """Compute the coefficients of a step much longer than the modal periods, by doubling.
 
-    fastest, slowest [1/s]: rates of the modes and of the drive. Returns (blocks at the end, push,
-    parts, quadratic form of the loss) and the nodes.
+    fastest, slowest [1/s]: rates of the modes and of the drive. Returns (free-motion blocks, motion per acceleration,
+    drive weights, quadratic form of the loss) and the nodes.
     """
-    times = max(0, int(np.ceil(np.log2(fastest * dt / SHORT_STEP_RATE_TIME))))
+    n_doublings = max(0, int(np.ceil(np.log2(fastest * dt / SHORT_STEP_RATE_TIME))))
     count = int(
         np.clip(
             MIN_GAUSS_POINTS + 2 * np.ceil(max(SHORT_STEP_RATE_TIME, slowest * dt)),
@@ -236,29 +242,31 @@ def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest
             MAX_GAUSS_POINTS,
         )
     )
-    whole = replace(modes, damping=modes.damping_matrix)
+    coupled_modes = replace(modes, damping=modes.damping_matrix)
     n = modes.omega.size
     nodes, weight = _gauss_rule(dt, count)
-    h = dt / 2**times
-    shrink = 1 / 2**times
-    near = nodes * shrink
-    light = weight * shrink
+    h = dt / 2**n_doublings
+    step_ratio = 1 / 2**n_doublings
+    short_nodes = nodes * step_ratio
+    short_weights = weight * step_ratio
     step = doubling.make_short_step(
         np.diag(modes.omega**2),
         modes.damping_matrix,
-        _motion_per_acceleration(whole, h, near, light),
-        *_drive_weights(whole, h, near, light, free_motion(whole, near)),
+        _motion_per_acceleration(coupled_modes, h, short_nodes, short_weights),
+        *_compute_drive_weights(
+            coupled_modes, h, short_nodes, short_weights, free_motion(coupled_modes, short_nodes)
+        ),
     )
     halves = _lagrange_polynomials(nodes, nodes / 2), _lagrange_polynomials(nodes, (dt + nodes) / 2)
-    for _ in range(times):
+    for _ in range(n_doublings):
         step = doubling.double_step(step, halves)
     parts, quadratic = doubling.split_step(step)
-    flow = step.change + np.eye(2 * n)
-    blocks = [flow[:n, :n], flow[:n, n:], flow[n:, :n], flow[n:, n:]]
-    push = (step.push[:n], step.push[n:])
+    transition = step.change + np.eye(2 * n)
+    blocks = [transition[:n, :n], transition[:n, n:], transition[n:, :n], transition[n:, n:]]
+    motion_per_acceleration = (step.push[:n], step.push[n:])
     if modes.damping is None:
         blocks = [np.diag(part) for part in blocks]
-        push = tuple(np.diag(part) for part in push)
+        motion_per_acceleration = tuple(np.diag(part) for part in motion_per_acceleration)
         pairs = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
         quadratic = np.stack(
             [
@@ -266,11 +274,11 @@ def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest
                 for i, k in pairs
             ]
         )
-    return (blocks, push, parts, quadratic), nodes
+    return (blocks, motion_per_acceleration, parts, quadratic), nodes
 
 
 def free_motion(modes: ModalBasis, times) -> tuple:
-    """Return the blocks zz, zv, vz, vv of the free motion after `times` (k,).
+    """Return the blocks zz, zv, vz, vv of the modal transition matrix after given times (k,).
 
     Each has the shape (k, n), or (k, n, n) where damping couples the coordinates.
     """
@@ -288,33 +296,37 @@ def free_motion(modes: ModalBasis, times) -> tuple:
 
 
 def _free_motion_uncoupled(omega, zeta, t) -> tuple:
-    """Return the blocks zz, zv, vz, vv of uncoupled coordinates (n,) after times t (k, 1).
+    """Return the transition blocks of uncoupled modal coordinates (n,) after times t (k, 1).
 
-    The closed form holds for any damping ratio.
+    The blocks are zz, zv, vz, vv. The closed form holds for any damping ratio.
     """
     decay = zeta * omega
     root = omega * np.sqrt(np.abs(zeta**2 - 1))
     x = root * t
-    small = x < 1e-3
-    under = np.where(small | (zeta < 1), x, 0.0)
-    over = np.where(~small & (zeta > 1), x, 0.0)
+    is_small = x < 1e-3
+    underdamped = np.where(is_small | (zeta < 1), x, 0.0)
+    overdamped = np.where(~is_small & (zeta > 1), x, 0.0)
     sign = np.where(zeta < 1, -1.0, 1.0)
     square = sign * x * x
-    fade = np.exp(-decay * t)
-    c = fade * np.cos(under)
-    s = fade * np.sinc(under / np.pi)
-    c = np.where(small, fade * (1 + square / 2 * (1 + square / 12)), c)
-    s = np.where(small, fade * (1 + square / 6 * (1 + square / 20)), s)
-    slow = np.exp(-decay * t + over)
-    fast = np.exp(-decay * t - over)
-    c = np.where(over > 0, (slow + fast) / 2, c)
-    s = np.where(over > 0, (slow - fast) / (2 * np.where(over > 0, over, 1.0)), s)
+    envelope = np.exp(-decay * t)
+    c = envelope * np.cos(underdamped)
+    s = envelope * np.sinc(underdamped / np.pi)
+    c = np.where(is_small, envelope * (1 + square / 2 * (1 + square / 12)), c)
+    s = np.where(is_small, envelope * (1 + square / 6 * (1 + square / 20)), s)
+    slow_decay = np.exp(-decay * t + overdamped)
+    fast_decay = np.exp(-decay * t - overdamped)
+    c = np.where(overdamped > 0, (slow_decay + fast_decay) / 2, c)
+    s = np.where(
+        overdamped > 0,
+        (slow_decay - fast_decay) / (2 * np.where(overdamped > 0, overdamped, 1.0)),
+        s,
+    )
     zv = t * s
     return c + decay * zv, zv, -(omega**2) * zv, c - decay * zv
 
 
 def matrix_exponentials(a) -> np.ndarray:
-    """Return the matrix exponentials (k, m, m) of matrices a (k, m, m), by scaling and squaring.
+    """Return the exponentials of matrices (k, m, m) by scaling and squaring.
 
     The Taylor series of order 13 of a matrix with a norm below 1/4 has an error of (1/4)^14/14! =
     4e-20.
@@ -332,7 +344,7 @@ def matrix_exponentials(a) -> np.ndarray:
 
 
 def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
-    """Return the motion (z, z') after dt [s] per constant modal acceleration.
+    """Return the modal coordinate and rate after dt [s] per constant modal acceleration.
 
     Each has the shape (n,), or (n, n) where damping couples the coordinates. The first one is the
     integral of zv, which avoids cancellation in a short step.
@@ -342,8 +354,8 @@ def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tup
     )[1][0]
 
 
-def _drive_weights(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
-    """Return weights of the drive at the Gauss points, and the quadratic form of the viscous loss.
+def _compute_drive_weights(modes: ModalBasis, dt, nodes, weight, node_blocks) -> tuple:
+    """Return the weights of the drive at the Gauss points, and the form of the viscous loss.
 
     `tables` multiplies the weights by the drive.
     """
@@ -351,57 +363,59 @@ def _drive_weights(modes: ModalBasis, dt, nodes, weight, inside) -> tuple:
     base = modes.base
     mass = modes.mass
     m = nodes.size
-    _, zv, vz, vv = inside
-    coupled = modes.damping is not None
-    back = free_motion(modes, dt - nodes)
+    _, zv, vz, vv = node_blocks
+    is_coupled = modes.damping is not None
+    remaining_motion = free_motion(modes, dt - nodes)
 
     def times_base(part):
-        return part @ base if coupled else part * base
+        return part @ base if is_coupled else part * base
 
     def base_times(part):
-        return np.einsum("i,kij->kj", base, part) if coupled else part * base
+        return np.einsum("i,kij->kj", base, part) if is_coupled else part * base
 
     # velocity at point k per drive at point j: -int_0^tau_k E_vv(tau_k - s) base l_j(s) ds
-    inner = np.empty((m, m, n))
-    share = (1 + np.polynomial.legendre.leggauss(m)[0]) / 2
+    node_velocities = np.empty((m, m, n))
+    positions = (1 + np.polynomial.legendre.leggauss(m)[0]) / 2
     for k, tau in enumerate(nodes):
-        reply = times_base(free_motion(modes, tau * (1 - share))[3])
-        spread = _lagrange_polynomials(nodes, tau * share) * (weight * tau / dt)[:, None]
-        inner[k] = -spread.T @ reply
-    if coupled:
-        d = (modes.damping + modes.damping.T) / 2
-        damped = np.einsum("ij,klj->kli", d, inner)
+        response = times_base(free_motion(modes, tau * (1 - positions))[3])
+        interpolation = _lagrange_polynomials(nodes, tau * positions) * (weight * tau / dt)[:, None]
+        node_velocities[k] = -interpolation.T @ response
+    if is_coupled:
+        damping = (modes.damping + modes.damping.T) / 2
+        damped_velocities = np.einsum("ij,klj->kli", damping, node_velocities)
     else:
-        d = 2 * modes.zeta * modes.omega
-        damped = inner * d
+        damping = 2 * modes.zeta * modes.omega
+        damped_velocities = node_velocities * damping
     parts = {
-        "z": -weight[:, None] * times_base(back[1]),
-        "v": -weight[:, None] * times_base(back[3]),
+        "z": -weight[:, None] * times_base(remaining_motion[1]),
+        "v": -weight[:, None] * times_base(remaining_motion[3]),
         "wz": -mass * weight[:, None] * base_times(vz),
         "wv": -mass * weight[:, None] * base_times(vv),
         "wf": -mass * weight[:, None] * base_times(zv),
-        "work": -mass * weight[:, None] * (inner @ base),
-        "lost": mass * np.einsum("k,kji,kli->jl", weight, damped, inner),
+        "work": -mass * weight[:, None] * (node_velocities @ base),
+        "lost": mass * np.einsum("k,kji,kli->jl", weight, damped_velocities, node_velocities),
     }
     for key, part in (("dz", vz), ("dv", vv), ("df", zv)):
-        rule = "k,kji,kil->jl" if coupled else "k,kjl,kl->jl"
-        parts[key] = 2 * mass * np.einsum(rule, weight, damped, part)
-    if coupled:
-        whole = np.concatenate([vz, vv, zv], axis=2)
-        return parts, mass * np.einsum("k,kai,ab,kbj->ij", weight, whole, d, whole)
+        rule = "k,kji,kil->jl" if is_coupled else "k,kjl,kl->jl"
+        parts[key] = 2 * mass * np.einsum(rule, weight, damped_velocities, part)
+    if is_coupled:
+        velocity_blocks = np.concatenate([vz, vv, zv], axis=2)
+        return parts, mass * np.einsum(
+            "k,kai,ab,kbj->ij", weight, velocity_blocks, damping, velocity_blocks
+        )
     pairs = (vz * vz, 2 * vz * vv, vv * vv, 2 * vz * zv, 2 * vv * zv, zv * zv)
-    return parts, np.stack([mass * d * (weight @ pair) for pair in pairs])
+    return parts, np.stack([mass * damping * (weight @ pair) for pair in pairs])
 
 
-def _lagrange_polynomials(nodes, at) -> np.ndarray:
-    """Return the Lagrange polynomials (k, m) of the nodes (m,) at the points `at` (k,)."""
-    gap = nodes[:, None] - nodes
-    np.fill_diagonal(gap, 1.0)
-    scale = 1 / np.prod(gap / np.ptp(nodes), axis=1)
-    apart = (at[:, None] - nodes) / np.ptp(nodes)
-    hit = np.abs(apart) < 1e-15
-    raw = scale / np.where(hit, 1.0, apart)
-    out = raw / raw.sum(axis=1, keepdims=True)
-    touched = hit.any(axis=1)
-    out[touched] = hit[touched]
-    return out
+def _lagrange_polynomials(nodes, points) -> np.ndarray:
+    """Evaluate the Lagrange polynomials of nodes (m,) at points (k,), as an array (k, m)."""
+    node_distances = nodes[:, None] - nodes
+    np.fill_diagonal(node_distances, 1.0)
+    scale = 1 / np.prod(node_distances / np.ptp(nodes), axis=1)
+    distances = (points[:, None] - nodes) / np.ptp(nodes)
+    is_node = np.abs(distances) < 1e-15
+    unscaled = scale / np.where(is_node, 1.0, distances)
+    polynomials = unscaled / unscaled.sum(axis=1, keepdims=True)
+    is_exact = is_node.any(axis=1)
+    polynomials[is_exact] = is_node[is_exact]
+    return polynomials

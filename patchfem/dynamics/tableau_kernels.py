@@ -1,6 +1,6 @@
-"""Coefficients of the Runge-Kutta method DOP853 of order 8, with error estimates.
+"""Coefficients of the Runge-Kutta method DOP853 of order 8, its error estimates and output.
 
-The estimates have orders 5 and 3, and the dense output (extension) has order 7.
+The error estimates have orders 5 and 3, and the dense output has order 7.
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd edition, II.5 and
 II.6 (the method of Dormand and Prince). The order conditions are tested.
@@ -8,14 +8,18 @@ II.6 (the method of Dormand and Prince). The order conditions are tested.
 
 import numpy as np
 
-N_STAGES = 16  # 12 of the step, the slope at its end, three more of the extension
+N_STAGES = (
+    16  # number of stages: 12 of the step, the slope at its end, and three of the dense output
+)
 
 # A row of a table below begins in the first column of its line. The first number is the column in which the second and
 # all further coefficients stand, one after the other; the first coefficient stands in column 0. All others are 0.
 
 
-def read_rows(table: str, n_rows: int, n_columns: int):
-    """Return the coefficients (n_rows, n_columns) of a table; the rows that it does not have come first and are 0.
+def parse_coefficients(table: str, n_rows: int, n_columns: int):
+    """Parse a text table of Runge-Kutta coefficients into an array (n_rows, n_columns).
+
+    The rows that the table does not have come first and are 0.
 
     Parameters
     ----------
@@ -32,7 +36,7 @@ def read_rows(table: str, n_rows: int, n_columns: int):
     return coefficients
 
 
-# nodes c_i of the stages as fractions of the step
+# Runge-Kutta nodes c_i of the stages, as fractions of the step
 STAGE_NODES = np.array(
     """
     0.0 0.05260015195876773 0.0789002279381516 0.1183503419072274
@@ -42,10 +46,10 @@ STAGE_NODES = np.array(
     """.split(),
     float,
 )
-# first column of each row of the Runge-Kutta matrix that is not 0, apart from column 0
+# first nonzero column of each row of the Runge-Kutta matrix, apart from column 0
 FIRST_COLUMNS = np.array("0 1 1 2 2 3 3 3 3 3 3 3 5 6 5 5".split(), int)
 # Runge-Kutta matrix a_ij, of which the table has the rows 1 to 15; row 12 holds the weights b_j of the step
-RUNGE_KUTTA_MATRIX = read_rows(
+RUNGE_KUTTA_MATRIX = parse_coefficients(
     """
 1 0.05260015195876773
 1 0.0197250569845379 0.0591751709536137
@@ -75,8 +79,8 @@ RUNGE_KUTTA_MATRIX = read_rows(
     N_STAGES,
     N_STAGES,
 )
-# weights of the step of order 8 minus those of order 5, and minus those of order 3
-ERROR_WEIGHTS = read_rows(
+# weights of the step of order 8 minus those of the embedded methods of order 5 and of order 3
+ERROR_WEIGHTS = parse_coefficients(
     """
 5 0.01312004499419488 -1.2251564463762044 -0.4957589496572502 1.6643771824549864
    -0.35032884874997366 0.3341791187130175 0.08192320648511571 -0.022355307863886294
@@ -88,8 +92,8 @@ ERROR_WEIGHTS = read_rows(
 )
 ORDER_5_WEIGHTS = ERROR_WEIGHTS[0]
 ORDER_3_WEIGHTS = ERROR_WEIGHTS[1]
-# coefficients of the four highest terms of the dense output
-EXTENSION_WEIGHTS = read_rows(
+# weights of the stages in the four highest terms of the dense output
+DENSE_OUTPUT_WEIGHTS = parse_coefficients(
     """
 5 -8.428938276109013 0.5667149535193777 -3.0689499459498917 2.38466765651207 2.117034582445028
    -0.871391583777973 2.2404374302607883 0.6315787787694688 -0.08899033645133331

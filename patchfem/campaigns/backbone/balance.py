@@ -170,7 +170,9 @@ class _FreeMotionSearch:
             return None
         here = amplitude / neighbour.reach
         try:
-            x = self.equations.towards(neighbour.unknowns, neighbour.free.amplitude, here)
+            x = self.equations.follow_to_amplitude(
+                neighbour.unknowns, neighbour.free.amplitude, here
+            )
             return _reach_amplitude(self.equations, self.joint, x, here, amplitude)
         except NotConverged:
             return None
@@ -257,7 +259,7 @@ def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) 
     except NotConverged:
         if not small < here:
             raise
-        return equations.towards(equations.solve(first, small)[0], small, here)
+        return equations.follow_to_amplitude(equations.solve(first, small)[0], small, here)
 
 
 def half_range(harmonics) -> float:

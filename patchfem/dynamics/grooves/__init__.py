@@ -1,20 +1,20 @@
-"""A rig whose load climbs the flanks of matched grooves as it slides (`friction.grooves`).
+"""Rigs whose load climbs the flanks of matched grooves as it slides (`friction.grooves`).
 
 Equation. On a flank of slope t(q) the lifted mass m rises with t q', so with the vertical force V
 = N + m (t q')' the force against the relative displacement is
 
     F = V (t + phi)/(1 - phi t),    phi = +-mu_k in slip, between -mu_s and mu_s in stick,
 
-and the energy goes into the height of the load, the lifted mass and friction along the flank.
+and the energy is stored in the height of the load and in the lifted mass, or dissipated by friction along the flank.
 
-Under Coulomb's law, or a force that follows the speed, the motion between a stop and the next
+Under Coulomb's law, or a velocity-dependent law, the motion between a stop and the next
 release is smooth: the integrator of `dynamics.smooth` finds stops, releases and loss of contact as
-events (`flank_kernels`, `run`). Laws with memory act over the path along the flank, as a contact
+events (`flank_kernels`, `run`). Laws with memory act along the path on the flank, as a contact
 of the march (`climbing`, `contact_kernels`, `points_kernels`).
 
 In: `core.ModalBasis`, a drive, grooves under their load, a friction law. Out: a `MarchResult`. It
-refuses a lifted mass whose friction exceeds the inertia of the sliding mass, where the motion is
-not determined. Cost: that of the smooth engine, or one Newton iteration more per step than that of
+rejects a lifted mass whose friction exceeds the inertia of the sliding mass, where the motion is
+not unique. Cost: that of the smooth engine, or one Newton iteration more per step than that of
 the march.
 
 | to read | module |

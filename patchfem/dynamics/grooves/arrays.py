@@ -1,15 +1,15 @@
-"""Named positions in the arrays of a contact that climbs flanks, `interfaces.arrays.ClimbingPoints`."""
+"""Names of the array entries of a contact that climbs flanks (`ClimbingPoints`)."""
 
 from enum import IntEnum
 
 
-class FlankPlace(IntEnum):
-    """Positions in `ClimbingPoints.flank`.
+class FlankIndex(IntEnum):
+    """Indices into `ClimbingPoints.flank`: load, groove geometry and kind of law.
 
-    - LOAD: on the patch [N]
-    - WAVE_NUMBER, AMPLITUDE, PHASE: of the grooves [rad/m], [m], [rad]
+    - LOAD: normal load on the patch [N]
+    - WAVE_NUMBER, AMPLITUDE, PHASE: geometry of the grooves [rad/m], [m], [rad]
     - LIFTED_MASS: mass that rises with the load [kg]
-    - KIND: of the law, as in `interfaces.shear_points_kernels`
+    - KIND: kind of the law, as in `interfaces.shear_points_kernels`
     """
 
     LOAD = 0
@@ -20,10 +20,10 @@ class FlankPlace(IntEnum):
     KIND = 5
 
 
-class ClimbPlace(IntEnum):
-    """Positions in `ClimbingPoints.climb`.
+class ClimbIndex(IntEnum):
+    """Indices into `ClimbingPoints.climb`: state of the lifted mass and trial step.
 
-    Of the state:
+    State:
 
     - RISE_SPEED: vertical velocity of the lifted mass [m/s]
     - VERTICAL_FORCE: mean vertical force of the last step [N]
@@ -32,9 +32,9 @@ class ClimbPlace(IntEnum):
     - START_FORCE: force along the flank at the end of the last step [N]
     - START_NORMAL: normal force at the start of the step [N]
 
-    Of the step that was tried last:
+    Of the last trial step:
 
-    - MEAN_FORCE, STIFFNESS: mean force against the relative displacement [N] and its derivative
+    - MEAN_FORCE, STIFFNESS: mean force opposing the relative displacement [N] and its derivative
     [N/m]
     - ALONG_FORCE: mean force along the flank [N]
     - MEAN_SLOPE, PATH_RATIO: height and path along the flank over the relative displacement [1]

@@ -1,4 +1,4 @@
-"""Contacts of laws with memory along flanks, for marches and prescribed slides."""
+"""Contact models of laws with memory along the flanks of grooves."""
 
 from dataclasses import dataclass, replace
 
@@ -18,18 +18,18 @@ from ..march.varying_load import (
     make_elastic_plastic_law,
     make_pressed_fields,
 )
-from .arrays import ClimbPlace
+from .arrays import ClimbIndex
 
 CONTACT_MODULE = "dynamics.grooves.contact_kernels"
-# bond length of points of Coulomb's law over the tolerance times the slide at which pieces slip as a whole; the force is
+# bond length for points of Coulomb's law, over the tolerance times the slide at gross slip of the pieces; the force is
 # then wrong by at most 0.17 of the tolerance
 COULOMB_LENGTH_RATIO = 0.1
-# shortest bond length over that slide by which shear modes are chosen
+# smallest bond length over the slide at gross slip, for the choice of shear modes
 MIN_LENGTH_RATIO = 1e-3
 
 
 def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
-    """Raise PatchfemError where friction takes all inertia of the sliding mass.
+    """Raise PatchfemError if friction of a lifted mass exceeds the inertia of the sliding mass.
 
     That is the case where 1 + m s t (t - mu)/(1 + mu t) <= 0 on some flank, with s [1/kg] the
     acceleration of the relative displacement per newton.
@@ -41,20 +41,20 @@ def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
         Coefficient of friction.
     modes : ModalBasis
     """
-    own = modes.mass / float(modes.slide @ modes.slide)
-    taken = -grooves.lifted_mass * grooves.min_mass_ratio(static)
-    if taken >= own:
+    sliding_mass = modes.mass / float(modes.slide @ modes.slide)
+    friction_mass = -grooves.lifted_mass * grooves.min_mass_ratio(static)
+    if friction_mass >= sliding_mass:
         raise PatchfemError(
             f"a lifted mass of {grooves.lifted_mass:.6g} kg presses so hard on the downward flank that "
-            f"friction exceeds the inertia of the sliding mass of {own:.6g} kg, and the motion is then "
-            f"not determined; the lifted mass must be below {own / -grooves.min_mass_ratio(static):.6g} "
+            f"friction exceeds the inertia of the sliding mass of {sliding_mass:.6g} kg, and the motion is then "
+            f"not determined; the lifted mass must be below {sliding_mass / -grooves.min_mass_ratio(static):.6g} "
             "kg",
             f"{grooves.key}.lifted_mass",
         )
 
 
 def lift_message(grooves: Grooves, time: float) -> str:
-    """Return the sentence on a lifted mass that leaves its grooves at a time [s]."""
+    """Return the message that the lifted mass leaves its grooves at a time [s]."""
     return (
         f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
         f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load"
@@ -62,20 +62,20 @@ def lift_message(grooves: Grooves, time: float) -> str:
 
 
 def make_model(grooves: Grooves, load: float, law: VaryingLoadLaw, modes) -> "ClimbingModel":
-    """Return the model of a law with memory along flanks.
+    """Return the contact model of a law with memory along the flanks of grooves.
 
-    Coulomb's law at the points of pieces that deform in shear is elastic-plastic with length 0;
-    `with_shear_modes` gives it a length.
+    Coulomb's law at points of pieces that deform in shear is an elastic-plastic law of length 0;
+    `with_shear_modes` sets its length.
 
     Parameters
     ----------
     grooves : Grooves
     load : float
-        [N].
+        Normal load [N].
     law : VaryingLoadLaw
-        Of `march.varying_load.plastic` or `bonds`.
+        Law from `march.varying_load.make_elastic_plastic_law` or `make_bonds_law`.
     modes : ModalBasis or None
-        None for a bench, where no mass is checked.
+        None for a bench, whose inertia is not checked.
 
     Returns
     -------
@@ -84,7 +84,7 @@ def make_model(grooves: Grooves, load: float, law: VaryingLoadLaw, modes) -> "Cl
     Raises
     ------
     PatchfemError
-        As `check_lifted_mass`.
+        See `check_lifted_mass`.
     """
     if modes is not None:
         check_lifted_mass(grooves, law.static, modes)
@@ -94,7 +94,7 @@ def make_model(grooves: Grooves, load: float, law: VaryingLoadLaw, modes) -> "Cl
 def with_shear_modes(
     model: "ClimbingModel", patch, count: int | None, tolerance: float
 ) -> "ClimbingModel":
-    """Return the model with the points of a solved patch, behind the shear modes of its pieces.
+    """Return a copy of the model with the points and shear modes of a solved patch.
 
     Points of Coulomb's law behind pieces of the shear stiffness K_t become elastic-plastic ones
     with a bond length COULOMB_LENGTH_RATIO tolerance mu N/K_t: on flat ground the force is then
@@ -119,9 +119,11 @@ def with_shear_modes(
     weakening = 1.0
     length = law.length
     if not length:
-        reach = limit.sum() / tangential_stiffness(patch.giving, force > 0)
-        law = make_elastic_plastic_law(law.static, COULOMB_LENGTH_RATIO * tolerance * reach)
-        length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * reach
+        gross_slip_slide = limit.sum() / tangential_stiffness(patch.giving, force > 0)
+        law = make_elastic_plastic_law(
+            law.static, COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide
+        )
+        length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
     found = (
@@ -133,9 +135,9 @@ def with_shear_modes(
 
 
 class FlankModel:
-    """Description of a contact along the flanks of `grooves` for `march.march`.
+    """Base class of contact models along the flanks of grooves, for `march.march`.
 
-    It is under a `load` [N] and has the coefficient of friction `static` [1].
+    A model has a normal `load` [N] and a static coefficient of friction `static` [1].
     """
 
     __slots__ = ()
@@ -146,32 +148,32 @@ class FlankModel:
 
     @property
     def limit(self) -> float:
-        """Largest force of the steepest flank [N], the scale of the residuals."""
+        """Largest friction force on the steepest flank [N], the scale of the residuals."""
         return self.grooves.max_force(self.load, self.static)
 
     @property
     def reduction(self):
-        """ShearModes behind the contact, None for pieces that are rigid in shear."""
+        """Shear modes of the pieces behind the contact; None if they are rigid in shear."""
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law holds without any stretch; it does not."""
+        """Whether the law sticks without any stretch; always False for a law with memory."""
         return False
 
-    def picture_fields(self, contact) -> dict:
-        """Return an empty dict, because all points have the same stretch."""
+    def get_plot_fields(self, contact) -> dict:
+        """Return an empty dict, because all points have the same stretch and need no plot."""
         return {}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ClimbingModel(FlankModel):
-    """A law with memory along flanks.
+    """Contact model of a friction law with memory along the flanks of grooves.
 
-    - grooves, load [N], law
-    - shear: ShearModes on the points under load where the pieces deform in shear, else None
-    - share: (a,) fractions of the load that the points carry
+    - grooves, load, law: geometry, normal load [N] and friction law
+    - shear: ShearModes of the points under load if the pieces deform in shear, otherwise None
+    - share: (a,) fractions of the load carried by the points
 
-    The pieces climb as one: height and slope are those at the relative displacement of the holder,
+    All points climb together: height and slope are those at the relative displacement of the holder,
     and the points carry the same fractions of the normal force as of the load.
     """
 
@@ -183,34 +185,34 @@ class ClimbingModel(FlankModel):
 
     @property
     def kind(self) -> tuple:
-        """Contact and law of which `march.instances` makes a loop."""
+        """Modules of contact and law, for which `march.instances` compiles the loop."""
         return CONTACT_MODULE, ""
 
     @property
     def static(self) -> float:
-        """Coefficient of friction [1]."""
+        """Static coefficient of friction [1]."""
         return self.law.static
 
     @property
     def length(self) -> float:
-        """Bond length [m]."""
+        """Bond length of the law [m]."""
         return self.law.length
 
     @property
     def runner(self):
-        """Class that marches this contact."""
+        """Class that integrates a motion with this contact in time."""
         return ClimbingRun
 
     def build(self) -> ClimbingPoints:
-        """Return the arrays of the contact at rest at the relative displacement 0."""
+        """Allocate the contact arrays at rest, at zero relative displacement."""
         g = self.grooves
         share = np.array(self.share, float)
         flank = np.array(
             [self.load, g.wave_number, g.amplitude, g.phase, g.lifted_mass, self.law.kind]
         )
         normal = self.load * np.hypot(1.0, float(g.slope(0.0)))
-        climb = np.zeros(len(ClimbPlace))
-        climb[[ClimbPlace.VERTICAL_FORCE, ClimbPlace.START_NORMAL, ClimbPlace.END_NORMAL]] = (
+        climb = np.zeros(len(ClimbIndex))
+        climb[[ClimbIndex.VERTICAL_FORCE, ClimbIndex.START_NORMAL, ClimbIndex.END_NORMAL]] = (
             self.load,
             normal,
             normal,
@@ -222,10 +224,10 @@ class ClimbingModel(FlankModel):
             *make_pressed_fields(self.law, normal * share, self.shear, self.limit),
         )
 
-    def picture_fields(self, contact) -> dict:
-        """Return fields of the points (3, a), nothing for one point.
+    def get_plot_fields(self, contact) -> dict:
+        """Return friction, stretch and load of the points (3, a) for plotting.
 
-        They are friction along the flank [N], elastic stretch [m] and the fraction of the vertical
+        The rows are friction along the flank [N], elastic stretch [m] and the fraction of the vertical
         force [N].
         """
         if self.shear is None:
@@ -234,56 +236,63 @@ class ClimbingModel(FlankModel):
         bottom = contact.memory[1]
         if self.law.kind == PLASTIC:
             force = self.law.static * top
-            over = self.law.length * np.divide(
+            stretch = self.law.length * np.divide(
                 top, bottom, where=bottom > 0, out=np.zeros_like(top)
             )
         else:
             force = self.law.static / self.law.length * bottom
-            over = np.divide(bottom, top, where=top > 0, out=np.zeros_like(top))
+            stretch = np.divide(bottom, top, where=top > 0, out=np.zeros_like(top))
         return {
             "nodes": np.stack(
                 [
                     force,
-                    over + contact.b @ contact.modes,
-                    contact.share * contact.climb[ClimbPlace.VERTICAL_FORCE],
+                    stretch + contact.b @ contact.modes,
+                    contact.share * contact.climb[ClimbIndex.VERTICAL_FORCE],
                 ]
             )
         }
 
 
 class GroovesRun(Run):
-    """Arrays and time of a march over grooves."""
+    """Time integration of a modal basis whose interface slides over grooves."""
 
     def make_response(self, rows, number) -> Response:
-        """Return histories; with a lifted mass `extra` has normal_load [N], the vertical force."""
-        out = super().make_response(rows, number)
+        """Return the time histories of samples, with the vertical force of a lifted mass.
+
+        The vertical force is `extra["normal_load"]` [N].
+
+        """
+        response = super().make_response(rows, number)
         g = self.model.grooves
         modes = self.modes
         if not g.lifted_mass:
-            return out
-        along = (
+            return response
+        acceleration = (
             find_accelerations(
                 modes,
-                self.drive.values(out.time),
-                out.modal,
-                out.modal_rate,
-                np.outer(out.force, modes.slide),
+                self.drive.values(response.time),
+                response.modal,
+                response.modal_rate,
+                np.outer(response.force, modes.slide),
             )
             @ modes.slide
         )
-        lift = g.slope(out.slide) * along + g.slope_derivative(out.slide) * out.slide_rate**2
+        lift = (
+            g.slope(response.slide) * acceleration
+            + g.slope_derivative(response.slide) * response.slide_rate**2
+        )
         return replace(
-            out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift}
+            response, extra=response.extra | {"normal_load": self.model.load + g.lifted_mass * lift}
         )
 
-    def _leaves(self) -> None:
-        """Set the outcome of a run whose lifted mass has left the grooves."""
+    def _set_grooves_left(self) -> None:
+        """Set the outcome and message of a march whose lifted mass has left the grooves."""
         self.outcome = Outcome.LEAVES_GROOVES
         self.message = lift_message(self.model.grooves, self.done * self.prop.dt)
 
 
 class ClimbingRun(GroovesRun):
-    """Arrays and time of a march whose points remember their loads."""
+    """Time integration over grooves under a friction law with memory."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
@@ -293,9 +302,9 @@ class ClimbingRun(GroovesRun):
         contact = self.contact
         climb = self.contact.climb
         normal = model.load * np.hypot(1.0, slope)
-        contact.memory[:] *= normal / climb[ClimbPlace.END_NORMAL]
-        contact.pressed[:] *= normal / climb[ClimbPlace.END_NORMAL]
-        climb[[ClimbPlace.RISE_SPEED, ClimbPlace.START_NORMAL, ClimbPlace.END_NORMAL]] = (
+        contact.memory[:] *= normal / climb[ClimbIndex.END_NORMAL]
+        contact.pressed[:] *= normal / climb[ClimbIndex.END_NORMAL]
+        climb[[ClimbIndex.RISE_SPEED, ClimbIndex.START_NORMAL, ClimbIndex.END_NORMAL]] = (
             slope * v,
             normal,
             normal,
@@ -303,13 +312,17 @@ class ClimbingRun(GroovesRun):
         self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
     def move_to(self, place, rate) -> None:
-        """Set the state, like `Run.move_to`; the lifted mass has the velocity of the flank there."""
+        """Set the modal coordinates and rates at the start of a cycle, like `Run.move_to`.
+
+        The lifted mass gets the vertical velocity of the flank there.
+
+        """
         super().move_to(place, rate)
-        self.contact.climb[ClimbPlace.RISE_SPEED] = (
+        self.contact.climb[ClimbIndex.RISE_SPEED] = (
             float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
         )
 
     def set_outcome(self, status: int) -> None:
         super().set_outcome(status)
-        if self.contact.climb[ClimbPlace.HAS_LIFTED] and self.outcome is None:
-            self._leaves()
+        if self.contact.climb[ClimbIndex.HAS_LIFTED] and self.outcome is None:
+            self._set_grooves_left()

@@ -1,12 +1,12 @@
-"""A contact that climbs flanks under a law with memory (compiled).
+"""Contact functions of a law with memory on climbing flanks (compiled).
 
 Over a step of dq the path along the flank is ds = int sqrt(1 + t^2) dq and the height rises by dz.
-The law acts over ds under a normal force that goes from R0 to R1, R = V sqrt(1 + t^2) + f t, with
+The law acts over ds under a normal force that changes from R0 to R1, R = V sqrt(1 + t^2) + f t, with
 the mean force f. The force against the relative displacement is then U = (V dz + f ds)/dq, which
-does exactly the work that height, lifted mass and law take. The lifted mass keeps its own velocity
-w with dz = dt (w0 + w1)/2, so V = N + m (w1 - w0)/dt takes exactly what its kinetic energy gains.
-If the pieces deform in shear, ds is the path of the holder. The functions solve, given, commit and
-state are those that `march.loop_kernels` needs of every contact; `points_kernels` has the points
+does exactly the work absorbed by height, lifted mass and law. The lifted mass has its own velocity
+w with dz = dt (w0 + w1)/2, so the work of V = N + m (w1 - w0)/dt includes exactly its gain of kinetic energy.
+If the pieces deform in shear, ds is the path of the holder. The functions solve_step, apply_increment, commit_step and
+read_state are those that `march.loop_kernels` needs of every contact; `points_kernels` has the points
 of the law.
 """
 
@@ -21,22 +21,28 @@ from ...friction.protocol_kernels import Reading
 from ..interfaces.arrays import SolvedStep, StepStart
 from ..modal_kernels import Bracket, narrow_bracket
 from . import points_kernels as points
-from .arrays import ClimbPlace, FlankPlace
+from .arrays import ClimbIndex, FlankIndex
 
-# outer points of Gauss's rule of three on [-1, 1]
+# outer points of the three-point Gauss rule on [-1, 1]
 GAUSS_POINT = sqrt(0.6)
-# [rad] phase of a groove below which sin(x)/x is taken by its series
+# phase of a groove [rad] below which sin(x)/x is evaluated by its series
 MIN_PHASE = 1e-4
-# residual over the goal, below which a step is solved
+# residual over the tolerance, below which a step is solved
 GOAL_FRACTION = 0.01
-# iterations of a step before bisection helps Newton's method, and iterations at most
+# number of Newton iterations of a step before bisection steps are inserted, and largest number of iterations
 MAX_NEWTON_STEPS = 40
 MAX_ITERATIONS = 200
-ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
+ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
 
 
 class FlankStep(NamedTuple):
-    """Path along a flank [m], normal force at its end without friction [N], and slope at its end."""
+    """Trial step along a flank.
+
+    - path: path along the flank [m]
+    - normal: normal force at the end without friction [N]
+    - slope: slope at the end [1]
+
+    """
 
     path: float
     normal: float
@@ -45,23 +51,25 @@ class FlankStep(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_slope(flank, q):
-    """Return the slope t [1] of the flank at q [m]."""
-    wave_number = flank[FlankPlace.WAVE_NUMBER]
+    """Return the slope t [1] of the flank at a relative displacement q [m]."""
+    wave_number = flank[FlankIndex.WAVE_NUMBER]
     return (
-        flank[FlankPlace.AMPLITUDE]
+        flank[FlankIndex.AMPLITUDE]
         * wave_number
-        * np.sin(wave_number * q - flank[FlankPlace.PHASE])
+        * np.sin(wave_number * q - flank[FlankIndex.PHASE])
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_path_ratio(flank, q, dq):
-    """Return the mean of sqrt(1 + t^2) over an increment, by Gauss's rule of three points.
+    """Return the mean ratio of flank path to slide over an increment, sqrt(1 + t^2).
+
+    The mean is computed by the three-point Gauss rule.
 
     Parameters
     ----------
     flank : ndarray
-        (6,) see `arrays.FlankPlace`.
+        (6,) see `arrays.FlankIndex`.
     q : float
         Relative displacement [m].
     dq : float
@@ -85,7 +93,7 @@ def mean_slope_and_path(flank, q, dq):
     Parameters
     ----------
     flank : ndarray
-        (6,) see `arrays.FlankPlace`.
+        (6,) see `arrays.FlankIndex`.
     q : float
         Relative displacement [m].
     dq : float
@@ -97,18 +105,18 @@ def mean_slope_and_path(flank, q, dq):
     path_ratio : float
         Mean of sqrt(1 + t^2).
     """
-    wave_number = flank[FlankPlace.WAVE_NUMBER]
+    wave_number = flank[FlankIndex.WAVE_NUMBER]
     half = 0.5 * wave_number * dq
-    middle = wave_number * (q + 0.5 * dq) - flank[FlankPlace.PHASE]
-    share = sin(half) / half if abs(half) > MIN_PHASE else 1 - half * half / 6
-    return flank[FlankPlace.AMPLITUDE] * wave_number * sin(middle) * share, mean_path_ratio(
+    mid_slide = wave_number * (q + 0.5 * dq) - flank[FlankIndex.PHASE]
+    sine_ratio = sin(half) / half if abs(half) > MIN_PHASE else 1 - half * half / 6
+    return flank[FlankIndex.AMPLITUDE] * wave_number * sin(mid_slide) * sine_ratio, mean_path_ratio(
         flank, q, dq
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def climb_flank(dq, start, flank, at):
-    """Climb a flank; slope, path and force go into `at`.
+def climb_flank(dq, start, flank, climb):
+    """Compute slope, path and vertical force of a trial step along a flank.
 
     Parameters
     ----------
@@ -116,65 +124,67 @@ def climb_flank(dq, start, flank, at):
         Increment of the relative displacement [m].
     start : interfaces.arrays.StepStart
     flank : (6,) array
-        See `arrays.FlankPlace`.
-    at : (14,) array
-        See `arrays.ClimbPlace`; it is written.
+        See `arrays.FlankIndex`.
+    climb : (14,) array
+        See `arrays.ClimbIndex`; output.
 
     Returns
     -------
     FlankStep
     """
-    lifted_mass = flank[FlankPlace.LIFTED_MASS]
-    at[ClimbPlace.MEAN_SLOPE], at[ClimbPlace.PATH_RATIO] = mean_slope_and_path(
+    lifted_mass = flank[FlankIndex.LIFTED_MASS]
+    climb[ClimbIndex.MEAN_SLOPE], climb[ClimbIndex.PATH_RATIO] = mean_slope_and_path(
         flank, start.rel_disp, dq
     )
-    at[ClimbPlace.TRIAL_VERTICAL] = flank[FlankPlace.LOAD]
+    climb[ClimbIndex.TRIAL_VERTICAL] = flank[FlankIndex.LOAD]
     if lifted_mass > 0.0:
-        at[ClimbPlace.TRIAL_VERTICAL] += (
+        climb[ClimbIndex.TRIAL_VERTICAL] += (
             lifted_mass
             * 2
-            * (at[ClimbPlace.MEAN_SLOPE] * dq / start.dt - at[ClimbPlace.RISE_SPEED])
+            * (climb[ClimbIndex.MEAN_SLOPE] * dq / start.dt - climb[ClimbIndex.RISE_SPEED])
             / start.dt
         )
     end = find_slope(flank, start.rel_disp + dq)
-    normal = max(at[ClimbPlace.TRIAL_VERTICAL], 0.0) * sqrt(1 + end * end)
-    return FlankStep(at[ClimbPlace.PATH_RATIO] * dq, normal, end)
+    normal = max(climb[ClimbIndex.TRIAL_VERTICAL], 0.0) * sqrt(1 + end * end)
+    return FlankStep(climb[ClimbIndex.PATH_RATIO] * dq, normal, end)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def write_resistance(pulled, gain, middle, dt, flank, at):
-    """Write the mean force against the relative displacement and its derivative [N/m] into `at`.
+def write_resistance(friction, friction_slope, middle, dt, flank, climb):
+    """Write the mean horizontal force of a trial step and its derivative by the slide.
 
     Parameters
     ----------
     pulled, gain : float
-        Mean force along the flank [N] and its derivative [N/m].
+        Mean friction force along the flank [N] and its derivative [N/m].
     middle : float
         Relative displacement in the middle of the step [m].
     dt, flank, at
     """
-    wave_number = flank[FlankPlace.WAVE_NUMBER]
-    slope = at[ClimbPlace.MEAN_SLOPE]
-    path = at[ClimbPlace.PATH_RATIO]
-    at[ClimbPlace.MEAN_FORCE] = at[ClimbPlace.TRIAL_VERTICAL] * slope + pulled * path
-    at[ClimbPlace.ALONG_FORCE] = pulled
-    bend = (
+    wave_number = flank[FlankIndex.WAVE_NUMBER]
+    slope = climb[ClimbIndex.MEAN_SLOPE]
+    path = climb[ClimbIndex.PATH_RATIO]
+    climb[ClimbIndex.MEAN_FORCE] = climb[ClimbIndex.TRIAL_VERTICAL] * slope + friction * path
+    climb[ClimbIndex.ALONG_FORCE] = friction
+    curvature = (
         0.5
-        * flank[FlankPlace.AMPLITUDE]
+        * flank[FlankIndex.AMPLITUDE]
         * wave_number
         * wave_number
-        * cos(wave_number * middle - flank[FlankPlace.PHASE])
+        * cos(wave_number * middle - flank[FlankIndex.PHASE])
     )
-    at[ClimbPlace.STIFFNESS] = (
-        gain * path * path
-        + at[ClimbPlace.TRIAL_VERTICAL] * bend
-        + 2 * flank[FlankPlace.LIFTED_MASS] * slope * slope / (dt * dt)
+    climb[ClimbIndex.STIFFNESS] = (
+        friction_slope * path * path
+        + climb[ClimbIndex.TRIAL_VERTICAL] * curvature
+        + 2 * flank[FlankIndex.LIFTED_MASS] * slope * slope / (dt * dt)
     )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_mean_force(dq, start, contact):
-    """Write the mean force over an increment and its derivative [N/m] into contact.climb.
+    """Write the mean horizontal force over a slide increment and its derivative.
+
+    The results [N], [N/m] are in contact.climb.
 
     Parameters
     ----------
@@ -184,42 +194,46 @@ def write_mean_force(dq, start, contact):
     contact : ClimbingPoints
     """
     step = climb_flank(dq, start, contact.flank, contact.climb)
-    pulled, gain = points.solve_friction(step.path, step.normal, step.slope, start.dt, contact)
+    friction, friction_slope = points.solve_friction(
+        step.path, step.normal, step.slope, start.dt, contact
+    )
     middle = start.rel_disp + 0.5 * dq
-    write_resistance(pulled, gain, middle, start.dt, contact.flank, contact.climb)
+    write_resistance(friction, friction_slope, middle, start.dt, contact.flank, contact.climb)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve a step with dq = free - beta force, like `interfaces.element_kernels.solve_step`.
+    """Solve the slide increment and mean force of a step over flanks.
+
+    Parameters are those of `interfaces.element_kernels.solve_step`.
 
     Returns
     -------
     arrays.SolvedStep
     """
-    at = contact.climb
-    start_friction(start, contact)
-    guess = 2 * at[ClimbPlace.LAST_SLIDE] - at[ClimbPlace.EARLIER_SLIDE]
+    climb = contact.climb
+    start_friction_step(start, contact)
+    guess = 2 * climb[ClimbIndex.LAST_SLIDE] - climb[ClimbIndex.EARLIER_SLIDE]
     bracket = Bracket(-np.inf, np.inf, guess)
     for count in range(1, MAX_ITERATIONS):
         dq = bracket.point
         write_mean_force(dq, start, contact)
-        force = at[ClimbPlace.MEAN_FORCE]
+        force = climb[ClimbIndex.MEAN_FORCE]
         residual = dq - free + beta * force
         noise = ROUND_OFF * (abs(free) + abs(dq) + beta * abs(force))
         if abs(residual) <= GOAL_FRACTION * goal * beta + noise:
             return SolvedStep(dq, force, count)
-        gain = max(1 + beta * at[ClimbPlace.STIFFNESS], 0.1)
+        gain = max(1 + beta * climb[ClimbIndex.STIFFNESS], 0.1)
         bracket = narrow_bracket(bracket, residual, gain, count - MAX_NEWTON_STEPS)
         if bracket.high - bracket.low <= noise:
             is_solved = abs(residual) <= goal * beta + 8 * gain * noise
             return SolvedStep(dq, force, count if is_solved else -count)
-    return SolvedStep(bracket.point, at[ClimbPlace.MEAN_FORCE], -MAX_ITERATIONS)
+    return SolvedStep(bracket.point, climb[ClimbIndex.MEAN_FORCE], -MAX_ITERATIONS)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_friction(start, contact):
-    """Start the step of the law along the flank.
+def start_friction_step(start, contact):
+    """Start a time step of the friction law along the flank.
 
     Parameters
     ----------
@@ -232,7 +246,7 @@ def start_friction(start, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, start, contact, goal):
-    """Return the mean force over a prescribed increment; the memory stays as it is.
+    """Return the mean force over a prescribed increment without updating the memory.
 
     Parameters
     ----------
@@ -250,14 +264,14 @@ def apply_increment(dq, start, contact, goal):
     is_solved : bool
         Always true.
     """
-    start_friction(start, contact)
+    start_friction_step(start, contact)
     write_mean_force(dq, start, contact)
-    return contact.climb[ClimbPlace.MEAN_FORCE], True
+    return contact.climb[ClimbIndex.MEAN_FORCE], True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Keep a solved step of mean force [N].
+    """Update the contact after a solved step over flanks.
 
     Returns
     -------
@@ -268,32 +282,34 @@ def commit_step(dq, force, start, end_velocity, contact):
     at = contact.climb
     slope = find_slope(contact.flank, start.rel_disp)
     end_slope = find_slope(contact.flank, start.rel_disp + dq)
-    climb = at[ClimbPlace.TRIAL_VERTICAL] * at[ClimbPlace.MEAN_SLOPE]
-    lost, is_solved = points.commit_friction(
-        at[ClimbPlace.PATH_RATIO] * dq,
-        (force - climb) / at[ClimbPlace.PATH_RATIO],
+    climb = at[ClimbIndex.TRIAL_VERTICAL] * at[ClimbIndex.MEAN_SLOPE]
+    dissipated, is_solved = points.commit_friction(
+        at[ClimbIndex.PATH_RATIO] * dq,
+        (force - climb) / at[ClimbIndex.PATH_RATIO],
         StepStart(start.rel_disp, start.velocity * sqrt(1 + slope * slope), start.dt),
         end_velocity * sqrt(1 + end_slope * end_slope),
         contact,
     )
-    if contact.flank[FlankPlace.LIFTED_MASS] > 0.0:
-        at[ClimbPlace.RISE_SPEED] = (
-            2 * at[ClimbPlace.MEAN_SLOPE] * dq / start.dt - at[ClimbPlace.RISE_SPEED]
+    if contact.flank[FlankIndex.LIFTED_MASS] > 0.0:
+        at[ClimbIndex.RISE_SPEED] = (
+            2 * at[ClimbIndex.MEAN_SLOPE] * dq / start.dt - at[ClimbIndex.RISE_SPEED]
         )
-        at[ClimbPlace.HAS_LIFTED] = max(
-            at[ClimbPlace.HAS_LIFTED], 0.0 if at[ClimbPlace.TRIAL_VERTICAL] > 0.0 else 1.0
+        at[ClimbIndex.HAS_LIFTED] = max(
+            at[ClimbIndex.HAS_LIFTED], 0.0 if at[ClimbIndex.TRIAL_VERTICAL] > 0.0 else 1.0
         )
-    at[ClimbPlace.VERTICAL_FORCE] = at[ClimbPlace.TRIAL_VERTICAL]
-    at[ClimbPlace.EARLIER_SLIDE] = at[ClimbPlace.LAST_SLIDE]
-    at[ClimbPlace.LAST_SLIDE] = dq
-    at[ClimbPlace.START_NORMAL] = at[ClimbPlace.END_NORMAL]
-    at[ClimbPlace.START_FORCE] = points.read_friction(contact, 0.0).force
-    return lost, is_solved
+    at[ClimbIndex.VERTICAL_FORCE] = at[ClimbIndex.TRIAL_VERTICAL]
+    at[ClimbIndex.EARLIER_SLIDE] = at[ClimbIndex.LAST_SLIDE]
+    at[ClimbIndex.LAST_SLIDE] = dq
+    at[ClimbIndex.START_NORMAL] = at[ClimbIndex.END_NORMAL]
+    at[ClimbIndex.START_FORCE] = points.read_friction(contact, 0.0).force
+    return dissipated, is_solved
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(contact, rel_disp, velocity):
-    """Return force against the relative displacement, energy of height, lifted mass and law, and slip.
+    """Return horizontal force, stored energy and slip of the contact.
+
+    The energy is that of the load height, the lifted mass and the law.
 
     Parameters
     ----------
@@ -310,12 +326,12 @@ def read_state(contact, rel_disp, velocity):
     flank = contact.flank
     slope = find_slope(flank, rel_disp)
     length = sqrt(1 + slope * slope)
-    half = sin(0.5 * (flank[FlankPlace.WAVE_NUMBER] * rel_disp - flank[FlankPlace.PHASE]))
-    rise_speed = contact.climb[ClimbPlace.RISE_SPEED]
+    half = sin(0.5 * (flank[FlankIndex.WAVE_NUMBER] * rel_disp - flank[FlankIndex.PHASE]))
+    rise_speed = contact.climb[ClimbIndex.RISE_SPEED]
     friction = points.read_friction(contact, rel_disp)
     energy = friction.stored_energy + (
-        2 * flank[FlankPlace.LOAD] * flank[FlankPlace.AMPLITUDE] * half * half
-        + 0.5 * flank[FlankPlace.LIFTED_MASS] * rise_speed * rise_speed
+        2 * flank[FlankIndex.LOAD] * flank[FlankIndex.AMPLITUDE] * half * half
+        + 0.5 * flank[FlankIndex.LIFTED_MASS] * rise_speed * rise_speed
     )
-    force = contact.climb[ClimbPlace.VERTICAL_FORCE] * slope + friction.force * length
+    force = contact.climb[ClimbIndex.VERTICAL_FORCE] * slope + friction.force * length
     return Reading(force, energy, rel_disp - (rel_disp - friction.slip) / length)

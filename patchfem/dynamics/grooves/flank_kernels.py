@@ -1,10 +1,10 @@
-"""Friction along flanks that the load climbs, as a law of the smooth engine (compiled).
+"""Friction law of climbing flanks for the smooth engine (compiled).
 
-It is Coulomb's law, or a force that follows the speed.
+The law is Coulomb's law, or a velocity-dependent force.
 
-It is a law of `dynamics.smooth` that holds the interface at rest; its numbers are `LawNumbers`,
+It is a law of `dynamics.smooth` that can hold the interface at rest; its numbers are `LawNumbers`,
 its memory the last force [N]. Its states are the friction loss along the flank [J], and two whose
-rates alone count: what remains of the hold and of the normal force [N]. In stick,
+rates alone are used: the reserves of the holding force and of the normal force [N]. In stick,
 turn[Turn.DIRECTION] is 0.
 """
 
@@ -16,17 +16,17 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from ..smooth.arrays import Turn
 
-# the law holds the relative displacement at rest
+# whether the law can hold the interface at rest (set-valued)
 IS_SET_VALUED = True
 
 
 class LawNumbers(NamedTuple):
-    """Positions in the numbers of the law; the first one is free.
+    """Indices into the numbers of the flank law; index 0 is unused.
 
-    - load, lifted_mass: [N], [kg]
-    - wave_number, amplitude, phase: of the grooves [rad/m], [m], [rad]
+    - load, lifted_mass: normal load [N] and lifted mass [kg]
+    - wave_number, amplitude, phase: geometry of the grooves [rad/m], [m], [rad]
     - static, kinetic: coefficients of friction
-    - speed: v_0 [m/s] of a force that follows the speed, else 0
+    - speed: v_0 [m/s] of a velocity-dependent force, otherwise 0
     """
 
     load: int = 1
@@ -44,7 +44,7 @@ LAW = LawNumbers()
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_flank_slope(numbers, q):
-    """Return the slope t [1] of the flank at q [m] and its derivative [1/m]."""
+    """Return the slope t [1] of the flank and its derivative [1/m] at a slide q [m]."""
     steep = numbers[LAW.amplitude] * numbers[LAW.wave_number]
     turn = numbers[LAW.wave_number] * q - numbers[LAW.phase]
     return steep * sin(turn), steep * numbers[LAW.wave_number] * cos(turn)
@@ -52,7 +52,7 @@ def find_flank_slope(numbers, q):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_hold_range(numbers, turn):
-    """Return the smallest and largest force [N] with which the flank holds at rest."""
+    """Return the smallest and largest force [N] at which the flank sticks."""
     t = find_flank_slope(numbers, turn[Turn.SLIDE])[0]
     mu = numbers[LAW.static]
     load = numbers[LAW.load]
@@ -61,9 +61,9 @@ def find_hold_range(numbers, turn):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def release_direction(numbers, turn):
-    """Return the direction in which the law lets go of the interface at rest, 0 where it holds.
+    """Return the direction in which a sticking interface is released, 0 while it sticks.
 
-    A force that follows the speed never holds.
+    A velocity-dependent force never sticks.
     """
     if numbers[LAW.speed] > 0:
         is_pushed = turn[Turn.FREE_ACCELERATION] >= turn[Turn.INVERSE_MASS] * turn[Turn.FORCE]
@@ -76,7 +76,7 @@ def release_direction(numbers, turn):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, way, y):
-    """Return the path to the next kink of the rates and its speed: there is none.
+    """Return the path to the next kink of the state rates: infinite, as there is none.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def start_motion(numbers, memory, way, y):
     memory : ndarray
         (1,) the last force [N].
     way : float
-        Direction of the motion.
+        Direction of the motion, +-1.
     y : ndarray
         (l,) states of the law.
 
@@ -99,9 +99,9 @@ def start_motion(numbers, memory, way, y):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state_rates(numbers, memory, turn, dq, v, y, out):
-    """Return the force F [N] and write the rates of the states.
+    """Return the friction force F [N] and write the rates of the law states.
 
-    F and the normal force are written into turn. With the acceleration q'' = a - F s, where a is
+    F and the normal force are also written into `turn`. With the acceleration q'' = a - F s, where a is
     that without F, V = N + m (t q'' + t' q'^2) and F = V c are linear in F with c = (t + phi)/(1 -
     phi t): F (1 + m t c s) = c (N + m (t' q'^2 + t a)).
 
@@ -120,7 +120,7 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
     y : ndarray
         (l,) states of the law.
     out : ndarray
-        (l,) rates of the states, which are written.
+        (l,) rates of the states; output.
 
     Returns
     -------
@@ -160,7 +160,7 @@ def state_rates(numbers, memory, turn, dq, v, y, out):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
-    """Return the last force, energy of load and lifted mass, and relative displacement.
+    """Return friction force, energy of load and lifted mass, and slide of the flank law.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def read_memory(numbers, memory, q, v):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def end_motion(numbers, memory, turn, dq, v, y):
-    """Return NaN, because the energy dissipated follows from the work.
+    """Return NaN as dissipated energy of a motion, because it follows from the work.
 
     Parameters
     ----------

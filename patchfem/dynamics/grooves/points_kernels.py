@@ -1,4 +1,4 @@
-"""Points of a contact that climbs flanks, under a law with memory (compiled).
+"""Points of a contact on climbing flanks under a law with memory (compiled).
 
 They carry the normal force of the flank and slide along it: one point for rigid pieces, or those
 behind shear modes as in `interfaces.shear_solve_kernels`.
@@ -7,7 +7,7 @@ behind shear modes as in `interfaces.shear_solve_kernels`.
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..dense_kernels import factorise, solve_factorised
-from ..interfaces.arrays import PointRow, PressedPlace, StepProblem, WorkRow
+from ..interfaces.arrays import PointRow, PressedIndex, StepProblem, WorkRow
 from ..interfaces.pressed_points_kernels import (
     commit_points,
     find_friction_force,
@@ -21,15 +21,15 @@ from ..interfaces.shear_solve_kernels import (
     set_middle_length,
     write_hessian,
 )
-from .arrays import ClimbPlace, FlankPlace
+from .arrays import ClimbIndex, FlankIndex
 
-# residual over the friction limit, to which pieces that deform in shear are solved
+# tolerance of pieces that deform in shear, over the friction limit
 SHEAR_GOAL = 1e-13
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_step(contact, v, dt):
-    """Start a step.
+    """Start a time step of the points: set the bond length at its middle.
 
     Parameters
     ----------
@@ -44,11 +44,11 @@ def start_step(contact, v, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_friction(ds, flat, end, dt, contact):
-    """Solve for the friction over the path ds [m] in dt [s].
+    """Solve for the mean friction force of the points over a path along the flank.
 
-    contact.pressed become the loads at the end of the step.
+    The loads of the points at the end of the step are written to contact.pressed.
 
-    The normal force at the end is flat + f end, where f is the force there; secant steps find it.
+    The normal force at the end is flat + f end, where f is the friction force there; it is found by the secant method.
 
     Parameters
     ----------
@@ -60,59 +60,62 @@ def solve_friction(ds, flat, end, dt, contact):
     Returns
     -------
     force : float
-        Mean along the flank [N].
+        Mean friction force along the flank [N].
     stiffness : float
-        Its derivative [N/m].
+        Derivative of the force by the path [N/m].
     """
-    kind = int(contact.flank[FlankPlace.KIND])
+    kind = int(contact.flank[FlankIndex.KIND])
     force = 0.0
     gain = 0.0
-    at = contact.climb
-    gives = contact.kappa.size > 0
-    close = (1e-12 if gives else 1e-14) * contact.flank[FlankPlace.LOAD]
-    goal = SHEAR_GOAL * contact.force[PressedPlace.MU_STATIC] * contact.flank[FlankPlace.LOAD]
-    tried = 0.0
-    missed = 0.0
+    climb = contact.climb
+    deforms = contact.kappa.size > 0
+    normal_tol = (1e-12 if deforms else 1e-14) * contact.flank[FlankIndex.LOAD]
+    goal = SHEAR_GOAL * contact.force[PressedIndex.MU_STATIC] * contact.flank[FlankIndex.LOAD]
+    last_normal = 0.0
+    last_residual = 0.0
     for count in range(60):
-        before = at[ClimbPlace.END_NORMAL]
+        normal = climb[ClimbIndex.END_NORMAL]
         press_points(kind, contact)
-        if gives:
+        if deforms:
             contact.y[0, 0] = ds
             force, _ = minimise(StepProblem(ds, 0.0, kind, False), contact, goal)
         else:
             force, gain = find_friction_force(ds, kind, contact)
-        bound = contact.force[PressedPlace.MU_STATIC] * before
-        after = min(max(2 * force - at[ClimbPlace.START_FORCE], -bound), bound)
-        now = max(flat + after * end, 0.0)
-        miss = now - before
+        bound = contact.force[PressedIndex.MU_STATIC] * normal
+        after = min(max(2 * force - climb[ClimbIndex.START_FORCE], -bound), bound)
+        new_normal = max(flat + after * end, 0.0)
+        residual = new_normal - normal
         if (
-            gives
+            deforms
             and count > 0
-            and abs(miss) > close
-            and abs(missed - miss) > 0.1 * abs(before - tried)
+            and abs(residual) > normal_tol
+            and abs(last_residual - residual) > 0.1 * abs(normal - last_normal)
         ):
             # secant method, because every solution is expensive
-            set_normal_force(contact, max(before - miss * (before - tried) / (miss - missed), 0.0))
+            set_normal_force(
+                contact,
+                max(normal - residual * (normal - last_normal) / (residual - last_residual), 0.0),
+            )
         else:
-            set_normal_force(contact, now)
-        tried = before
-        missed = miss
-        if abs(miss) <= close:
+            set_normal_force(contact, new_normal)
+        last_normal = normal
+        last_residual = residual
+        if abs(residual) <= normal_tol:
             break
-    return force, find_stiffness(contact) if gives else gain
+    return force, find_stiffness(contact) if deforms else gain
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def set_normal_force(contact, normal):
-    """Distribute a normal force [N] over the points."""
-    contact.climb[ClimbPlace.END_NORMAL] = normal
+    """Distribute a normal force [N] over the points in proportion to their load."""
+    contact.climb[ClimbIndex.END_NORMAL] = normal
     for j in range(contact.pressed.shape[1]):
         contact.pressed[1, j] = contact.share[j] * normal
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_stiffness(contact):
-    """Return the derivative [N/m] of the force over the slide of the holder."""
+    """Return the derivative [N/m] of the friction force by the slide of the holder."""
     hess = contact.hess[0]
     p = contact.workspace[WorkRow.STEP]
     total = 0.0
@@ -132,7 +135,7 @@ def find_stiffness(contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_inverse_form(hess, p, workspace):
-    """Return the quadratic form p . hess^-1 p of the inverse of a matrix.
+    """Return the quadratic form p . hess^-1 p of the inverse of a factorised matrix.
 
     Parameters
     ----------
@@ -154,16 +157,16 @@ def find_inverse_form(hess, p, workspace):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_friction(ds, along, start, end_velocity, contact):
-    """Keep a step over a path along the flank.
+    """Update the points after a solved path along the flank.
 
     Parameters
     ----------
     ds : float
         Path [m].
     along : float
-        Mean force over it [N].
+        Mean friction force over the path [N].
     start : interfaces.arrays.StepStart
-        With the velocity along the flank.
+        Start of the step, with the velocity along the flank.
     end_velocity : float
         Velocity along the flank at the end [m/s].
     contact : ClimbingPoints
@@ -173,25 +176,25 @@ def commit_friction(ds, along, start, end_velocity, contact):
     lost : float
         Energy dissipated [J].
     is_solved : bool
-        Whether points and pieces agree.
+        Whether points and pieces reached equilibrium.
     """
-    kind = int(contact.flank[FlankPlace.KIND])
-    fine = True
-    lost = commit_points(ds, along, start, end_velocity, kind, contact)
+    kind = int(contact.flank[FlankIndex.KIND])
+    is_solved = True
+    dissipated = commit_points(ds, along, start, end_velocity, kind, contact)
     if contact.kappa.size:
-        more, count = relax_pieces(
+        relaxation_loss, count = relax_pieces(
             kind,
             contact,
-            contact.force[PressedPlace.MU_STATIC] * contact.flank[FlankPlace.LOAD] * 1e-11,
+            contact.force[PressedIndex.MU_STATIC] * contact.flank[FlankIndex.LOAD] * 1e-11,
         )
-        lost = lost + more
-        fine = count > 0
+        dissipated = dissipated + relaxation_loss
+        is_solved = count > 0
     for j in range(contact.pressed.shape[1]):
         contact.pressed[0, j] = contact.pressed[1, j]
-    return lost, fine
+    return dissipated, is_solved
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_friction(contact, q):
-    """Return force along the flank [N], energy of the law [J] and slip [m] at q [m]."""
-    return read_points(int(contact.flank[FlankPlace.KIND]), contact, q)
+    """Return friction force along the flank [N], energy [J] and slip [m] of the points."""
+    return read_points(int(contact.flank[FlankIndex.KIND]), contact, q)

@@ -1,8 +1,8 @@
-"""Run of modes whose load climbs grooves, under a law without memory.
+"""Time integration over grooves under a friction law without memory.
 
-The law is Coulomb's, or a force that follows the speed.
+The law is Coulomb's law, or a velocity-dependent force.
 
-`dynamics.smooth` integrates the motion, which is sampled as a march samples it.
+`dynamics.smooth` integrates the motion, which is sampled at the steps of a march.
 """
 
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from ..smooth import run as smooth
 from ..smooth.arrays import Counter, Scalar, Work
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
-# relative tolerance of a step
+# relative tolerance of an integration step, the accuracy of a step of the march
 STEP_TOLERANCE = 1e-11
-# motion over wavelength/(2 pi), below which the choice of the step takes it for rest
+# motion over wavelength/(2 pi), below which the step-size control counts it as rest
 REST_RATIO = 1e-6
 LAW_MODULE = "dynamics.grooves.flank_kernels"
-# positions in the ledger of a march of the sums that `SampledRun._read_sums` returns
+# ledger positions of the sums that `SampledRun._read_sums` returns
 LEDGER_SUMS = [
     Ledger.DRIVE_WORK,
     Ledger.VISCOUS_LOSS,
@@ -33,15 +33,15 @@ LEDGER_SUMS = [
     Ledger.N_ITERATIONS,
     Ledger.FRICTION_WORK,
 ]
-# status of a march by the outcome of the motion
+# status of the march for each outcome of the integrated motion
 STATUS_OF_OUTCOME = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GroovesModel(FlankModel):
-    """A law without memory along flanks.
+    """Contact model of a friction law without memory along the flanks of grooves.
 
-    - grooves, load [N]
+    - grooves, load: geometry and normal load [N]
     - static, kinetic: coefficients of friction [1]
     - speed: v_0 [m/s] of eq. 2.4, static tanh(v/v_0) along the flank; None for Coulomb's law
     """
@@ -54,34 +54,34 @@ class GroovesModel(FlankModel):
 
     @property
     def length(self) -> float:
-        """Bond length [m]; 0, as the law has no bonds."""
+        """Bond length [m]; always 0, as the law has no bonds."""
         return 0.0
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law holds without any stretch."""
+        """Whether the law sticks without any stretch (rigid Coulomb friction)."""
         return self.speed is None
 
     @property
     def runner(self):
-        """Class that marches this contact."""
+        """Class that integrates a motion with this contact in time."""
         return SampledRun
 
     def build(self):
-        """Return a contact without friction, which no kernel reads."""
+        """Return a placeholder contact without friction, which no kernel evaluates."""
         return coulomb_model(0.0, 0.0).build()
 
 
 def make_model(
     grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes
 ) -> GroovesModel:
-    """Return the model of grooves below these modes.
+    """Return the contact model of grooves under a law without memory.
 
     Parameters
     ----------
     grooves : Grooves
     load : float
-        Mean of the load [N].
+        Mean normal load [N].
     static, kinetic : float
         Coefficients of friction on the flanks [1].
     speed : float or None
@@ -95,23 +95,23 @@ def make_model(
     Raises
     ------
     PatchfemError
-        As `climbing.check_lifted_mass`.
+        See `climbing.check_lifted_mass`.
     """
     check_lifted_mass(grooves, static, modes)
     return GroovesModel(grooves, load, static, kinetic, speed)
 
 
 class SampledRun(GroovesRun):
-    """Arrays and time of a march over grooves, and the motion that is sampled."""
+    """Time integration over grooves by the smooth engine, sampled as a march."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         self.width += 1
-        self._begin()
+        self._start_smooth_motion()
         self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
-    def _begin(self) -> None:
-        """Start the motion from the present state, at the start of the drive."""
+    def _start_smooth_motion(self) -> None:
+        """Start the smooth motion from the present modal state, at the start of the drive."""
         g = self.model.grooves
         model = self.model
         numbers = [
@@ -133,39 +133,39 @@ class SampledRun(GroovesRun):
         )
         self.smooth_motion.request_last_phasors(1)
         n = self.modes.omega.size
-        least = self.smooth_motion.arrays.work[Work.SIZES]
-        least[:n] = REST_RATIO / g.wave_number
-        least[n : 2 * n] = (
+        size_floors = self.smooth_motion.arrays.work[Work.SIZES]
+        size_floors[:n] = REST_RATIO / g.wave_number
+        size_floors[n : 2 * n] = (
             REST_RATIO / g.wave_number * self.smooth_motion.arrays.scalars[Scalar.FASTEST_RATE]
         )
         self.booked = self._read_sums()
 
     def _read_sums(self) -> np.ndarray:
-        """Return the sums of the motion, six energies and counts.
+        """Return the energy sums and the step counter of the smooth motion, (6,).
 
-        They are work of the drive, viscous loss, its |work|, friction loss [J], steps, and friction
+        They are drive work, viscous loss, sum of absolute drive works, friction loss [J], number of steps, and friction
         work [J].
         """
         y = self.smooth_motion.arrays.state
-        own = self.smooth_motion.record.counters
+        counters = self.smooth_motion.record.counters
         n = 2 * self.modes.omega.size
         return np.array(
-            [y[-3], y[-2], own[Counter.DRIVE_POWER], y[n], own[Counter.ACCEPTED], y[-1]]
+            [y[-3], y[-2], counters[Counter.DRIVE_POWER], y[n], counters[Counter.ACCEPTED], y[-1]]
         )
 
     def fork(self, drive):
-        """Return an independent copy, like `Run.fork`."""
-        twin = super().fork(drive)
-        twin.smooth_motion = self.smooth_motion.fork(drive)
-        return twin
+        """Return an independent copy of the march that continues under another drive."""
+        copied_run = super().fork(drive)
+        copied_run.smooth_motion = self.smooth_motion.fork(drive)
+        return copied_run
 
     def _slide_contact(self, path) -> None:
-        """Do nothing: there is no memory."""
+        """Do nothing, because the contact has no memory."""
 
     def _march_steps(self, count: int, rows) -> tuple:
-        """Fill rows like `Run._march_steps`, from samples of the motion.
+        """Fill the sample rows of a march from the smooth motion.
 
-        They also have the friction loss of each step.
+        The rows have the friction loss of each step as an additional column.
         """
         n = self.modes.omega.size
         dt = float(self.prop.dt)
@@ -174,37 +174,39 @@ class SampledRun(GroovesRun):
         if motion.time != times[0] or not np.array_equal(
             motion.arrays.state[: 2 * n], self.state.ravel()
         ):
-            self._begin()
+            self._start_smooth_motion()
             motion = self.smooth_motion
-        begun = motion.fork(self.drive)
-        seen = motion.run_to(times[-1], times)
-        # where it ends, at the sample that follows
-        if motion.outcome is not None and len(seen) <= count:
-            seen = np.concatenate([seen, motion.read_state()[0][None]])
-        out = seen[:, 1 : 1 + n] @ self.modes.output
-        beyond = np.flatnonzero(np.abs(out) > self.travel)
+        start_motion = motion.fork(self.drive)
+        samples = motion.run_to(times[-1], times)
+        # a motion that ended early is sampled at its end, as the next sample
+        if motion.outcome is not None and len(samples) <= count:
+            samples = np.concatenate([samples, motion.read_state()[0][None]])
+        output = samples[:, 1 : 1 + n] @ self.modes.output
+        exceeding = np.flatnonzero(np.abs(output) > self.travel)
         last, status = (
-            (int(beyond[0]), 1)
-            if beyond.size
-            else (len(seen) - 1, STATUS_OF_OUTCOME.get(motion.outcome, 0))
+            (int(exceeding[0]), 1)
+            if exceeding.size
+            else (len(samples) - 1, STATUS_OF_OUTCOME.get(motion.outcome, 0))
         )
-        if 0 < last < len(seen) - 1:  # the sums and the state are those of the last sample
-            motion = self.smooth_motion = begun
+        if (
+            0 < last < len(samples) - 1
+        ):  # the motion is repeated up to the last sample, so that sums and state belong to it
+            motion = self.smooth_motion = start_motion
             motion.run_to(times[last], times[: last + 1])
-        seen = seen[: last + 1]
-        work = np.diff(seen[:, -1])
-        slip_path = np.diff(seen[:, 2 * n + 1])
-        part = rows[: last + 1]
-        part[:, : 2 * n + 2] = seen[:, 1 : 2 * n + 3]
-        part[:, 2 * n + 2] = seen[:, 2 * n + 3]
-        part[:, 2 * n + 3] = seen[:, 2 * n + 4]
-        part[:, 2 * n + 4] = seen[:, 2 * n + 3]
-        part[:, 2 * n + 5] = seen[:, 2 * n + 5]
-        part[:-1, 2 * n + 4] = np.divide(
-            work, slip_path, out=seen[:-1, 2 * n + 3].copy(), where=slip_path != 0
+        samples = samples[: last + 1]
+        work = np.diff(samples[:, -1])
+        slip_path = np.diff(samples[:, 2 * n + 1])
+        filled_rows = rows[: last + 1]
+        filled_rows[:, : 2 * n + 2] = samples[:, 1 : 2 * n + 3]
+        filled_rows[:, 2 * n + 2] = samples[:, 2 * n + 3]
+        filled_rows[:, 2 * n + 3] = samples[:, 2 * n + 4]
+        filled_rows[:, 2 * n + 4] = samples[:, 2 * n + 3]
+        filled_rows[:, 2 * n + 5] = samples[:, 2 * n + 5]
+        filled_rows[:-1, 2 * n + 4] = np.divide(
+            work, slip_path, out=samples[:-1, 2 * n + 3].copy(), where=slip_path != 0
         )
-        part[:-1, 2 * n + 6] = work
-        part[:-1, 2 * n + 7] = work - np.diff(seen[:, 2 * n + 5])
+        filled_rows[:-1, 2 * n + 6] = work
+        filled_rows[:-1, 2 * n + 7] = work - np.diff(samples[:, 2 * n + 5])
         self.state[:] = motion.arrays.state[: 2 * n].reshape(2, n)
         sums = self._read_sums()
         self.ledger[LEDGER_SUMS] += sums - self.booked
@@ -220,9 +222,9 @@ class SampledRun(GroovesRun):
         return sampled_work(rows[:, n], rows[:, n + 2], after)
 
     def _step_energies(self, rows) -> np.ndarray:
-        """Return the energies of the steps, like `Run._step_energies`.
+        """Return friction work, dissipated and created energy of each step, (3, steps) [J].
 
-        Friction dissipates its own work along the flank.
+        The dissipated energy is the work of friction along the flank.
         """
         n = 2 * self.modes.omega.size
         return np.stack([self._step_works(rows), rows[:-1, n + 7], np.zeros(len(rows) - 1)])
@@ -230,10 +232,10 @@ class SampledRun(GroovesRun):
     def set_outcome(self, status: int) -> None:
         super().set_outcome(status)
         if status == 5:
-            self._leaves()
+            self._set_grooves_left()
 
     def check_steps(self) -> None:
-        """Set the outcome not_converged where steps did not meet their error."""
+        """Set the outcome to not_converged if an integration step did not meet its tolerance."""
         if self.ledger[Ledger.N_UNCONVERGED]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -242,7 +244,7 @@ class SampledRun(GroovesRun):
             )
 
     def find_interface_energy(self) -> float:
-        """Return the potential energy of the load and the kinetic energy of the lifted mass [J]."""
+        """Return the energy [J] of the load height and of the moving lifted mass."""
         g = self.model.grooves
         z, v = self.state
         q = float(self.modes.slide @ z)

@@ -16,7 +16,14 @@ import numpy as np
 
 from ...core import NotConverged
 from ...formatting import format_length
-from .harmonic import Balance, LinearPart, System, pack_harmonics, solve_damped, unpack_harmonics
+from .harmonic import (
+    BalanceEquations,
+    HarmonicBalance,
+    LinearPart,
+    pack_harmonics,
+    solve_damped,
+    unpack_harmonics,
+)
 
 # largest number of times that the step between two amplitudes is halved where no motion is found
 MAX_HALVINGS = 6
@@ -52,37 +59,45 @@ class FreeBalance:
     prescribed coordinate has no receptance; its two equations determine omega and zeta.
     """
 
-    def __init__(self, balance: Balance, mode: int, harmonics: int, scale: float):
+    def __init__(self, balance: HarmonicBalance, mode: int, harmonics: int, scale: float):
         self.balance = balance
         self.mode = mode
         self.h = harmonics
         self.scale = scale
 
-    def linear(self, omega: float, zeta: float) -> LinearPart:
+    def make_linear_part(self, omega: float, zeta: float) -> LinearPart:
         """Return the receptances of the modes with the damping -2 zeta omega added.
 
         The coordinate of prescribed amplitude has no receptance. omega: frequency [rad/s].
         """
-        m = self.balance.modes
+        modes = self.balance.modes
         k = np.arange(self.h + 1)[:, None, None]
-        eye = np.eye(m.omega.size)
-        keep = np.arange(m.omega.size) != self.mode
-        p = (
-            np.diag(m.omega**2)
+        eye = np.eye(modes.omega.size)
+        is_other = np.arange(modes.omega.size) != self.mode
+        dynamic_stiffness = (
+            np.diag(modes.omega**2)
             - (k * omega) ** 2 * eye
-            + 1j * k * omega * (m.damping_matrix - 2 * zeta * omega * eye)
+            + 1j * k * omega * (modes.damping_matrix - 2 * zeta * omega * eye)
         )
-        inverse = np.zeros_like(p)
-        right = eye[self.mode] + 0j
-        left = eye[self.mode] + 0j
-        inverse[np.arange(self.h + 1) != 1] = _invert(p[np.arange(self.h + 1) != 1])
-        inverse[np.ix_([1], keep, keep)] = np.linalg.inv(p[1][np.ix_(keep, keep)])
-        right -= inverse[1] @ p[1][:, self.mode]
-        left -= p[1][self.mode] @ inverse[1]
-        slope = -2 * k**2 * omega * eye + 1j * k * (m.damping_matrix - 4 * zeta * omega * eye)
-        return LinearPart(inverse, slope, ((1, right, left, left @ p[1][:, self.mode]),))
+        inverse = np.zeros_like(dynamic_stiffness)
+        right_vector = eye[self.mode] + 0j
+        left_vector = eye[self.mode] + 0j
+        inverse[np.arange(self.h + 1) != 1] = _invert_matrices(
+            dynamic_stiffness[np.arange(self.h + 1) != 1]
+        )
+        inverse[np.ix_([1], is_other, is_other)] = np.linalg.inv(
+            dynamic_stiffness[1][np.ix_(is_other, is_other)]
+        )
+        right_vector -= inverse[1] @ dynamic_stiffness[1][:, self.mode]
+        left_vector -= dynamic_stiffness[1][self.mode] @ inverse[1]
+        slope = -2 * k**2 * omega * eye + 1j * k * (modes.damping_matrix - 4 * zeta * omega * eye)
+        return LinearPart(
+            inverse,
+            slope,
+            ((1, right_vector, left_vector, left_vector @ dynamic_stiffness[1][:, self.mode]),),
+        )
 
-    def system(self, x, amplitude: float) -> System:
+    def evaluate(self, x, amplitude: float) -> BalanceEquations:
         """Evaluate the balance equations of a free motion at given unknowns and amplitude.
 
         x: unknowns (N,); amplitude [m], by which all lengths of the equations are divided.
@@ -92,19 +107,24 @@ class FreeBalance:
         zeta = x[-1]
         balance = self.balance
         if not omega > 0:
-            return System(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
-        here = self.linear(omega, zeta)
-        one = balance.system(
-            np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, here
+            return BalanceEquations(np.full(x.size, np.inf), np.eye(x.size), None, None, None)
+        linear_part = self.make_linear_part(omega, zeta)
+        equations = balance.evaluate(
+            np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, linear_part
         )
         # derivative of the dynamic stiffness with respect to zeta, times the motion
-        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * one.modal
-        turned = balance.faces @ np.einsum("kab,kb->ak", here.inverse, by_zeta)
-        last = here.free[0][2] @ by_zeta[1] / omega**2
-        jacobian = one.jacobian.copy()
-        jacobian[:, -2] = one.by_omega * self.scale / amplitude
-        jacobian[:, -1] = np.append(pack_harmonics(turned), [last.real, last.imag]) / amplitude
-        return one._replace(residual=one.residual / amplitude, jacobian=jacobian)
+        by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * equations.modal
+        slides_by_zeta = balance.faces @ np.einsum("kab,kb->ak", linear_part.inverse, by_zeta)
+        residual_by_zeta = linear_part.free[0][2] @ by_zeta[1] / omega**2
+        jacobian = equations.jacobian.copy()
+        jacobian[:, -2] = equations.by_omega * self.scale / amplitude
+        jacobian[:, -1] = (
+            np.append(
+                pack_harmonics(slides_by_zeta), [residual_by_zeta.real, residual_by_zeta.imag]
+            )
+            / amplitude
+        )
+        return equations._replace(residual=equations.residual / amplitude, jacobian=jacobian)
 
     def solve(self, x, amplitude: float) -> tuple:
         """Solve for the free motion at an amplitude by Newton's method.
@@ -121,26 +141,26 @@ class FreeBalance:
         NotConverged
             If there is no motion near x.
         """
-        found = solve_damped(
-            lambda v: self.system(v, amplitude),
+        solution = solve_damped(
+            lambda v: self.evaluate(v, amplitude),
             x,
             lambda _, left, size: np.linalg.norm(left) < 1e-7,
         )
-        if found is None:
+        if solution is None:
             raise NotConverged(
                 f"backbone: no free motion with the amplitude {format_length(amplitude, 3)} was found by "
                 "following the motion from smaller amplitudes"
             )
-        x = found[0]
-        one = self.system(found[0], amplitude)
+        x = solution[0]
+        equations = self.evaluate(solution[0], amplitude)
         slides = self.balance.lift @ unpack_harmonics(
             x[:-2] * amplitude, self.balance.lift.shape[1]
         )
         return x, FreeMotion(
-            amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal
+            amplitude, x[-2] * self.scale, x[-1], slides, equations.fold.force, equations.modal
         )
 
-    def towards(self, x, done: float, target: float) -> np.ndarray:
+    def follow_to_amplitude(self, x, start: float, target: float) -> np.ndarray:
         """Follow a free motion from one amplitude to another by natural continuation.
 
         x: unknowns (N,) at the amplitude `start` [m]; target: the other amplitude [m].
@@ -150,31 +170,31 @@ class FreeBalance:
         NotConverged
             If a step fails after MAX_HALVINGS halvings.
         """
-        stops = [float(target)]
-        while stops:
+        targets = [float(target)]
+        while targets:
             try:
-                x = self.solve(x, stops[-1])[0]
-                done = stops.pop()
+                x = self.solve(x, targets[-1])[0]
+                start = targets.pop()
             except NotConverged:
-                if len(stops) > MAX_HALVINGS:
+                if len(targets) > MAX_HALVINGS:
                     raise
-                stops.append(float(np.sqrt(done * stops[-1])))
+                targets.append(float(np.sqrt(start * targets[-1])))
         return x
 
 
-def _invert(p) -> np.ndarray:
+def _invert_matrices(matrices) -> np.ndarray:
     """Return the inverses of matrices (k, n, n), or pseudoinverses if one is singular.
 
     A matrix is singular where nothing determines the mean of a coordinate.
 
     """
     try:
-        found = np.linalg.inv(p)
-        if np.isfinite(found).all():
-            return found
+        inverses = np.linalg.inv(matrices)
+        if np.isfinite(inverses).all():
+            return inverses
     except np.linalg.LinAlgError:
         pass
-    return np.linalg.pinv(p, rcond=1e-13)
+    return np.linalg.pinv(matrices, rcond=1e-13)
 
 
 def trace_free_motions(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
@@ -198,11 +218,11 @@ def trace_free_motions(equations: FreeBalance, amplitudes, omega: float, shape) 
     y = np.zeros((balance.lift.shape[1], h + 1), complex)
     y[:, 1] = balance.faces @ shape
     x = np.append(pack_harmonics(y), [omega / equations.scale, 0.0])
-    done = None
-    out = []
+    last_amplitude = None
+    motions = []
     for target in amplitudes:
-        x = equations.towards(x, done, target) if out else x
-        x, free = equations.solve(x, float(target))
-        done = float(target)
-        out.append(free)
-    return out
+        x = equations.follow_to_amplitude(x, last_amplitude, target) if motions else x
+        x, motion = equations.solve(x, float(target))
+        last_amplitude = float(target)
+        motions.append(motion)
+    return motions

@@ -22,15 +22,15 @@ def find_regime(periodic: SteadyMotion) -> tuple:
     slipping_limit = 0.0
     total_limit = 0.0
     for track, laws in zip(
-        periodic.group.tracks(periodic.coefficients, periodic.omega), periodic.group.laws
+        periodic.group.sample_slides(periodic.coefficients, periodic.omega), periodic.group.laws
     ):
         slides = track.turning_points.slides
-        swing = float(np.ptp(slides)) if slides.size else 0.0
+        slide_range = float(np.ptp(slides)) if slides.size else 0.0
         for law in laws:
             sampled = law.sample(track)
             total_limit += sampled.limit
             if isinstance(law, Jenkins):
-                is_slipping = 2 * law.limit_slide < swing
+                is_slipping = 2 * law.limit_slide < slide_range
                 slipping_limit += float(law.stiffness @ (law.limit_slide * is_slipping))
             elif sampled.limit:
                 length = getattr(law, "length", 0.0)
@@ -90,20 +90,20 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
     """
     omega = periodic.omega
     group = periodic.group
-    inner = samples * max(1, -(-2 * periodic.samples // samples))
-    every = inner // samples
+    n_samples = samples * max(1, -(-2 * periodic.samples // samples))
+    stride = n_samples // samples
 
     def cycle(values):
-        kept = values[..., ::every]
-        return np.concatenate([kept, kept[..., :1]], axis=-1).T
+        selected = values[..., ::stride]
+        return np.concatenate([selected, selected[..., :1]], axis=-1).T
 
     k = np.arange(periodic.modal.shape[0])[:, None]
-    z, rate = (evaluate_series((periodic.modal * f).T, inner) for f in (1.0, 1j * k * omega))
-    forces = group.forces(periodic.coefficients, omega, inner)
-    base = periodic.level * np.sin(2 * np.pi * np.arange(inner) / inner)
+    z, rate = (evaluate_series((periodic.modal * f).T, n_samples) for f in (1.0, 1j * k * omega))
+    forces = group.compute_forces(periodic.coefficients, omega, n_samples)
+    base = periodic.level * np.sin(2 * np.pi * np.arange(n_samples) / n_samples)
     accel = find_accelerations(modes, base, z.T, rate.T, forces.T @ group.rows).T
-    track = SampledSlide(periodic.coefficients[0], omega, inner)
-    found = [law.sample(track) for law in group.laws[0]]
+    track = SampledSlide(periodic.coefficients[0], omega, n_samples)
+    sampled = [law.sample(track) for law in group.laws[0]]
     floor = base if drive.moving else 0 * base
     return Response(
         np.arange(samples + 1) * (2 * np.pi / omega / samples),
@@ -115,6 +115,6 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
         cycle(modes.output @ rate),
         cycle(modes.output @ accel + floor),
         cycle(floor),
-        cycle(friction_force(group.laws[0], found)),
-        cycle(find_slip(track, found)),
+        cycle(friction_force(group.laws[0], sampled)),
+        cycle(find_slip(track, sampled)),
     )

@@ -12,13 +12,13 @@ from .laws import evaluate_series
 from .point import (
     HARMONIC_COUNTS,
     SteadyMotion,
-    evaluate_by_level,
-    evaluate_by_omega,
+    change_harmonic_count,
+    differentiate_by_frequency,
+    differentiate_by_level,
     find_point,
     make_balance,
     make_group,
     make_point,
-    with_harmonics,
 )
 from .stability import add_stability
 from .starts import find_one_harmonic_roots
@@ -57,7 +57,7 @@ class Branch:
 
 
 def trace_over_frequency(
-    modes, drive: SineDrive, group, frequencies, stability: bool = False, **how
+    modes, drive: SineDrive, group, frequencies, stability: bool = False, **numerics
 ) -> Branch:
     """Trace the branch of steady motions over drive frequency at constant drive amplitude.
 
@@ -80,11 +80,11 @@ def trace_over_frequency(
     """
     checked = _check_values(frequencies, "drive.frequency: a frequency response", "frequencies")
     drives = [replace(drive, omega=2 * np.pi * frequency) for frequency in checked]
-    return _trace("frequency", modes, drives, group, CurveNumerics(**how), stability)
+    return _trace_branch("frequency", modes, drives, group, CurveNumerics(**numerics), stability)
 
 
 def trace_over_level(
-    modes, drive: SineDrive, group, accelerations, stability: bool = False, **how
+    modes, drive: SineDrive, group, accelerations, stability: bool = False, **numerics
 ) -> Branch:
     """Trace the branch of steady motions over drive amplitude [m s-2] at constant frequency.
 
@@ -103,7 +103,7 @@ def trace_over_level(
         accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes"
     )
     drives = [replace(drive, acceleration=float(acceleration)) for acceleration in checked]
-    return _trace("level", modes, drives, group, CurveNumerics(**how), stability)
+    return _trace_branch("level", modes, drives, group, CurveNumerics(**numerics), stability)
 
 
 class CurveNumerics(NamedTuple):
@@ -121,43 +121,45 @@ class CurveNumerics(NamedTuple):
     longest: float = 0.05
 
 
-def _check_values(given, what: str, noun: str) -> np.ndarray:
-    values = np.asarray(given, float)
+def _check_values(parameter_values, subject: str, noun: str) -> np.ndarray:
+    values = np.asarray(parameter_values, float)
     if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
-        raise PatchfemError(f"{what} needs two or more positive {noun}")
+        raise PatchfemError(f"{subject} needs two or more positive {noun}")
     return values
 
 
-def _trace(parameter: str, modes, drives, group, how: CurveNumerics, stability: bool) -> Branch:
+def _trace_branch(
+    parameter: str, modes, drives, group, numerics: CurveNumerics, stability: bool
+) -> Branch:
     """Trace a branch of steady motions over prescribed drives, with stability on request."""
-    solve = _solve_curve if len(drives) == 2 else _solve_each
-    branch = solve(modes, drives, make_group(modes, group), parameter, how)
+    solve = _trace_curve if len(drives) == 2 else _solve_points
+    branch = solve(modes, drives, make_group(modes, group), parameter, numerics)
     if not stability:
         return branch
     return replace(branch, points=tuple(add_stability(point, modes) for point in branch.points))
 
 
-def _solve_each(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
+def _solve_points(modes, drives, group, parameter, numerics: CurveNumerics) -> Branch:
     points = []
-    last = how.start
+    last = numerics.start
     for drive in drives:
-        last = find_point(modes, drive, group, how.harmonics, how.tolerance, last)
+        last = find_point(modes, drive, group, numerics.harmonics, numerics.tolerance, last)
         points.append(last)
     return Branch(tuple(points), parameter)
 
 
-def _solve_curve(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
+def _trace_curve(modes, drives, group, parameter, numerics: CurveNumerics) -> Branch:
     """Trace a branch by arc length with the same number of harmonics at all points.
 
     The number is raised until the harmonics above it are negligible at all points.
     """
-    harmonics, tolerance, start, longest = how
+    harmonics, tolerance, start, max_step = numerics
     first = find_point(modes, drives[0], group, harmonics, tolerance, start)
     for h in [harmonics] if harmonics else [h for h in HARMONIC_COUNTS if h >= first.harmonics]:
-        points, above, path, scale = _follow_harmonics(
-            modes, drives, group, parameter, h, first, longest
+        points, truncated, path, scale = _trace_with_harmonics(
+            modes, drives, group, parameter, h, first, max_step
         )
-        if harmonics or above <= tolerance / 4:
+        if harmonics or truncated <= tolerance / 4:
             return Branch(
                 points,
                 parameter,
@@ -166,42 +168,51 @@ def _solve_curve(modes, drives, group, parameter, how: CurveNumerics) -> Branch:
                 path.ended,
             )
     raise NotConverged(
-        f"harmonic balance with {HARMONIC_COUNTS[-1]} harmonics leaves out {above:.1e} of the motion, more than "
+        f"harmonic balance with {HARMONIC_COUNTS[-1]} harmonics leaves out {truncated:.1e} of the motion, more than "
         f"the limit of {tolerance / 4:g}; raise the tolerance"
     )
 
 
-def _follow_harmonics(modes, drives, group, parameter, h, first, longest) -> tuple:
+def _trace_with_harmonics(modes, drives, group, parameter, h, first, max_step) -> tuple:
     """Trace a branch with h harmonics and enough samples per cycle for the largest slide.
 
     Returns the points, the largest fraction of a motion above h, the CurvePath and the unit of its
     parameter.
     """
     samples = max(first.samples // 2, group.samples or group.samples_for(h))
-    frequency = parameter == "frequency"
-    ends = [d.omega if frequency else d.acceleration for d in drives]
+    is_frequency = parameter == "frequency"
+    ends = [d.omega if is_frequency else d.acceleration for d in drives]
     for _ in range(3):
         balance = make_balance(modes, group, samples)
-        x = with_harmonics(balance, first.coefficients, first.unknowns, first.harmonics, h)
+        x = change_harmonic_count(balance, first.coefficients, first.unknowns, first.harmonics, h)
 
-        def system(v, p, balance=balance):
-            if frequency:
-                return evaluate_by_omega(balance, v, p, drives[0].acceleration, h)
-            return evaluate_by_level(balance, v, drives[0].omega, p, h)
+        def evaluate_equations(v, p, balance=balance):
+            if is_frequency:
+                return differentiate_by_frequency(balance, v, p, drives[0].acceleration, h)
+            return differentiate_by_level(balance, v, drives[0].omega, p, h)
 
-        settings = PathSettings(first_step=longest / 4, max_step=longest)
-        path = follow_curve(system, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], settings)
-        key = "omega" if frequency else "acceleration"
-        made = [
+        settings = PathSettings(first_step=max_step / 4, max_step=max_step)
+        path = follow_curve(
+            evaluate_equations, x, ends[0], (min(ends), max(ends)), ends[1] > ends[0], settings
+        )
+        key = "omega" if is_frequency else "acceleration"
+        solved_points = [
             make_point(balance, v, replace(drives[0], **{key: float(p)}), h)
             for v, p in zip(path.x, path.p)
         ]
-        widest = np.max([_find_amplitude(p.coefficients, h + 64) for p, _ in made], axis=0)
-        want = group.samples or group.samples_for(h, widest)
-        if want <= samples:
+        amplitudes = np.max(
+            [_find_amplitude(p.coefficients, h + 64) for p, _ in solved_points], axis=0
+        )
+        needed_samples = group.samples or group.samples_for(h, amplitudes)
+        if needed_samples <= samples:
             break
-        samples = want
-    return tuple(p for p, _ in made), max(a for _, a in made), path, 2 * np.pi if frequency else 1.0
+        samples = needed_samples
+    return (
+        tuple(p for p, _ in solved_points),
+        max(a for _, a in solved_points),
+        path,
+        2 * np.pi if is_frequency else 1.0,
+    )
 
 
 def _find_amplitude(coefficients, min_samples: int):
@@ -214,7 +225,7 @@ def _find_amplitude(coefficients, min_samples: int):
     return np.ptp(samples, axis=-1) / 2
 
 
-def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> float:
+def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) -> float:
     """Return the distance between two points of a branch in scaled unknowns and frequency.
 
     Parameters
@@ -226,19 +237,19 @@ def measure_distance(one: SteadyMotion, other: SteadyMotion, width: float) -> fl
     -------
     float
     """
-    return float(np.linalg.norm(_find_scaled_step(one, other, width)[0]))
+    return float(np.linalg.norm(_find_scaled_step(first, second, width)[0]))
 
 
-def _find_scaled_step(one: SteadyMotion, other: SteadyMotion, width: float) -> tuple:
+def _find_scaled_step(first: SteadyMotion, second: SteadyMotion, width: float) -> tuple:
     """Return the scaled step (N + 1,) between two points of a branch, and the motion size."""
-    size = max(float(np.linalg.norm(one.unknowns)), float(np.linalg.norm(other.unknowns))) or 1.0
+    size = max(float(np.linalg.norm(first.unknowns)), float(np.linalg.norm(second.unknowns))) or 1.0
     return np.append(
-        (other.unknowns - one.unknowns) / size, (other.omega - one.omega) / width
+        (second.unknowns - first.unknowns) / size, (second.omega - first.omega) / width
     ), size
 
 
 def find_point_between(
-    modes, drive, one: SteadyMotion, other: SteadyMotion, share: float, width: float
+    modes, drive, first: SteadyMotion, second: SteadyMotion, fraction: float, width: float
 ) -> SteadyMotion:
     """Find the point of a frequency branch at a fraction of the step between two points.
 
@@ -248,7 +259,7 @@ def find_point_between(
     ----------
     modes, drive
     one, other : SteadyMotion
-    share : float
+    fraction : float
         Fraction of the step.
     width : float
         See `measure_distance`.
@@ -262,22 +273,22 @@ def find_point_between(
     NotConverged
         If Newton's method finds no motion near the interpolated one.
     """
-    balance = make_balance(modes, one.group, one.base_samples)
-    step, size = _find_scaled_step(one, other, width)
-    h = one.harmonics
+    balance = make_balance(modes, first.group, first.base_samples)
+    step, size = _find_scaled_step(first, second, width)
+    h = first.harmonics
     length = float(np.linalg.norm(step))
-    found = correct_point(
-        lambda x, p: evaluate_by_omega(balance, x, p, drive.acceleration, h),
-        (one.unknowns + share * size * step[:-1], one.omega + share * width * step[-1]),
+    corrected = correct_point(
+        lambda x, p: differentiate_by_frequency(balance, x, p, drive.acceleration, h),
+        (first.unknowns + fraction * size * step[:-1], first.omega + fraction * width * step[-1]),
         step / length,
         Scales(size, width),
         NEWTON_TOL,
     )
-    if found is None:
+    if corrected is None:
         raise NotConverged(
             "accuracy.method: no steady motion was found between two neighbouring points of the curve"
         )
-    return make_point(balance, found.x, replace(drive, omega=float(found.p)), h)[0]
+    return make_point(balance, corrected.x, replace(drive, omega=float(corrected.p)), h)[0]
 
 
 def find_branches(
@@ -301,27 +312,29 @@ def find_branches(
         not found.
     """
     group = make_group(modes, group)
-    found = []
+    motions = []
     for start in [
         None,
         *find_one_harmonic_roots(make_balance(modes, group, 512), drive.omega, drive.acceleration),
     ]:
         try:
-            new = find_point(modes, drive, group, None, tolerance, start)
+            motion = find_point(modes, drive, group, None, tolerance, start)
         except NotConverged:
             continue
-        size = max(np.abs(new.coefficients).max(), 1e-300)
-        if not any(_subtract_padded(new, old) < 10 * tolerance * size for old in found):
-            found.append(new)
-    if not found:
+        size = max(np.abs(motion.coefficients).max(), 1e-300)
+        if not any(
+            _max_harmonic_difference(motion, old) < 10 * tolerance * size for old in motions
+        ):
+            motions.append(motion)
+    if not motions:
         raise NotConverged(
             f"accuracy.method: no steady motion was found at {drive.omega / (2 * np.pi):.6g} Hz"
         )
-    found.sort(key=lambda p: float(np.linalg.norm(p.coefficients)))
-    return [add_stability(p, modes) for p in found] if stability else found
+    motions.sort(key=lambda p: float(np.linalg.norm(p.coefficients)))
+    return [add_stability(p, modes) for p in motions] if stability else motions
 
 
-def _subtract_padded(a: SteadyMotion, b: SteadyMotion) -> float:
+def _max_harmonic_difference(a: SteadyMotion, b: SteadyMotion) -> float:
     k = min(a.coefficients.shape[1], b.coefficients.shape[1])
     return float(np.abs(a.coefficients[:, :k] - b.coefficients[:, :k]).max())
 
@@ -368,29 +381,33 @@ def find_backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -
         If the amplitudes do not increase.
     """
     group = make_group(modes, group)
-    wanted = np.asarray(amplitudes, float)
+    checked_amplitudes = np.asarray(amplitudes, float)
     if (
-        wanted.size == 0
-        or not np.isfinite(wanted).all()
-        or wanted[0] <= 0
-        or np.any(np.diff(wanted) <= 0)
+        checked_amplitudes.size == 0
+        or not np.isfinite(checked_amplitudes).all()
+        or checked_amplitudes[0] <= 0
+        or np.any(np.diff(checked_amplitudes) <= 0)
     ):
         raise PatchfemError("backbone: the amplitudes must be positive and in rising order")
     if not 0 <= mode < modes.omega.size:
         raise PatchfemError(
             f"backbone: there is no mode {mode}; the rig has {modes.omega.size} modes, counted from 0"
         )
-    samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
+    samples = group.samples or group.samples_for(
+        harmonics, np.full(len(group.rows), checked_amplitudes[-1])
+    )
     balance = make_balance(modes, group, samples)
     omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), mode)
-    found = trace_free_motions(FreeBalance(balance, mode, harmonics, omega), wanted, omega, shape)
+    motions = trace_free_motions(
+        FreeBalance(balance, mode, harmonics, omega), checked_amplitudes, omega, shape
+    )
     k = np.arange(harmonics + 1)
-    loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in found]
-    slide = [_find_amplitude(f.slides[0], harmonics + 128) for f in found]
+    loss = [np.pi * float(np.sum(k * (np.conj(f.slides) * f.forces).imag)) for f in motions]
+    slide = [_find_amplitude(f.slides[0], harmonics + 128) for f in motions]
     return Backbone(
-        wanted,
-        np.array([f.omega for f in found]) / (2 * np.pi),
-        np.array([f.zeta for f in found]),
+        checked_amplitudes,
+        np.array([f.omega for f in motions]) / (2 * np.pi),
+        np.array([f.zeta for f in motions]),
         np.array(slide),
         np.array(loss),
     )

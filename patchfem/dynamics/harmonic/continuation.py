@@ -93,14 +93,14 @@ class _PathPoint(NamedTuple):
 
 
 def follow_curve(
-    system, x, p: float, bounds: tuple, forward: bool = True, settings: PathSettings | None = None
+    evaluate, x, p: float, bounds: tuple, forward: bool = True, settings: PathSettings | None = None
 ) -> CurvePath:
     """Trace a solution curve of r(x, p) = 0 by arc-length continuation within parameter bounds.
 
     Parameters
     ----------
-    system : callable
-        system(x, p) -> residual (N,), d/dx (N, N), d/dp (N,).
+    evaluate : callable
+        evaluate(x, p) -> residual (N,), d/dx (N, N), d/dp (N,).
     x : array_like
     p : float
         Initial guess of the first point, which is corrected first.
@@ -124,41 +124,45 @@ def follow_curve(
     x = np.array(x, float)
     scales = Scales(settings.size or float(np.linalg.norm(x)) or 1.0, bounds[1] - bounds[0])
     start = correct_point(
-        system, (x, float(p)), _parameter_direction(x), scales, tolerance, float(p)
+        evaluate, (x, float(p)), _parameter_direction(x), scales, tolerance, float(p)
     )
     if start is None:
         raise NotConverged(
             "accuracy.method: the first point of the curve was not found near the given start"
         )
-    here = _make_path_point(system, start, 0.0, None, scales)
+    last_point = _make_path_point(evaluate, start, 0.0, None, scales)
     if not forward:
-        here = here._replace(tangent=-here.tangent, sign=-here.sign)
-    points = [here]
+        last_point = last_point._replace(tangent=-last_point.tangent, sign=-last_point.sign)
+    points = [last_point]
     step = settings.first_step
     ended = "points"
     while len(points) < settings.max_points:
         if not settings.size:
-            size = max(scales.size, 0.5 * float(np.linalg.norm(here.x)))
+            size = max(scales.size, 0.5 * float(np.linalg.norm(last_point.x)))
             scales = Scales(size, scales.width)
-        new = _take_step(system, here, step, scales, tolerance)
-        if new is None:
+        corrected = _take_step(evaluate, last_point, step, scales, tolerance)
+        if corrected is None:
             step /= 2
             if step < MIN_STEP:
                 ended = "step"
                 break
             continue
-        if not bounds[0] <= new.p <= bounds[1]:
-            bound = bounds[1] if new.p > bounds[1] else bounds[0]
-            fraction = (bound - here.p) / (new.p - here.p)
-            guess = (here.x + fraction * (new.x - here.x), bound)
-            last = correct_point(system, guess, _parameter_direction(x), scales, tolerance, bound)
+        if not bounds[0] <= corrected.p <= bounds[1]:
+            bound = bounds[1] if corrected.p > bounds[1] else bounds[0]
+            fraction = (bound - last_point.p) / (corrected.p - last_point.p)
+            guess = (last_point.x + fraction * (corrected.x - last_point.x), bound)
+            last = correct_point(evaluate, guess, _parameter_direction(x), scales, tolerance, bound)
             if last is not None:
-                points.append(here._replace(x=last.x, p=bound, arc=here.arc + fraction * step))
+                points.append(
+                    last_point._replace(x=last.x, p=bound, arc=last_point.arc + fraction * step)
+                )
             ended = "end" if (bound == bounds[1]) == forward else "start"
             break
-        here = _make_path_point(system, new, here.arc + step, here.tangent, scales)
-        points.append(here)
-        step = min(step * _step_factor(new.n_steps), settings.max_step)
+        last_point = _make_path_point(
+            evaluate, corrected, last_point.arc + step, last_point.tangent, scales
+        )
+        points.append(last_point)
+        step = min(step * _step_factor(corrected.n_steps), settings.max_step)
     return CurvePath(
         np.array([point.x for point in points]),
         np.array([point.p for point in points]),
@@ -186,22 +190,24 @@ def _step_factor(n_newton_steps: int) -> float:
     return 1.1 if n_newton_steps <= 5 else 0.6
 
 
-def _take_step(system, here: _PathPoint, step, scales, tolerance) -> CorrectedPoint | None:
+def _take_step(evaluate, point: _PathPoint, step, scales, tolerance) -> CorrectedPoint | None:
     """Take a predictor step along the tangent and correct it.
 
     Returns None if the corrector fails or jumps to another part of the curve.
 
     """
-    t = here.tangent
-    guess = (here.x + step * scales.size * t[:-1], here.p + step * scales.width * t[-1])
-    new = correct_point(system, guess, t, scales, tolerance)
-    if new is None:
+    t = point.tangent
+    guess = (point.x + step * scales.size * t[:-1], point.p + step * scales.width * t[-1])
+    corrected = correct_point(evaluate, guess, t, scales, tolerance)
+    if corrected is None:
         return None
-    move = np.append((new.x - here.x) / scales.size, (new.p - here.p) / scales.width)
+    scaled_step = np.append(
+        (corrected.x - point.x) / scales.size, (corrected.p - point.p) / scales.width
+    )
     # a step that does not follow the tangent jumps to another part of the curve
-    if float(move @ t) <= MIN_STEP_COSINE * float(np.linalg.norm(move)):
+    if float(scaled_step @ t) <= MIN_STEP_COSINE * float(np.linalg.norm(scaled_step)):
         return None
-    return new
+    return corrected
 
 
 def _make_bordered_matrix(jacobian, by_p, t, scales: Scales) -> np.ndarray:
@@ -215,13 +221,13 @@ def _make_bordered_matrix(jacobian, by_p, t, scales: Scales) -> np.ndarray:
 
 
 def correct_point(
-    system, guess: tuple, tangent, scales: Scales, tolerance: float, fixed: float | None = None
+    evaluate, guess: tuple, tangent, scales: Scales, tolerance: float, fixed: float | None = None
 ) -> CorrectedPoint | None:
     """Correct a predicted point by Newton's method perpendicular to the tangent.
 
     Parameters
     ----------
-    system : callable
+    evaluate : callable
         See `follow_curve`.
     guess : tuple
         Solution (N,) and parameter.
@@ -239,38 +245,40 @@ def correct_point(
         None where the method does not converge.
     """
     x, p = guess
-    before = np.inf
+    last_length = np.inf
     for n_steps in range(1, MAX_NEWTON_STEPS + 1):
-        residual, jacobian, by_p = system(x, p)
+        residual, jacobian, by_p = evaluate(x, p)
         if not (np.isfinite(residual).all() and np.isfinite(jacobian).all()):
             return None
         factors, pivots, _ = dgetrf(_make_bordered_matrix(jacobian, by_p, tangent, scales))
         step = dgetrs(factors, pivots, -np.append(residual / scales.size, 0.0))[0]
         length = float(np.linalg.norm(step))
-        if not np.isfinite(length) or (fixed is None and (length > 2 * before or length > 1.0)):
+        if not np.isfinite(length) or (
+            fixed is None and (length > 2 * last_length or length > 1.0)
+        ):
             return None
         x = x + scales.size * step[:-1]
         p = p + scales.width * step[-1] if fixed is None else fixed
         if length <= tolerance * max(1.0, float(np.linalg.norm(x)) / scales.size):
             return CorrectedPoint(x, p, n_steps)
-        before = length
+        last_length = length
     return None
 
 
 def _make_path_point(
-    system, point: CorrectedPoint, arc: float, last_tangent, scales: Scales
+    evaluate, point: CorrectedPoint, arc: float, last_tangent, scales: Scales
 ) -> _PathPoint:
     """Return a corrected point with its unit tangent and the sign of the bordered determinant.
 
     last_tangent: tangent at the previous point; None at the first point, where p increases.
     """
-    _, jacobian, by_p = system(point.x, point.p)
-    upright = _parameter_direction(point.x)
-    border = upright if last_tangent is None else last_tangent
+    _, jacobian, by_p = evaluate(point.x, point.p)
+    parameter_direction = _parameter_direction(point.x)
+    border = parameter_direction if last_tangent is None else last_tangent
     factors, pivots, _ = dgetrf(_make_bordered_matrix(jacobian, by_p, border, scales))
-    tangent = dgetrs(factors, pivots, upright)[0]
+    tangent = dgetrs(factors, pivots, parameter_direction)[0]
     tangent /= np.linalg.norm(tangent)
-    swaps = np.sum(pivots != np.arange(upright.size))
+    swaps = np.sum(pivots != np.arange(parameter_direction.size))
     sign = (-1.0) ** (np.sum(np.diag(factors) < 0) + swaps)
     return _PathPoint(point.x, point.p, tangent, arc, sign)
 
@@ -283,7 +291,7 @@ def _find_folds(points: list, width: float) -> tuple:
     The cubic interpolates values and slopes over the distance along the first tangent, which a step covers
     exactly.
     """
-    out = []
+    folds = []
     for first, second in pairwise(points):
         t0 = first.tangent
         t1 = second.tangent
@@ -293,13 +301,15 @@ def _find_folds(points: list, width: float) -> tuple:
         h = second.arc - first.arc
         a = t0[-1] * h
         b = t1[-1] * h / max(float(t0 @ t1), 0.1)
-        rise = (second.p - p0) / width
+        scaled_rise = (second.p - p0) / width
         # derivative of the cubic: a + 2 s (3 rise - 2 a - b) + 3 s^2 (a + b - 2 rise)
-        c = 3 * (a + b - 2 * rise)
-        d = 2 * (3 * rise - 2 * a - b)
+        c = 3 * (a + b - 2 * scaled_rise)
+        d = 2 * (3 * scaled_rise - 2 * a - b)
         roots = np.roots([c, d, a]) if abs(c) > 1e-9 * (abs(a) + abs(b)) else np.zeros(0)
         s = next((r.real for r in roots if abs(r.imag) < 1e-9 and 0 <= r.real <= 1), a / (a - b))
-        out.append(
-            p0 + width * (a * s + (3 * rise - 2 * a - b) * s * s + (a + b - 2 * rise) * s**3)
+        folds.append(
+            p0
+            + width
+            * (a * s + (3 * scaled_rise - 2 * a - b) * s * s + (a + b - 2 * scaled_rise) * s**3)
         )
-    return tuple(out)
+    return tuple(folds)

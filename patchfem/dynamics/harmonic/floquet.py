@@ -51,7 +51,7 @@ class FadingMemory:
 
 
 def find_monodromy(
-    modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()
+    modes: ModalBasis, rows, omega: float, slope, by_rate, reversals=(), fading=()
 ) -> np.ndarray:
     """Return the monodromy matrix of modes and contact memories over one cycle.
 
@@ -74,42 +74,47 @@ def find_monodromy(
     """
     n = modes.omega.size
     count = slope.shape[1]
-    remembered = [
-        np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)
+    memory_coefficients = [
+        np.broadcast_to(part, count)
+        for memory in fading
+        for part in (memory.gain, memory.loss, memory.limit)
     ]
-    first = _find_equal_cells([slope, by_rate, *(mark.hold for mark in marks), *remembered], marks)
+    first = _find_equal_cells(
+        [slope, by_rate, *(reversal.hold for reversal in reversals), *memory_coefficients],
+        reversals,
+    )
     width = np.diff(first, append=count) * (2 * np.pi / count)
     cells = first.size
     slope = slope[:, first]
     by_rate = by_rate[:, first]
-    size = 2 * n + len(marks) + len(fading)
+    size = 2 * n + len(reversals) + len(fading)
     a = np.zeros((cells, size, size))
-    grip = rows.T / (modes.mass * omega**2)
+    force_to_rate = rows.T / (modes.mass * omega**2)
     a[:, :n, n : 2 * n] = np.eye(n)
     a[:, n : 2 * n, :n] = -np.diag(modes.omega**2) / omega**2 - np.einsum(
-        "ai,in,ib->nab", grip, slope, rows
+        "ai,in,ib->nab", force_to_rate, slope, rows
     )
     a[:, n : 2 * n, n : 2 * n] = -modes.damping_matrix / omega - omega * np.einsum(
-        "ai,in,ib->nab", grip, by_rate, rows
+        "ai,in,ib->nab", force_to_rate, by_rate, rows
     )
-    for k, mark in enumerate(marks):
-        a[:, n : 2 * n, 2 * n + k] = -mark.hold[first][:, None] * grip[:, mark.row]
-    for k, one in enumerate(fading, 2 * n + len(marks)):
+    for k, reversal in enumerate(reversals):
+        a[:, n : 2 * n, 2 * n + k] = -reversal.hold[first][:, None] * force_to_rate[:, reversal.row]
+    for k, memory in enumerate(fading, 2 * n + len(reversals)):
         a[:, n : 2 * n, k] = -np.multiply.outer(
-            np.broadcast_to(one.limit, count)[first], grip[:, one.row]
+            np.broadcast_to(memory.limit, count)[first], force_to_rate[:, memory.row]
         )
-        a[:, k, n : 2 * n] = one.gain[first][:, None] * rows[one.row]
-        a[:, k, k] = -one.loss[first]
+        a[:, k, n : 2 * n] = memory.gain[first][:, None] * rows[memory.row]
+        a[:, k, k] = -memory.loss[first]
     steps = matrix_exponentials(a * width[:, None, None])
-    for k, mark in enumerate(marks, 2 * n):
+    for k, reversal in enumerate(reversals, 2 * n):
         across = np.zeros(size)
-        across[:n] = rows[mark.row]
-        cell = np.searchsorted(first, mark.cell)
-        steps[cell, k] = (1 - mark.share) * across + mark.share * (across @ steps[cell])
+        across[:n] = rows[reversal.row]
+        cell = np.searchsorted(first, reversal.cell)
+        steps[cell, k] = (1 - reversal.share) * across + reversal.share * (across @ steps[cell])
     return multiply_pairwise(steps)
 
 
-def _find_equal_cells(coefficients: list, marks) -> np.ndarray:
+def _find_equal_cells(coefficients: list, reversals) -> np.ndarray:
     """Return the first cell of each run of adjacent cells with equal coefficients (..., N).
 
     A cell with a reversal is a run of its own.
@@ -117,15 +122,15 @@ def _find_equal_cells(coefficients: list, marks) -> np.ndarray:
     table = np.concatenate(
         [coefficient.reshape(-1, coefficient.shape[-1]) for coefficient in coefficients]
     )
-    new = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
-    for mark in marks:
-        new[mark.cell : mark.cell + 2] = True
-    return np.flatnonzero(new)
+    is_first = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
+    for reversal in reversals:
+        is_first[reversal.cell : reversal.cell + 2] = True
+    return np.flatnonzero(is_first)
 
 
 def multiply_pairwise(steps) -> np.ndarray:
     """Return the ordered product of matrices (N, s, s), the first one rightmost, by pairs."""
     while len(steps) > 1:
-        rest = steps[-1:] if len(steps) % 2 else steps[:0]
-        steps = np.concatenate([steps[1::2] @ steps[0 : len(steps) - len(rest) : 2], rest])
+        unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
+        steps = np.concatenate([steps[1::2] @ steps[0 : len(steps) - len(unpaired) : 2], unpaired])
     return steps[0]

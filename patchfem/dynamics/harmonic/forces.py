@@ -46,26 +46,26 @@ class LawGroup:
 
     def with_samples(self, samples: int) -> "LawGroup":
         """Return a copy with another number of samples per cycle."""
-        other = object.__new__(LawGroup)
-        other.rows = self.rows
-        other.laws = self.laws
-        other.samples = samples
-        return other
+        copy = object.__new__(LawGroup)
+        copy.rows = self.rows
+        copy.laws = self.laws
+        copy.samples = samples
+        return copy
 
     def with_elements(self, change) -> "LawGroup":
         """Return a copy with replaced elastic-plastic elements.
 
         change: function of stiffness (t,) [N/m] and yield slide (t,) [m] that returns both of the new elements.
         """
-        other = self.with_samples(self.samples)
+        copy = self.with_samples(self.samples)
 
         def replace_elements(law):
             if isinstance(law, Jenkins):
                 return Jenkins(*change(law.stiffness, law.limit_slide))
             return law
 
-        other.laws = [tuple(map(replace_elements, laws)) for laws in self.laws]
-        return other
+        copy.laws = [tuple(map(replace_elements, laws)) for laws in self.laws]
+        return copy
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
         """Return the number of samples per cycle that resolves the harmonics and stick phases.
@@ -92,7 +92,7 @@ class LawGroup:
         """Return the tangent stiffness at rest of the laws on each interface row, (i,) [N/m]."""
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
-    def tracks(self, q, omega: float, samples: int = 0) -> list:
+    def sample_slides(self, q, omega: float, samples: int = 0) -> list:
         """Sample the slide of every interface row over a cycle.
 
         Parameters
@@ -113,7 +113,7 @@ class LawGroup:
         rates = evaluate_series(1j * np.arange(q.shape[1]) * q, n)
         return [SampledSlide(x, omega, n, v, r) for x, v, r in zip(q, values, rates)]
 
-    def forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
+    def compute_forces(self, q, omega: float, samples: int = 0) -> np.ndarray:
         """Return the friction forces (i, N) [N] of all interface rows at the samples of a cycle.
 
         Parameters
@@ -127,12 +127,12 @@ class LawGroup:
         -------
         ndarray
         """
-        tracks = self.tracks(q, omega, samples)
+        tracks = self.sample_slides(q, omega, samples)
         return np.array(
             [sum(law.sample(track).force for law in laws) for track, laws in zip(tracks, self.laws)]
         )
 
-    def force(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
+    def compute_force_harmonics(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
         """Return the harmonics (i, harmonics + 1) of the friction forces [N] at given slides.
 
         Parameters
@@ -145,10 +145,10 @@ class LawGroup:
         -------
         ndarray
         """
-        return find_harmonics(self.forces(q, omega, samples), harmonics)
+        return find_harmonics(self.compute_forces(q, omega, samples), harmonics)
 
     def __call__(self, q, omega: float) -> ContactResponse:
-        tracks = self.tracks(q, omega)
+        tracks = self.sample_slides(q, omega)
         sampled = [[law.sample(track) for law in laws] for track, laws in zip(tracks, self.laws)]
         return find_response(tracks, sampled)
 
@@ -171,41 +171,42 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     holds = [_sum_laws(laws, "hold") for laws in sampled]
     forces = [_sum_laws(laws, "force") for laws in sampled]
     slopes = [_sum_laws(laws, "slope") for laws in sampled]
-    moving = any(one is not None for one in rates)
-    lines = [*forces, *slopes, *(rates if moving else ())]
-    lines = [np.zeros(samples) if line is None else line for line in lines]
-    found = find_harmonics(
-        np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h
+    has_rates = any(rate_slopes is not None for rate_slopes in rates)
+    sampled_fields = [*forces, *slopes, *(rates if has_rates else ())]
+    sampled_fields = [np.zeros(samples) if values is None else values for values in sampled_fields]
+    harmonics = find_harmonics(
+        np.concatenate([np.array(sampled_fields), *(hold for hold in holds if hold is not None)]),
+        2 * h,
     )
-    slope = find_local_jacobians(found[rows : 2 * rows])
+    slope = find_local_jacobians(harmonics[rows : 2 * rows])
     rate = np.zeros((rows, h + 1), complex)
-    turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
-    at = 2 * rows
+    depends_on_omega = has_rates or any(s.tangent is not None for laws in sampled for s in laws)
+    first_hold = 2 * rows
     k = np.arange(1, h + 1)
 
-    def by_omega(turned, change):
+    def derivative_by_omega(jacobians, change):
         parts = np.concatenate([np.zeros((rows, 1)), change.real, change.imag], axis=1)
-        return np.einsum("ikl,il->ik", turned, parts)
+        return np.einsum("ikl,il->ik", jacobians, parts)
 
-    if moving:
-        turned = find_local_jacobians(found[at : at + rows])
-        at = at + rows
-        slope[..., 1 : h + 1] += turned[..., h + 1 :] * (k * omega)
-        slope[..., h + 1 :] -= turned[..., 1 : h + 1] * (k * omega)
-        rate += by_omega(turned, 1j * k * x[:, 1:])
+    if has_rates:
+        jacobians = find_local_jacobians(harmonics[first_hold : first_hold + rows])
+        first_hold = first_hold + rows
+        slope[..., 1 : h + 1] += jacobians[..., h + 1 :] * (k * omega)
+        slope[..., h + 1 :] -= jacobians[..., 1 : h + 1] * (k * omega)
+        rate += derivative_by_omega(jacobians, 1j * k * x[:, 1:])
     for i, (track, hold) in enumerate(zip(tracks, holds)):
         if hold is not None and len(hold):
             phase = np.arange(h + 1) * track.turning_points.angles[:, None]
             basis = np.concatenate([np.cos(phase), -np.sin(phase[:, 1:])], axis=1)
-            slope[i] += found[at : at + len(hold), : h + 1].T @ basis
-            at += len(hold)
+            slope[i] += harmonics[first_hold : first_hold + len(hold), : h + 1].T @ basis
+            first_hold += len(hold)
     for i, laws in enumerate(sampled):
         for law in laws:
             if law.tangent is not None:
                 to_slide, to_omega = law.tangent()
                 slope[i] += find_harmonics(to_slide.T, h).T
                 rate[i] += find_harmonics(to_omega, h)
-    return ContactResponse(found[:rows, : h + 1], slope, rate if turns else None)
+    return ContactResponse(harmonics[:rows, : h + 1], slope, rate if depends_on_omega else None)
 
 
 def _sum_laws(laws: list, name: str) -> np.ndarray | None:
@@ -236,11 +237,13 @@ def find_local_jacobians(k) -> np.ndarray:
     """
     h = k.shape[1] // 2
     # complex Fourier coefficients of exp(i m theta), m = -2 H..2 H
-    two = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)
-    less, more = (two[:, place] for place in _coefficient_positions(h))
+    coefficients = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)
+    difference_part, sum_part = (
+        coefficients[:, positions] for positions in _coefficient_positions(h)
+    )
     out = np.empty((len(k), h + 1, 2 * h + 1), complex)
-    out[..., : h + 1] = less + more
-    out[..., h + 1 :] = 1j * (less - more)[..., 1:]
+    out[..., : h + 1] = difference_part + sum_part
+    out[..., h + 1 :] = 1j * (difference_part - sum_part)[..., 1:]
     out[..., 0] = k[:, : h + 1]
     out[:, 0] = out[:, 0].real
     out[:, 0, 1:] /= 2

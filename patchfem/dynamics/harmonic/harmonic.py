@@ -95,42 +95,54 @@ def make_linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearP
     """
     n = modes.omega.size
     k = np.arange(harmonics + 1)
-    around = k * omega
-    slope = (-2 * k * around)[:, None, None] * np.eye(n) + 1j * k[
+    angular_rates = k * omega
+    slope = (-2 * k * angular_rates)[:, None, None] * np.eye(n) + 1j * k[
         :, None, None
     ] * modes.damping_matrix
     if modes.damping is None:
-        along = (
-            modes.omega**2 - around[:, None] ** 2 + 2j * around[:, None] * modes.zeta * modes.omega
+        stiffnesses = (
+            modes.omega**2
+            - angular_rates[:, None] ** 2
+            + 2j * angular_rates[:, None] * modes.zeta * modes.omega
         )
-        scale = np.maximum(modes.omega**2 + around[:, None] ** 2, omega**2)
-        bad = np.abs(along) < SINGULAR_RATIO * scale
+        scale = np.maximum(modes.omega**2 + angular_rates[:, None] ** 2, omega**2)
+        is_singular = np.abs(stiffnesses) < SINGULAR_RATIO * scale
         inverse = np.zeros((k.size, n, n), complex)
-        inverse[:, np.arange(n), np.arange(n)] = np.where(bad, 0.0, 1 / np.where(bad, 1.0, along))
+        inverse[:, np.arange(n), np.arange(n)] = np.where(
+            is_singular, 0.0, 1 / np.where(is_singular, 1.0, stiffnesses)
+        )
         unit = np.eye(n)
         return LinearPart(
             inverse,
             slope,
-            tuple((int(h), unit[j], unit[j], along[h, j]) for h, j in np.argwhere(bad)),
+            tuple(
+                (int(h), unit[j], unit[j], stiffnesses[h, j]) for h, j in np.argwhere(is_singular)
+            ),
         )
-    p = (
+    dynamic_stiffness = (
         np.diag(modes.omega**2)
-        - (around**2)[:, None, None] * np.eye(n)
-        + 1j * around[:, None, None] * modes.damping_matrix
+        - (angular_rates**2)[:, None, None] * np.eye(n)
+        + 1j * angular_rates[:, None, None] * modes.damping_matrix
     )
-    u, s, vh = np.linalg.svd(p)
-    bad = s < SINGULAR_RATIO * np.maximum(np.max(modes.omega) ** 2 + around[:, None] ** 2, omega**2)
+    u, s, vh = np.linalg.svd(dynamic_stiffness)
+    is_singular = s < SINGULAR_RATIO * np.maximum(
+        np.max(modes.omega) ** 2 + angular_rates[:, None] ** 2, omega**2
+    )
     inverse = (
-        vh.conj().transpose(0, 2, 1) * np.where(bad, 0.0, 1 / np.where(bad, 1.0, s))[:, None, :]
+        vh.conj().transpose(0, 2, 1)
+        * np.where(is_singular, 0.0, 1 / np.where(is_singular, 1.0, s))[:, None, :]
     ) @ u.conj().transpose(0, 2, 1)
     return LinearPart(
         inverse,
         slope,
-        tuple((int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j]) for h, j in np.argwhere(bad)),
+        tuple(
+            (int(h), vh[h, j].conj(), u[h, :, j].conj(), s[h, j])
+            for h, j in np.argwhere(is_singular)
+        ),
     )
 
 
-class System(NamedTuple):
+class BalanceEquations(NamedTuple):
     """Residual and Jacobian of the harmonic balance at given unknowns.
 
     - residual: (N,), jacobian: (N, N)
@@ -147,7 +159,7 @@ class System(NamedTuple):
     modal: np.ndarray | None = None
 
 
-class Balance:
+class HarmonicBalance:
     """Harmonic balance of a modal basis with contact forces on interface rows.
 
     rows: (i, n); contact: (q (i, H + 1), omega) -> ContactResponse.
@@ -167,21 +179,21 @@ class Balance:
                 "structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "
                 "balance is not needed; give a mode the key `slide`"
             )
-        full = rank == rows.shape[0]
+        is_independent = rank == rows.shape[0]
         self.modes = modes
         self.rows = rows
         self.contact = contact
-        self.lift = np.eye(rank) if full else u[:, :rank]
-        self.faces = rows if full else s[:rank, None] * vt[:rank]
+        self.lift = np.eye(rank) if is_independent else u[:, :rank]
+        self.faces = rows if is_independent else s[:rank, None] * vt[:rank]
         self._linear = {}
 
-    def with_contact(self, contact) -> "Balance":
+    def with_contact(self, contact) -> "HarmonicBalance":
         """Return a copy of the harmonic balance with another contact."""
-        other = object.__new__(Balance)
-        other.__dict__.update(self.__dict__, contact=contact)
-        return other
+        copy = object.__new__(HarmonicBalance)
+        copy.__dict__.update(self.__dict__, contact=contact)
+        return copy
 
-    def linear(self, omega: float, harmonics: int) -> LinearPart:
+    def get_linear_part(self, omega: float, harmonics: int) -> LinearPart:
         """Return the modal receptances at a frequency [rad/s], from a cache of nine frequencies."""
         key = (omega, harmonics)
         if key not in self._linear:
@@ -190,12 +202,12 @@ class Balance:
             self._linear[key] = make_linear_part(self.modes, omega, harmonics)
         return self._linear[key]
 
-    def size(self, omega: float, harmonics: int) -> int:
+    def count_unknowns(self, omega: float, harmonics: int) -> int:
         """Return the number of real unknowns at a frequency omega [rad/s]."""
-        free = self.linear(omega, harmonics).free
+        free = self.get_linear_part(omega, harmonics).free
         return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
 
-    def slides(self, x, omega: float, harmonics: int) -> np.ndarray:
+    def unpack_slides(self, x, omega: float, harmonics: int) -> np.ndarray:
         """Unpack the harmonics of the interface slides (i, H + 1) [m] from the unknowns.
 
         Parameters
@@ -211,7 +223,9 @@ class Balance:
         r = self.lift.shape[1]
         return self.lift @ unpack_harmonics(x[: r * (2 * harmonics + 1)], r)
 
-    def motion(self, x, omega: float, level: float, harmonics: int, force) -> np.ndarray:
+    def compute_modal_motion(
+        self, x, omega: float, level: float, harmonics: int, force
+    ) -> np.ndarray:
         """Return the modal harmonics (K + 1, n) [m] under drive and contact forces.
 
         Parameters
@@ -228,35 +242,37 @@ class Balance:
         -------
         ndarray
         """
-        top = force.shape[1] - 1
-        return self._motion(
-            self.linear(omega, top),
-            self._coordinates(x, self.linear(omega, harmonics), harmonics),
+        n_harmonics = force.shape[1] - 1
+        return self._compute_motion(
+            self.get_linear_part(omega, n_harmonics),
+            self._unpack_coordinates(x, self.get_linear_part(omega, harmonics), harmonics),
             level,
             force,
         )
 
-    def _coordinates(self, x, here: LinearPart, harmonics) -> list:
-        rest = x[self.lift.shape[1] * (2 * harmonics + 1) :]
-        out = []
-        at = 0
-        for k, *_ in here.free:
-            out.append(complex(rest[at], rest[at + 1] if k else 0.0))
-            at += 2 if k else 1
-        return out
+    def _unpack_coordinates(self, x, linear_part: LinearPart, harmonics) -> list:
+        free_unknowns = x[self.lift.shape[1] * (2 * harmonics + 1) :]
+        coordinates = []
+        position = 0
+        for k, *_ in linear_part.free:
+            coordinates.append(
+                complex(free_unknowns[position], free_unknowns[position + 1] if k else 0.0)
+            )
+            position += 2 if k else 1
+        return coordinates
 
-    def _motion(self, here, coordinates, level, force):
-        push = -(force.T @ self.rows) / self.modes.mass + 0j
-        if len(push) > 1:
-            push[1] += 1j * level * self.modes.base
-        z = np.einsum("kab,kb->ka", here.inverse, push)
-        for (k, right, *_), c in zip(here.free, coordinates):
+    def _compute_motion(self, linear_part, coordinates, level, force):
+        modal_force = -(force.T @ self.rows) / self.modes.mass + 0j
+        if len(modal_force) > 1:
+            modal_force[1] += 1j * level * self.modes.base
+        z = np.einsum("kab,kb->ka", linear_part.inverse, modal_force)
+        for (k, right, *_), c in zip(linear_part.free, coordinates):
             z[k] += right * c
         return z
 
-    def system(
-        self, x, omega: float, level: float, harmonics: int, here: LinearPart | None = None
-    ) -> System:
+    def evaluate(
+        self, x, omega: float, level: float, harmonics: int, linear_part: LinearPart | None = None
+    ) -> BalanceEquations:
         """Evaluate residual and Jacobian of the harmonic balance at given unknowns.
 
         Parameters
@@ -265,44 +281,55 @@ class Balance:
         omega, level : float
             Frequency [rad/s] and amplitude [m s-2] of the drive.
         harmonics : int
-        here : LinearPart, optional
+        linear_part : LinearPart, optional
             Receptances in place of those of the modes.
 
         Returns
         -------
-        System
+        BalanceEquations
         """
         h = harmonics
         r = self.lift.shape[1]
         mass = self.modes.mass
-        here = here or self.linear(omega, h)
-        coordinates = self._coordinates(x, here, h)
+        linear_part = linear_part or self.get_linear_part(omega, h)
+        coordinates = self._unpack_coordinates(x, linear_part, h)
         y = unpack_harmonics(x[: r * (2 * h + 1)], r)
-        fold = self.contact(self.lift @ y, omega)
-        z = self._motion(here, coordinates, level, fold.force[:, : h + 1])
-        through = -np.einsum("ra,kab->krb", self.faces, here.inverse)  # -faces R_k
-        miss = y - (z @ self.faces.T).T
-        receptance = -through @ self.faces.T / mass  # (H + 1, r, r)
-        linked = self.combine_slopes(fold.slope)
-        block = (receptance @ linked).reshape(h + 1, r, r, 2 * h + 1)
+        response = self.contact(self.lift @ y, omega)
+        z = self._compute_motion(linear_part, coordinates, level, response.force[:, : h + 1])
+        force_to_slide = -np.einsum("ra,kab->krb", self.faces, linear_part.inverse)  # -faces R_k
+        residual = y - (z @ self.faces.T).T
+        receptance = -force_to_slide @ self.faces.T / mass  # (H + 1, r, r)
+        reduced_slope = self.combine_slopes(response.slope)
+        block = (receptance @ reduced_slope).reshape(h + 1, r, r, 2 * h + 1)
         size = r * (2 * h + 1)
         jacobian = np.eye(x.size)
         block = _to_real_equations(block).transpose(1, 0, 2, 3).reshape(size, size)
         jacobian[:size, :size] += block
-        turned = -np.einsum("krb,kbc,kc->rk", through, here.slope, z)
-        if fold.rate is not None:
-            turned = turned + np.einsum("krs,sk->rk", receptance, self.lift.T @ fold.rate)
-        lifted = np.zeros((r, h + 1), complex)
+        by_omega = -np.einsum("krb,kbc,kc->rk", force_to_slide, linear_part.slope, z)
+        if response.rate is not None:
+            by_omega = by_omega + np.einsum("krs,sk->rk", receptance, self.lift.T @ response.rate)
+        by_level = np.zeros((r, h + 1), complex)
         if h:
-            lifted[:, 1] = 1j * through[1] @ self.modes.base
-        parts = [[pack_harmonics(miss)], [pack_harmonics(turned)], [pack_harmonics(lifted)]]
-        self._free(here, coordinates, jacobian, parts, fold, z, level, linked, omega, size)
-        return System(
+            by_level[:, 1] = 1j * force_to_slide[1] @ self.modes.base
+        parts = [[pack_harmonics(residual)], [pack_harmonics(by_omega)], [pack_harmonics(by_level)]]
+        self._append_free_equations(
+            linear_part,
+            coordinates,
+            jacobian,
+            parts,
+            response,
+            z,
+            level,
+            reduced_slope,
+            omega,
+            size,
+        )
+        return BalanceEquations(
             *[np.concatenate(parts[0])],
             jacobian,
             np.concatenate(parts[1]),
             np.concatenate(parts[2]),
-            fold,
+            response,
             z,
         )
 
@@ -326,11 +353,11 @@ class Balance:
         -------
         complex
         """
-        k, left, stiffness = free
-        drive = left @ self.modes.base if k == 1 else 0.0
+        k, left_vector, stiffness = free
+        drive = left_vector @ self.modes.base if k == 1 else 0.0
         return (
             stiffness * c
-            + left @ (self.rows.T @ force[:, k]) / self.modes.mass
+            + left_vector @ (self.rows.T @ force[:, k]) / self.modes.mass
             - 1j * level * drive
         ) / omega**2
 
@@ -342,11 +369,19 @@ class Balance:
         count, r = self.lift.shape
         h = slope.shape[1] - 1
         pairs = (self.lift[:, :, None] * self.lift[:, None, :]).reshape(count, r * r)
-        both = (pairs.T @ np.ascontiguousarray(slope).reshape(count, -1).view(float)).view(complex)
-        return both.reshape(r, r, h + 1, 2 * h + 1).transpose(2, 0, 1, 3).reshape(h + 1, r, -1)
+        combined = (pairs.T @ np.ascontiguousarray(slope).reshape(count, -1).view(float)).view(
+            complex
+        )
+        return combined.reshape(r, r, h + 1, 2 * h + 1).transpose(2, 0, 1, 3).reshape(h + 1, r, -1)
 
-    def is_rounding(
-        self, here: System, left, omega: float, level: float, harmonics: int, size: float
+    def is_round_off(
+        self,
+        equations: BalanceEquations,
+        residual,
+        omega: float,
+        level: float,
+        harmonics: int,
+        size: float,
     ) -> bool:
         """Return whether the residual after the last Newton step is due to round-off.
 
@@ -354,8 +389,8 @@ class Balance:
 
         Parameters
         ----------
-        here : LinearPart
-        left : ndarray
+        equations : LinearPart
+        residual : ndarray
             Residual after the step [m].
         omega : float
             [rad/s].
@@ -369,57 +404,77 @@ class Balance:
         -------
         bool
         """
-        low = self.lift.shape[1] * (2 * harmonics + 1)
-        push = float(np.linalg.norm(here.fold.force) * np.linalg.norm(self.rows)) / (
+        n_slide_unknowns = self.lift.shape[1] * (2 * harmonics + 1)
+        force_scale = float(np.linalg.norm(equations.fold.force) * np.linalg.norm(self.rows)) / (
             self.modes.mass * omega**2
         )
-        for part, own in ((slice(0, low), size), (slice(low, None), push)):
-            scale = own + abs(level) * float(np.linalg.norm(here.by_level[part]))
+        for part, part_scale in (
+            (slice(0, n_slide_unknowns), size),
+            (slice(n_slide_unknowns, None), force_scale),
+        ):
+            scale = part_scale + abs(level) * float(np.linalg.norm(equations.by_level[part]))
             # the residual of a solution is round-off; at a minimum of the residual without a root it is larger
-            if float(np.linalg.norm(left[part])) > 1e-7 * scale:
+            if float(np.linalg.norm(residual[part])) > 1e-7 * scale:
                 return False
         return True
 
-    def _free(self, here, coordinates, jacobian, parts, fold, z, level, linked, omega, size):
+    def _append_free_equations(
+        self,
+        linear_part,
+        coordinates,
+        jacobian,
+        parts,
+        response,
+        z,
+        level,
+        reduced_slope,
+        omega,
+        size,
+    ):
         """Append the equations of modal coordinates without receptance to the balance.
 
         The equations are divided by omega^2 [m].
         """
         h = z.shape[0] - 1
         r = self.lift.shape[1]
-        at = size
-        for (k, right, left, stiffness), c in zip(here.free, coordinates):
-            w = left @ self.rows.T / self.modes.mass / omega**2
-            drive = left @ self.modes.base / omega**2 if k == 1 else 0.0
-            miss = self.free_residual((k, left, stiffness), c, omega, level, fold.force)
-            by_omega = left @ here.slope[k] @ z[k] / omega**2 - 2 * miss / omega
-            if fold.rate is not None:
-                by_omega = by_omega + w @ fold.rate[:, k]
-            row = left @ self.faces.T / self.modes.mass / omega**2 @ linked[k]
-            across = self.faces @ right
+        position = size
+        for (k, right_vector, left_vector, stiffness), c in zip(linear_part.free, coordinates):
+            w = left_vector @ self.rows.T / self.modes.mass / omega**2
+            drive = left_vector @ self.modes.base / omega**2 if k == 1 else 0.0
+            residual = self.free_residual(
+                (k, left_vector, stiffness), c, omega, level, response.force
+            )
+            by_omega = left_vector @ linear_part.slope[k] @ z[k] / omega**2 - 2 * residual / omega
+            if response.rate is not None:
+                by_omega = by_omega + w @ response.rate[:, k]
+            row = left_vector @ self.faces.T / self.modes.mass / omega**2 @ reduced_slope[k]
+            slide_by_coordinate = self.faces @ right_vector
             count = 2 if k else 1
             for j in range(count):
                 unit = 1j**j
-                jacobian[at + j, :size] = (row.real, row.imag)[j]
-                own = stiffness / omega**2 * unit
+                jacobian[position + j, :size] = (row.real, row.imag)[j]
+                diagonal = stiffness / omega**2 * unit
                 column = np.zeros((r, h + 1), complex)
-                column[:, k] = -across * unit
-                jacobian[:size, at + j] = pack_harmonics(column)
-                jacobian[at : at + count, at + j] = [own.real, own.imag][:count]
-            for part, value in zip(parts, (miss, by_omega, -1j * drive)):
+                column[:, k] = -slide_by_coordinate * unit
+                jacobian[:size, position + j] = pack_harmonics(column)
+                jacobian[position : position + count, position + j] = [
+                    diagonal.real,
+                    diagonal.imag,
+                ][:count]
+            for part, value in zip(parts, (residual, by_omega, -1j * drive)):
                 part.append(np.array([value.real, value.imag][:count]))
-            at += count
+            position += count
 
 
 def solve_damped(
-    system, x, is_accepted, tolerance: float = 1e-10, max_steps: int = 40
+    evaluate, x, is_accepted, tolerance: float = 1e-10, max_steps: int = 40
 ) -> tuple | None:
     """Solve equations by damped Newton iteration with the natural monotonicity test.
 
     Parameters
     ----------
-    system : callable
-        system(x) -> BalanceEquations.
+    evaluate : callable
+        evaluate(x) -> BalanceEquations.
     x : ndarray
         (N,) initial guess.
     is_accepted : callable
@@ -435,28 +490,28 @@ def solve_damped(
     tuple or None
         Unknowns, BalanceEquations before the last step, and number of steps; None without convergence.
     """
-    here = system(x)
+    equations = evaluate(x)
     for count in range(1, max_steps + 1):
-        solve = solve_linear(here.jacobian)
-        step = -solve(here.residual)
+        solve = solve_linear(equations.jacobian)
+        step = -solve(equations.residual)
         length = float(np.linalg.norm(step))
         size = float(np.linalg.norm(x))
         if not np.isfinite(length):
             break
         if length <= tolerance * max(size, 1e-300) or length < 1e-300:
             return (
-                (x + step, here, count)
-                if is_accepted(here, here.residual + here.jacobian @ step, size)
+                (x + step, equations, count)
+                if is_accepted(equations, equations.residual + equations.jacobian @ step, size)
                 else None
             )
         fraction = 1.0
         best = None
         while True:
             trial = x + fraction * step
-            there = system(trial)
-            residual = float(np.linalg.norm(solve(there.residual)))
+            trial_equations = evaluate(trial)
+            residual = float(np.linalg.norm(solve(trial_equations.residual)))
             if best is None or residual < best[0] or not np.isfinite(best[0]):
-                best = (residual, trial, there)
+                best = (residual, trial, trial_equations)
             # natural monotonicity (Deuflhard): the next simplified step must be shorter; a tiny step is always
             # accepted
             if (
@@ -466,18 +521,18 @@ def solve_damped(
             ):
                 break
             fraction /= 2
-        _, x, here = best
+        _, x, equations = best
     return None
 
 
 def solve_newton(
-    balance: Balance, x, omega: float, level: float, harmonics: int, max_steps: int = 40
+    balance: HarmonicBalance, x, omega: float, level: float, harmonics: int, max_steps: int = 40
 ):
     """Solve a harmonic balance by damped Newton iteration from an initial guess.
 
     Parameters
     ----------
-    balance : Balance
+    balance : HarmonicBalance
     x : ndarray
         (N,) initial guess.
     omega, level : float
@@ -497,16 +552,16 @@ def solve_newton(
         If the residual does not decrease to round-off within `max_steps`.
     """
 
-    def is_accepted(here, left, size) -> bool:
-        return balance.is_rounding(here, left, omega, level, harmonics, size)
+    def is_accepted(equations, residual, size) -> bool:
+        return balance.is_round_off(equations, residual, omega, level, harmonics, size)
 
-    found = solve_damped(
-        lambda v: balance.system(v, omega, level, harmonics), x, is_accepted, max_steps=max_steps
+    solution = solve_damped(
+        lambda v: balance.evaluate(v, omega, level, harmonics), x, is_accepted, max_steps=max_steps
     )
-    if found is None:
-        at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
+    if solution is None:
+        conditions = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
         raise NotConverged(
-            f"accuracy.harmonics: harmonic balance with {at} did not converge in {max_steps} iterations; "
+            f"accuracy.harmonics: harmonic balance with {conditions} did not converge in {max_steps} iterations; "
             "give a motion to start from, or begin at a lower drive level"
         )
-    return found
+    return solution

@@ -148,8 +148,8 @@ class SampledSlide:
 def evaluate_series(x, samples: int) -> np.ndarray:
     """Evaluate Fourier series Re sum X_k exp(i k theta) at N samples of a cycle."""
     if 2 * x.shape[-1] > samples:
-        every = -(-2 * x.shape[-1] // samples)
-        return evaluate_series(x, samples * every)[..., ::every]
+        stride = -(-2 * x.shape[-1] // samples)
+        return evaluate_series(x, samples * stride)[..., ::stride]
     spectrum = np.zeros((*x.shape[:-1], samples // 2 + 1), complex)
     spectrum[..., : x.shape[-1]] = x * (samples / 2)
     spectrum[..., 0] *= 2
@@ -359,14 +359,14 @@ class FlowLaw(Law):
         """Return the periodic state of the law at the samples and reversals of a cycle."""
         angles, slides, cells, _ = track.turning_points
         n = track.samples
-        own = np.ones(track.samples + len(cells), bool)
-        own[cells + 1 + np.arange(len(cells))] = False
-        angle, q, speed = np.zeros((3, own.size))  # the velocity is 0 at a turning point
-        angle[own] = np.arange(n) * (2 * np.pi / n)
-        q[own] = track.q
-        speed[own] = track.omega * track.rate
-        angle[~own] = angles
-        q[~own] = slides
+        is_sample = np.ones(track.samples + len(cells), bool)
+        is_sample[cells + 1 + np.arange(len(cells))] = False
+        angle, q, speed = np.zeros((3, is_sample.size))  # the velocity is 0 at a turning point
+        angle[is_sample] = np.arange(n) * (2 * np.pi / n)
+        q[is_sample] = track.q
+        speed[is_sample] = track.omega * track.rate
+        angle[~is_sample] = angles
+        q[~is_sample] = slides
         dt = np.maximum(np.diff(angle, append=2 * np.pi) / track.omega, 1e-300)
         z = np.empty(q.size)
         steps = np.empty((3, q.size))
@@ -375,7 +375,7 @@ class FlowLaw(Law):
         load_flow_kernels(self.element.kernels).solve_cycle(
             self.element.numbers[None], q, speed, dt, z, steps, force, slopes
         )
-        return FlowNodes(angle, own, dt, z, steps, force, slopes)
+        return FlowNodes(angle, is_sample, dt, z, steps, force, slopes)
 
     def sample(self, track: SampledSlide) -> SampledForce:
         """Return the steady periodic force at the samples of a slide.
@@ -383,50 +383,53 @@ class FlowLaw(Law):
         For a rate-independent law the derivatives are those with respect to the slide and its
         reversals, otherwise those with respect to the harmonics.
         """
-        one = self.find_periodic_state(track)
-        own = one.own
-        force = one.force[one.own]
-        stretch = self.element.limit * one.z[one.own]
-        if one.steps[2].any() or one.slopes[1].any():
+        nodes = self.find_periodic_state(track)
+        is_sample = nodes.own
+        force = nodes.force[nodes.own]
+        stretch = self.element.limit * nodes.z[nodes.own]
+        if nodes.steps[2].any() or nodes.slopes[1].any():
             return SampledForce(
                 force,
                 limit=self.element.limit,
                 stretch=stretch,
-                tangent=lambda: self._tangent(track, one),
+                tangent=lambda: self._compute_tangent(track, nodes),
             )
         # dz/dq at the end of a step is the derivative of z by the slide; at its start this derivative is also divided by the
         # fraction of z that the step keeps
-        before = np.roll(one.steps[1], 1)
-        after = one.steps[1] / np.maximum(one.steps[0], 1e-300)
-        hold = one.find_remainders(np.flatnonzero(~own)) * (before - after)[~own, None]
+        before = np.roll(nodes.steps[1], 1)
+        after = nodes.steps[1] / np.maximum(nodes.steps[0], 1e-300)
+        hold = (
+            nodes.find_remainders(np.flatnonzero(~is_sample)) * (before - after)[~is_sample, None]
+        )
         return SampledForce(
             force,
-            (one.slopes[0] * before)[own],
+            (nodes.slopes[0] * before)[is_sample],
             None,
-            (one.slopes[0] * hold)[:, own],
+            (nodes.slopes[0] * hold)[:, is_sample],
             self.element.limit,
             stretch,
         )
 
-    def _tangent(self, track: SampledSlide, one: "FlowNodes") -> tuple:
+    def _compute_tangent(self, track: SampledSlide, nodes: "FlowNodes") -> tuple:
         """Return the derivatives of the force by the harmonics of the slide and the frequency.
 
         See `SampledForce.tangent`.
 
         """
         k = np.arange(track.x.size)
-        own = one.own
-        turned = np.exp(1j * np.outer(one.angle, k))
+        is_sample = nodes.own
+        exponentials = np.exp(1j * np.outer(nodes.angle, k))
         wave, rate = (
-            np.concatenate([x.real, -x.imag[:, 1:]], axis=1) for x in (turned, 1j * k * turned)
+            np.concatenate([x.real, -x.imag[:, 1:]], axis=1)
+            for x in (exponentials, 1j * k * exponentials)
         )
-        out = np.empty((one.angle.size, wave.shape[1] + 1))
+        out = np.empty((nodes.angle.size, wave.shape[1] + 1))
         out[:, :-1] = np.roll(wave, -1, axis=0) - wave
-        out[:, -1] = -one.dt / track.omega
-        load_flow_kernels(self.element.kernels).solve_tangents(one.steps, out)
-        out = out[own] * one.slopes[0, own, None]
-        out[:, :-1] += one.slopes[1, own, None] * track.omega * rate[own]
-        out[:, -1] += one.slopes[1, own] * track.rate
+        out[:, -1] = -nodes.dt / track.omega
+        load_flow_kernels(self.element.kernels).solve_tangents(nodes.steps, out)
+        out = out[is_sample] * nodes.slopes[0, is_sample, None]
+        out[:, :-1] += nodes.slopes[1, is_sample, None] * track.omega * rate[is_sample]
+        out[:, -1] += nodes.slopes[1, is_sample] * track.rate
         return out[:, :-1], out[:, -1]
 
 
@@ -452,26 +455,30 @@ class FlowNodes(NamedTuple):
 
         It is 0 for a law whose memory does not fade.
         """
-        fall = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
-        since = (
-            fall[:-1]
-            - fall[nodes, None]
-            + np.where(np.arange(self.z.size) < nodes[:, None], fall[-1], 0.0)
+        log_decay = np.append(0.0, np.cumsum(np.log(np.maximum(self.steps[0], 1e-300))))
+        log_remainder = (
+            log_decay[:-1]
+            - log_decay[nodes, None]
+            + np.where(np.arange(self.z.size) < nodes[:, None], log_decay[-1], 0.0)
         )
-        forgets = -np.expm1(fall[-1])
-        return np.exp(since) / forgets if forgets > 1e-12 else np.zeros_like(since)
+        cycle_loss = -np.expm1(log_decay[-1])
+        return (
+            np.exp(log_remainder) / cycle_loss
+            if cycle_loss > 1e-12
+            else np.zeros_like(log_remainder)
+        )
 
     def find_cell_factors(self) -> tuple:
         """Return the decay factor (N,) of the stretch per cell and its derivative by the slide."""
-        kept, by_slide, _ = self.steps
+        decay, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
-        turns = ~self.own
-        share = np.ones(self.z.size)
-        share[turns] = self.dt[turns]
-        share[np.roll(turns, -1)] = self.dt[np.roll(turns, -1)]
-        share[turns | np.roll(turns, -1)] /= self.dt[self.own][0]
-        later = np.where(np.roll(turns, -1), np.roll(kept, -1), 1.0)
-        return np.multiply.reduceat(kept, first), np.add.reduceat(by_slide * share * later, first)
+        is_reversal = ~self.own
+        weight = np.ones(self.z.size)
+        weight[is_reversal] = self.dt[is_reversal]
+        weight[np.roll(is_reversal, -1)] = self.dt[np.roll(is_reversal, -1)]
+        weight[is_reversal | np.roll(is_reversal, -1)] /= self.dt[self.own][0]
+        later = np.where(np.roll(is_reversal, -1), np.roll(decay, -1), 1.0)
+        return np.multiply.reduceat(decay, first), np.add.reduceat(by_slide * weight * later, first)
 
 
 def _count_samples(stick_fraction: float) -> int:
@@ -491,16 +498,16 @@ def make_law(model):
     PatchfemError
         If harmonic balance cannot treat it; the message says what to do.
     """
-    one = model.element
-    form = one.form if one is not None else ""
+    element = model.element
+    form = element.form if element is not None else ""
     if form == "parallel":
-        count = int(one.numbers[1])
-        return Jenkins(one.numbers[2 : 2 + count], one.numbers[2 + count :])
+        count = int(element.numbers[1])
+        return Jenkins(element.numbers[2 : 2 + count], element.numbers[2 + count :])
     if form == "speed":
-        return SpeedLaw(one)
+        return SpeedLaw(element)
     # bond points whose bonds neither grow nor break gradually have one stretch as their memory
-    if form == "flow" or (form == "points" and one.numbers[3] < 0 and not one.numbers[8]):
-        return FlowLaw(one)
+    if form == "flow" or (form == "points" and element.numbers[3] < 0 and not element.numbers[8]):
+        return FlowLaw(element)
     if model.set_valued:
         raise PatchfemError(
             'accuracy.method: "harmonic" '

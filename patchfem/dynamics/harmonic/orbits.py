@@ -12,27 +12,27 @@ import numpy as np
 from ..march.recording import make_mark, read_output_extremes
 
 # number of cycles from the start to the first extrapolation
-FIRST_CYCLES = 6
+N_FIRST_CYCLES = 6
 # number of cycles after an extrapolation in which the memory of the contact adapts to the new state
-MEMORY_CYCLES = 2
+N_MEMORY_CYCLES = 2
 # largest number of cycles that are marched
 MAX_CYCLES = 600
 # ratio of the changes per cycle after and before an extrapolation; above it the next one is postponed twice as long
-MIN_GAIN = 0.1
+MAX_CHANGE_RATIO = 0.1
 # relative change of the state in a cycle, below which the motion counts as periodic
 PERIODIC_TOL = 1e-8
 # motion over that of a free mass under the drive, below which the rig counts as at rest
 REST_RATIO = 1e-9
 # perturbation over the largest state for the estimate of multipliers: far above round-off, yet nearly linear
-DISTURBANCE = 1e-6
+PERTURBATION_RATIO = 1e-6
 # number of cycles in which the memory of the contact adapts to a perturbation
-SETTLING_CYCLES = 2
+N_SETTLING_CYCLES = 2
 # number of cycles that are marched after a perturbation
-N_DISTURBED_CYCLES = 8
+N_PERTURBED_CYCLES = 8
 # smallest singular value of the perturbations, over the largest one, that is not round-off
 MIN_SINGULAR_RATIO = 1e-3
 # perturbation over its initial value, below which it has decayed
-MIN_DISTURBANCE = 1e-5
+MIN_PERTURBATION_RATIO = 1e-5
 
 
 def march_to_periodic(run) -> float:
@@ -42,36 +42,36 @@ def march_to_periodic(run) -> float:
     if the march ended early.
     """
     size = 2 * run.state.shape[1] + 2
-    done = 0
-    before = _state(run)
-    least = (
+    n_cycles = 0
+    before = _scaled_state(run)
+    min_size = (
         REST_RATIO
         * float(np.abs(run.drive.values(np.linspace(0, run.drive.period, 9))).max())
         / _fastest_rate(run) ** 2
     )
-    least = max(least * _size(run.modes.base), 1e-300)
+    min_size = max(min_size * _max_magnitude(run.modes.base), 1e-300)
     change = np.inf
-    misses = 0
-    waiting = 0
-    while done < MAX_CYCLES and run.outcome is None:
-        kept = [before]
-        for _ in range((FIRST_CYCLES if done == 0 else MEMORY_CYCLES) + size):
+    n_failures = 0
+    n_waiting = 0
+    while n_cycles < MAX_CYCLES and run.outcome is None:
+        states = [before]
+        for _ in range((N_FIRST_CYCLES if n_cycles == 0 else N_MEMORY_CYCLES) + size):
             run.march_cycle(run.prop.steps, 0, [])
-            done += 1
-            kept.append(_state(run))
+            n_cycles += 1
+            states.append(_scaled_state(run))
             if run.outcome is not None:
                 break
         last = change
-        change = _size(kept[-1] - kept[-2]) / max(_size(kept[-1]), least)
+        change = _max_magnitude(states[-1] - states[-2]) / max(_max_magnitude(states[-1]), min_size)
         if change <= PERIODIC_TOL or run.outcome is not None:
             break
-        if waiting == 0:  # judge the last extrapolation by the cycles since
-            misses = 0 if change < MIN_GAIN * last else misses + 1
-            waiting = 2**misses
-        waiting -= 1
-        before = _extrapolate(kept[-size:]) if waiting == 0 else None
+        if n_waiting == 0:  # judge the last extrapolation by the cycles since
+            n_failures = 0 if change < MAX_CHANGE_RATIO * last else n_failures + 1
+            n_waiting = 2**n_failures
+        n_waiting -= 1
+        before = _extrapolate(states[-size:]) if n_waiting == 0 else None
         if before is None:
-            before = kept[-1]
+            before = states[-1]
         else:
             run.move_to(*_split_state(run, before))
     return float(change)
@@ -84,61 +84,61 @@ def march_cycle(run, frames: int = 0) -> tuple:
     """
     run.reset_balance()
     snapshots = []
-    part = run.march_cycle(run.prop.steps, frames, snapshots)
+    cycle = run.march_cycle(run.prop.steps, frames, snapshots)
     run.check_steps()
-    return make_mark(run, [part], read_output_extremes([part], run)), snapshots
+    return make_mark(run, [cycle], read_output_extremes([cycle], run)), snapshots
 
 
 def estimate_multipliers(run) -> np.ndarray:
     """Estimate the Floquet multipliers (2 n,) of a periodic march by perturbed marches.
 
     They are in decreasing magnitude. Each march perturbs one number of the present state. In the first
-    SETTLING_CYCLES the memory of the contact adapts; the map of a cycle is fitted to the cycles that
+    N_SETTLING_CYCLES the memory of the contact adapts; the map of a cycle is fitted to the cycles that
     follow in least squares. Memories that fade slowly bias the fit: no multiplier counts as larger
     than 1 unless the perturbation grew as much.
     """
-    here = _state(run)
-    found = []
-    nudge = DISTURBANCE * max(_size(here), 1e-300)
-    for k in range(-1, here.size):
-        twin = run.fork(run.drive)
-        there = here.copy()
-        there[k] += nudge if k >= 0 else 0.0
-        twin.move_to(*_split_state(run, there))
+    state = _scaled_state(run)
+    runs = []
+    perturbation = PERTURBATION_RATIO * max(_max_magnitude(state), 1e-300)
+    for k in range(-1, state.size):
+        perturbed_run = run.fork(run.drive)
+        perturbed_state = state.copy()
+        perturbed_state[k] += perturbation if k >= 0 else 0.0
+        perturbed_run.move_to(*_split_state(run, perturbed_state))
         states = []
-        for _ in range(N_DISTURBED_CYCLES):
-            twin.march_cycle(twin.prop.steps, 0, [])
-            states.append(_state(twin))
-        found.append(states)
+        for _ in range(N_PERTURBED_CYCLES):
+            perturbed_run.march_cycle(perturbed_run.prop.steps, 0, [])
+            states.append(_scaled_state(perturbed_run))
+        runs.append(states)
     # perturbations (cycles, 2 n, 2 n) after each cycle
-    after = np.moveaxis(np.array(found[1:]) - np.array(found[0]), 0, 2) / nudge
-    sizes = np.abs(after).max(axis=(1, 2))
-    last = SETTLING_CYCLES + int(
-        np.argmax(np.append(sizes[SETTLING_CYCLES:] < MIN_DISTURBANCE, True))
+    perturbations = np.moveaxis(np.array(runs[1:]) - np.array(runs[0]), 0, 2) / perturbation
+    sizes = np.abs(perturbations).max(axis=(1, 2))
+    last = N_SETTLING_CYCLES + int(
+        np.argmax(np.append(sizes[N_SETTLING_CYCLES:] < MIN_PERTURBATION_RATIO, True))
     )
-    first = min(SETTLING_CYCLES, last) - 1
+    first = min(N_SETTLING_CYCLES, last) - 1
     if last - first < 2:
         first = 0
         last = 2
     pairs = [
-        (after[k] / sizes[k], after[k + 1] / sizes[k])
+        (perturbations[k] / sizes[k], perturbations[k + 1] / sizes[k])
         for k in range(first, last - 1)
         if sizes[k] > 0
     ]
     if not pairs:
-        return np.zeros(here.size)
-    now, then = (np.concatenate(part, axis=1) for part in zip(*pairs))
-    values = np.linalg.eigvals(then @ np.linalg.pinv(now, rcond=MIN_SINGULAR_RATIO))
-    grown = (
+        return np.zeros(state.size)
+    starts, ends = (np.concatenate(part, axis=1) for part in zip(*pairs))
+    values = np.linalg.eigvals(ends @ np.linalg.pinv(starts, rcond=MIN_SINGULAR_RATIO))
+    growth = (
         (sizes[last - 1] / sizes[first]) ** (1 / max(last - 1 - first, 1))
         if sizes[first] > 0
         else 0.0
     )
-    values /= np.maximum(np.abs(values) / max(grown, 1.0), 1.0)
+    values /= np.maximum(np.abs(values) / max(growth, 1.0), 1.0)
     return values[np.argsort(-np.abs(values))]
 
 
-def _state(run) -> np.ndarray:
+def _scaled_state(run) -> np.ndarray:
     """Return the state (2 n,) [m] of a run: coordinates, and rates over the fastest rate."""
     return np.concatenate([run.state[0], run.state[1] / _fastest_rate(run)])
 
@@ -153,22 +153,22 @@ def _split_state(run, state) -> tuple:
     return state[:n], state[n:] * _fastest_rate(run)
 
 
-def _size(state) -> float:
+def _max_magnitude(state) -> float:
     return float(np.abs(state).max(initial=0.0))
 
 
-def _extrapolate(kept):
+def _extrapolate(successive_states):
     """Extrapolate the limit of successive states (k, 2 n) by reduced rank extrapolation.
 
     The limit is the weighted mean of the states with the smallest change. The result is None if the
     extrapolation is ill-conditioned.
     """
-    states = np.array(kept)
+    states = np.array(successive_states)
     changes = np.diff(states, axis=0)
-    rise = np.diff(changes, axis=0)
-    if not _size(rise) > 0:
+    second_differences = np.diff(changes, axis=0)
+    if not _max_magnitude(second_differences) > 0:
         return None
-    share = np.linalg.lstsq(rise.T, -changes[0], rcond=1e-10)[0]
-    if _size(share) > 1e6:
+    weights = np.linalg.lstsq(second_differences.T, -changes[0], rcond=1e-10)[0]
+    if _max_magnitude(weights) > 1e6:
         return None
-    return states[0] + share @ changes[:-1]
+    return states[0] + weights @ changes[:-1]

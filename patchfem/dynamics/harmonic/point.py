@@ -14,16 +14,23 @@ import numpy as np
 from ...core import NotConverged
 from .continuation import PathSettings, follow_curve
 from .forces import LawGroup
-from .harmonic import Balance, System, pack_harmonics, solve_linear, solve_newton, unpack_harmonics
+from .harmonic import (
+    BalanceEquations,
+    HarmonicBalance,
+    pack_harmonics,
+    solve_linear,
+    solve_newton,
+    unpack_harmonics,
+)
 from .laws import Interlock, SampledSlide, evaluate_series
 from .starts import find_one_harmonic_roots
 
 # numbers of harmonics that are tried in turn, each about twice the one before
 HARMONIC_COUNTS = (7, 15, 31, 63, 127, 255)
 # ratio of all harmonics to those that Newton's method solves for; the others follow from the force
-FOLLOWING_RATIO = 4
+ALL_HARMONICS_RATIO = 4
 # numbers of harmonics that are solved in turn where the direct solution with many harmonics fails
-CLIMB_COUNTS = (11, 15, 23, 31, 47, 63, 95, 127, 191)
+INTERMEDIATE_HARMONIC_COUNTS = (11, 15, 23, 31, 47, 63, 95, 127, 191)
 # largest number of sweeps over the harmonics that follow from the force
 MAX_SWEEPS = 40
 # change in the last sweep over the tolerance, so that the sweeps add no error
@@ -86,7 +93,7 @@ class SteadyMotion:
         y = evaluate_series(self.modal @ np.asarray(row, float), samples)
         return (find_peak(y) + find_peak(-y)) / 2
 
-    def turns(self) -> tuple:
+    def find_reversals(self) -> tuple:
         """Return slide [m], friction force [N] and slip [m] of the first row at both reversals.
 
         The result is () for an interface at rest.
@@ -97,23 +104,23 @@ class SteadyMotion:
         if not angles.size:
             return ()
         k = np.arange(self.coefficients.shape[1])
-        out = []
-        for at in (
+        reversals = []
+        for index in (
             np.argmin(places),
             np.argmax(places),
         ):  # the cycle begins at the reversal, so its first sample is the reversal
             track = SampledSlide(
-                self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples
+                self.coefficients[0] * np.exp(1j * k * angles[index]), self.omega, self.samples
             )
-            found = [law.sample(track) for law in self.group.laws[0]]
-            out.append(
+            sampled = [law.sample(track) for law in self.group.laws[0]]
+            reversals.append(
                 (
-                    float(places[at]),
-                    float(friction_force(self.group.laws[0], found)[0]),
-                    float(find_slip(track, found)[0]),
+                    float(places[index]),
+                    float(friction_force(self.group.laws[0], sampled)[0]),
+                    float(find_slip(track, sampled)[0]),
                 )
             )
-        return tuple(out)
+        return tuple(reversals)
 
 
 def friction_force(laws: tuple, sampled: list) -> np.ndarray:
@@ -122,18 +129,20 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
     The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not
     friction.
     """
-    friction = [one.force for law, one in zip(laws, sampled) if not isinstance(law, Interlock)]
-    return sum(friction or [one.force for one in sampled])
+    friction = [
+        law_force.force for law, law_force in zip(laws, sampled) if not isinstance(law, Interlock)
+    ]
+    return sum(friction or [law_force.force for law_force in sampled])
 
 
-def find_slip(track: SampledSlide, found: list) -> np.ndarray:
+def find_slip(track: SampledSlide, sampled: list) -> np.ndarray:
     """Return the slip (N,) [m] of an interface row from its sampled laws.
 
     The slip is the slide minus the mean elastic stretch; it is 0 without friction.
 
     """
-    limit = sum(one.limit for one in found)
-    stretch = sum(one.stretch for one in found if one.stretch is not None)
+    limit = sum(law_force.limit for law_force in sampled)
+    stretch = sum(law_force.stretch for law_force in sampled if law_force.stretch is not None)
     return track.q - stretch / limit if limit > 0 else np.zeros(track.samples)
 
 
@@ -159,7 +168,7 @@ def make_group(modes, group) -> LawGroup:
     return group if isinstance(group, LawGroup) else LawGroup(modes, group)
 
 
-def make_balance(modes, group: LawGroup, samples: int) -> Balance:
+def make_balance(modes, group: LawGroup, samples: int) -> HarmonicBalance:
     """Return the harmonic balance of a law group with a number of samples per cycle.
 
     Parameters
@@ -170,10 +179,10 @@ def make_balance(modes, group: LawGroup, samples: int) -> Balance:
 
     Returns
     -------
-    Balance
+    HarmonicBalance
     """
-    gridded = group.with_samples(samples)
-    return Balance(modes, gridded.rows, gridded)
+    sampled_group = group.with_samples(samples)
+    return HarmonicBalance(modes, sampled_group.rows, sampled_group)
 
 
 def find_point(
@@ -203,45 +212,53 @@ def find_point(
         If no balance is found, or no number of harmonics meets the tolerance.
     """
     group = make_group(modes, group)
-    x, near = (
+    x, min_samples = (
         (start.unknowns, start.base_samples) if isinstance(start, SteadyMotion) else (start, 0)
     )
     if harmonics is not None:
-        return _solve_harmonics(modes, drive, group, harmonics, x, 1, near=near)
-    found = None
-    least = (
-        start.harmonics if isinstance(start, SteadyMotion) else _min_harmonics(modes, drive, group)
+        return _solve_harmonics(modes, drive, group, harmonics, x, 1, near=min_samples)
+    motion = None
+    min_count = (
+        start.harmonics
+        if isinstance(start, SteadyMotion)
+        else _estimate_min_harmonics(modes, drive, group)
     )
-    for h in [h for h in HARMONIC_COUNTS if h >= least] or HARMONIC_COUNTS[-1:]:
+    for h in [h for h in HARMONIC_COUNTS if h >= min_count] or HARMONIC_COUNTS[-1:]:
         try:
-            found = _solve_harmonics(modes, drive, group, h, x, FOLLOWING_RATIO, tolerance, near)
+            motion = _solve_harmonics(
+                modes, drive, group, h, x, ALL_HARMONICS_RATIO, tolerance, min_samples
+            )
         except _Unbounded:
             raise
         except NotConverged:
             if h == HARMONIC_COUNTS[-1]:
                 raise
             continue
-        if found.error <= tolerance:
-            return found
-        x = with_harmonics(
-            make_balance(modes, group, 0), found.coefficients, found.unknowns, h, _next_harmonics(h)
+        if motion.error <= tolerance:
+            return motion
+        x = change_harmonic_count(
+            make_balance(modes, group, 0),
+            motion.coefficients,
+            motion.unknowns,
+            h,
+            _next_harmonic_count(h),
         )
-    if found is None or found.error > tolerance:
+    if motion is None or motion.error > tolerance:
         raise NotConverged(
             f"accuracy.tolerance: with {HARMONIC_COUNTS[-1]} harmonics the motion still has an error of "
-            f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
+            f"{motion.error if motion else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
             'use accuracy.method = "march"'
         )
-    return found
+    return motion
 
 
-def _min_harmonics(modes, drive, group) -> float:
+def _estimate_min_harmonics(modes, drive, group) -> float:
     """Return the number of harmonics (<= 63) above which inertia exceeds the contact stiffness."""
     stiff = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1))) / modes.mass
     return min(np.sqrt(stiff) / drive.omega, 63)
 
 
-def _next_harmonics(h: int) -> int:
+def _next_harmonic_count(h: int) -> int:
     return (
         HARMONIC_COUNTS[min(HARMONIC_COUNTS.index(h) + 1, len(HARMONIC_COUNTS) - 1)]
         if h in HARMONIC_COUNTS
@@ -249,12 +266,12 @@ def _next_harmonics(h: int) -> int:
     )
 
 
-def with_harmonics(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
+def change_harmonic_count(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
     """Convert the unknowns of a balance with h harmonics to another number of harmonics.
 
     Parameters
     ----------
-    balance : Balance
+    balance : HarmonicBalance
     slides : ndarray
         (i, K + 1) harmonics of the slides [m]; they are truncated or padded with zeros.
     unknowns : ndarray
@@ -271,7 +288,7 @@ def with_harmonics(balance, slides, unknowns, h: int, harmonics: int) -> np.ndar
     return np.concatenate([pack_harmonics(y), unknowns[y.shape[0] * (2 * h + 1) :]])
 
 
-def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
+def refine_point(motion: SteadyMotion, modes, drive) -> SteadyMotion:
     """Recompute a steady motion with twice its harmonics and samples.
 
     One harmonic becomes three, because a symmetric law has no even ones. NotConverged is raised if it
@@ -279,7 +296,7 @@ def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
 
     Parameters
     ----------
-    found : SteadyMotion
+    motion : SteadyMotion
     modes : ModalBasis
     drive
 
@@ -287,18 +304,23 @@ def refine_point(found: SteadyMotion, modes, drive) -> SteadyMotion:
     -------
     SteadyMotion
     """
-    h = found.harmonics
-    x = found.unknowns
-    top = max(2 * (found.coefficients.shape[1] - 1), 3)
-    balance = make_balance(modes, found.group, 2 * found.base_samples)
-    here = balance.system(x, drive.omega, drive.acceleration, h)
-    one = _add_harmonics(
-        balance, SweepStart(x, here, 0, found.coefficients), drive, h, top // h, DEFAULT_TOLERANCE
+    h = motion.harmonics
+    x = motion.unknowns
+    n_harmonics = max(2 * (motion.coefficients.shape[1] - 1), 3)
+    balance = make_balance(modes, motion.group, 2 * motion.base_samples)
+    equations = balance.evaluate(x, drive.omega, drive.acceleration, h)
+    refined = _add_harmonics(
+        balance,
+        SweepStart(x, equations, 0, motion.coefficients),
+        drive,
+        h,
+        n_harmonics // h,
+        DEFAULT_TOLERANCE,
     )
     return (
-        one
-        if np.isfinite(one.error)
-        else _solve_harmonics(modes, drive, balance.contact, top, x, 1)
+        refined
+        if np.isfinite(refined.error)
+        else _solve_harmonics(modes, drive, balance.contact, n_harmonics, x, 1)
     )
 
 
@@ -314,124 +336,134 @@ def _solve_harmonics(
     samples = group.samples or max(group.samples_for(h * wider), near)
     balance = make_balance(modes, group, samples)
     for _ in range(3):
-        x, here, count = _solve_balance(balance, x, drive, h)
-        swing = (
+        x, equations, count = _solve_balance(balance, x, drive, h)
+        amplitudes = (
             np.ptp(
-                evaluate_series(balance.slides(x, drive.omega, h), 2 ** (h + 64).bit_length()),
+                evaluate_series(
+                    balance.unpack_slides(x, drive.omega, h), 2 ** (h + 64).bit_length()
+                ),
                 axis=1,
             )
             / 2
         )
-        want = group.samples or group.samples_for(h * wider, swing)
-        if want <= balance.contact.samples:
+        needed_samples = group.samples or group.samples_for(h * wider, amplitudes)
+        if needed_samples <= balance.contact.samples:
             break
-        balance = balance.with_contact(balance.contact.with_samples(want))
-    return _add_harmonics(balance, SweepStart(x, here, count), drive, h, wider, tolerance)
+        balance = balance.with_contact(balance.contact.with_samples(needed_samples))
+    return _add_harmonics(balance, SweepStart(x, equations, count), drive, h, wider, tolerance)
 
 
 def _solve_balance(balance, x, drive, h: int):
     """Solve a harmonic balance from several initial guesses in turn, last from weaker drives."""
     omega = drive.omega
     level = drive.acceleration
-    for start in _iterate_starts(balance, x, omega, level, h):
+    for start in _generate_guesses(balance, x, omega, level, h):
         try:
             return solve_newton(balance, start, omega, level, h)
         except NotConverged:
             pass
-    return solve_newton(balance, _climb_harmonics(balance, omega, level, h), omega, level, h)
+    return solve_newton(balance, _raise_harmonics(balance, omega, level, h), omega, level, h)
 
 
-def _iterate_starts(balance, x, omega, level, h: int):
+def _generate_guesses(balance, x, omega, level, h: int):
     """Yield initial guesses for Newton's method, the most promising first."""
     r = balance.lift.shape[1]
     if x is not None:
-        free = sum(1 if k == 0 else 2 for k, *_ in balance.linear(omega, h).free)
-        have, rest = divmod(x.size - free - r, 2 * r)
-        if have >= 0 and not rest:
-            yield with_harmonics(
-                balance, balance.lift @ unpack_harmonics(x[: r * (2 * have + 1)], r), x, have, h
+        free = sum(1 if k == 0 else 2 for k, *_ in balance.get_linear_part(omega, h).free)
+        n_harmonics, rest = divmod(x.size - free - r, 2 * r)
+        if n_harmonics >= 0 and not rest:
+            yield change_harmonic_count(
+                balance,
+                balance.lift @ unpack_harmonics(x[: r * (2 * n_harmonics + 1)], r),
+                x,
+                n_harmonics,
+                h,
             )
     yield _solve_stuck(balance, omega, level, h)
     for one_harmonic_root in find_one_harmonic_roots(balance, omega, level):
-        yield with_harmonics(
-            balance, balance.slides(one_harmonic_root, omega, 1), one_harmonic_root, 1, h
+        yield change_harmonic_count(
+            balance, balance.unpack_slides(one_harmonic_root, omega, 1), one_harmonic_root, 1, h
         )
 
 
-def _climb_harmonics(balance, omega, level, h: int) -> np.ndarray:
+def _raise_harmonics(balance, omega, level, h: int) -> np.ndarray:
     """Return an initial guess by raising the number of harmonics step by step.
 
     Few harmonics are inexpensive to follow from weaker drives.
 
     """
-    below = min(HARMONIC_COUNTS[0], h)
-    x = _follow_levels(balance, omega, level, below)
-    for more in [k for k in CLIMB_COUNTS if below < k < h] + [h] * (h > below):
+    n_solved = min(HARMONIC_COUNTS[0], h)
+    x = _follow_levels(balance, omega, level, n_solved)
+    for n_harmonics in [k for k in INTERMEDIATE_HARMONIC_COUNTS if n_solved < k < h] + [h] * (
+        h > n_solved
+    ):
         try:
-            start = with_harmonics(balance, balance.slides(x, omega, below), x, below, more)
-            x = solve_newton(balance, start, omega, level, more)[0]
-            below = more
+            start = change_harmonic_count(
+                balance, balance.unpack_slides(x, omega, n_solved), x, n_solved, n_harmonics
+            )
+            x = solve_newton(balance, start, omega, level, n_harmonics)[0]
+            n_solved = n_harmonics
         except NotConverged:
             pass
-    return x if below == h else _follow_levels(balance, omega, level, h)
+    return x if n_solved == h else _follow_levels(balance, omega, level, h)
 
 
 def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
     """Return the unknowns at a drive level by continuation from a thousandth of it."""
     path = follow_curve(
-        lambda v, p: evaluate_by_level(balance, v, omega, p, h),
+        lambda v, p: differentiate_by_level(balance, v, omega, p, h),
         _solve_stuck(balance, omega, level, h) * 1e-3,
         1e-3 * level,
         (0.0, level),
         settings=PathSettings(0.05, 0.5, 1000, 1e-6),
     )
     if path.ended != "end":
-        bare = any(k for k, *_ in balance.linear(omega, h).free)
-        why = (
+        has_undamped_mode = any(k for k, *_ in balance.get_linear_part(omega, h).free)
+        reason = (
             (
                 "; an undamped mode that is driven at its natural frequency stays bounded only if friction is strong "
                 "enough to stop the slip; give the mode damping"
             )
-            if bare
+            if has_undamped_mode
             else "; the search began at the sticking contact and also followed the motion while the drive rose from zero"
         )
-        raise (_Unbounded if bare else NotConverged)(
+        raise (_Unbounded if has_undamped_mode else NotConverged)(
             f"accuracy.harmonics: harmonic balance with {h} harmonics found no steady motion at "
-            f"{omega / (2 * np.pi):.6g} Hz{why}"
+            f"{omega / (2 * np.pi):.6g} Hz{reason}"
         )
     return path.x[-1]
 
 
-def evaluate_by_level(balance, x, omega, level, h) -> tuple:
+def differentiate_by_level(balance, x, omega, level, h) -> tuple:
     """Return residual, Jacobian and derivative of a balance by the drive level.
 
     Parameters
     ----------
     balance, x, omega, level, h
-        See `Balance.system`.
+        See `HarmonicBalance.evaluate`.
 
     Returns
     -------
     tuple
     """
-    s = balance.system(x, omega, level, h)
-    return s.residual, s.jacobian, s.by_level
+    equations = balance.evaluate(x, omega, level, h)
+    return equations.residual, equations.jacobian, equations.by_level
 
 
-def evaluate_by_omega(balance, x, omega, level, h) -> tuple:
+def differentiate_by_frequency(balance, x, omega, level, h) -> tuple:
     """Return residual, Jacobian and derivative of a balance by the drive frequency.
 
     Parameters
     ----------
     balance, x, omega, level, h
-        See `Balance.system`.
+        See `HarmonicBalance.evaluate`.
 
     Returns
     -------
     tuple
     """
-    s = balance.system(x, omega, level, h)
-    return s.residual, s.jacobian, s.by_omega
+    equations = balance.evaluate(x, omega, level, h)
+    return equations.residual, equations.jacobian, equations.by_omega
 
 
 def make_point(balance, x, drive, h: int) -> tuple:
@@ -439,7 +471,7 @@ def make_point(balance, x, drive, h: int) -> tuple:
 
     Parameters
     ----------
-    balance : Balance
+    balance : HarmonicBalance
     x : ndarray
     drive
     h : int
@@ -449,30 +481,32 @@ def make_point(balance, x, drive, h: int) -> tuple:
     tuple
     SteadyMotion, and norm of h further harmonics over that of the motion.
     """
-    here = balance.system(x, drive.omega, drive.acceleration, h)
-    found = _add_harmonics(balance, SweepStart(x, here), drive, h, 1, 1.0)
-    force = balance.contact.force(found.coefficients, drive.omega, 2 * h, balance.contact.samples)
-    z = balance.motion(x, drive.omega, drive.acceleration, h, force)
-    above = float(np.linalg.norm(z[h + 1 :] @ balance.rows.T))
-    return found, above / max(float(np.linalg.norm(found.coefficients)), 1e-300)
+    equations = balance.evaluate(x, drive.omega, drive.acceleration, h)
+    motion = _add_harmonics(balance, SweepStart(x, equations), drive, h, 1, 1.0)
+    force = balance.contact.compute_force_harmonics(
+        motion.coefficients, drive.omega, 2 * h, balance.contact.samples
+    )
+    z = balance.compute_modal_motion(x, drive.omega, drive.acceleration, h, force)
+    truncated = float(np.linalg.norm(z[h + 1 :] @ balance.rows.T))
+    return motion, truncated / max(float(np.linalg.norm(motion.coefficients)), 1e-300)
 
 
 def _solve_stuck(balance, omega, level, h: int) -> np.ndarray:
     """Return the unknowns of the linear motion with all contacts stuck."""
-    x = np.zeros(balance.size(omega, h))
-    here = balance.system(x, omega, level, h)
-    return -solve_linear(here.jacobian)(here.residual)
+    x = np.zeros(balance.count_unknowns(omega, h))
+    equations = balance.evaluate(x, omega, level, h)
+    return -solve_linear(equations.jacobian)(equations.residual)
 
 
 class SweepStart(NamedTuple):
     """Initial values of the sweeps over the higher harmonics.
 
-    - x, system, count: unknowns (N,), their equations, and iterations so far
+    - x, equations, count: unknowns (N,), their equations, and iterations so far
     - slides: (i, K + 1) [m] with harmonics above those of the unknowns, or None
     """
 
     x: np.ndarray
-    system: System
+    equations: BalanceEquations
     count: int = 0
     slides: np.ndarray | None = None
 
@@ -482,50 +516,56 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> St
 
     The harmonics up to h are corrected with their Jacobian. The last sweep takes twice the samples.
     """
-    x, here, count, known = start
+    x, equations, count, known_slides = start
     omega = drive.omega
     level = drive.acceleration
-    top = h * wider
-    solve = solve_linear(here.jacobian)
-    probe = max(top, 2 * h)  # additional harmonics that estimate the truncation error
-    q = np.zeros((len(balance.rows), probe + 1), complex)
-    if known is not None:
-        q[:, : known.shape[1]] = known[:, : probe + 1]
-    q[:, : h + 1] = balance.slides(x, omega, h)
-    samples = fine = balance.contact.samples
+    n_harmonics = h * wider
+    solve = solve_linear(equations.jacobian)
+    n_probed = max(n_harmonics, 2 * h)  # additional harmonics that estimate the truncation error
+    q = np.zeros((len(balance.rows), n_probed + 1), complex)
+    if known_slides is not None:
+        q[:, : known_slides.shape[1]] = known_slides[:, : n_probed + 1]
+    q[:, : h + 1] = balance.unpack_slides(x, omega, h)
+    samples = n_force_samples = balance.contact.samples
     size = float(np.linalg.norm(q))
     changes = []
     for sweep in range(MAX_SWEEPS):
-        force = balance.contact.force(q, omega, probe, fine)
-        z = balance.motion(x, omega, level, h, force)
-        moved = -solve(_find_residual(balance, x, omega, level, h, force, z))
+        force = balance.contact.compute_force_harmonics(q, omega, n_probed, n_force_samples)
+        z = balance.compute_modal_motion(x, omega, level, h, force)
+        correction = -solve(_find_residual(balance, x, omega, level, h, force, z))
         if sweep and wider > 1:
-            x = x + moved
+            x = x + correction
         new = (z @ balance.rows.T).T
-        new[:, : h + 1] = balance.slides(x, omega, h)
+        new[:, : h + 1] = balance.unpack_slides(x, omega, h)
         changes.append(
-            float(np.hypot(np.linalg.norm(moved), np.linalg.norm(new[:, h + 1 :] - q[:, h + 1 :])))
+            float(
+                np.hypot(
+                    np.linalg.norm(correction), np.linalg.norm(new[:, h + 1 :] - q[:, h + 1 :])
+                )
+            )
         )
         q = new
-        if fine > samples or (wider == 1 and sweep):
+        if n_force_samples > samples or (wider == 1 and sweep):
             break
         if sweep and changes[-1] <= SWEEP_TOL_RATIO * tolerance * size:
-            fine = 2 * samples
+            n_force_samples = 2 * samples
         if sweep > 2 and (changes[-1] > changes[-2] > changes[-3] or changes[-1] > changes[1]):
-            return _make_diverged(balance, start, drive, h, samples)
-    return _make_periodic(balance, x, drive, h, top, fine, changes, size, count, q)
+            return _make_diverged_motion(balance, start, drive, h, samples)
+    return _make_steady_motion(
+        balance, x, drive, h, n_harmonics, n_force_samples, changes, size, count, q
+    )
 
 
-def _make_diverged(balance, start: SweepStart, drive, h, samples) -> SteadyMotion:
+def _make_diverged_motion(balance, start: SweepStart, drive, h, samples) -> SteadyMotion:
     """Return the steady motion of h harmonics with unknown error, if higher harmonics diverge."""
-    x, here, count, _ = start
-    q = balance.slides(x, drive.omega, h)
-    z = balance.motion(x, drive.omega, drive.acceleration, h, here.fold.force)
+    x, equations, count, _ = start
+    q = balance.unpack_slides(x, drive.omega, h)
+    z = balance.compute_modal_motion(x, drive.omega, drive.acceleration, h, equations.fold.force)
     return SteadyMotion(
         drive.omega,
         drive.acceleration,
         q,
-        here.fold.force,
+        equations.fold.force,
         z,
         h,
         samples,
@@ -539,32 +579,36 @@ def _make_diverged(balance, start: SweepStart, drive, h, samples) -> SteadyMotio
 
 def _find_residual(balance, x, omega, level, h, force, z) -> np.ndarray:
     """Return the residual (N,) of a balance under forces with additional harmonics."""
-    low = balance.lift.shape[1] * (2 * h + 1)
-    at = 0
-    y = unpack_harmonics(x[:low], balance.lift.shape[1])
-    out = [pack_harmonics(y - (z[: h + 1] @ balance.faces.T).T)]
-    for k, _, left, stiffness in balance.linear(omega, h).free:
-        parts = x[low + at : low + at + (2 if k else 1)]
-        miss = balance.free_residual((k, left, stiffness), complex(*parts), omega, level, force)
-        out.append(np.array([miss.real, miss.imag])[: parts.size])
-        at += parts.size
-    return np.concatenate(out)
+    n_slide_unknowns = balance.lift.shape[1] * (2 * h + 1)
+    position = 0
+    y = unpack_harmonics(x[:n_slide_unknowns], balance.lift.shape[1])
+    residuals = [pack_harmonics(y - (z[: h + 1] @ balance.faces.T).T)]
+    for k, _, left_vector, stiffness in balance.get_linear_part(omega, h).free:
+        parts = x[n_slide_unknowns + position : n_slide_unknowns + position + (2 if k else 1)]
+        free_residual = balance.free_residual(
+            (k, left_vector, stiffness), complex(*parts), omega, level, force
+        )
+        residuals.append(np.array([free_residual.real, free_residual.imag])[: parts.size])
+        position += parts.size
+    return np.concatenate(residuals)
 
 
-def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) -> SteadyMotion:
+def _make_steady_motion(
+    balance, x, drive, h, n_harmonics, samples, changes, size, count, q
+) -> SteadyMotion:
     omega = drive.omega
     level = drive.acceleration
     group = balance.contact
-    q = q[:, : top + 1]
-    fine = group.forces(q, omega, 2 * samples)
-    used = group.force(q, omega, top, samples)
-    left = fine - evaluate_series(used, 2 * samples)
-    scale = float(np.sqrt(np.mean(fine**2)))
+    q = q[:, : n_harmonics + 1]
+    sampled_forces = group.compute_forces(q, omega, 2 * samples)
+    force_harmonics = group.compute_force_harmonics(q, omega, n_harmonics, samples)
+    left = sampled_forces - evaluate_series(force_harmonics, 2 * samples)
+    scale = float(np.sqrt(np.mean(sampled_forces**2)))
     residual = float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
-    z = balance.motion(x, omega, level, h, used)
+    z = balance.compute_modal_motion(x, omega, level, h, force_harmonics)
     error = max(changes)
     left = 0.0
-    if top > h:
+    if n_harmonics > h:
         # error of the unfinished sweeps, and of the harmonics above `top`, which decrease like k^-5/2
         ratio = (
             min((changes[-2] / changes[1]) ** (1 / max(len(changes) - 3, 1)), 0.9)
@@ -572,8 +616,20 @@ def _make_periodic(balance, x, drive, h, top, samples, changes, size, count, q) 
             else 0.9
         )
         left = changes[-2] * ratio / (1 - ratio)
-        error = 2 * (changes[-1] + left + max(changes) * (h / top) ** 2.5)
+        error = 2 * (changes[-1] + left + max(changes) * (h / n_harmonics) ** 2.5)
     size = max(size, 1e-300)
     return SteadyMotion(
-        omega, level, q, used, z, h, samples, residual, error / size, count, x, group, left / size
+        omega,
+        level,
+        q,
+        force_harmonics,
+        z,
+        h,
+        samples,
+        residual,
+        error / size,
+        count,
+        x,
+        group,
+        left / size,
     )

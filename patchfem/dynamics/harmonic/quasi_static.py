@@ -20,9 +20,9 @@ from .forces import LawGroup
 from .laws import Jenkins, SampledSlide
 
 # relative slide increment for the finite difference of the force at the tip of a loop
-SLOPE_STEP = 1e-6
+RELATIVE_SLIDE_STEP = 1e-6
 # ratio of two drive frequencies at which the force of a law is compared, to detect a dependence on speed
-RATE_RATIO = 2.0
+TEST_RATE_RATIO = 2.0
 # largest relative change of a force that is due to round-off
 FORCE_TOL = 1e-9
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
@@ -67,13 +67,13 @@ def find_loops(laws, u: float, samples: int) -> StaticLoops:
     -------
     StaticLoops
     """
-    found = [
+    loops = [
         StaticLoops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))
         if isinstance(law, Jenkins)
         else _sample_loops(law, u, samples)
         for law in laws
     ]
-    return StaticLoops(sum(one.tip for one in found), sum(one.area for one in found))
+    return StaticLoops(sum(loop.tip for loop in loops), sum(loop.area for loop in loops))
 
 
 def _sample_loops(law, u: float, samples: int) -> StaticLoops:
@@ -93,10 +93,12 @@ def depends_on_speed(group: LawGroup, u: float) -> bool:
     u: amplitude of the slide [m] at which the laws are sampled.
 
     """
-    for law in (one for laws in group.laws for one in laws if not isinstance(one, Jenkins)):
+    for law in (
+        group_law for laws in group.laws for group_law in laws if not isinstance(group_law, Jenkins)
+    ):
         slow, fast = (
             law.sample(SampledSlide(np.array([0.0, u], complex), rate, 512)).force
-            for rate in (1.0, RATE_RATIO)
+            for rate in (1.0, TEST_RATE_RATIO)
         )
         if np.abs(fast - slow).max() > FORCE_TOL * np.abs(slow).max(initial=1e-300):
             return True
@@ -137,29 +139,29 @@ def find_static_motions(
     if depends_on_speed(group, float(np.abs(group.rows).max()) * float(np.max(amplitudes))):
         raise PatchfemError(SPEED_MESSAGE)
     omega, shape = stuck_mode
-    out = []
-    near = np.append(shape, 1.0)
+    motions = []
+    guess = np.append(shape, 1.0)
     row = shape / (shape @ shape) if row is None else row
     for amplitude in amplitudes:
         try:
-            near = _solve_equilibrium(
-                modes, group, (*stuck_mode, row), float(amplitude), near, samples
+            guess = _solve_equilibrium(
+                modes, group, (*stuck_mode, row), float(amplitude), guess, samples
             )
         except NotConverged:
-            out.append(
+            motions.append(
                 StaticMotion(
                     float(amplitude), np.nan, np.nan, np.full(modes.omega.size, np.nan), np.nan
                 )
             )
             continue
-        z = near[:-1] * amplitude
-        alpha = float(near[-1]) * omega**2 * amplitude
+        z = guess[:-1] * amplitude
+        alpha = float(guess[-1]) * omega**2 * amplitude
         loss = sum(
-            find_loops(laws, abs(one), samples).area
-            for one, laws in zip(group.rows @ z, group.laws)
+            find_loops(laws, abs(slide), samples).area
+            for slide, laws in zip(group.rows @ z, group.laws)
         )
-        out.append(_make_static(modes, shape, (z, alpha, loss)))
-    return out
+        motions.append(_make_static_motion(modes, shape, (z, alpha, loss)))
+    return motions
 
 
 def find_static_motions_from_loops(
@@ -185,19 +187,19 @@ def find_static_motions_from_loops(
     """
     shape = stuck_mode[1]
     n = modes.omega.size
-    out = []
+    motions = []
     matrix = np.zeros((n + 1, n + 1))
     matrix[:n, :n] = np.diag(modes.omega**2)
     matrix[:n, n] = -shape
     matrix[n, :n] = row
     for slide, loop in zip(slides, loops):
         x = np.linalg.solve(matrix, np.append(-np.asarray(row) * loop.tip / modes.mass, slide))
-        out.append(_make_static(modes, shape, (x[:n], float(x[n]), loop.area)))
-    return out
+        motions.append(_make_static_motion(modes, shape, (x[:n], float(x[n]), loop.area)))
+    return motions
 
 
 def _solve_equilibrium(
-    modes, group, mode: tuple, amplitude: float, near, samples: int
+    modes, group, mode: tuple, amplitude: float, guess, samples: int
 ) -> np.ndarray:
     """Solve for the static equilibrium of a mode at an amplitude [m].
 
@@ -207,31 +209,33 @@ def _solve_equilibrium(
     omega, shape, row = mode
     m = modes.mass
     n = modes.omega.size
-    stiff = np.diag(modes.omega**2) / omega**2
+    modal_stiffness = np.diag(modes.omega**2) / omega**2
 
     def find_residual(x):
         u = group.rows @ x[:n] * amplitude
         force = np.array(
             [
-                np.sign(one) * find_loops(laws, abs(one), samples).tip
-                for one, laws in zip(u, group.laws)
+                np.sign(slide) * find_loops(laws, abs(slide), samples).tip
+                for slide, laws in zip(u, group.laws)
             ]
         )
         return np.append(
-            stiff @ x[:n] + group.rows.T @ force / (m * omega**2 * amplitude) - x[n] * shape,
+            modal_stiffness @ x[:n]
+            + group.rows.T @ force / (m * omega**2 * amplitude)
+            - x[n] * shape,
             row @ x[:n] - 1,
         )
 
     def find_slopes(x):
         u = np.abs(group.rows @ x[:n] * amplitude)
-        rise = [_find_tip_slope(laws, one, samples) for one, laws in zip(u, group.laws)]
-        top = stiff + group.rows.T * rise @ group.rows / (m * omega**2)
-        return np.block([[top, -shape[:, None]], [row[None], np.zeros((1, 1))]])
+        tip_slopes = [_find_tip_slope(laws, slide, samples) for slide, laws in zip(u, group.laws)]
+        stiffness = modal_stiffness + group.rows.T * tip_slopes @ group.rows / (m * omega**2)
+        return np.block([[stiffness, -shape[:, None]], [row[None], np.zeros((1, 1))]])
 
-    for start in (near, np.append(shape, 1.0)):
-        found = root(find_residual, start, jac=find_slopes, tol=1e-13)
-        if np.abs(found.fun).max() < 1e-9:
-            return found.x
+    for start in (guess, np.append(shape, 1.0)):
+        solution = root(find_residual, start, jac=find_slopes, tol=1e-13)
+        if np.abs(solution.fun).max() < 1e-9:
+            return solution.x
     raise NotConverged(
         f"backbone: no equilibrium was found at the amplitude {format_length(amplitude, 3)} of the static curve"
     )
@@ -239,19 +243,19 @@ def _solve_equilibrium(
 
 def _find_tip_slope(laws, u: float, samples: int) -> float:
     """Return the derivative [N/m] of the tip force of friction loops by the slide amplitude."""
-    step = max(SLOPE_STEP * u, 1e-30)
+    step = max(RELATIVE_SLIDE_STEP * u, 1e-30)
     return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step
 
 
-def _make_static(modes, shape, motion: tuple) -> StaticMotion:
+def _make_static_motion(modes, shape, motion: tuple) -> StaticMotion:
     """Return the quasi-static motion with the frequency and damping ratio of an equilibrium.
 
     motion: z (n,) [m], alpha [m s-2] and loss [J].
 
     """
     z, alpha, loss = motion
-    share = float(shape @ z / (shape @ shape))
-    omega = float(np.sqrt(alpha / share)) if alpha * share > 0 else np.nan
+    component = float(shape @ z / (shape @ shape))
+    omega = float(np.sqrt(alpha / component)) if alpha * component > 0 else np.nan
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
-    work = 2 * np.pi * alpha * share * modes.mass * float(shape @ shape)
-    return StaticMotion(share, omega, (loss + viscous) / work, z, float(loss))
+    work = 2 * np.pi * alpha * component * modes.mass * float(shape @ shape)
+    return StaticMotion(component, omega, (loss + viscous) / work, z, float(loss))

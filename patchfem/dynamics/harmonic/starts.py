@@ -20,7 +20,7 @@ def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 24
 
     Parameters
     ----------
-    balance : Balance
+    balance : HarmonicBalance
     omega, level : float
         Frequency [rad/s] and amplitude [m s-2] of the drive.
     count : int, optional
@@ -30,38 +30,40 @@ def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 24
     -------
     list of ndarray
     """
-    here = balance.linear(omega, 1)
-    if any(k == 1 for k, *_ in here.free):
+    linear_part = balance.get_linear_part(omega, 1)
+    if any(k == 1 for k, *_ in linear_part.free):
         return []
-    through = balance.faces @ here.inverse[1]
-    linear = 1j * level * (through @ balance.modes.base)
+    force_to_slide = balance.faces @ linear_part.inverse[1]
+    linear = 1j * level * (force_to_slide @ balance.modes.base)
     size = float(np.linalg.norm(linear))
     if size == 0:
         return []
-    along = linear / size
-    receptance = through @ balance.rows.T / balance.modes.mass
+    direction = linear / size
+    receptance = force_to_slide @ balance.rows.T / balance.modes.mass
 
     def left(log):
         q = np.zeros((balance.lift.shape[0], 2), complex)
-        q[:, 1] = balance.lift @ along * np.exp(log)
-        force = balance.contact.force(q, omega, 1, N_SAMPLES)[:, 1]
-        return np.exp(log) + along.conj() @ (receptance @ force)
+        q[:, 1] = balance.lift @ direction * np.exp(log)
+        force = balance.contact.compute_force_harmonics(q, omega, 1, N_SAMPLES)[:, 1]
+        return np.exp(log) + direction.conj() @ (receptance @ force)
 
     def miss(log):
         return abs(left(log)) - size
 
     grid = np.log(size) + np.linspace(np.log(1e-7), np.log(1e4), count)
     values = [miss(g) for g in grid]
-    out = []
+    roots = []
     for a, b in _bracket_roots(miss, grid, values):
         log = brentq(miss, a, b, xtol=1e-10)
-        turn = left(log)
-        y = along * np.exp(log) * (turn.conjugate() / abs(turn))
-        out.append(np.concatenate([*([0.0, v.real, v.imag] for v in y), np.zeros(len(here.free))]))
-    return out
+        residual = left(log)
+        y = direction * np.exp(log) * (residual.conjugate() / abs(residual))
+        roots.append(
+            np.concatenate([*([0.0, v.real, v.imag] for v in y), np.zeros(len(linear_part.free))])
+        )
+    return roots
 
 
-def _bracket_roots(miss, grid, values) -> list:
+def _bracket_roots(function, grid, values) -> list:
     """Return intervals (a, b) around all sign changes of a function on a grid (k,).
 
     A sample closer to zero than its neighbours may hide two roots; its minimum is then located.
@@ -71,7 +73,7 @@ def _bracket_roots(miss, grid, values) -> list:
         sign = np.sign(values[k])
         if all(0 < sign * values[k] < sign * v for v in (values[k - 1], values[k + 1])):
             low = minimize_scalar(
-                lambda x, sign=sign: sign * miss(x),
+                lambda x, sign=sign: sign * function(x),
                 bounds=(grid[k - 1], grid[k + 1]),
                 method="bounded",
                 options={"xatol": 1e-8},

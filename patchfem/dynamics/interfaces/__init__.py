@@ -1,4 +1,4 @@
-"""Interfaces of a march: what one contact is to the compiled loop.
+"""Contacts of a march: solution of a step and update of their memory in the compiled loop.
 
 Equation of a step. Over a step of dt the friction force enters as its mean over the path, so its
 work is exact:
@@ -7,7 +7,7 @@ work is exact:
 
 with the increment dq of the relative displacement, its value `free` without friction, and the
 compliance beta of the modes. Every contact has the functions solve_step (this equation),
-apply_increment (F over a prescribed dq), commit_step (move the memory) and read_state (force,
+apply_increment (F over a prescribed dq), commit_step (update the memory) and read_state (force,
 energy, slip).
 
 | contact | module | arrays |
@@ -20,6 +20,6 @@ energy, slip).
 | nonlinear springs, as a law | `spring_kernels` | |
 
 In: numbers and memory of a law (`friction`). Out: increment and mean force of a step, and the
-memory after it. A step that is not solved returns a number of iterations below 0. Cost: 20 to 100
+updated memory. An unsolved step returns a number of iterations below 0. Cost: 20 to 100
 ns per step of one law; of m points behind r shear modes one Newton step takes m r^2/2 products.
 """

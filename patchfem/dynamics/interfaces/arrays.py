@@ -1,4 +1,4 @@
-"""Arrays of the contacts that a march can have."""
+"""Arrays of the contacts, loads and modes that the compiled loop of a march uses."""
 
 from collections import namedtuple
 from enum import IntEnum
@@ -8,12 +8,12 @@ import numpy as np
 
 
 class Element(NamedTuple):
-    """One law on one relative displacement.
+    """Arrays of a contact with one friction law on one relative displacement.
 
     - num, mem: (1, k), (1, l) numbers and memory of the law
     - last: (2,) increments of the last two steps [m]
     - eps: (1,) bond length of the step [m]
-    - bound: (1,) largest force [N], infinite where there is none
+    - bound: (1,) upper bound of the force [N], infinite for an unbounded law
     """
 
     num: np.ndarray
@@ -37,9 +37,9 @@ class StepStart(NamedTuple):
 
 
 class SolvedStep(NamedTuple):
-    """Solution of a step of a contact.
+    """Solution of a time step of a contact: increment and mean force.
 
-    - increment: of the relative displacement [m]
+    - increment: increment of the relative displacement [m]
     - mean_force: path mean of the friction force [N]
     - iterations: number of iterations, below 0 if the solution failed
     """
@@ -50,12 +50,14 @@ class SolvedStep(NamedTuple):
 
 
 class StepProblem(NamedTuple):
-    """Step of points behind shear modes, dq = free - compliance times friction force.
+    """Equation of a time step of points behind shear modes.
+
+    It is dq = free - compliance times friction force.
 
     - free: increment of the holder without friction [m]
-    - compliance: of the modes in the step [m/N]; at 0 the increment of the holder is prescribed
+    - compliance: compliance of the modes in the step [m/N]; if it is 0, the increment of the holder is prescribed
     - law_kind: kind of the law of the points, PLASTIC or POINTS of `shear_points_kernels`
-    - relaxes: whether the pieces spring back while the holder stands
+    - relaxes: whether the pieces relax while the holder is at rest
     """
 
     free: float
@@ -65,11 +67,11 @@ class StepProblem(NamedTuple):
 
 
 class LawStep(NamedTuple):
-    """One law in a step.
+    """State of one friction law at the start of a time step.
 
-    - numbers, memory: of the law
+    - numbers, memory: parameters and memory of the law
     - rel_disp: relative displacement at the start [m]
-    - bond_length: of the step [m]
+    - bond_length: bond length in the step [m]
     - dt: duration of the step [s]
     """
 
@@ -81,7 +83,7 @@ class LawStep(NamedTuple):
 
 
 class BondSums(NamedTuple):
-    """Sums over points of bonds: force [N], energy [J], stretch times load [N m] and load [N]."""
+    """Sums over bond points: force [N], energy [J], stretch times load [N m] and load [N]."""
 
     force: float
     energy: float
@@ -90,10 +92,10 @@ class BondSums(NamedTuple):
 
 
 class PointRow(IntEnum):
-    """Rows of `ShearedPoints.points`.
+    """Rows of `ShearedPoints.points`: bonds, load and step solution of each point.
 
-    - DENSITY, STRETCH, SQUARED_STRETCH: of bonds; of an elastic-plastic law DENSITY is the traction over mu and
-      STRETCH the springs
+    - DENSITY, STRETCH, SQUARED_STRETCH: moments of the bonds; for an elastic-plastic law DENSITY is the traction over mu and
+      STRETCH the density of the springs
     - PLAY: play of bonds with an elastic range [m]
     - LOAD: load, or friction limit of a list of bonds
     - SLIDE, FORCE, SLOPE: slide [m], force [N] and slope [N/m] in the step
@@ -110,11 +112,11 @@ class PointRow(IntEnum):
 
 
 class ListPointRow(IntEnum):
-    """First rows of `ShearedLists.points`, in place of those of `PointRow`.
+    """First rows of `ShearedLists.points`, which replace those of `PointRow` for lists of bonds.
 
     - GROWTH_SPEED: speed at which bonds grow in the step [m/s]
     - LAST_SPEED: mean speed of the last step [m/s]
-    - TRIAL_SLIDE, TRIAL_FORCE: slide [m] and force of the last trial
+    - TRIAL_SLIDE, TRIAL_FORCE: slide [m] and force at the last evaluation
     """
 
     GROWTH_SPEED = 0
@@ -123,10 +125,10 @@ class ListPointRow(IntEnum):
     TRIAL_FORCE = 3
 
 
-class DragRow(IntEnum):
-    """Rows of `ShearedPoints.drag`, for the slide of the holder and for each shear mode.
+class FullSlipRow(IntEnum):
+    """Rows of `ShearedPoints.drag`: full-slip forces of the holder and of each shear mode.
 
-    - FORCE: force while all points slip in the positive direction [N]
+    - FORCE: force if all points slip in the positive direction [N]
     - MAX_SLIDE: largest slide of a point per coordinate
     - MEAN_SLIDE: mean slide of the points per coordinate
     """
@@ -136,35 +138,35 @@ class DragRow(IntEnum):
     MEAN_SLIDE = 2
 
 
-class FlowPlace(IntEnum):
-    """Places in `ShearedPoints.flow`.
+class FlowIndex(IntEnum):
+    """Indices into `ShearedPoints.flow`: state of full slip.
 
-    - DRAG_DIRECTION: sign of the slide while all points slip in one direction, else 0
+    - FULL_SLIP_DIRECTION: sign of the slide while all points are in steady full slip, otherwise 0
     - TOTAL_SLIDE: slide of the holder [m]
-    - IS_FULL: of `ShearedLists`, in place of the direction: 1 once a list is full
+    - IS_FULL: for `ShearedLists`, in place of the direction: 1 if a list is full
     """
 
-    DRAG_DIRECTION = 0
+    FULL_SLIP_DIRECTION = 0
     TOTAL_SLIDE = 1
     IS_FULL = 0
 
 
 class WorkRow(IntEnum):
-    """Rows of `ShearedPoints.workspace`: gradient, Newton step and trial solution."""
+    """Rows of `ShearedPoints.workspace`: gradient, Newton step and trial solution of a step."""
 
     GRADIENT = 0
     STEP = 1
     TRIAL = 2
 
 
-class PressedPlace(IntEnum):
-    """Places in `PressedPoints.force`.
+class PressedIndex(IntEnum):
+    """Indices into `PressedPoints.force`: parameters of the friction law of the points.
 
     - MU_STATIC, MU_KINETIC: coefficients of friction
-    - BOND_LENGTH: [m]
-    - INITIAL_DENSITY: of the bonds
-    - LAW_KIND: PLASTIC or POINTS of `shear_points_kernels`
-    - RESIDUAL_GOAL: [N]
+    - BOND_LENGTH: bond length [m]
+    - INITIAL_DENSITY: initial density of the bonds
+    - LAW_KIND: kind of the law, PLASTIC or POINTS of `shear_points_kernels`
+    - RESIDUAL_GOAL: tolerance of the residual [N]
     """
 
     MU_STATIC = 0
@@ -175,14 +177,14 @@ class PressedPlace(IntEnum):
     RESIDUAL_GOAL = 5
 
 
-class LoadPlace(IntEnum):
-    """Places in `VaryingLoad.few`.
+class LoadIndex(IntEnum):
+    """Indices into `VaryingLoad.few`: load and normal contact of the present step.
 
     - LOAD: present load [N]
     - MEAN_PRESS: mean forces of the step on heave [N] and pitch [N m]
-    - GUESS: increments of heave and pitch of the last step, the guess of this one
-    - OUT: nine results of `contact.press_path_kernels.path_mean`
-    - START: heave, pitch, energy and forces at the start of the step
+    - GUESS: increments of heave and pitch of the last step, the initial guess of the present one
+    - OUT: first of nine results of `contact.press_path_kernels.path_mean`
+    - START: first of heave, pitch, energy and forces at the start of the step
     """
 
     LOAD = 0
@@ -193,19 +195,19 @@ class LoadPlace(IntEnum):
 
 
 class ShearedPoints(NamedTuple):
-    """Points (m,) of a law with memory behind r shear modes of the pieces.
+    """Arrays of a contact of m points with memory behind r shear modes of the pieces.
 
-    - weight: (m,) makes a traction of the law a force [N]: mu_s area/eps_0 of bonds under a load
+    - weight: (m,) force per traction of the law: mu_s area/eps_0 for bonds under a load
       in Pa
-    - eps: (2,) bond length at the start and in the middle of the step [m]
-    - growth: (6,) of eq. 2.10 and of the breakaway fraction
+    - eps: (2,) bond length at the start and at the middle of the step [m]
+    - growth: (6,) parameters of eq. 2.10 and of the breakaway fraction
     - psi, kappa, b: shear modes (r, m), their stiffness [N/m] and coordinates [m] (r,)
     - points: (8, m), see `PointRow`
-    - count: (1,) columns of points and psi that are under load
-    - drag, flow: (3, 1 + r), (2,) of points that all drag under a constant load, see `DragRow` and
-      `FlowPlace`
-    - y: (2, 1 + r) solution (dq, db) of the step, and of the pieces that spring back
-    - last: (2, 1 + r) those of the two steps before
+    - count: (1,) number of columns of points and psi that are under load
+    - drag, flow: (3, 1 + r), (2,) full slip under a constant load, see `FullSlipRow` and
+      `FlowIndex`
+    - y: (2, 1 + r) solution (dq, db) of the step, and of the relaxation of the pieces
+    - last: (2, 1 + r) solutions of the two steps before
     - scale, workspace: (1 + r,), (3, 1 + r), see `WorkRow`
     - hess, ready: (2, 1 + r, 1 + r), and (2,): 1 where `hess` holds the factorised Hessian
     """
@@ -231,20 +233,20 @@ class ShearedPoints(NamedTuple):
 def make_sheared_fields(
     weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
 ) -> dict:
-    """Return the fields of `ShearedPoints` at rest.
+    """Return the initial fields of `ShearedPoints` for a contact at rest.
 
     Parameters
     ----------
     weight : array_like
-        (m,).
+        (m,) force per traction of the law.
     length : float
         Bond length [m].
     growth : array_like
-        (6,).
+        (6,) parameters of the growth of bonds.
     psi, kappa : ndarray
-        (m, r) and (r,) shear modes; none for pieces that are rigid in shear.
+        (m, r) and (r,) shear modes and their stiffnesses; empty for pieces that are rigid in shear.
     lanes : int, optional
-        m is filled up to a multiple of it by points that carry nothing.
+        The number of points is padded to a multiple of `lanes` by points without load.
     load : array_like, optional
         (m,) constant load [Pa].
 
@@ -254,26 +256,26 @@ def make_sheared_fields(
     """
     m, r = psi.shape
     size = 1 + len(kappa)
-    more = -m % lanes
+    n_padding = -m % lanes
     points = np.zeros((len(PointRow), m + -m % lanes))
-    drag = np.zeros((len(DragRow), size))
+    drag = np.zeros((len(FullSlipRow), size))
     if load is not None:
         points[PointRow.LOAD, :m] = load
-        pull = length * weight * load
+        full_slip_force = length * weight * load
         drag[:] = (
-            np.append(pull.sum(), psi.T @ pull),
+            np.append(full_slip_force.sum(), psi.T @ full_slip_force),
             np.append(0.0, np.abs(psi).max(axis=0)),
-            np.append(1.0, psi.T @ pull / pull.sum()),
+            np.append(1.0, psi.T @ full_slip_force / full_slip_force.sum()),
         )
     return {
-        "weight": np.pad(np.array(weight, float), (0, more)),
+        "weight": np.pad(np.array(weight, float), (0, n_padding)),
         "eps": np.full(2, length),
         "growth": np.array(growth, float),
-        "psi": np.pad(np.array(psi.T, order="C"), ((0, 0), (0, more))),
+        "psi": np.pad(np.array(psi.T, order="C"), ((0, 0), (0, n_padding))),
         "kappa": np.array(kappa, float),
         "b": np.zeros(r),
         "points": points,
-        "count": np.full(1, m + more),
+        "count": np.full(1, m + n_padding),
         "drag": drag,
         "flow": np.zeros(2),
         "y": np.zeros((2, size)),
@@ -290,15 +292,15 @@ class PressedPoints(
         "PressedPoints", ("force", "memory", "pressed", "modes", "under", *ShearedPoints._fields)
     )
 ):
-    """Points of a law under a load that changes, see `pressed_points_kernels`.
+    """Arrays of a contact of points under a varying load, see `pressed_points_kernels`.
 
-    - force: (6,), see `PressedPlace`
-    - memory: (3, m) elastic-plastic traction/mu and springs [N], or m, z, s2 of bonds [N, N m, N
+    - force: (6,) law parameters, see `PressedIndex`
+    - memory: (3, m) elastic-plastic traction/mu and springs [N], or moments m, z, s2 of bonds [N, N m, N
       m2]
     - pressed: (2, m) nodal forces at both ends of the step [N]
-    - modes: (r, m) shear modes at all points, none for pieces that are rigid in shear
-    - under: (m,) numbers of the points under load, in the order in which they stand in the other
-      fields, which are those of `ShearedPoints`; there they have the memory after half of the
+    - modes: (r, m) shear modes at all points; empty for pieces that are rigid in shear
+    - under: (m,) numbers of the points under load, in the order of the columns of the other
+      fields, which are those of `ShearedPoints`; these have the memory after half of the
       change of load, and the mean load
     """
 
@@ -308,9 +310,9 @@ class PressedPoints(
 class ClimbingPoints(
     namedtuple("ClimbingPoints", ("flank", "climb", "share", *PressedPoints._fields))
 ):
-    """A law with memory along flanks, see `dynamics.grooves`.
+    """Arrays of a contact with memory along the flanks of grooves, see `dynamics.grooves`.
 
-    - flank, climb: (6,), (14,) see `FlankPlace` and `ClimbPlace` of `grooves.arrays`
+    - flank, climb: (6,), (14,) see `FlankIndex` and `ClimbIndex` of `grooves.arrays`
     - share: (m,) fractions of the normal force that the points carry
 
     The other fields are those of `PressedPoints`, with fractions of the normal force for the loads.
@@ -320,11 +322,11 @@ class ClimbingPoints(
 
 
 class BondList(NamedTuple):
-    """One list of bonds that all share a relative displacement.
+    """Arrays of a contact with one list of bonds on one relative displacement.
 
-    - force: (1,) mu_s N [N]
+    - force: (1,) friction limit mu_s N [N]
     - bondlist, now, status, law, table: see `friction.bonds.list_rows_kernels`
-    - growth: (6,) of eq. 2.10
+    - growth: (6,) parameters of eq. 2.10
     - last: (2,) increments of the last two steps [m]
     - bound: (1,) largest force [N]
     """
@@ -359,17 +361,19 @@ class ShearedLists(
         ),
     )
 ):
-    """Points (m,) behind shear modes, each a list of bonds, see `shear_list_kernels`.
+    """Arrays of a contact of m points behind shear modes, each with a list of bonds.
 
-    - bondlist: (9, m capacity) the lists beside each other
-    - nows, statuses: (m, 6), (m, 16) of each list; now, status: those of the present one
+    The functions are those of `shear_list_kernels`.
+
+    - bondlist: (9, m capacity) lists of all points, one after the other
+    - nows, statuses: (m, 6), (m, 16) time state and status of each list; now, status: those of the present list
     - law, table: see `BondList`
     - time: (1,) duration of the step [s]
-    - pressed: (2, m) nodal forces at both ends of the step [N], over the row LOAD of points; (2,
+    - pressed: (2, m) nodal forces at both ends of the step [N], relative to the row LOAD of points; (2,
       0) where they are constant
-    - pattern: (2, k) places [m] and relative pressures of the lower piece, (2, 0) where the
+    - pattern: (2, k) positions [m] and relative pressures of the lower piece, (2, 0) where the
       pressure moves with the upper one
-    - places: (m,) of the points at rest [m]
+    - places: (m,) initial positions of the points [m]
 
     The other fields are those of `ShearedPoints`: weight (m,) has the friction limits [N], the
     first four rows of points are those of `ListPointRow`.
@@ -379,18 +383,18 @@ class ShearedLists(
 
 
 class VaryingLoad(NamedTuple):
-    """A load that changes, see `march.pressing_kernels`.
+    """Arrays of a varying normal load with heave and pitch, see `march.pressing_kernels`.
 
     - sets: `contact.set_arrays.SetArrays`
-    - rows: (3, n) slide, heave and pitch per coordinate; beta: (3, 3) what constant forces take
-      from them
-    - arm: (1,) half the length of the patch [m]
-    - force: (2,) mu_s, mu_k of a law on the resultant load
+    - rows: (3, n) slide, heave and pitch per coordinate; beta: (3, 3) their reduction in a step
+      per constant force
+    - arm: (1,) half-length of the patch [m]
+    - force: (2,) mu_s, mu_k of a law under the resultant load
     - now: (m,) nodal forces [N]; loads: (steps + 1,) prescribed load [N], empty where the contact
       determines it
     - slot: (1,) number of the contact set, below 0 where none fits
-    - mean, goal: (1,) friction force of the step before, and goal of the residuals [N]
-    - few: (22,) workspace, see `LoadPlace`
+    - mean, goal: (1,) friction force of the step before, and tolerance of the residuals [N]
+    - few: (22,) workspace, see `LoadIndex`
     """
 
     sets: tuple
@@ -407,15 +411,19 @@ class VaryingLoad(NamedTuple):
 
 
 class ConstantLoad(NamedTuple):
-    """A constant load; loads: (0,)."""
+    """Empty arrays in place of `VaryingLoad` for a constant normal load.
+
+    - loads: (0,)
+
+    """
 
     loads: np.ndarray
 
 
 def split_memory(contact, element=None) -> list | None:
-    """Return the memory that a contact carries from step to step, as rows of numbers of one kind.
+    """Return the memory of a contact as rows of comparable numbers.
 
-    It is None for a list of bonds, whose sums grow without end. element: the law of an `Element`.
+    It is None for a list of bonds, whose sums increase without bound. element: law of an `Element`.
     """
     if isinstance(contact, Element):
         return split_element_memory(element, contact.mem[0])
@@ -423,7 +431,7 @@ def split_memory(contact, element=None) -> list | None:
         return [
             contact.eps,
             contact.b,
-            contact.flow[FlowPlace.TOTAL_SLIDE :],
+            contact.flow[FlowIndex.TOTAL_SLIDE :],
             *contact.points[: PointRow.SLIDE],
         ]
     return (
@@ -434,27 +442,27 @@ def split_memory(contact, element=None) -> list | None:
 
 
 def split_element_memory(element, memory) -> list:
-    """Return the memory (l,) of an element as rows of numbers of one kind each."""
+    """Return the memory (l,) of a friction element as rows of comparable numbers."""
     head = {"parallel": 3, "points": 1, "places": 1}.get(element.form, memory.size)
     kinds = 5 if element.form in ("points", "places") else 1
     return [*memory[:head, None], *memory[head:].reshape(kinds, -1)]
 
 
 def copy_arrays(parts):
-    """Return a copy of a nested tuple of arrays."""
+    """Return a deep copy of a nested tuple of arrays."""
     return type(parts)(
         *(copy_arrays(part) if isinstance(part, tuple) else part.copy() for part in parts)
     )
 
 
 class ModalArrays(NamedTuple):
-    """The modes as the loops of a march take them.
+    """Arrays of the modes for the compiled loop of a march.
 
     - omega, damp, slide, base, output: (n,); damp is 2 zeta omega
-    - damping: (n, n) where it couples the modes, else (0, 0)
-    - free, push, dense, reach, loss, dense_loss: of `propagator.Propagator`
-    - dt, beta: step [s], and compliance of the first interface in a step [m/N]
-    - mass: [kg]; workspace: (3, n)
+    - damping: (n, n) if it couples the modes, otherwise (0, 0)
+    - free, push, dense, reach, loss, dense_loss: step coefficients of `propagator.Propagator`
+    - dt, beta: step length [s], and compliance of the first interface in a step [m/N]
+    - mass: modal mass [kg]; workspace: (3, n)
     """
 
     omega: np.ndarray

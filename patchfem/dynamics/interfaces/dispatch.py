@@ -1,6 +1,6 @@
-"""Several compiled laws as one module that asks numbers[0] for the law.
+"""Dispatch module that combines several compiled laws, selected by numbers[0].
 
-It is written beside the compiled code.
+It is generated and stored with the compiled code.
 """
 
 from functools import cache
@@ -30,9 +30,9 @@ def {name}({signature}):
 
 
 def number_laws(laws: tuple) -> dict:
-    """Return numbers[0] of every law by its module: 0 for Coulomb's law, else from 1 on.
+    """Return the number that selects each law module: 0 for Coulomb's law, others from 1.
 
-    The loops treat Coulomb's law apart, because it has no slope.
+    The loops treat Coulomb's law separately, because it has no slope.
     """
     return {COULOMB_LAW: 0} | {
         law: k for k, law in enumerate((law for law in laws if law != COULOMB_LAW), 1)
@@ -41,9 +41,9 @@ def number_laws(laws: tuple) -> dict:
 
 @cache
 def load_law(laws: tuple):
-    """Return the compiled module of one law, or one that is written for several laws.
+    """Load the compiled module of one law, or generate a dispatch module for several laws.
 
-    laws: modules. The written module is kept beside the compiled code.
+    laws: names of the law modules. The dispatch module is stored with the compiled code.
     """
     if len(laws) == 1:
         return compiled.load(laws[0])
@@ -51,11 +51,11 @@ def load_law(laws: tuple):
     text = ""
     for name, signature in SIGNATURES.items():
         calls = [f"    return law_{numbers[law]}.{name}({signature})\n" for law in laws]
-        asked = [
+        conditional_calls = [
             f"    if numbers[0] == {numbers[law]}:\n    {call}" for law, call in zip(laws, calls)
         ]
         text += FUNCTION_TEMPLATE.format(
-            name=name, signature=signature, calls="".join([*asked[:-1], calls[-1]])
+            name=name, signature=signature, calls="".join([*conditional_calls[:-1], calls[-1]])
         )
     text = (
         MODULE_HEAD.format(

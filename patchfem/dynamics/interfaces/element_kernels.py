@@ -1,6 +1,6 @@
-"""A contact with one relative displacement and one law on it, `arrays.Element` (compiled).
+"""Contact functions of one friction law on one relative displacement (compiled).
 
-Examples are elements side by side, a law of the velocity, and points that slide alike.
+The arrays are `arrays.Element`. Examples are parallel elements, a velocity-dependent law, and points with a common slide.
 `march.loop_kernels` calls the functions of every contact.
 """
 
@@ -13,16 +13,18 @@ from .arrays import LawStep
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve a step with dq = free - beta force; the memory stays as it is.
+    """Solve the slide increment and mean friction force of a step without updating the memory.
+
+    The equation is dq = free - beta force.
 
     Parameters
     ----------
     free, beta : float
-        Increment without friction [m], and what a newton takes of it [m/N].
+        Increment without friction [m], and its reduction per unit force [m/N].
     start : arrays.StepStart
     contact : arrays.Element
     goal : float
-        Of the residual [N].
+        Tolerance of the residual [N].
 
     Returns
     -------
@@ -36,7 +38,7 @@ def solve_step(free, beta, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, start, contact, goal):
-    """Return the mean force over a prescribed increment; the memory stays as it is.
+    """Return the mean friction force over a prescribed increment without updating the memory.
 
     Parameters
     ----------
@@ -63,7 +65,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Move the memory by a solved step.
+    """Update the memory of the element after a solved step.
 
     Parameters
     ----------
@@ -100,7 +102,7 @@ def commit_step(dq, force, start, end_velocity, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(contact, rel_disp, velocity):
-    """Return force, stored energy and slip of the element.
+    """Return friction force, stored energy and slip of the element.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Step of one element, in closed form or by Newton's method (compiled)."""
+"""Step solution of one friction element, in closed form or by Newton's method (compiled)."""
 
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
@@ -7,14 +7,16 @@ from ..modal_kernels import Bracket, narrow_bracket
 from .arrays import SolvedStep
 
 MAX_ITERATIONS = 200
-N_NEWTON_STEPS = 40  # iterations before bisection helps Newton's method
-BOUND_MARGIN = 1.001  # keeps a contact in full slip inside the bracket, not on its edge
-ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
+N_NEWTON_STEPS = 40  # number of Newton iterations before bisection steps are inserted
+BOUND_MARGIN = (
+    1.001  # enlarges the bracket, so that the solution of a contact in full slip lies inside it
+)
+ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_element(free, beta, step, guess, bound, goal):
-    """Solve dq = free - beta F(dq) for one element.
+    """Solve the step equation dq = free - beta F(dq) of one friction element.
 
     Parameters
     ----------
@@ -22,9 +24,9 @@ def solve_element(free, beta, step, guess, bound, goal):
         See `element_kernels.solve_step`.
     step : arrays.LawStep
     guess : float
-        Guess of dq [m].
+        Initial guess of dq [m].
     bound : float
-        Largest |F| [N], infinite where there is none.
+        Upper bound of |F| [N], infinite for an unbounded law.
     goal : float
         Tolerance of the residual over beta [N].
 
@@ -35,8 +37,10 @@ def solve_element(free, beta, step, guess, bound, goal):
     closed = law.solve_step(step.numbers, step.memory, free, beta)
     if closed.is_solved:
         return SolvedStep(closed.increment, closed.mean_force, 1)
-    reach = BOUND_MARGIN * beta * bound
-    bracket = Bracket(free - reach, free + reach, min(max(guess, free - reach), free + reach))
+    max_change = BOUND_MARGIN * beta * bound
+    bracket = Bracket(
+        free - max_change, free + max_change, min(max(guess, free - max_change), free + max_change)
+    )
     force = 0.0
     for count in range(1, MAX_ITERATIONS):
         dq = bracket.point
@@ -47,10 +51,10 @@ def solve_element(free, beta, step, guess, bound, goal):
         noise = ROUND_OFF * (abs(free) + abs(dq) + beta * abs(force))
         if abs(residual) <= goal * beta + noise:
             return SolvedStep(dq, force, count)
-        # a force that decreases with the slide must not reverse the step
+        # a force that decreases with the slide must not reverse the direction of the Newton step
         gain = max(1 + beta * slope, 0.1)
         bracket = narrow_bracket(bracket, residual, gain, count - N_NEWTON_STEPS)
-        # the force jumps at this slide if round-off of the slide does not explain the residual
+        # a residual above round-off of the slide shows that the force jumps at this slide
         if bracket.high - bracket.low <= noise:
             is_solved = abs(residual) <= goal * beta + 8 * gain * noise
             return SolvedStep(bracket.point, force, count if is_solved else -count)

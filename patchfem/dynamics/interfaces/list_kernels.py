@@ -1,6 +1,6 @@
-"""A contact of one shared list of bonds, `arrays.BondList` (compiled).
+"""Contact functions of one list of bonds on one relative displacement (compiled).
 
-`march.loop_kernels` calls the functions of every contact.
+The arrays are `arrays.BondList`. `march.loop_kernels` calls the functions of every contact.
 """
 
 import numpy as np
@@ -14,22 +14,22 @@ from ...friction.protocol_kernels import Reading
 from ..modal_kernels import Bracket, narrow_bracket
 from .arrays import SolvedStep
 
-# increment over the bond length, below which the slope of the force is the mean of the slopes in both directions
-SLOPE_STEP = 1e-9
-# largest energy that a list may gain in short steps and repay by its next dissipation (see `commit_step`), over the
-# energy of one bond length at the friction limit
-MAX_OWED_RATIO = 1e-4
+# increment [bond lengths] below which the slope of the force is the mean of the slopes in both directions
+SLOPE_INCREMENT_RATIO = 1e-9
+# largest energy that a list may gain in short steps and offset by its next dissipation (see `commit_step`), over the
+# work of one bond length at the friction limit
+MAX_CARRIED_RATIO = 1e-4
 MAX_ITERATIONS = 300
-N_SECANT_STEPS = 8  # iterations before bisection helps the secant method
-ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
+N_SECANT_STEPS = 8  # number of secant iterations before bisection steps are inserted
+ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_mean_and_slope(dq, contact, v0, dt):
-    """Return the path-mean weight of a list and its slope.
+    """Return the path-mean force of a list of bonds over its limit, and the slope.
 
-    The slope of a form other than FORM_MOMENTS is that of a mean whose force depends on the displacement
-    alone; it may be less than 0.
+    For a form other than FORM_MOMENTS the slope assumes that the force depends on the displacement
+    alone; it may be negative.
 
     Parameters
     ----------
@@ -51,17 +51,17 @@ def find_mean_and_slope(dq, contact, v0, dt):
         mean, slope = list_slope(dq, contact, v0, dt)
         return mean, slope
     mean = list_mean(dq, contact, v0, dt)
-    short = SLOPE_STEP * contact.law[LAW.length]
-    if abs(dq) > short:
+    increment = SLOPE_INCREMENT_RATIO * contact.law[LAW.length]
+    if abs(dq) > increment:
         return mean, (list_force(dq, contact, v0, dt) - mean) / dq
-    return mean, (list_force(short, contact, v0, dt) - list_force(-short, contact, v0, dt)) / (
-        4 * short
-    )
+    return mean, (
+        list_force(increment, contact, v0, dt) - list_force(-increment, contact, v0, dt)
+    ) / (4 * increment)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_mean_force(dq, contact, v0, dt):
-    """Return the path-mean force of a list [N].
+    """Return the path-mean friction force [N] of a list of bonds over an increment.
 
     Parameters
     ----------
@@ -84,7 +84,9 @@ def find_mean_force(dq, contact, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve a step with dq = free - beta force by secants, like `element_kernels.solve_step`.
+    """Solve the slide increment and mean friction force of a step by the secant method.
+
+    Parameters are those of `element_kernels.solve_step`.
 
     Returns
     -------
@@ -112,7 +114,7 @@ def solve_step(free, beta, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, start, contact, goal):
-    """Return the mean force over a prescribed increment; the memory stays as it is.
+    """Return the mean friction force over a prescribed increment without updating the bonds.
 
     Parameters
     ----------
@@ -135,19 +137,19 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Move the list by a solved step.
+    """Update the list of bonds after a solved step.
 
     The work that is not stored is dissipated where positive; the law as printed also creates
     energy, and both are summed separately. The stretch reading creates none: what its sums gain in
-    a short step beyond the work, as strips change from one rule of integration to another, was
-    stored before. It is owed, up to MAX_OWED_RATIO, and the next dissipation repays it.
+    a short step beyond the work, because strips change from one integration rule to another, was
+    stored before. Up to MAX_CARRIED_RATIO it is carried over and subtracted from the next dissipation.
 
     Returns
     -------
     work : float
         Work that is not stored [J].
     has_room : bool
-        Whether the list had room.
+        Whether the capacity of the list sufficed.
     """
     contact.last[1] = contact.last[0]
     contact.last[0] = dq
@@ -158,25 +160,27 @@ def commit_step(dq, force, start, end_velocity, contact):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def add_list_energies(work, before, limit, contact):
-    """Return the loss [J] of a step, and add it to the dissipated energy of the list.
+    """Return the dissipated energy [J] of a step, and add it to the energy sums of the list.
 
     The loss is the work of the step minus the increase of the stored energy; a negative loss is
-    added to the created energy. Gains of the stretch reading are owed, see `commit_step`.
+    added to the created energy. Gains of the stretch reading are carried over, see `commit_step`.
 
     Parameters
     ----------
     work : float
         Work of the step [J].
     before : float
-        Energy in the status before the step.
+        Stored energy in the status before the step.
     limit : float
-        mu_s N [N].
+        Friction limit mu_s N [N].
     contact : arrays.BondList
     """
     net = work - limit * (contact.status[STATUS.energy] - before)
     if contact.law[LAW.form] <= FORM_POWER and limit > 0:
         owed = contact.status[STATUS.owed] - net / limit
-        contact.status[STATUS.owed] = min(max(owed, 0.0), MAX_OWED_RATIO * contact.law[LAW.length])
+        contact.status[STATUS.owed] = min(
+            max(owed, 0.0), MAX_CARRIED_RATIO * contact.law[LAW.length]
+        )
         net = limit * (contact.status[STATUS.owed] - owed)
     if net < 0:
         contact.status[STATUS.created] -= net
@@ -187,7 +191,7 @@ def add_list_energies(work, before, limit, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(contact, rel_disp, velocity):
-    """Return force, stored energy and slip of the list.
+    """Return friction force, stored energy and slip of the list of bonds.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""A contact of points under a load that changes in time, `arrays.PressedPoints` (compiled).
+"""Contact functions of points under a normal load that varies in time (compiled).
 
-The points are elastic-plastic or bonds.
+The arrays are `arrays.PressedPoints`; the points are elastic-plastic or bonds.
 
-A step is half of the change of load, the slide under the mean load, and the other half, as on a
-bench. So a changing load alone never gives energy, and no point keeps more than mu times its load.
-The changing load leaves the points out of balance with pieces that deform in shear; a mean alone
-would keep that and reverse it in every step. So a step ends with the pieces springing back while
-the holder stands. The caller writes the nodal forces at both ends of the step into `pressed`.
+A step consists of half the change of load, the slide under the mean load, and the other half (as in
+Strang splitting). So a changing load alone never creates energy, and no point carries more than mu times its load.
+The changing load leaves the points out of equilibrium with pieces that deform in shear; a mean force alone
+would retain this imbalance and reverse it in every step. So a step ends with the relaxation of the pieces while
+the holder is at rest. The caller writes the nodal forces at both ends of the step into `pressed`.
 `march.loop_kernels` calls the functions whose names do not begin with `rub_`.
 """
 
@@ -15,17 +15,17 @@ from ...friction.bonds.point_kernels import bond_step, grow, press_point
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import press_springs, spring_step
 from ...friction.protocol_kernels import Reading
-from .arrays import PointRow, PressedPlace, SolvedStep, StepProblem
+from .arrays import PointRow, PressedIndex, SolvedStep, StepProblem
 from .shear_points_kernels import PLASTIC, POINTS, write_forces
 from .shear_solve_kernels import accept_step, minimise, set_middle_length, set_slides
 
-# residual over the goal, to which pieces that deform in shear are solved; their loss is a small difference
+# tolerance of pieces that deform in shear, over that of the step, because their loss is a small difference
 GOAL_FRACTION = 0.01
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def gather_loaded_points(part, contact):
-    """Gather the points under load at a fraction of the step, their loads and their modes."""
+    """Gather the loads and shear modes of the points under load at a fraction of the step."""
     count = 0
     under = contact.under
     same = True
@@ -45,7 +45,7 @@ def gather_loaded_points(part, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_points(kind, contact):
-    """Put the points under the load at the middle of the step, and write their memory there."""
+    """Change the load of the points to that at mid-step, and write their memory under it."""
     gather_loaded_points(0.5, contact)
     memory = contact.memory
     points = contact.points
@@ -64,14 +64,14 @@ def press_points(kind, contact):
                 (memory[0, j], memory[1, j], memory[2, j]),
                 contact.pressed[0, j],
                 points[PointRow.LOAD, i],
-                contact.force[PressedPlace.INITIAL_DENSITY],
-                contact.force[PressedPlace.BOND_LENGTH],
+                contact.force[PressedIndex.INITIAL_DENSITY],
+                contact.force[PressedIndex.BOND_LENGTH],
             )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_friction_force(dq, kind, contact):
-    """Return the path-mean friction force and its slope for a rigid increment.
+    """Return the path-mean friction force and its slope for a common increment of all points.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def find_friction_force(dq, kind, contact):
     Returns
     -------
     force : float
-        [N].
+        Path mean [N].
     slope : float
         [N/m].
     """
@@ -98,13 +98,15 @@ def find_friction_force(dq, kind, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve a step with dq = free - beta force under the mean load; dq = free for beta = 0.
+    """Solve the slide increment and mean friction force of a step under the mean load.
+
+    The equation is dq = free - beta force, with dq = free for beta = 0.
 
     Returns
     -------
     arrays.SolvedStep
     """
-    kind = int(contact.force[PressedPlace.LAW_KIND])
+    kind = int(contact.force[PressedIndex.LAW_KIND])
     if kind == POINTS:
         set_middle_length(start.velocity, start.dt, contact)
     press_points(kind, contact)
@@ -118,7 +120,7 @@ def solve_step(free, beta, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, start, contact, goal):
-    """Return the mean force over a prescribed increment; the memory stays as it is.
+    """Return the mean friction force over a prescribed increment without updating the memory.
 
     Parameters
     ----------
@@ -127,14 +129,14 @@ def apply_increment(dq, start, contact, goal):
     start : arrays.StepStart
     contact : arrays.PressedPoints
     goal : float
-        Tolerance of the residual [N].
+        Tolerance of the residual Path mean [N].
 
     Returns
     -------
     force : float
-        Path mean [N].
+        Path mean Path mean [N].
     is_solved : bool
-        Whether it was found.
+        Whether the solution converged.
     """
     solution = solve_step(dq, 0.0, start, contact, goal)
     return solution.mean_force, solution.iterations >= 0
@@ -142,26 +144,26 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Move points and pieces by a solved step.
+    """Update the points and relax the pieces after a solved step.
 
     Returns
     -------
     lost : float
-        Energy dissipated [J], that of the changing load and of the springing back included.
+        Energy dissipated [J], including that of the changing load and of the relaxation.
     is_solved : bool
-        Whether the pieces came to balance.
+        Whether the relaxation converged.
     """
-    kind = int(contact.force[PressedPlace.LAW_KIND])
-    lost = commit_points(dq, force, start, end_velocity, kind, contact)
+    kind = int(contact.force[PressedIndex.LAW_KIND])
+    dissipated = commit_points(dq, force, start, end_velocity, kind, contact)
     if contact.b.size == 0:
-        return lost, True
-    more, count = relax_pieces(kind, contact, contact.force[PressedPlace.RESIDUAL_GOAL])
-    return lost + more, count >= 0
+        return dissipated, True
+    relaxation_loss, count = relax_pieces(kind, contact, contact.force[PressedIndex.RESIDUAL_GOAL])
+    return dissipated + relaxation_loss, count >= 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(contact, rel_disp, velocity):
-    """Return force, stored energy and slip of points and pieces.
+    """Return friction force, stored energy and slip of points and pieces.
 
     Parameters
     ----------
@@ -175,19 +177,19 @@ def read_state(contact, rel_disp, velocity):
     -------
     friction.protocol_kernels.Reading
     """
-    return read_points(int(contact.force[PressedPlace.LAW_KIND]), contact, rel_disp)
+    return read_points(int(contact.force[PressedIndex.LAW_KIND]), contact, rel_disp)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_points(dq, force, start, end_velocity, kind, contact):
-    """Move the memory of the points by a solved step.
+    """Update the memory of the points after a solved step.
 
     Parameters
     ----------
     dq : float
         Increment of the relative displacement [m].
     force : float
-        Path-mean force over dq [N].
+        Path-mean force over dq Path mean [N].
     start : arrays.StepStart
     end_velocity : float
         Relative velocity at the end of the step [m/s].
@@ -198,12 +200,12 @@ def commit_points(dq, force, start, end_velocity, kind, contact):
     Returns
     -------
     float
-        Energy dissipated [J], that of the changing load included.
+        Energy dissipated [J], including that of the changing load.
     """
-    length = contact.force[PressedPlace.BOND_LENGTH]
+    length = contact.force[PressedIndex.BOND_LENGTH]
     memory = contact.memory
     points = contact.points
-    lost = force * dq + elastic_energy(kind, contact) if kind == PLASTIC else 0.0
+    dissipated = force * dq + elastic_energy(kind, contact) if kind == PLASTIC else 0.0
     for i in range(contact.count[0]):
         j = contact.under[i]
         load = points[PointRow.LOAD, i]
@@ -214,7 +216,9 @@ def commit_points(dq, force, start, end_velocity, kind, contact):
             )
             memory[0, j], memory[1, j] = press_springs(y, springs, contact.pressed[1, j])
         else:
-            lost += 0.5 * contact.weight[i] * (memory[2, j] - points[PointRow.SQUARED_STRETCH, i])
+            dissipated += (
+                0.5 * contact.weight[i] * (memory[2, j] - points[PointRow.SQUARED_STRETCH, i])
+            )
             m, z, s2, part = bond_step(
                 points[PointRow.DENSITY, i],
                 points[PointRow.STRETCH, i],
@@ -227,31 +231,31 @@ def commit_points(dq, force, start, end_velocity, kind, contact):
                 (m, z, s2),
                 load,
                 contact.pressed[1, j],
-                contact.force[PressedPlace.INITIAL_DENSITY],
+                contact.force[PressedIndex.INITIAL_DENSITY],
                 length,
             )
-            lost += 0.5 * contact.weight[i] * (part + s2 - memory[2, j])
+            dissipated += 0.5 * contact.weight[i] * (part + s2 - memory[2, j])
     accept_step(contact)
     if kind == PLASTIC:
-        return lost - elastic_energy(kind, contact)
+        return dissipated - elastic_energy(kind, contact)
     contact.eps[0] = grow(
         contact.eps[0], start.velocity, end_velocity, abs(dq), start.dt, contact.growth
     )[0]
-    return lost
+    return dissipated
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def relax_pieces(kind, contact, goal):
-    """Bring pieces and points to balance while the holder stands.
+    """Relax the pieces to equilibrium with the points while the holder is at rest.
 
     The load is that at the end of the step.
 
     Returns
     -------
     lost : float
-        Energy [J].
+        Energy dissipated [J].
     iterations : int
-        Below 0 where it failed.
+        Number of iterations, below 0 if the relaxation failed.
     """
     memory = contact.memory
     points = contact.points
@@ -270,7 +274,7 @@ def relax_pieces(kind, contact, goal):
         xi = points[PointRow.SLIDE, i]
         if kind == PLASTIC:
             a, b = spring_step(
-                memory[0, j], memory[1, j], load, xi, contact.force[PressedPlace.BOND_LENGTH]
+                memory[0, j], memory[1, j], load, xi, contact.force[PressedIndex.BOND_LENGTH]
             )
             memory[0, j], memory[1, j] = press_springs(a, b, load)
         else:
@@ -284,10 +288,10 @@ def relax_pieces(kind, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def elastic_energy(kind, contact):
-    """Return the elastic energy of memory and pieces [J]."""
+    """Return the elastic energy [J] of the points and the shear modes of the pieces."""
     out = 0.0
-    mu = contact.force[PressedPlace.MU_STATIC]
-    length = contact.force[PressedPlace.BOND_LENGTH]
+    mu = contact.force[PressedIndex.MU_STATIC]
+    length = contact.force[PressedIndex.BOND_LENGTH]
     memory = contact.memory
     for k in range(contact.b.size):
         out += 0.5 * contact.kappa[k] * contact.b[k] * contact.b[k]
@@ -317,8 +321,8 @@ def read_points(kind, contact, rel_disp):
     -------
     friction.protocol_kernels.Reading
     """
-    mu = contact.force[PressedPlace.MU_STATIC]
-    length = contact.force[PressedPlace.BOND_LENGTH]
+    mu = contact.force[PressedIndex.MU_STATIC]
+    length = contact.force[PressedIndex.BOND_LENGTH]
     memory = contact.memory
     points = contact.points
     force = 0.0

@@ -1,10 +1,10 @@
-"""A contact of bond points behind shear modes, `arrays.ShearedPoints` (compiled).
+"""Contact functions of bond points behind shear modes under a constant load (compiled).
 
-The load is constant.
+The arrays are `arrays.ShearedPoints`.
 
-For most of a cycle of gross slip all points drag: their bonds are those of a slide without end,
+For most of a cycle of gross slip all points are in steady full slip: their bonds are those of an endless slide,
 and a further slide in the same direction has the force weight length load at every point, whatever
-its size. Such a step has a closed form in the modes alone (`solve_dragging_step`). The slide of a
+its size. Such a step has a closed form in the modes alone (`solve_full_slip_step`). The slide of a
 point is that of the holder minus psi^T b at all times. `march.loop_kernels` calls the functions of
 every contact.
 """
@@ -13,35 +13,40 @@ from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_bond_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
-from .arrays import BondSums, DragRow, FlowPlace, PointRow, SolvedStep, StepProblem
+from .arrays import BondSums, FlowIndex, FullSlipRow, PointRow, SolvedStep, StepProblem
 from .shear_points_kernels import POINTS, are_slides_short
 from .shear_solve_kernels import accept_step, minimise, set_middle_length
 
-# difference of the bonds of a point from those of a drag, over the latter; that of their energy is 100 times as large
-DRAG_TOL = 2e-15
+# relative difference of the bonds of a point from those of steady full slip, below which it counts as in full slip;
+# the tolerance of their energy is 100 times as large
+FULL_SLIP_TOL = 2e-15
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve a step with dq = free - beta force, like `element_kernels.solve_step`.
+    """Solve the slide increment and mean friction force of a step.
+
+    Parameters are those of `element_kernels.solve_step`.
 
     Returns
     -------
     arrays.SolvedStep
-        No iterations where all points drag.
+        Without iterations if all points are in steady full slip.
     """
-    if contact.flow[FlowPlace.DRAG_DIRECTION] != 0.0 and solve_dragging_step(free, beta, contact):
-        force = contact.flow[FlowPlace.DRAG_DIRECTION] * contact.drag[DragRow.FORCE, 0]
+    if contact.flow[FlowIndex.FULL_SLIP_DIRECTION] != 0.0 and solve_full_slip_step(
+        free, beta, contact
+    ):
+        force = contact.flow[FlowIndex.FULL_SLIP_DIRECTION] * contact.drag[FullSlipRow.FORCE, 0]
         return SolvedStep(contact.y[0, 0], force, 0)
-    contact.flow[FlowPlace.DRAG_DIRECTION] = 0.0
+    contact.flow[FlowIndex.FULL_SLIP_DIRECTION] = 0.0
     set_middle_length(start.velocity, start.dt, contact)
     force, count = minimise(StepProblem(free, beta, POINTS, False), contact, goal)
     return SolvedStep(contact.y[0, 0], force, count)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def solve_dragging_step(free, beta, contact):
-    """Solve a step in which all points drag.
+def solve_full_slip_step(free, beta, contact):
+    """Solve a step in closed form if all points are in steady full slip.
 
     The solution is that of kappa (b + db/2) = psi^T f.
 
@@ -56,16 +61,18 @@ def solve_dragging_step(free, beta, contact):
     Returns
     -------
     bool
-        Whether all points drag on in this step; contact.y[0] is then its solution.
+        Whether all points remain in full slip in this step; contact.y[0] is then its solution.
     """
-    way = contact.flow[FlowPlace.DRAG_DIRECTION]
+    direction = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
     y = contact.y[0]
-    least = 0.0
-    dq = free - beta * way * contact.drag[DragRow.FORCE, 0]
+    min_increment = 0.0
+    dq = free - beta * direction * contact.drag[FullSlipRow.FORCE, 0]
     for k in range(contact.b.size):
-        y[k + 1] = 2 * (way * contact.drag[DragRow.FORCE, k + 1] / contact.kappa[k] - contact.b[k])
-        least += contact.drag[DragRow.MAX_SLIDE, k + 1] * abs(y[k + 1])
-    if way * dq <= least:
+        y[k + 1] = 2 * (
+            direction * contact.drag[FullSlipRow.FORCE, k + 1] / contact.kappa[k] - contact.b[k]
+        )
+        min_increment += contact.drag[FullSlipRow.MAX_SLIDE, k + 1] * abs(y[k + 1])
+    if direction * dq <= min_increment:
         return False
     y[0] = dq
     return True
@@ -73,7 +80,7 @@ def solve_dragging_step(free, beta, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, start, contact, goal):
-    """Return the mean force over a prescribed increment; the memory stays as it is.
+    """Return the mean friction force over a prescribed increment without updating the memory.
 
     Parameters
     ----------
@@ -89,9 +96,9 @@ def apply_increment(dq, start, contact, goal):
     force : float
         Path mean [N].
     is_solved : bool
-        Whether it was found.
+        Whether the solution converged.
     """
-    contact.flow[FlowPlace.DRAG_DIRECTION] = 0.0
+    contact.flow[FlowIndex.FULL_SLIP_DIRECTION] = 0.0
     contact.y[0, 0] = dq
     solution = solve_step(dq, 0.0, start, contact, goal)
     return solution.mean_force, solution.iterations >= 0
@@ -99,7 +106,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Move points and pieces by a solved step.
+    """Update the points and pieces after a solved step.
 
     Parameters
     ----------
@@ -119,58 +126,62 @@ def commit_step(dq, force, start, end_velocity, contact):
     is_solved : bool
         Always true.
     """
-    way = contact.flow[FlowPlace.DRAG_DIRECTION]
+    direction = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
     length = contact.eps[1]
-    lost = 0.0
-    contact.flow[FlowPlace.TOTAL_SLIDE] += dq
-    if way != 0.0:
+    dissipated = 0.0
+    contact.flow[FlowIndex.TOTAL_SLIDE] += dq
+    if direction != 0.0:
         for k in range(contact.y.shape[1]):
-            lost += (
-                way * contact.drag[DragRow.FORCE, k] * contact.y[0, k] * (1.0 if k == 0 else -1.0)
+            dissipated += (
+                direction
+                * contact.drag[FullSlipRow.FORCE, k]
+                * contact.y[0, k]
+                * (1.0 if k == 0 else -1.0)
             )
         accept_step(contact)
-        return lost, True
+        return dissipated, True
     loose = contact.growth[5] * length
     if loose == 0.0 and are_slides_short(contact, length):
-        lost = move_points_short(contact, length)
+        dissipated = update_points_short(contact, length)
     else:
-        lost = move_points(contact, loose, length)
+        dissipated = update_points(contact, loose, length)
     accept_step(contact)
     contact.eps[0] = grow(
         contact.eps[0], start.velocity, end_velocity, abs(dq), start.dt, contact.growth
     )[0]
     if contact.growth[0] < 0.0 and loose == 0.0:
-        contact.flow[FlowPlace.DRAG_DIRECTION] = find_drag_direction(
+        contact.flow[FlowIndex.FULL_SLIP_DIRECTION] = find_full_slip_direction(
             1.0 if dq > 0.0 else -1.0, contact
         )
-    return lost / 2, True
+    return dissipated / 2, True
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_drag_direction(way, contact):
-    """Return the direction if all points drag in it, else 0."""
+def find_full_slip_direction(direction, contact):
+    """Return the direction of steady full slip of all points, or 0 without full slip."""
     points = contact.points
     length = contact.eps[0]
     for j in range(contact.weight.size):
         load = points[PointRow.LOAD, j]
         if not (
-            abs(points[PointRow.STRETCH, j] - way * length * load) <= DRAG_TOL * length * load
-            and abs(points[PointRow.DENSITY, j] - load) <= DRAG_TOL * load
+            abs(points[PointRow.STRETCH, j] - direction * length * load)
+            <= FULL_SLIP_TOL * length * load
+            and abs(points[PointRow.DENSITY, j] - load) <= FULL_SLIP_TOL * load
             and abs(points[PointRow.SQUARED_STRETCH, j] - 2 * length * length * load)
-            <= 100 * DRAG_TOL * length * length * load
+            <= 100 * FULL_SLIP_TOL * length * length * load
         ):
             return 0.0
-    return way
+    return direction
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def move_points_short(contact, length):
-    """Move all points by slides below MAX_SHORT_PATH bond lengths.
+def update_points_short(contact, length):
+    """Update all points for slides below MAX_SHORT_PATH bond lengths.
 
     Returns twice the energy dissipated [J].
     """
     points = contact.points
-    lost = 0.0
+    dissipated = 0.0
     for j in range(contact.weight.size):
         xi = points[PointRow.SLIDE, j]
         (
@@ -186,13 +197,13 @@ def move_points_short(contact, length):
             points[PointRow.LOAD, j],
             length,
         )
-        lost += contact.weight[j] * part
-    return lost
+        dissipated += contact.weight[j] * part
+    return dissipated
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def move_points(contact, loose, length):
-    """Move all points by slides of any size.
+def update_points(contact, loose, length):
+    """Update all points for slides of any size.
 
     Parameters
     ----------
@@ -208,7 +219,7 @@ def move_points(contact, loose, length):
         Twice the energy dissipated [J].
     """
     points = contact.points
-    lost = 0.0
+    dissipated = 0.0
     for j in range(contact.weight.size):
         m = points[PointRow.DENSITY, j]
         z = points[PointRow.STRETCH, j]
@@ -223,13 +234,13 @@ def move_points(contact, loose, length):
         points[PointRow.DENSITY, j] = m
         points[PointRow.STRETCH, j] = z
         points[PointRow.SQUARED_STRETCH, j] = s2
-        lost += contact.weight[j] * part
-    return lost
+        dissipated += contact.weight[j] * part
+    return dissipated
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def read_state(contact, rel_disp, velocity):
-    """Return force, stored energy and slip of points and pieces.
+    """Return friction force, stored energy and slip of points and pieces.
 
     Parameters
     ----------
@@ -243,14 +254,14 @@ def read_state(contact, rel_disp, velocity):
     -------
     friction.protocol_kernels.Reading
     """
-    way = contact.flow[FlowPlace.DRAG_DIRECTION]
+    way = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
     energy = 0.0
-    slip = contact.flow[FlowPlace.TOTAL_SLIDE]
+    slip = contact.flow[FlowIndex.TOTAL_SLIDE]
     for k in range(contact.b.size):
         energy += 0.5 * contact.kappa[k] * contact.b[k] ** 2
-        slip -= contact.drag[DragRow.MEAN_SLIDE, k + 1] * contact.b[k]
+        slip -= contact.drag[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
     if way != 0.0:
-        limit = contact.drag[DragRow.FORCE, 0]
+        limit = contact.drag[FullSlipRow.FORCE, 0]
         energy += contact.eps[0] * limit
         return Reading(way * limit, energy, slip - way * contact.eps[0])
     sums = sum_bonds(contact)
@@ -260,7 +271,7 @@ def read_state(contact, rel_disp, velocity):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sum_bonds(contact):
-    """Return the `BondSums` of the points."""
+    """Return the sums of force, energy, stretch and load over all bond points."""
     points = contact.points
     force = 0.0
     energy = 0.0

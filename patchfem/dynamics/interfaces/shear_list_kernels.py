@@ -1,8 +1,9 @@
-"""A contact of lists of bonds behind shear modes, `arrays.ShearedLists` (compiled).
+"""Contact functions of lists of bonds behind shear modes (compiled).
 
-Where the pressure of a point changes, with the load or as it slides over the lower piece, a bond
-keeps the pressure under which it formed, and a point that lifts off loses its bonds with all
-energy that they store. `march.loop_kernels` calls the functions of every contact.
+The arrays are `arrays.ShearedLists`. Where the pressure of a point varies, with the load or as it
+slides over the lower piece, a bond keeps the pressure under which it formed, and a point that lifts
+off loses its bonds with all energy that they store. `march.loop_kernels` calls the functions of
+every contact.
 """
 
 from ...compiled.jit import njit
@@ -11,7 +12,7 @@ from ...friction.bonds.list_rows_kernels import CLOCK, LAW, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
-from .arrays import DragRow, FlowPlace, ListPointRow, PointRow, SolvedStep, StepProblem
+from .arrays import FlowIndex, FullSlipRow, ListPointRow, PointRow, SolvedStep, StepProblem
 from .list_kernels import add_list_energies
 from .shear_lists_kernels import (
     find_pressure,
@@ -24,7 +25,9 @@ from .shear_lists_kernels import (
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve a step with dq = free - beta force, like `element_kernels.solve_step`.
+    """Solve the slide increment and mean friction force of a step.
+
+    Parameters are those of `element_kernels.solve_step`.
 
     Returns
     -------
@@ -41,7 +44,7 @@ def solve_step(free, beta, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def apply_increment(dq, start, contact, goal):
-    """Return the mean force over a prescribed increment; the memory stays as it is.
+    """Return the mean friction force over a prescribed increment without updating the lists.
 
     Parameters
     ----------
@@ -57,7 +60,7 @@ def apply_increment(dq, start, contact, goal):
     force : float
         Path mean [N].
     is_solved : bool
-        Whether it was found.
+        Whether the solution converged.
     """
     solution = solve_step(dq, 0.0, start, contact, goal)
     return solution.mean_force, solution.iterations >= 0
@@ -65,26 +68,28 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Move lists and pieces by a solved step; the lists sum up what they dissipate and create.
+    """Update the lists of bonds and the pieces after a solved step.
+
+    The lists accumulate their dissipated and created energies.
 
     Returns
     -------
     work : float
         Work that is not stored [J].
     has_room : bool
-        Whether every list had room.
+        Whether the capacity of every list sufficed.
     """
     points = contact.points
     before = stored_energy(contact)
-    fine = True
+    has_room = True
     changes = has_changing_pressure(contact)
-    contact.flow[FlowPlace.TOTAL_SLIDE] += dq
+    contact.flow[FlowIndex.TOTAL_SLIDE] += dq
     for j in range(int(contact.count[0])):
         load_list(j, contact)
         xi = points[PointRow.SLIDE, j]
         energy = contact.status[STATUS.energy]
         speed = abs(xi) / start.dt
-        fine = list_step(xi, contact, speed, speed, start.dt) and fine
+        has_room = list_step(xi, contact, speed, speed, start.dt) and has_room
         if changes:
             contact.nows[j, CLOCK.displacement] = contact.now[CLOCK.displacement]
             if find_pressure(j, contact) <= 0.0:
@@ -96,13 +101,13 @@ def commit_step(dq, force, start, end_velocity, contact):
         )
         points[ListPointRow.LAST_SPEED, j] = speed
     solver.accept_step(contact)
-    contact.flow[FlowPlace.IS_FULL] = 0.0 if fine else 1.0
-    return force * dq - (stored_energy(contact) - before), fine
+    contact.flow[FlowIndex.IS_FULL] = 0.0 if has_room else 1.0
+    return force * dq - (stored_energy(contact) - before), has_room
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def break_bonds(status):
-    """Break all bonds of a list."""
+    """Break all bonds of a list, as when its point lifts off."""
     status[STATUS.head] = status[STATUS.end] = status[STATUS.room_start]
     status[STATUS.n_spread] = status[STATUS.n_after_merge] = 0.0
     status[STATUS.energy] = status[STATUS.force] = status[STATUS.initial_pressure] = 0.0
@@ -110,7 +115,7 @@ def break_bonds(status):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stored_energy(contact):
-    """Return the energy of lists and pieces [J]."""
+    """Return the energy [J] stored in the lists of bonds and the shear modes of the pieces."""
     energy = 0.0
     for k in range(contact.b.size):
         energy += 0.5 * contact.kappa[k] * contact.b[k] ** 2
@@ -123,7 +128,7 @@ def stored_energy(contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_state(contact, rel_disp, velocity):
-    """Return force, stored energy and slip of lists and pieces.
+    """Return friction force, stored energy and slip of lists and pieces.
 
     Parameters
     ----------
@@ -148,9 +153,9 @@ def read_state(contact, rel_disp, velocity):
             total += load
         slip = (slip - contact.law[LAW.length] * force) / total if total > 0 else rel_disp
         return Reading(force, stored_energy(contact), slip)
-    slip = contact.flow[FlowPlace.TOTAL_SLIDE]
+    slip = contact.flow[FlowIndex.TOTAL_SLIDE]
     for k in range(contact.b.size):
-        slip -= contact.drag[DragRow.MEAN_SLIDE, k + 1] * contact.b[k]
+        slip -= contact.drag[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
     for j in range(int(contact.count[0])):
         force += contact.weight[j] * contact.statuses[j, STATUS.force]
         total += contact.weight[j]

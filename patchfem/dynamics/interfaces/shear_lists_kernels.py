@@ -1,8 +1,8 @@
-"""Forces of points behind shear modes, each a list of bonds (compiled).
+"""Forces of points behind shear modes, each with a list of bonds (compiled).
 
 The lists have any order and reading of eq. 2.17.
 
-Every point has a path, a damage and, where bonds grow, a bond length of its own, at its own
+Every point has its own path, damage and, where bonds grow, bond length, at its own
 velocity. Its weight is its friction limit [N]. The tests compare with
 `friction.bonds.quadrature.Quadrature`, point by point.
 """
@@ -15,17 +15,17 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
 from .list_kernels import find_mean_and_slope
 
-# residual over the goal that is accepted where it does not decrease further, because sums over bonds jump by up to 1e-8
+# accepted residual over the tolerance if it no longer decreases, because sums over bonds jump by up to 1e-8
 GOAL_SLACK = 1e4
-# whether a force may decrease as its point slides on
+# whether the force of a point may decrease with its slide
 FORCE_MAY_FALL = True
-# damping of a Newton step over the stiffness of the modes, needed because the forces jump
+# damping of a step over the stiffness of the shear modes, needed because the forces jump
 STEP_DAMPING = 1 / 16
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def load_list(j, contact):
-    """Copy the numbers of the list of point j to `now` and `status`."""
+    """Copy the time state and status of the list of point j to `now` and `status`."""
     for i in range(contact.now.size):
         contact.now[i] = contact.nows[j, i]
     for i in range(contact.status.size):
@@ -34,7 +34,7 @@ def load_list(j, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store_list(j, contact):
-    """Copy `now` and `status` to the numbers of the list of point j."""
+    """Copy `now` and `status` back to the list of bonds of point j."""
     for i in range(contact.now.size):
         contact.nows[j, i] = contact.now[i]
     for i in range(contact.status.size):
@@ -43,7 +43,7 @@ def store_list(j, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def interpolate_pressure(x, pattern):
-    """Return the relative pressure of the lower piece at x [m], 0 outside its nodes."""
+    """Return the relative pressure of the lower piece at x [m]; 0 outside its nodes."""
     last = pattern.shape[1] - 1
     if x < pattern[0, 0] or x > pattern[0, last]:
         return 0.0
@@ -61,13 +61,13 @@ def interpolate_pressure(x, pattern):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def has_changing_pressure(contact):
-    """Return whether the pressure of a point changes in a run."""
+    """Return whether the pressure of the points varies during a run."""
     return contact.pressed.shape[1] + contact.pattern.shape[1] > 0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_pressure(j, contact):
-    """Return the relative pressure of point j, after the step where the load changes."""
+    """Return the relative pressure of point j, at the end of the step under a varying load."""
     if contact.pattern.shape[1] > 0:
         return interpolate_pressure(
             contact.places[j] + contact.nows[j, CLOCK.displacement], contact.pattern
@@ -79,9 +79,9 @@ def find_pressure(j, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_step(dt, contact):
-    """Start a step of dt [s]; bonds form under the mean pressure of both its ends.
+    """Start a time step: set the mean pressure under which bonds form.
 
-    On the lower piece that is the pressure half way along the slide of the step before.
+    dt: duration of the step [s]. A pressure fixed to the lower piece is taken half way along the slide of the step before.
     """
     contact.time[0] = dt
     for j in range(contact.points.shape[1]):
@@ -105,16 +105,16 @@ def start_step(dt, contact):
 
 @njit(
     error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
-)  # without this option the caller's forced inlining would extend to all functions called here
+)  # without this option the forced inlining of the caller would extend to all functions called here
 def write_forces(kind, ending, contact):
-    """Write path-mean force [N] and slope [N/m] of every point at its slide.
+    """Write the path-mean force [N] and slope [N/m] of every point for its slide.
 
     Parameters
     ----------
     kind : int
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
-        Whether the pieces spring back while the holder stands.
+        Whether the pieces relax while the holder is at rest.
     contact : arrays.ShearedLists
 
     Returns
@@ -135,7 +135,7 @@ def write_forces(kind, ending, contact):
             continue
         load_list(j, contact)
         f, s = find_mean_and_slope(xi, contact, points[ListPointRow.GROWTH_SPEED, j], dt)
-        # where many bonds have the same stretch, the mean force is steeper than its slope s, so the secant is used
+        # where many bonds have the same stretch, the mean force is steeper than the slope s, so the secant is used
         if xi != points[ListPointRow.TRIAL_SLIDE, j]:
             steep = (f - points[ListPointRow.TRIAL_FORCE, j]) / (
                 xi - points[ListPointRow.TRIAL_SLIDE, j]

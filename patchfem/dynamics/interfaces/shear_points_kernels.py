@@ -1,7 +1,7 @@
-"""Forces and slopes of points behind shear modes, elastic-plastic or bonds (compiled).
+"""Forces and slopes of elastic-plastic or bond points behind shear modes (compiled).
 
-The bonds have the stretch reading with p = 1. A step has the path mean of its forces under the
-load in the row LOAD; `ending` asks for the forces after the slide.
+The bonds have the stretch reading with p = 1. A step uses the path mean of the forces under the
+load in the row LOAD; `ending` selects the forces after the slide.
 """
 
 from ...compiled.jit import njit
@@ -16,10 +16,10 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 from .arrays import PointRow
 
-# kinds of the law of the points: elastic-plastic, or bonds
+# kinds of the law of the points: elastic-plastic springs, or bonds
 PLASTIC = 1
 POINTS = 2
-# as in `shear_lists_kernels`, for forces that neither jump nor decrease
+# constants as in `shear_lists_kernels`, for forces that neither jump nor decrease
 GOAL_SLACK = 100.0
 FORCE_MAY_FALL = False
 STEP_DAMPING = 0.0
@@ -27,25 +27,25 @@ STEP_DAMPING = 0.0
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def are_slides_short(contact, length):
-    """Return whether no point slides farther than MAX_SHORT_PATH bond lengths; false for nan."""
+    """Return whether all slides are at most MAX_SHORT_PATH bond lengths; False for nan."""
     points = contact.points
     near = 0.0
     for j in range(int(contact.count[0])):
-        # a sum, which unlike a maximum is vectorised
+        # the count is a sum, because the compiler vectorises sums but not maxima
         near += 1.0 if abs(points[PointRow.SLIDE, j]) <= MAX_SHORT_PATH * length else 0.0
     return near == contact.count[0]
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_forces(kind, ending, contact):
-    """Write force [N] and slope [N/m] >= 0 of every point at its slide.
+    """Write the force [N] and slope [N/m] >= 0 of every point for its slide.
 
     Parameters
     ----------
     kind : int
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
-        Whether the pieces spring back while the holder stands.
+        Whether the pieces relax while the holder is at rest.
     contact : arrays.ShearedPoints
 
     Returns
@@ -80,14 +80,14 @@ def write_forces(kind, ending, contact):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def write_general_forces(kind, ending, contact, length):
-    """Write the forces of `write_forces` for any law and slide.
+    """Write the force and slope of every point for any law and any slide.
 
     Parameters
     ----------
     kind : int
         Kind of the law of the points, PLASTIC or POINTS.
     ending : bool
-        Whether the pieces spring back while the holder stands.
+        Whether the pieces relax while the holder is at rest.
     contact : arrays.ShearedPoints
     length : float
         Bond length [m].

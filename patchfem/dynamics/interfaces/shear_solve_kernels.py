@@ -1,18 +1,18 @@
-"""Step of points behind shear modes of the pieces, by a minimisation (compiled).
+"""Step solution of points behind shear modes of the pieces, by minimisation (compiled).
 
 The slide of point j in a step is xi_j = dq - sum_k psi_kj db_k, and the coordinates b follow kappa
-(b + db/2) = psi^T f with the path-mean forces f, so the work of the holder is what points and
-pieces take. A force that jumps would leave b oscillating about the balance; for such laws kappa
-STEP_DAMPING (db - db of the step before) is added, which removes two thirds of it in a step and
-changes a smooth motion to second order. With `ending` the pieces spring back while the holder
-stands: kappa (b + db) = psi^T f with the forces after the slide, which only loses energy as long
-as a force grows with the slide.
+(b + db/2) = psi^T f with the path-mean forces f, so the work of the holder equals the energy of points and
+pieces. A force that jumps would leave b oscillating about equilibrium; for such laws kappa
+STEP_DAMPING (db - db of the step before) is added, which removes two thirds of the oscillation in a step and
+changes a smooth motion to second order. With `ending` the pieces relax while the holder
+is at rest: kappa (b + db) = psi^T f with the forces after the slide, which dissipates energy as long
+as the force increases with the slide.
 
 Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
 line search finds them. The forces of some laws may decrease as their points slide, and then several
-minima exist: the one found lies downhill from where the last steps lead, to which pieces without
-mass would jump. `contact` is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`
-has the forces of the points; `march.instances` compiles this text for each.
+minima exist: the descent from the extrapolated last steps selects the one to which massless pieces
+would jump. `contact` is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`
+is the module of the point forces; `march.instances` compiles this source for each.
 """
 
 import numpy as np
@@ -21,13 +21,13 @@ from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import grow
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..dense_kernels import factorise, solve_factorised
-from ..modal_kernels import safe_point
+from ..modal_kernels import choose_point_in_bracket
 from . import shear_points_kernels as law
-from .arrays import DragRow, PointRow, WorkRow
+from .arrays import FullSlipRow, PointRow, WorkRow
 
-# step over the bond length, below which Newton's method ends: half its square is below the goal of a march, 1e-11
+# largest last Newton step [bond lengths]: half its square is below the tolerance of a march, 1e-11
 LAST_STEP_RATIO = 4e-6
-ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
+ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
 GOAL_SLACK = law.GOAL_SLACK
 FORCE_MAY_FALL = law.FORCE_MAY_FALL
 STEP_DAMPING = law.STEP_DAMPING
@@ -37,7 +37,7 @@ MAX_ITERATIONS = 1000 if FORCE_MAY_FALL else 200
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def set_middle_length(v, dt, contact):
-    """Set the bond length in the middle of a step.
+    """Set the bond length at the middle of a step from the velocity at its start.
 
     Parameters
     ----------
@@ -51,28 +51,30 @@ def set_middle_length(v, dt, contact):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
-def set_slides(q, moved, contact):
-    """Write the slides of the points [m].
+def set_slides(q, increments, contact):
+    """Compute the slides [m] of the points from those of the holder and the shear modes.
 
     Parameters
     ----------
     q : float
         Slide of the holder [m].
-    moved : ndarray
-        (r,) increments of the coordinates [m].
+    increments : ndarray
+        (r,) increments of the shear-mode coordinates [m].
     contact : arrays.ShearedPoints
     """
     psi = contact.psi
     points = contact.points
     count = int(contact.count[0])
-    r = moved.size
+    r = increments.size
     for j in range(count):
         points[PointRow.SLIDE, j] = q
-    for k in range(0, r - 3, 4):  # four modes in one pass: a pass reads and writes every point
-        first = moved[k]
-        second = moved[k + 1]
-        third = moved[k + 2]
-        fourth = moved[k + 3]
+    for k in range(
+        0, r - 3, 4
+    ):  # four modes are processed in one pass, because each pass reads and writes every point
+        first = increments[k]
+        second = increments[k + 1]
+        third = increments[k + 2]
+        fourth = increments[k + 3]
         for j in range(count):
             points[PointRow.SLIDE, j] -= (
                 psi[k, j] * first
@@ -81,19 +83,19 @@ def set_slides(q, moved, contact):
                 + psi[k + 3, j] * fourth
             )
     for k in range(r - r % 4, r):
-        part = moved[k]
+        part = increments[k]
         for j in range(count):
             points[PointRow.SLIDE, j] -= psi[k, j] * part
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def project_onto_modes(row, psi, points, count, out):
-    """Write psi^T of a row of the points.
+    """Project a row of point values onto the shear modes.
 
     Parameters
     ----------
     row : int
-        Row of the points.
+        Row of the point array.
     psi : ndarray
         (r, m) shear modes.
     points : ndarray
@@ -101,7 +103,7 @@ def project_onto_modes(row, psi, points, count, out):
     count : int
         Number of points under load.
     out : ndarray
-        (1 + r,); the entries from the second on are written.
+        (1 + r,) output; the entries from the second on are written.
     """
     r = psi.shape[0]
     for k in range(0, r - 3, 4):
@@ -134,7 +136,7 @@ def is_prescribed(problem):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_gradient(y, problem, contact, out):
-    """Write the gradient of the function that a step minimises: the residual of the step.
+    """Write the residual of a step, the gradient of its minimised potential.
 
     The slide of the holder may be prescribed.
 
@@ -145,12 +147,12 @@ def write_gradient(y, problem, contact, out):
     problem : arrays.StepProblem
     contact : arrays.ShearedPoints
     out : ndarray
-        (1 + r,) residual [N], which is written.
+        (1 + r,) residual [N]; output.
 
     Returns
     -------
     float
-        Friction force [N].
+        Friction force Friction force [N].
     """
     end_fraction = 1.0 if problem.relaxes else 0.5
     damping = 0.0 if problem.relaxes else STEP_DAMPING
@@ -175,16 +177,16 @@ def write_gradient(y, problem, contact, out):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def write_hessian(problem, contact, hess):
-    """Write the Hessian of a step from the slopes of the points.
+    """Write the Hessian of the minimised potential from the force slopes of the points.
 
-    It overwrites the forces of the points.
+    The forces of the points are overwritten.
 
     Parameters
     ----------
     problem : arrays.StepProblem
     contact : arrays.ShearedPoints
     hess : ndarray
-        (1 + r, 1 + r), of which the lower triangle is written.
+        (1 + r, 1 + r) output, lower triangle only.
     """
     psi = contact.psi
     points = contact.points
@@ -225,9 +227,9 @@ def write_hessian(problem, contact, hess):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def find_largest_residual(out, scale):
-    """Return the largest residual as a force [N].
+    """Return the largest residual of the step equations as a force Friction force [N].
 
-    Modal residuals are multiplied by the slide they stand for.
+    The residuals of the shear modes are scaled by the slide per coordinate.
     """
     worst = abs(out[0])
     for k in range(1, out.size):
@@ -237,41 +239,43 @@ def find_largest_residual(out, scale):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def is_last_step(p, contact):
-    """Return whether a Newton step (1 + r,) moves all points by very little.
+    """Return whether a Newton step (1 + r,) changes all slides by less than a limit.
 
     The limit is LAST_STEP_RATIO bond lengths.
 
-    The curvature of the mean of a bond is below its limit over the length squared, so half of
-    LAST_STEP_RATIO^2 of the limit is left.
+    The curvature of the mean bond force is below its limit over the bond length squared, so a residual of half
+    LAST_STEP_RATIO^2 of the limit remains.
     """
-    way = abs(p[0])
+    max_slide = abs(p[0])
     for k in range(1, p.size):
-        way += contact.drag[DragRow.MAX_SLIDE, k] * abs(p[k])
-    return way <= LAST_STEP_RATIO * contact.eps[1] and contact.drag[DragRow.FORCE, 0] > 0.0
+        max_slide += contact.drag[FullSlipRow.MAX_SLIDE, k] * abs(p[k])
+    return (
+        max_slide <= LAST_STEP_RATIO * contact.eps[1] and contact.drag[FullSlipRow.FORCE, 0] > 0.0
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def minimise(problem, contact, goal):
-    """Minimise over contact.y = (dq, db) in place, from the guess in it.
+    """Minimise the potential of a step by Newton's method with a line search.
 
-    The factor of a Hessian serves all solves of a step of the march, until an iteration with it
-    gains less than a factor of ten. No residual is computed after a Newton step that is short
-    enough.
+    The unknowns contact.y = (dq, db) hold the initial guess and the solution. A factorised Hessian
+    is reused within a step of the march, until an iteration with it reduces the residual by less
+    than a factor of ten. No residual is computed after a Newton step that is short enough.
 
     Parameters
     ----------
     problem : arrays.StepProblem
-        The row 1 of contact.y has the solution while the pieces spring back, else the row 0.
+        Row 1 of contact.y has the solution of a relaxation, row 0 that of a step.
     contact : arrays.ShearedPoints
     goal : float
-        Of the residual [N].
+        Tolerance of the residual Friction force [N].
 
     Returns
     -------
     force : float
-        [N].
+        Friction force [N].
     iterations : int
-        Below 0 where it failed.
+        Number of iterations, below 0 if the iteration failed.
     """
     which = 1 if problem.relaxes else 0
     compliance = problem.compliance
@@ -291,7 +295,7 @@ def minimise(problem, contact, goal):
         step[i] = 0.0
     for count in range(
         MAX_ITERATIONS
-    ):  # the first pass evaluates the guess, so that the code contains the gradient once
+    ):  # the first pass evaluates the guess, so that the gradient code appears only once
         if count > 0:
             if contact.ready[which] == 0.0:
                 write_hessian(problem, contact, hess)
@@ -328,7 +332,9 @@ def minimise(problem, contact, goal):
             if count == 0 or slope <= -0.5 * descent:
                 break
             high = fraction
-            fraction = safe_point(low, high, max(0.1, -descent / (slope - descent)) * fraction)
+            fraction = choose_point_in_bracket(
+                low, high, max(0.1, -descent / (slope - descent)) * fraction
+            )
         for i in range(y.size):
             y[i] = trial[i]
         residual = find_largest_residual(gradient, contact.scale)
@@ -349,14 +355,14 @@ def minimise(problem, contact, goal):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def accept_step(contact):
-    """Move the pieces by a solved step, and extrapolate the next guess from three steps."""
+    """Update the shear modes after a solved step, and extrapolate the next initial guess."""
     y = contact.y[0]
     last = contact.last
     for k in range(contact.b.size):
         contact.b[k] += y[k + 1]
     for k in range(y.size):
-        here = y[k]
-        y[k] = 3 * (here - last[0, k]) + last[1, k]
+        increment = y[k]
+        y[k] = 3 * (increment - last[0, k]) + last[1, k]
         last[1, k] = last[0, k]
-        last[0, k] = here
+        last[0, k] = increment
     contact.ready[:] = 0.0

@@ -1,10 +1,10 @@
-"""Nonlinear springs with the signature of a law (compiled).
+"""Nonlinear springs with the interface of a friction law (compiled).
 
 The force is k_3 q^3 + k lambda/(2 pi) sin(2 pi q/lambda).
 
 numbers: k_3 [N/m3] of stiffening, k [N/m] and wavelength lambda [m] of interlocking peaks. The
-path-mean force is (V(q + dq) - V(q))/dq of the potential V, so they neither create nor lose energy
-at any step.
+path-mean force is (V(q + dq) - V(q))/dq of the potential V, so the springs neither create nor dissipate energy
+for any step size.
 """
 
 from math import cos, pi, sin
@@ -18,9 +18,9 @@ from ...friction.protocol_kernels import step_bond_length as step_bond_length
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, q, dq, eps, dt):
-    """Return the path-mean force of the springs and its slope.
+    """Return the path-mean force of the springs over an increment, and its slope.
 
-    It is (V(q + dq) - V(q))/dq, written without cancellation.
+    The force is (V(q + dq) - V(q))/dq, evaluated without cancellation.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     Returns
     -------
     force : float
-        [N].
+        Path mean [N].
     slope : float
-        Over dq [N/m].
+        Derivative with respect to dq [N/m].
     """
     b = q + dq
     cubic = 0.25 * numbers[1]
@@ -54,7 +54,7 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     turn = 2 * pi / numbers[3]
     half = 0.5 * turn * dq
     centre = turn * (q + 0.5 * dq)
-    # the error of the series is 1e-4^4/120 here, and the quotients would lose digits
+    # the error of the series is 1e-4^4/120 here, whereas the quotients would lose digits
     if abs(half) < 1e-4:
         ratio = 1 - half * half / 6
         bend = -half / 3
@@ -67,7 +67,7 @@ def mean_force(numbers, memory, q, dq, eps, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
-    """Return the dissipated energy, which is 0 for springs.
+    """Return the dissipated energy of a step, which is 0 for springs.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
     dq : float
         Increment of the relative displacement [m].
     force : float
-        Path mean over dq [N].
+        Path mean over dq Path mean [N].
     v0 : float
         Not used.
     v1 : float
@@ -98,7 +98,7 @@ def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def read_memory(numbers, memory, q, v):
-    """Return the force, the stored energy V(q) and the slide of the springs.
+    """Return the force and the stored energy V(q) of the springs, with the slide as slip.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The march in time: modes move exactly under friction forces that are constant over a step.
+"""Time integration of modes that move exactly under friction forces constant over a step.
 
 Equation. The modal coordinates z follow z'' + 2 zeta omega z' + omega^2 z = (drive - sum_p row_p F_p)/mass, where F_p is
 the friction force on port p and row_p gives the slide q_p = row_p z of the port.
@@ -8,8 +8,8 @@ dq of the slide. The modes then move exactly (`dynamics.propagator`), so the inc
 
     dq = free - beta F(dq),
 
-where `free` are the increments without friction and beta is the give of the ports in a step. The mean force times dq is
-exactly the work of the law, so the sum of all energies never grows by itself, for any step. The method is of second order.
+where `free` are the increments without friction and beta is the compliance of the ports in a step. The mean force times dq
+is exactly the work of the law, so the sum of all energies never grows by itself, for any step. The method is of second order.
 The table lists the module that solves the equation.
 
 ========================================= ============================ ==============================================
@@ -25,13 +25,17 @@ the same, many cases                      `lanes_kernels`              the same,
 
 Events. Smooth laws have none. A set-valued element stops and is released inside a step: the force that would hold it
 changes linearly over the step, so an event is the root of a line or a parabola. A list of bonds may overflow its array;
-the cycles since the last copy are then marched again with twice the room (`capacity`). A motion that repeats to round-off
-is not marched on (`dynamics.periodicity`).
+the cycles since the last copy are then repeated with twice the capacity (`capacity`). The remaining cycles of a motion that
+is periodic to round-off are skipped (`dynamics.periodicity`).
 
-Refused: an unknown set of stick and slip states, or a residual above 1e-11 of the friction limit, ends the run as
+Failures: an unknown set of stick and slip states, or a residual above 1e-11 of the friction limit, ends the run as
 not_converged with a message; a list of bonds beyond two million entries is `Missing`. Cost: 0.1 to 0.3 us per step and a
 few ns per point of a contact, so a cycle of 200 steps takes 20 to 60 us, and 150 ns per step for bonds behind shear modes.
 
-`instances` makes one compiled loop per contact, set of laws and load from the text of `loop_kernels`. Read `march` first,
-then `loop_kernels`, then `faces_kernels` or `pressing_kernels` where a rig needs them.
+Modules. `march` marches a model over its cycles with a `run.Run`, which holds the state and calls the compiled loop;
+`recording` keeps its samples, and `folding` (arrays in `folded_arrays`) marches without samples. `models`, `joints` and
+`varying_load` describe contacts, elements and loads; `faces` and `element_arrays` have the arrays of the elements. `lanes`
+marches many cases, whose array rows `lane_rows` names. `instances` compiles one loop per contact, set of laws and load from
+the source of `loop_kernels`, with the flags of `parts_kernels`. Read `march` first, then `run`, then `loop_kernels`, then
+`faces_kernels` or `pressing_kernels` where a rig needs them.
 """

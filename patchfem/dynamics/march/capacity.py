@@ -1,7 +1,7 @@
-"""Capacity of a list of bonds that grows.
+"""Capacity of growing lists of bonds.
 
-What a part of a run may change is copied before it. If the list fills up, the part is run again with twice the capacity. A
-contact without a list has all the capacity that it needs; for it everything here does nothing.
+The arrays that a part of a run may change are copied before it. If the list fills up, the part is repeated with twice
+the capacity. A contact without a list has a fixed size; for it these functions do nothing.
 """
 
 from typing import NamedTuple
@@ -10,17 +10,21 @@ import numpy as np
 
 from ...core import Missing
 from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
-from ..interfaces.arrays import FlowPlace
+from ..interfaces.arrays import FlowIndex
 
-MAX_ENTRIES = 2_000_000  # number of entries of a list of bonds beyond which a run is refused
+MAX_ENTRIES = (
+    2_000_000  # largest number of entries of a list of bonds, which bounds the memory of a run
+)
 ENTRY_BYTES = 8 * N_ROWS
-REMEDY = 'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
+LONG_LIST_ADVICE = (
+    'raise accuracy.tail or accuracy.merge, or use reading = "stretch" with order = 1'
+)
 
 
 class SavedState(NamedTuple):
-    """Copies of arrays of a run, from which a step is repeated.
+    """Copies of the arrays of a run, from which a part of the march is repeated.
 
-    - `entries`: entries in use of every list of bonds.
+    - `entries`: used entries of every list of bonds.
     - `fields`: other arrays of the contact by name.
     - `others`: further arrays of the run.
     """
@@ -31,7 +35,7 @@ class SavedState(NamedTuple):
 
 
 def copy_state(contact, *others) -> SavedState | None:
-    """Return copies of a contact with a list of bonds and of other arrays.
+    """Copy the arrays of a contact with a list of bonds, and other arrays of a run.
 
     The result is None for a contact without a list.
     """
@@ -40,57 +44,62 @@ def copy_state(contact, *others) -> SavedState | None:
     fields = {name: array.copy() for name, array in contact._asdict().items() if name != "bondlist"}
     entries = [
         contact.bondlist[:, head:end].copy()
-        for head, end in _statuses(contact)[:, [STATUS.head, STATUS.end]].astype(int)
+        for head, end in _get_statuses(contact)[:, [STATUS.head, STATUS.end]].astype(int)
     ]
     return SavedState(entries, fields, tuple(array.copy() for array in others))
 
 
-def _statuses(contact) -> np.ndarray:
-    """Return the statuses (m, 16) of the lists of a contact."""
+def _get_statuses(contact) -> np.ndarray:
+    """Return the status rows (m, 16) of the lists of bonds of a contact."""
     return contact.statuses if hasattr(contact, "statuses") else contact.status[None]
 
 
 def is_full(contact) -> bool:
-    """Return whether a list of bonds of a contact is full.
+    """Return whether a list of bonds of a contact has reached its capacity.
 
     For a contact with a single list a full list is the only cause of a failed step.
     """
     return hasattr(contact, "bondlist") and (
-        not hasattr(contact, "flow") or contact.flow[FlowPlace.IS_FULL] == 1.0
+        not hasattr(contact, "flow") or contact.flow[FlowIndex.IS_FULL] == 1.0
     )
 
 
-def enlarge_list(contact, kept: SavedState, place: str, *others):
-    """Restore a contact with twice the capacity of its list; other arrays are restored in place.
+def enlarge_list(contact, saved_state: SavedState, location: str, *others):
+    """Restore a contact from saved copies with twice the capacity of its list of bonds.
+
+    The other arrays are restored in place.
 
     Parameters
     ----------
     contact : tuple
         Arrays of a contact with a list of bonds.
-    kept : SavedState
-    place : str
-        Where the run is, for the message.
+    saved_state : SavedState
+    location : str
+        Position of the run in the message, such as "at step 10".
     """
-    rows, have = contact.bondlist.shape
-    if have >= MAX_ENTRIES:
+    rows, old_capacity = contact.bondlist.shape
+    if old_capacity >= MAX_ENTRIES:
         raise Missing(
-            f"the bond list grew beyond {have} entries ({have * ENTRY_BYTES / 1e6:.0f} MB) {place}; {REMEDY}",
+            f"the bond list grew beyond {old_capacity} entries ({old_capacity * ENTRY_BYTES / 1e6:.0f} MB) {location}; "
+            f"{LONG_LIST_ADVICE}",
             "",
         )
-    for array, old in zip(others, kept.others):
-        array[...] = old
-    found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})
-    statuses = _statuses(found)
-    capacity = min(2 * have, MAX_ENTRIES) // len(statuses)
-    wider = np.zeros((rows, capacity * len(statuses)))
-    for j, (status, entries) in enumerate(zip(statuses, kept.entries)):
+    for array, saved in zip(others, saved_state.others):
+        array[...] = saved
+    restored = contact._replace(
+        **{name: array.copy() for name, array in saved_state.fields.items()}
+    )
+    statuses = _get_statuses(restored)
+    capacity = min(2 * old_capacity, MAX_ENTRIES) // len(statuses)
+    enlarged = np.zeros((rows, capacity * len(statuses)))
+    for j, (status, entries) in enumerate(zip(statuses, saved_state.entries)):
         status[STATUS.room_start] = status[STATUS.head] = j * capacity
         status[STATUS.room_end] = (j + 1) * capacity
         status[STATUS.end] = j * capacity + entries.shape[1]
-        wider[:, j * capacity : j * capacity + entries.shape[1]] = entries
-    return found._replace(bondlist=wider)
+        enlarged[:, j * capacity : j * capacity + entries.shape[1]] = entries
+    return restored._replace(bondlist=enlarged)
 
 
-def list_bytes(strips: float) -> float:
-    """Return the memory [bytes] of a list of bonds, with the copy that exists while it is enlarged."""
-    return 3 * ENTRY_BYTES * min(strips, MAX_ENTRIES)
+def list_bytes(n_entries: float) -> float:
+    """Return the memory [bytes] of a list of bonds, including its copy during enlargement."""
+    return 3 * ENTRY_BYTES * min(n_entries, MAX_ENTRIES)

@@ -1,4 +1,4 @@
-"""Arrays of the friction elements and springs of a march, and the names of their rows."""
+"""Arrays of the friction elements and springs of a march, with names for their rows."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -7,11 +7,11 @@ import numpy as np
 
 
 class LinkRow(IntEnum):
-    """Rows of `PortElements.links`.
+    """Rows of `PortElements.links`: port, kind and plane partner of each element.
 
     - PORT: port on which the element acts
     - IS_FRICTION: 1 for friction, 0 for a spring
-    - MATE: element of the other direction of a slide in a plane, else its own number
+    - MATE: element of the other direction of a slide in a plane, otherwise the number of the element itself
     """
 
     PORT = 0
@@ -20,14 +20,14 @@ class LinkRow(IntEnum):
 
 
 class ElementRow(IntEnum):
-    """Rows of `PortElements.state`: numbers of an element in the present step.
+    """Rows of `PortElements.state`: force, slide and residual of an element in a step.
 
     - FORCE: mean force of the step [N]
     - SLIDE, SPEED: slide [m] and its speed [m/s] at the start
     - BOND_LENGTH: bond length of the step [m]
     - INCREMENT: increment of the slide [m]
     - RESIDUAL: residual of the force [N]
-    - MAX_FORCE: largest force [N]; of a set-valued element in a step by mean forces alone
+    - MAX_FORCE: largest force [N]; for a set-valued element in a step with mean forces alone
     - FORCE_TOL: tolerance of the force [N]
     - LAST_INCREMENT, INCREMENT_BEFORE: increments of the last two steps [m]
     """
@@ -44,8 +44,8 @@ class ElementRow(IntEnum):
     INCREMENT_BEFORE = 9
 
 
-class ContactPlace(IntEnum):
-    """Places in `PortElements.contact`: the contact on port 0 in the present step.
+class ContactIndex(IntEnum):
+    """Indices into `PortElements.contact`: state of the contact on port 0 in a step.
 
     - FORCE: mean force [N]
     - INCREMENT: increment of the slide [m]
@@ -62,17 +62,17 @@ class ContactPlace(IntEnum):
 
 
 class PortRow(IntEnum):
-    """Rows of `PortElements.port`: increment of the slide [m] and speed at the end [m/s] without forces."""
+    """Rows of `PortElements.port`: slide increment [m] and end speed [m/s] without forces."""
 
     FREE_SLIDE = 0
     FREE_SPEED = 1
 
 
 class ModalRow(IntEnum):
-    """Rows of `PortElements.modal`.
+    """Rows of `PortElements.modal`: compliances, accelerations and workspace of the modes.
 
     - COMPLIANCE: compliance of the coordinates in a step [m/N]
-    - OTHER_ACCELERATION: accelerations by forces other than those of contact and elements [m s-2]
+    - OTHER_ACCELERATION: accelerations due to forces other than those of contact and elements [m s-2]
     - SCRATCH: first of three rows of scratch space
     """
 
@@ -82,11 +82,11 @@ class ModalRow(IntEnum):
 
 
 class ComplianceRow(IntEnum):
-    """First index of `compliances`: what a constant force takes from the motion of a port in a step.
+    """First index of `compliances`: reduction of a port's motion in a step per constant force.
 
-    - SLIDE: from the slide [m/N]
-    - SPEED: from the speed [m/(s N)]
-    - ACCELERATION: from the acceleration [1/kg]; of set-valued elements alone
+    - SLIDE: reduction of the slide [m/N]
+    - SPEED: reduction of the speed [m/(s N)]
+    - ACCELERATION: reduction of the acceleration [1/kg]; for set-valued elements only
     """
 
     SLIDE = 0
@@ -95,7 +95,11 @@ class ComplianceRow(IntEnum):
 
 
 class LimitRow(IntEnum):
-    """Rows of `SetValuedElements.limit` [N]; those of the end of the step are AT_END rows further on."""
+    """Rows of `SetValuedElements.limit`: friction limits [N] of set-valued elements.
+
+    The limits at the end of the step are AT_END rows further on.
+
+    """
 
     STATIC = 0
     KINETIC = 1
@@ -103,22 +107,22 @@ class LimitRow(IntEnum):
 
 
 class FaceRow(IntEnum):
-    """Rows of `SetValuedElements.field`: numbers of a set-valued element, a face, in the present step.
+    """Rows of `SetValuedElements.field`: state of a set-valued element (a face) in a step.
 
     - FREE_SLIDE, FREE_SPEED: increment of the slide [m] and speed at the end [m/s] without the forces of the faces
     - START_SPEED: speed at the start [m/s]
-    - WAS_RESTING: 1 if the face rests at the start
-    - HOLDING_START, HOLDING_END: force that would hold it, at the start and at the end [N]
+    - WAS_RESTING: 1 if the face rests at the start of the step
+    - HOLDING_START, HOLDING_END: force that would hold the face, at the start and at the end of the step [N]
     - SLIDE: slide since the start [m]
     - SPEED: present speed [m/s]
     - MEAN_FORCE: mean force so far [N]
     - FORCE, FORCE_SLOPE: present force and its slope over the step [N]
-    - SLIP_STATE: 0 for a face that rests, +-1 for one that slides, +-2 for one that carries its static friction while
+    - SLIP_STATE: 0 for a resting face, +-1 for a sliding face, +-2 for a face that carries its static friction while
       other faces hold it
-    - SLIDES_ON: 1 if it slides in one direction through the whole step
-    - RIGHT_SIDE, SOLUTION, RESIDUAL: of the equations that are solved; RESIDUAL is also scratch space
+    - SLIDES_ON: 1 if the face slides in one direction through the entire step
+    - RIGHT_SIDE, SOLUTION, RESIDUAL: vectors of the equations that are solved; RESIDUAL is also scratch space
     - INCREMENT: increment of the slide in the step [m]
-    - BLOW: impulse at the end of the step [N s]
+    - IMPULSE: impulse at the end of the step [N s]
     """
 
     FREE_SLIDE = 0
@@ -138,15 +142,15 @@ class FaceRow(IntEnum):
     SOLUTION = 14
     RESIDUAL = 15
     INCREMENT = 16
-    BLOW = 17
+    IMPULSE = 17
 
 
 class LoadColumn(IntEnum):
-    """Last columns of a sample under a load that varies.
+    """Last columns of a march sample under a varying load.
 
     - LOAD, MOMENT: normal force [N] and its moment [N m]
     - ENERGY: energy of the preloaded contact [J]
-    - HEAVE, PITCH: [m] and [rad]
+    - HEAVE, PITCH: normal displacement [m] and rotation [rad] of the upper holder
     """
 
     LOAD = 0
@@ -156,21 +160,25 @@ class LoadColumn(IntEnum):
     PITCH = 4
 
 
-# An element has the first columns of `dynamics.ledger.SampleColumn` up to the mean force.
+# Number of sample columns of an element: those of `dynamics.ledger.SampleColumn` up to the mean force.
 N_ELEMENT_COLUMNS = 5
 N_LOAD_COLUMNS = len(LoadColumn)
 
 
 class SingleContact(NamedTuple):
-    """A contact on port 0 alone; goal: (1,) of its residual [N]."""
+    """Array of a march with a single contact and no elements.
+
+    - goal: (1,) tolerance of the residual of the contact [N]
+
+    """
 
     goal: np.ndarray
 
 
 class SetValuedElements(NamedTuple):
-    """The m set-valued elements of a march, the faces of `stops_kernels`.
+    """Arrays of the m set-valued elements of a march, the faces of `stops_kernels`.
 
-    - element, names: (m,) their numbers, and workspace for numbers
+    - element, names: (m,) numbers of the elements, and workspace for numbers of faces
     - limit: (4, m) friction limits, see `LimitRow`
     - compliances: (3, m, m), see `ComplianceRow`
     - rows: (m, n) relative displacement per coordinate
@@ -187,14 +195,16 @@ class SetValuedElements(NamedTuple):
 
 
 class PortElements(NamedTuple):
-    """Elements (e,) on ports (p,), in addition to a contact on port 0 or in its place.
+    """Arrays of friction elements and springs (e,) on ports (p,) of a march.
+
+    They act in addition to a contact on port 0 or in its place.
 
     - rows: (p, n) displacement of every port per coordinate
     - compliances: (2, p, p), see `ComplianceRow`
     - links: (3, e), see `LinkRow`
     - num, mem: (e, ...) numbers and memory of the laws; num[e, 0] is the number of the law
     - state: (10, e), see `ElementRow`
-    - contact: (5,), see `ContactPlace`
+    - contact: (5,), see `ContactIndex`
     - port: (2, p), see `PortRow`
     - modal: (5, n), see `ModalRow`
     - system, hess: (e, e) and (n, n) workspace
@@ -216,7 +226,7 @@ class PortElements(NamedTuple):
 
 
 class MarchArrays(NamedTuple):
-    """Arrays that the compiled loop of a march takes.
+    """Arguments of the compiled loop of a march: modes, interface, load and ledger.
 
     - motion: (2, n) coordinates and rates of the modes
     - modal_system: `interfaces.arrays.ModalArrays`
@@ -224,7 +234,7 @@ class MarchArrays(NamedTuple):
     - interface: arrays of the contact on port 0, in `interfaces.arrays`
     - elements: `PortElements` or `SingleContact`
     - press: `interfaces.arrays.VaryingLoad` or `ConstantLoad`
-    - ledger: (9,) see `dynamics.ledger.Ledger`
+    - ledger: (9,) energy sums, see `dynamics.ledger.Ledger`
     - travel: largest displacement of the output [m], beyond which the march ends
     """
 

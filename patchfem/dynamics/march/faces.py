@@ -1,10 +1,10 @@
-"""Arrays of the friction elements of a march, which act with a contact or in its place."""
+"""Initial arrays of the friction elements and springs of a march."""
 
 import numpy as np
 
 from ..interfaces.dispatch import COULOMB_LAW, number_laws
 from .element_arrays import (
-    ContactPlace,
+    ContactIndex,
     ElementRow,
     FaceRow,
     LinkRow,
@@ -15,12 +15,15 @@ from .element_arrays import (
     SingleContact,
 )
 
-STEP_TOL = 1e-11  # residual of the step solve over the friction limit
-TINY_FORCE = 1e-300  # [N]; keeps the tolerance of a spring above 0 if the scale of the model is 0
+STEP_TOL = 1e-11  # largest residual of a step solution over the friction limit; it is far below any time-step error
+# [N]; smallest tolerance of a spring force, so that it stays above 0 if the force scale of the model is 0
+TINY_FORCE = 1e-300
 
 
-def make_faces(model, prop, modal_system, mass: float):
-    """Return the arrays of the elements of a march at its start; `SingleContact` for a model without elements.
+def make_element_arrays(model, prop, modal_system, mass: float):
+    """Return the arrays of the friction elements and springs at the start of a march.
+
+    The result is a `SingleContact` for a model without elements.
 
     Parameters
     ----------
@@ -55,12 +58,12 @@ def make_faces(model, prop, modal_system, mass: float):
     for k, element in enumerate(elements):
         state[ElementRow.MAX_FORCE, k] = element.limit if element.is_bounded else np.inf
         state[ElementRow.FORCE_TOL, k] = STEP_TOL * (element.limit or scale)
-    contact = np.zeros(len(ContactPlace))
+    contact = np.zeros(len(ContactIndex))
     has_contact = getattr(model, "patch", None) is not None
-    contact[ContactPlace.FORCE_TOL] = STEP_TOL * (model.patch.limit if has_contact else model.limit)
+    contact[ContactIndex.FORCE_TOL] = STEP_TOL * (model.patch.limit if has_contact else model.limit)
     modal = np.zeros((ModalRow.SCRATCH + 3, n))
     modal[ModalRow.COMPLIANCE] = modal_system.push[0] / mass
-    # rows of the rates under a constant force
+    # rates of the modes per constant force
     rate_rows = prop.rows * prop.push[1]
     if prop.dense.size:
         rate_rows = prop.rows @ prop.dense[n:, 2 * n :]
@@ -85,17 +88,17 @@ def make_faces(model, prop, modal_system, mass: float):
 
 
 def _make_set_valued(elements, ports, num, compliances, rows, mass: float) -> SetValuedElements:
-    """Return the arrays of the set-valued elements.
+    """Return the arrays of the set-valued elements of a march at its start.
 
     Parameters
     ----------
     elements : list of Element
     ports : (e,) array
-        Their ports.
+        Ports of the elements.
     num : (e, k) array
-        Numbers of their laws.
+        Numbers of the laws of the elements.
     compliances : tuple of (p, p) arrays
-        What port forces take from the displacements [m/N] and velocities [m/(s N)] of the ports.
+        Reduction of the displacements [m/N] and velocities [m/(s N)] of the ports per constant port force.
     rows : (p, n) array
         Displacement of every port per coordinate.
     mass : float

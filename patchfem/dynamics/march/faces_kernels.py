@@ -1,10 +1,10 @@
-"""Solution of a contact and several elements over a step, by block descent on their forces.
+"""Step solution of a contact and several elements by block descent on their forces.
 
-Port p is a row of slides. The contact, if there is one, acts on port 0, and every element on its own port. Over a step the
+A port is a row of slides. The contact, if there is one, acts on port 0, and every element on its own port. Over a step the
 path-mean forces F satisfy d = free - beta F together with every law. Each law is solved in turn under the forces of the
 others, which is block descent on a convex problem for laws that dissipate. All set-valued elements are one block, which is
-followed from stop to release inside the step (`stops_kernels`). If that fails, `solve_coupled_forces` finds mean forces of
-the whole step, which always exist. Where the turns converge slowly, a Newton step on all forces takes over
+followed from stop to release inside the step (`stops_kernels`). If that fails, `solve_coupled_forces` finds mean forces over
+the entire step, which always exist. Where the sweeps converge slowly, a Newton step on all forces takes over
 (`together_kernels`). The text runs with any contact and any laws; `instances` makes an instance of it.
 """
 
@@ -29,7 +29,7 @@ from . import together_kernels as together
 from .element_arrays import (
     N_ELEMENT_COLUMNS,
     ComplianceRow,
-    ContactPlace,
+    ContactIndex,
     ElementRow,
     FaceRow,
     LimitRow,
@@ -45,22 +45,24 @@ HAS_SLOPES = parts.HAS_SLOPES
 HAS_CONTACT = parts.HAS_CONTACT
 IS_COUPLED = parts.IS_COUPLED
 HAS_PLANES = parts.HAS_PLANES
-MAX_TURNS = 1000  # block descent has failed after this number of turns over all elements
-# Largest number of turns if stops and releases lie inside the step; the first half of the turns decides which.
-MAX_EVENT_TURNS = 60
-FORCE_GOAL_FRACTION = (
-    0.1  # tolerance of the force of an element that is solved alone, over its tolerance
-)
-SLOW_RATIO = 0.2  # ratio of the changes of two turns above which the turns converge slowly
-FIRST_NEWTON_TURN = 5  # turn after which a Newton step on all forces is worth its cost
-# Round-off limits the residual to this fraction of a force and of a free slide over its compliance.
+MAX_SWEEPS = 1000  # largest number of sweeps of the block descent over all elements, after which it has failed
+# Largest number of sweeps if stops and releases lie inside the step; the first half of the sweeps determines them.
+MAX_EVENT_SWEEPS = 60
+# tolerance of a single element solution within a sweep, over the tolerance of the element in the step
+FORCE_GOAL_FRACTION = 0.1
+# ratio of the force changes in two successive sweeps, above which the block descent converges slowly
+SLOW_CONVERGENCE_RATIO = 0.2
+FIRST_NEWTON_SWEEP = 5  # number of sweeps before the first Newton step on all forces, as fewer cost less than that step
+# Smallest attainable residual, over the force and over the free slide divided by its compliance, due to round-off.
 ROUND_OFF = 4e-15
 
 
-class NewtonPace(NamedTuple):
-    """Turn of the next Newton step on all forces, pause between two, and change before the last one.
+class NewtonSchedule(NamedTuple):
+    """Schedule of the Newton steps on all forces within the block descent.
 
-    The pause is a number of turns. The change is the largest one of a force, over its tolerance.
+    - next_turn: sweep of the next Newton step
+    - pause: number of sweeps between two Newton steps
+    - worst: largest force change over its tolerance before the last Newton step
     """
 
     next_turn: int
@@ -68,11 +70,11 @@ class NewtonPace(NamedTuple):
     worst: float
 
 
-class ContactTurn(NamedTuple):
-    """Solution of the contact in a turn of the block descent.
+class ContactSolution(NamedTuple):
+    """Solution of the contact in a sweep of the block descent.
 
-    - increment: of its slide [m]
-    - change: of its force over the tolerance, infinite if the solution fails
+    - increment: increment of the slide of the contact [m]
+    - change: force change over the tolerance, infinite if the solution fails
     - iterations: number of iterations
     """
 
@@ -82,11 +84,11 @@ class ContactTurn(NamedTuple):
 
 
 class EventStep(NamedTuple):
-    """Step with stops and releases inside it.
+    """Solution of a step with stops and releases of set-valued elements inside it.
 
-    - increment: of the slide of the contact [m]
+    - increment: increment of the slide of the contact [m]
     - iterations: number of iterations
-    - is_solved: false if no such step is found, or if it would create energy
+    - is_solved: false if no solution is found, or if it would create energy
     """
 
     increment: float
@@ -96,16 +98,16 @@ class EventStep(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def sample_elements(modal, system, row):
-    """Write the state of all elements into the row, and return that of the interface.
+    """Write the state of all elements into a sample row; return that of the first interface.
 
-    Force and slip are those of the contact, or without a contact those of the first element.
+    Force and slip are those of the contact, or of the first element without a contact.
 
     Parameters
     ----------
     modal : modal_kernels.ModalSample
     system : element_arrays.MarchArrays
     row : (k,) array
-        Row of samples of `loop_kernels.march`; it is written.
+        Sample row of `loop_kernels.march`; output.
 
     Returns
     -------
@@ -144,21 +146,21 @@ def sample_elements(modal, system, row):
         force = reading.force
         slip = reading.slip
         friction_energy += reading.stored_energy
-        elements.contact[ContactPlace.SAMPLE_FORCE] = force
+        elements.contact[ContactIndex.SAMPLE_FORCE] = force
     return Reading(force, friction_energy, slip), spring_energy
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def find_element_columns(motion):
-    """Return the first column of the first element in a row of samples."""
+    """Return the column at which the elements begin in a sample row of a march."""
     return 2 * motion.shape[1] + N_SAMPLE_COLUMNS
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def sample_set_valued(drive, force, system, row):
-    """Write the forces of the set-valued elements at a sample into their memory and the row.
+    """Write the sampled forces of the set-valued elements into their memory and the sample row.
 
-    Elements that slide have their kinetic friction, those that rest the force that leaves them no acceleration.
+    A sliding element has its kinetic friction, a resting element the force that keeps its acceleration at zero.
 
     Parameters
     ----------
@@ -168,7 +170,7 @@ def sample_set_valued(drive, force, system, row):
         Force of the contact [N].
     system : element_arrays.MarchArrays
     row : (k,) array
-        Row of samples of `loop_kernels.march`; it is written.
+        Sample row of `loop_kernels.march`; output.
 
     Returns
     -------
@@ -186,7 +188,7 @@ def sample_set_valued(drive, force, system, row):
         limit = elements.num[e, 1] if abs(slip_state) == 2.0 else elements.num[e, 2]
         elements.mem[e, 0] = np.sign(slip_state) * limit
         row[force_column + N_ELEMENT_COLUMNS * e] = elements.mem[e, 0]
-    contact_force = elements.contact[ContactPlace.SAMPLE_FORCE]
+    contact_force = elements.contact[ContactIndex.SAMPLE_FORCE]
     for k in range(accel.size):
         accel[k] = (
             elements.modal[ModalRow.OTHER_ACCELERATION, k]
@@ -211,13 +213,13 @@ def sample_set_valued(drive, force, system, row):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def prepare_step(at, system):
-    """Write the free slides and speeds of all ports and the bond lengths of the step.
+def prepare_step(table_row, system):
+    """Prepare a step: write the free slides and speeds of all ports, and the bond lengths.
 
     Parameters
     ----------
-    at : int
-        Row of the table for this step.
+    table_row : int
+        Row of the drive table for the step.
     system : element_arrays.MarchArrays
     """
     elements = system.elements
@@ -225,10 +227,12 @@ def prepare_step(at, system):
     modal_system = system.modal_system
     table = system.table
     for p in range(elements.port.shape[1]):
-        elements.port[PortRow.FREE_SLIDE, p] = free_increment(motion, modal_system, p, table, at)
+        elements.port[PortRow.FREE_SLIDE, p] = free_increment(
+            motion, modal_system, p, table, table_row
+        )
         if HAS_STOPS:
             elements.port[PortRow.FREE_SPEED, p] = free_rate(
-                motion, elements.rows[p], modal_system, table, at
+                motion, elements.rows[p], modal_system, table, table_row
             )
     for e in range(elements.links.shape[1]):
         elements.state[ElementRow.BOND_LENGTH, e] = law.step_bond_length(
@@ -238,7 +242,7 @@ def prepare_step(at, system):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_slide_by_others(element, port, elements):
-    """Return the reduction [m] of the slide of a port due to the forces of all other elements.
+    """Return the slide reduction [m] of a port due to the forces of all other elements.
 
     Parameters
     ----------
@@ -258,13 +262,13 @@ def find_slide_by_others(element, port, elements):
             other_port = elements.links[LinkRow.PORT, k]
             reduction += compliances[other_port] * elements.state[ElementRow.FORCE, k]
     if element >= 0:
-        reduction += compliances[0] * elements.contact[ContactPlace.FORCE]
+        reduction += compliances[0] * elements.contact[ContactIndex.FORCE]
     return reduction
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_element(e, turn, elements, dt):
-    """Solve an element under the forces of all others.
+def solve_element(e, sweep, elements, dt):
+    """Solve the step of one element under fixed forces of all others.
 
     The first direction of an element in a plane is solved together with its second one.
 
@@ -272,8 +276,8 @@ def solve_element(e, turn, elements, dt):
     ----------
     e : int
         Number of the element.
-    turn : int
-        Number of the turn, from 0.
+    sweep : int
+        Number of the sweep, from 0.
     elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
@@ -281,14 +285,14 @@ def solve_element(e, turn, elements, dt):
     Returns
     -------
     float
-        Change of its force over the tolerance, infinite if the solution fails.
+        Force change over the tolerance, infinite if the solution fails.
     int
         Number of iterations.
     """
     if HAS_PLANES:
         mate = elements.links[LinkRow.MATE, e]
         if mate > e:
-            return solve_plane_element(e, turn, elements)
+            return solve_plane_element(e, sweep, elements)
         if mate < e:
             return 0.0, 0
     p = elements.links[LinkRow.PORT, e]
@@ -303,7 +307,7 @@ def solve_element(e, turn, elements, dt):
             increment = solve_coulomb_step(free, beta, limit, limit)[0]
     if HAS_SLOPES:
         if elements.num[e, 0] != SET_VALUED:
-            if turn == 0:
+            if sweep == 0:
                 increment = extrapolate_increment(e, elements)
             step = LawStep(
                 elements.num[e],
@@ -326,23 +330,23 @@ def solve_element(e, turn, elements, dt):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def extrapolate_increment(e, elements):
-    """Return the increment of an element that its last two steps suggest."""
+    """Return the slide increment of an element by linear extrapolation from its last two steps."""
     last = elements.state[ElementRow.LAST_INCREMENT, e]
     return 2 * last - elements.state[ElementRow.INCREMENT_BEFORE, e]
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def find_force_change(force, last_force, free_force, e, elements):
-    """Return the change of a force over its tolerance.
+    """Return the change of an element force in a sweep, over its tolerance.
 
     Parameters
     ----------
     force, last_force : float
-        Force in this turn and in the last one [N].
+        Force in this sweep and in the last one [N].
     free_force : float
         Force that would hold the element [N].
     e : int
-        Number of the element whose tolerance holds.
+        Number of the element whose tolerance applies.
     elements : element_arrays.PortElements
 
     Returns
@@ -354,15 +358,17 @@ def find_force_change(force, last_force, free_force, e, elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_plane_element(e, turn, elements):
-    """Solve both directions of an element in a plane, like `solve_element`.
+def solve_plane_element(e, sweep, elements):
+    """Solve the step of an element with slides in a plane, in both directions together.
+
+    Parameters and results are those of `solve_element`.
 
     Parameters
     ----------
     e : int
         Number of the element.
-    turn : int
-        Number of the turn, from 0.
+    sweep : int
+        Number of the sweep, from 0.
     elements : element_arrays.PortElements
 
     Returns
@@ -388,7 +394,7 @@ def solve_plane_element(e, turn, elements):
     )
     dx = elements.state[ElementRow.INCREMENT, e]
     dy = elements.state[ElementRow.INCREMENT, f]
-    if turn == 0:
+    if sweep == 0:
         dx = extrapolate_increment(e, elements)
         dy = extrapolate_increment(f, elements)
     dx, dy, force_x, force_y, iterations = plane.solve_plane_step(
@@ -412,7 +418,7 @@ def solve_plane_element(e, turn, elements):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_contact(start, system):
-    """Solve the contact on port 0 under the forces of all elements.
+    """Solve the step of the contact on port 0 under fixed forces of all elements.
 
     Parameters
     ----------
@@ -421,33 +427,33 @@ def solve_contact(start, system):
 
     Returns
     -------
-    ContactTurn
+    ContactSolution
     """
     elements = system.elements
     free_slide = elements.port[PortRow.FREE_SLIDE, 0]
     free = free_slide - find_slide_by_others(-1, 0, elements)
     beta = elements.compliances[ComplianceRow.SLIDE, 0, 0]
-    tolerance = elements.contact[ContactPlace.FORCE_TOL]
+    tolerance = elements.contact[ContactIndex.FORCE_TOL]
     step = contact.solve_step(free, beta, start, system.interface, tolerance)
     force = (free - step.increment) / beta
-    change = abs(force - elements.contact[ContactPlace.FORCE]) / (
+    change = abs(force - elements.contact[ContactIndex.FORCE]) / (
         tolerance + ROUND_OFF * (abs(free_slide) / beta + abs(force))
     )
-    elements.contact[ContactPlace.FORCE] = force
+    elements.contact[ContactIndex.FORCE] = force
     change = change if step.iterations >= 0 else np.inf
-    return ContactTurn(step.increment, change, abs(step.iterations))
+    return ContactSolution(step.increment, change, abs(step.iterations))
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_coupled_forces(start, system):
-    """Solve contact and elements over a step by block descent, with mean forces alone.
+    """Solve contact and elements over a step by block descent on their mean forces.
 
-    Each is solved in turn under the forces of the others, into elements.contact and elements.state. A Newton step on all
-    forces speeds up turns that converge slowly.
+    Each is solved in turn under the forces of the others; the results are written to elements.contact and
+    elements.state. A Newton step on all forces accelerates slow convergence.
 
     With one friction limit per set-valued element the problem is convex, and block descent converges. So each of
-    them begins with its static friction; those that slip under it are released to their kinetic friction, and the
-    turns go on. No element gets its static friction back, so there are at most as many releases as elements. In
+    them begins with its static friction; those that slip under it are limited to their kinetic friction, and the
+    descent continues. No element returns to its static friction, so there are at most as many releases as elements. In
     the end an element at rest carries at most its static friction, and one that slips has its kinetic friction.
 
     Parameters
@@ -465,11 +471,11 @@ def solve_coupled_forces(start, system):
     elements = system.elements
     n_iterations = 0
     last_worst = np.inf
-    pace = NewtonPace(FIRST_NEWTON_TURN, 1, np.inf)
+    pace = NewtonSchedule(FIRST_NEWTON_SWEEP, 1, np.inf)
     increment = 0.0
     if HAS_STOPS:
         set_static_limits(elements)
-    for turn in range(MAX_TURNS):
+    for sweep in range(MAX_SWEEPS):
         worst = 0.0
         if HAS_CONTACT:
             solution = solve_contact(start, system)
@@ -477,7 +483,7 @@ def solve_coupled_forces(start, system):
             worst = solution.change
             n_iterations += solution.iterations
         for e in range(elements.links.shape[1]):
-            change, count = solve_element(e, turn, elements, start.dt)
+            change, count = solve_element(e, sweep, elements, start.dt)
             worst = max(worst, change)
             n_iterations += count
         if not IS_COUPLED:
@@ -490,9 +496,9 @@ def solve_coupled_forces(start, system):
                     last_worst = np.inf
                     continue
             return increment, n_iterations
-        if turn > 1:
-            pace, count = speed_up_turns(
-                turn, worst, last_worst, pace, system.modal_system, elements
+        if sweep > 1:
+            pace, count = accelerate_sweeps(
+                sweep, worst, last_worst, pace, system.modal_system, elements
             )
             n_iterations += count
         last_worst = worst
@@ -501,7 +507,7 @@ def solve_coupled_forces(start, system):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_static_limits(elements):
-    """Let every set-valued element carry up to its static friction."""
+    """Limit the forces of all set-valued elements to their static friction."""
     for i in range(elements.stops.names.size):
         e = elements.stops.element[i]
         elements.state[ElementRow.MAX_FORCE, e] = elements.num[e, 1]
@@ -509,9 +515,9 @@ def set_static_limits(elements):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def release_slipping(elements):
-    """Limit the forces of set-valued elements that slip to their kinetic friction.
+    """Limit the forces of slipping set-valued elements to their kinetic friction.
 
-    Returns whether one of them had a higher limit.
+    Returns whether a limit was reduced.
     """
     is_released = False
     for i in range(elements.stops.names.size):
@@ -526,62 +532,62 @@ def release_slipping(elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def speed_up_turns(turn, worst, last_worst, pace, modal_system, elements):
-    """Take a Newton step on the forces of all elements at once.
+def accelerate_sweeps(sweep, max_change, last_max_change, schedule, modal_system, elements):
+    """Take a Newton step on the forces of all elements if the block descent converges slowly.
 
     This is done only without a contact. Laws with a slope are solved to the minimum of their potential; others
-    take a Newton step if the turns are slow. Newton's method can cycle between two states where laws are steep. So
-    the pause doubles after each Newton step that did not reduce the change of the forces, and the turns between
+    take a Newton step if the sweeps converge slowly. Newton's method can cycle between two states where laws are steep. So
+    the pause doubles after each Newton step that did not reduce the change of the forces, and the sweeps between
     two steps converge.
 
     Parameters
     ----------
-    turn : int
-        Number of the turn, from 0.
-    worst : float
-        Largest change of a force in the turn, over its tolerance.
-    last_worst : float
-        The same of the turn before.
-    pace : NewtonPace
+    sweep : int
+        Number of the sweep, from 0.
+    max_change : float
+        Largest change of a force in the sweep, over its tolerance.
+    last_max_change : float
+        Largest change of a force in the sweep before, over its tolerance.
+    schedule : NewtonSchedule
     modal_system : interfaces.arrays.ModalArrays
     elements : element_arrays.PortElements
 
     Returns
     -------
-    NewtonPace
+    NewtonSchedule
     int
         Number of iterations.
     """
     if HAS_CONTACT:
-        return pace, 0
+        return schedule, 0
     elif HAS_SLOPES:
         if HAS_PLANES:  # the force of an element in a plane has no potential
             pass
         elif elements.stops.names.size == 0 and modal_system.dense.size == 0:
-            return pace, abs(together.solve_smooth(elements, modal_system.dt))
-    if turn >= pace.next_turn and worst > SLOW_RATIO * last_worst:
-        together.newton_step(elements, modal_system.dt, False)
-        pause = pace.pause if worst < pace.worst else 2 * pace.pause
-        return NewtonPace(turn + pause, pause, worst), 0
-    return pace, 0
+            return schedule, abs(together.solve_smooth(elements, modal_system.dt))
+    if sweep >= schedule.next_turn and max_change > SLOW_CONVERGENCE_RATIO * last_max_change:
+        together.take_newton_step(elements, modal_system.dt, False)
+        pause = schedule.pause if max_change < schedule.worst else 2 * schedule.pause
+        return NewtonSchedule(sweep + pause, pause, max_change), 0
+    return schedule, 0
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def set_free_motion(elements):
-    """Write the slides and speeds of set-valued elements without their forces into the field.
+    """Write the slides and speeds of the set-valued elements without their own forces.
 
-    The forces of the contact and of all other elements act.
+    The forces of the contact and of all other elements act. The result is in the field of `elements.stops`.
     """
     stops = elements.stops
     for i in range(stops.names.size):
         p = elements.links[LinkRow.PORT, stops.element[i]]
         slide = (
             elements.port[PortRow.FREE_SLIDE, p]
-            - elements.compliances[ComplianceRow.SLIDE, p, 0] * elements.contact[ContactPlace.FORCE]
+            - elements.compliances[ComplianceRow.SLIDE, p, 0] * elements.contact[ContactIndex.FORCE]
         )
         speed = (
             elements.port[PortRow.FREE_SPEED, p]
-            - elements.compliances[ComplianceRow.SPEED, p, 0] * elements.contact[ContactPlace.FORCE]
+            - elements.compliances[ComplianceRow.SPEED, p, 0] * elements.contact[ContactIndex.FORCE]
         )
         for e in range(elements.links.shape[1]):
             if elements.num[e, 0] != SET_VALUED:
@@ -598,10 +604,10 @@ def set_free_motion(elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def take_stop_forces(elements):
-    """Copy the mean forces of the set-valued elements into elements.state.
+def copy_set_valued_forces(elements):
+    """Copy the mean forces of the set-valued elements from the event solution to elements.state.
 
-    Returns their largest change over the tolerance.
+    Returns the largest force change over the tolerance.
     """
     stops = elements.stops
     worst = 0.0
@@ -619,13 +625,13 @@ def take_stop_forces(elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def rests_in_step(at, system):
-    """Return whether static friction holds all set-valued elements through the step and at its end.
+def rests_in_step(table_row, system):
+    """Return whether static friction holds all set-valued elements throughout a step.
 
     Parameters
     ----------
-    at : int
-        Row of the table for this step.
+    table_row : int
+        Row of the drive table for the step.
     system : element_arrays.MarchArrays
 
     Returns
@@ -646,29 +652,29 @@ def rests_in_step(at, system):
         for k in range(accel.size):
             row_entry = elements.rows[elements.links[LinkRow.PORT, e], k]
             accel[k] -= row_entry * change / modal_system.mass
-    write_end_state(system.motion, modal_system, system.table, at, accel, end)
+    write_end_state(system.motion, modal_system, system.table, table_row, accel, end)
     for i in range(stops.names.size):
         e = stops.element[i]
         force = stops.field[FaceRow.MEAN_FORCE, i]
         for k in range(accel.size):
             row_entry = elements.rows[elements.links[LinkRow.PORT, e], k]
             accel[k] += row_entry * force / modal_system.mass
-    drive = system.table[at, 8 * accel.size + 2]
+    drive = system.table[table_row, 8 * accel.size + 2]
     return stop_kernels.rests_at_end(end, modal_system, drive, accel, stops)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_with_events(start, at, system):
-    """Solve the step with the stops and releases of the set-valued elements inside it, and their blows.
+def solve_with_events(start, table_row, system):
+    """Solve a step with stops and releases of set-valued elements inside it.
 
-    The first half of the turns decides which elements stop and slip. The other half keeps their slides and finds
-    the forces of the other elements.
+    The impulses at the end of the step are determined too. The first half of the sweeps determines which elements stop
+    and slip. The other half keeps their slides and finds the forces of the other elements.
 
     Parameters
     ----------
     start : interfaces.arrays.StepStart
-    at : int
-        Row of the table for this step.
+    table_row : int
+        Row of the drive table for the step.
     system : element_arrays.MarchArrays
 
     Returns
@@ -682,7 +688,7 @@ def solve_with_events(start, at, system):
     increment = 0.0
     for i in range(stops.names.size):
         stops.field[FaceRow.START_SPEED, i] = elements.state[ElementRow.SPEED, stops.element[i]]
-    for turn in range(MAX_EVENT_TURNS):
+    for sweep in range(MAX_EVENT_SWEEPS):
         worst = 0.0
         if HAS_CONTACT:
             solution = solve_contact(start, system)
@@ -692,30 +698,30 @@ def solve_with_events(start, at, system):
         if HAS_SLOPES:
             for e in range(elements.links.shape[1]):
                 if elements.num[e, 0] != SET_VALUED:
-                    change, count = solve_element(e, turn, elements, start.dt)
+                    change, count = solve_element(e, sweep, elements, start.dt)
                     worst = max(worst, change)
                     n_iterations += count
         set_free_motion(elements)
-        if turn < MAX_EVENT_TURNS // 2:
-            if not (rests_in_step(at, system) or stop_kernels.follow_step(start.dt, stops)):
+        if sweep < MAX_EVENT_SWEEPS // 2:
+            if not (rests_in_step(table_row, system) or stop_kernels.follow_step(start.dt, stops)):
                 break
         if not stop_kernels.match_mean_forces(stops):
             break
-        worst = max(worst, take_stop_forces(elements))
+        worst = max(worst, copy_set_valued_forces(elements))
         n_iterations += 1
         if worst <= 1.0 or is_all_set_valued(elements):
-            loses_energy = stop_kernels.find_blows(stops) >= 0.0
+            loses_energy = stop_kernels.find_impulses(stops) >= 0.0
             return EventStep(increment, n_iterations, loses_energy)
         if IS_COUPLED:
-            if turn > 4 and worst > SLOW_RATIO * last_worst:
-                newton_with_stops(elements, start.dt)
+            if sweep > 4 and worst > SLOW_CONVERGENCE_RATIO * last_worst:
+                take_newton_step_with_stops(elements, start.dt)
         last_worst = worst
     return EventStep(increment, n_iterations, False)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def is_all_set_valued(elements):
-    """Return whether all elements are set-valued, so that they are solved at once."""
+    """Return whether all elements are set-valued, so that one solution suffices."""
     if HAS_CONTACT:
         return False
     else:
@@ -723,8 +729,8 @@ def is_all_set_valued(elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_with_stops(elements, dt):
-    """Take a step of Newton's method on the forces of the elements, which keep their stops.
+def take_newton_step_with_stops(elements, dt):
+    """Take a Newton step on the forces of all elements with fixed stops of the set-valued ones.
 
     It does nothing if the rig has a contact that can open.
     """
@@ -732,20 +738,21 @@ def newton_with_stops(elements, dt):
         if HAS_CONTACT:
             return
         else:
-            together.newton_step(elements, dt, True)
+            together.take_newton_step(elements, dt, True)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_step(start, at, system):
-    """Solve contact and elements over a step whose free slides are in elements.port.
+def solve_step(start, table_row, system):
+    """Solve the contact and all elements over a prepared step.
 
-    Blows of set-valued elements are in elements.stops then, or are left to `strike_modes`.
+    The free slides are taken from elements.port. Impulses of set-valued elements are written to elements.stops, or are
+    found later by `apply_end_impulses`.
 
     Parameters
     ----------
     start : interfaces.arrays.StepStart
-    at : int
-        Row of the table for this step.
+    table_row : int
+        Row of the drive table for the step.
     system : element_arrays.MarchArrays
 
     Returns
@@ -756,23 +763,23 @@ def solve_step(start, at, system):
     elements = system.elements
     n_event_iterations = 0
     if HAS_STOPS:
-        step = solve_with_events(start, at, system)
+        step = solve_with_events(start, table_row, system)
         if step.is_solved:
-            elements.contact[ContactPlace.STOPS_KNOWN] = 1.0
-            force = elements.contact[ContactPlace.FORCE]
+            elements.contact[ContactIndex.STOPS_KNOWN] = 1.0
+            force = elements.contact[ContactIndex.FORCE]
             return SolvedStep(step.increment, force, step.iterations)
         n_event_iterations = step.iterations
-        elements.contact[ContactPlace.STOPS_KNOWN] = 0.0
+        elements.contact[ContactIndex.STOPS_KNOWN] = 0.0
     increment, n_iterations = solve_coupled_forces(start, system)
     total = n_iterations + n_event_iterations
     if n_iterations < 0:
         total = n_iterations - n_event_iterations
-    return SolvedStep(increment, elements.contact[ContactPlace.FORCE], total)
+    return SolvedStep(increment, elements.contact[ContactIndex.FORCE], total)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_accelerations(modal_system, elements, accel):
-    """Write the modal accelerations of all forces [m s-2] into accel (n,).
+    """Write the modal accelerations (n,) [m s-2] due to the forces of contact and elements.
 
     Parameters
     ----------
@@ -784,7 +791,7 @@ def set_accelerations(modal_system, elements, accel):
     for k in range(accel.size):
         accel[k] = (
             elements.modal[ModalRow.OTHER_ACCELERATION, k]
-            - modal_system.slide[k] * elements.contact[ContactPlace.FORCE] / modal_system.mass
+            - modal_system.slide[k] * elements.contact[ContactIndex.FORCE] / modal_system.mass
         )
     for e in range(elements.links.shape[1]):
         for k in range(accel.size):
@@ -797,14 +804,14 @@ def set_accelerations(modal_system, elements, accel):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def write_mean_forces(increment, row, elements):
-    """Write the mean forces of the step into the row of its start; return its friction work [J].
+    """Write the mean forces of a step into its sample row; return its friction work [J].
 
     Parameters
     ----------
     increment : float
         Increment of the slide of the contact [m].
     row : (k,) array
-        Row of samples of `loop_kernels.march`; it is written.
+        Sample row of `loop_kernels.march`; output.
     elements : element_arrays.PortElements
 
     Returns
@@ -813,10 +820,10 @@ def write_mean_forces(increment, row, elements):
     """
     state = elements.state
     first_column = find_element_columns(elements.modal)
-    work = elements.contact[ContactPlace.FORCE] * increment
+    work = elements.contact[ContactIndex.FORCE] * increment
     first_force = state[ElementRow.FORCE, 0] if elements.links[LinkRow.IS_FRICTION, 0] else 0.0
     if HAS_CONTACT:
-        first_force = elements.contact[ContactPlace.FORCE]
+        first_force = elements.contact[ContactIndex.FORCE]
     row[2 * elements.modal.shape[1] + SampleColumn.MEAN_FORCE] = first_force
     for e in range(elements.links.shape[1]):
         row[first_column + N_ELEMENT_COLUMNS * e + SampleColumn.MEAN_FORCE] = state[
@@ -828,10 +835,10 @@ def write_mean_forces(increment, row, elements):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
-def strike_modes(motion, mass, elements):
-    """Change the speeds of the modes by the blows of set-valued elements; return the energy lost [J].
+def apply_end_impulses(motion, mass, elements):
+    """Apply the impulses of set-valued elements to the modes; return the dissipated energy [J].
 
-    If no stops are known, the blows bring the elements that do not slide to rest.
+    If the stops are not known, the impulses bring the elements that do not slide to rest.
 
     Parameters
     ----------
@@ -846,18 +853,18 @@ def strike_modes(motion, mass, elements):
     float
     """
     stops = elements.stops
-    if elements.contact[ContactPlace.STOPS_KNOWN] == 0.0:
+    if elements.contact[ContactIndex.STOPS_KNOWN] == 0.0:
         for i in range(stops.names.size):
             stops.field[FaceRow.INCREMENT, i] = elements.state[
                 ElementRow.INCREMENT, stops.element[i]
             ]
-        stop_kernels.find_stopping_blows(motion, stops)
-    return stop_kernels.apply_blows(motion, mass, stops)
+        stop_kernels.find_stopping_impulses(motion, stops)
+    return stop_kernels.apply_impulses(motion, mass, stops)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def commit_step(start, increment, system):
-    """Move the memories of contact and elements by the step.
+    """Update the memory of the contact and of all elements after a solved step.
 
     Parameters
     ----------
@@ -881,12 +888,12 @@ def commit_step(start, increment, system):
     if HAS_CONTACT:
         loss, has_room = contact.commit_step(
             increment,
-            elements.contact[ContactPlace.FORCE],
+            elements.contact[ContactIndex.FORCE],
             start,
             project_modes(system.modal_system.slide, rates),
             system.interface,
         )
-        elements.contact[ContactPlace.INCREMENT] = increment
+        elements.contact[ContactIndex.INCREMENT] = increment
     for e in range(elements.links.shape[1]):
         is_single = True
         if HAS_PLANES:
@@ -917,16 +924,16 @@ def commit_step(start, increment, system):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_limits(load0, load1, mu, elements):
-    """Set the limits of the set-valued elements under a load that changes linearly in the step.
+    """Set the friction limits of the set-valued elements under a load linear over the step.
 
     Parameters
     ----------
     load0 : float
         Load at the start of the step [N].
     load1 : float
-        Load at its end [N].
+        Load at the end of the step [N].
     mu : (2,) array
-        Static and kinetic coefficient.
+        Static and kinetic coefficient of friction.
     elements : element_arrays.PortElements
     """
     stops = elements.stops
@@ -940,26 +947,26 @@ def set_limits(load0, load1, mu, elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def cap_forces(elements):
-    """Limit the forces of the set-valued elements at a sample to their static friction."""
+def limit_sampled_forces(elements):
+    """Limit the sampled forces of the set-valued elements to their static friction."""
     for i in range(elements.stops.names.size):
         e = elements.stops.element[i]
         elements.mem[e, 0] = min(max(elements.mem[e, 0], -elements.num[e, 1]), elements.num[e, 1])
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slide_freely(used, elements):
-    """Let the only set-valued element slide through the step under a mean force.
+def slide_freely(mean_force, elements):
+    """Let the only set-valued element slide through a step under a prescribed mean force.
 
-    Returns its slide.
+    Returns the slide of the element.
     """
     f = elements.stops.field
-    elements.state[ElementRow.FORCE, 0] = used
+    elements.state[ElementRow.FORCE, 0] = mean_force
     elements.state[ElementRow.INCREMENT, 0] = (
         elements.port[PortRow.FREE_SLIDE, 0]
-        - elements.compliances[ComplianceRow.SLIDE, 0, 0] * used
+        - elements.compliances[ComplianceRow.SLIDE, 0, 0] * mean_force
     )
-    elements.contact[ContactPlace.STOPS_KNOWN] = 1.0
-    f[FaceRow.BLOW, 0] = 0.0
-    f[FaceRow.SLIP_STATE, 0] = 1.0 if used >= 0 else -1.0
+    elements.contact[ContactIndex.STOPS_KNOWN] = 1.0
+    f[FaceRow.IMPULSE, 0] = 0.0
+    f[FaceRow.SLIP_STATE, 0] = 1.0 if mean_force >= 0 else -1.0
     return elements.state[ElementRow.INCREMENT, 0]

@@ -1,4 +1,4 @@
-"""Arrays of a march without stored samples, and the names of their rows."""
+"""Arrays of a march without stored samples, with names for their rows."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 
-class SumPlace(IntEnum):
-    """Places in `FoldedCycles.sums` [J].
+class SumIndex(IntEnum):
+    """Indices into `FoldedCycles.sums`: energies accumulated over the folded cycles [J].
 
     - WORK: friction work
-    - LOSS, CREATED: dissipated and created energy
-    - SAMPLED_WORK: friction work from the samples alone
-    - WORK_SIZE: sum of the absolute works of the steps
+    - LOSS, CREATED: dissipated energy, and energy created by numerical errors
+    - SAMPLED_WORK: friction work by the trapezoidal rule from the samples
+    - WORK_SIZE: sum of the absolute friction works of the steps
     """
 
     WORK = 0
@@ -23,7 +23,7 @@ class SumPlace(IntEnum):
 
 
 class TraceRow(IntEnum):
-    """Rows of `FoldedCycles.trace`: output [m] and its rate [m/s], cosine and sine of the drive."""
+    """Rows of `FoldedCycles.trace`: output [m], output rate [m/s], cosine and sine of the drive."""
 
     OUTPUT = 0
     RATE = 1
@@ -32,7 +32,7 @@ class TraceRow(IntEnum):
 
 
 class CycleColumn(IntEnum):
-    """Columns of the results of a cycle: extremes and phasor of the output [m]."""
+    """Columns of the results of a folded cycle: extremes and phasor of the output [m]."""
 
     MIN_OUTPUT = 0
     MAX_OUTPUT = 1
@@ -41,14 +41,14 @@ class CycleColumn(IntEnum):
 
 
 class BlockRow(IntEnum):
-    """Rows of `FoldedCycles.workspace`, of a block of steps.
+    """Rows of `FoldedCycles.workspace`: energies and motion in a block of steps.
 
     - DRIVE_WORK, VISCOUS_LOSS: energies of the step [J]
-    - SLIDE, SPEED: slide [m] and speed [m/s] at its end; SLIDE later has the increment
-    - OUTPUT, RATE: output [m] and its rate [m/s]
+    - SLIDE, SPEED: slide [m] and speed [m/s] at the end of the step; SLIDE later has the increment
+    - OUTPUT, RATE: output [m] and output rate [m/s]
     - SQUARES: sum of v^2 + omega^2 z^2 of the modes
 
-    As many rows again receive results that are not used.
+    As many further rows receive results that are discarded.
     """
 
     DRIVE_WORK = 0
@@ -61,15 +61,15 @@ class BlockRow(IntEnum):
 
 
 N_BLOCK_ROWS = len(BlockRow)
-BLOCK = 32  # number of steps of a drag that are tried at once
+BLOCK = 32  # number of steps in full slip that are computed as a block, mode by mode
 
 
 class StepBounds(NamedTuple):
-    """Bounds of a march of folded cycles.
+    """Tolerance and limits of a march of folded cycles.
 
     - goal: tolerance of the friction force of a step [N]
     - force: friction limit [N]
-    - travel: displacement of the output beyond which the march ends [m]
+    - travel: largest displacement of the output [m], beyond which the march ends
     """
 
     goal: float
@@ -78,11 +78,11 @@ class StepBounds(NamedTuple):
 
 
 class LargestSlide(NamedTuple):
-    """Sample of the largest slide, in a system of n modes.
+    """March sample at the largest slide so far, for n modes.
 
-    - row: (2 n + 7,) the present sample
-    - kept: (2 n + 10,) sample of the largest slide so far, with the sums there
-    - number: (1,) its number, counted from the first step
+    - row: (2 n + 7,) present sample
+    - kept: (2 n + 10,) sample of the largest slide so far, with the energy sums at that time
+    - number: (1,) number of this sample, counted from the first step
     """
 
     row: np.ndarray
@@ -91,14 +91,14 @@ class LargestSlide(NamedTuple):
 
 
 class FoldedCycles(NamedTuple):
-    """Sums and output that `passing_kernels` records of cycles without samples.
+    """Energy sums and output that `passing_kernels` records in place of samples.
 
-    - bounds, largest: as above
-    - ledger: (9,) see `dynamics.ledger.Ledger`
-    - sums: (5,) sums over these cycles [J], see `SumPlace`
-    - totals: (3,) the first three sums before these cycles [J]
-    - trace: (4, s + 1) samples of the output and waves of the drive, see `TraceRow`
-    - workspace: (14, k) space for a block of k steps, see `BlockRow`
+    - bounds, largest: tolerance and limits, and the sample of the largest slide
+    - ledger: (9,) energy sums, see `dynamics.ledger.Ledger`
+    - sums: (5,) sums over these cycles [J], see `SumIndex`
+    - totals: (3,) values of the first three sums before these cycles [J]
+    - trace: (4, s + 1) samples of the output and of the harmonic functions of the drive, see `TraceRow`
+    - workspace: (14, k) workspace for a block of k steps, see `BlockRow`
     """
 
     bounds: StepBounds
@@ -111,13 +111,13 @@ class FoldedCycles(NamedTuple):
 
 
 class FoldedMarch(NamedTuple):
-    """Arrays that `passing_kernels` takes.
+    """Arguments of `passing_kernels`: modes, contact and records of folded cycles.
 
     - motion: (2, n) coordinates and rates of the modes
     - modal_system: `interfaces.arrays.ModalArrays`
     - table: (s, k) table of `propagator.Propagator`
     - interface: `interfaces.arrays.ShearedPoints`
-    - folded: sums and output that are recorded
+    - folded: records of energy sums and output
     """
 
     motion: np.ndarray

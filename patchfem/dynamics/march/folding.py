@@ -1,4 +1,4 @@
-"""Long marches of bonds behind shear modes, without stored samples (`passing_kernels`)."""
+"""Long marches of bonds behind shear modes without stored samples (`passing_kernels`)."""
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from .folded_arrays import (
     FoldedMarch,
     LargestSlide,
     StepBounds,
-    SumPlace,
+    SumIndex,
     TraceRow,
 )
 from .recording import N_SUMS
@@ -26,20 +26,24 @@ FOLDED_KERNELS = "dynamics.march.passing_kernels"
 
 
 def can_fold(run: Run) -> bool:
-    """Return whether a march can be folded: bonds behind shear modes alone, under a constant load."""
+    """Return whether a march can record cycles without samples (`march_folded`).
+
+    This requires bonds behind shear modes without other elements, under a constant load.
+
+    """
     return type(run) is Run and run.model.tuple_of is ShearedPoints and not run.model.joints
 
 
 def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
-    """March to a step without samples, and keep extremes and phasors of all cycles.
+    """March to a step without stored samples, and record extremes and phasors of all cycles.
 
-    The sample of the largest slide is kept too.
+    The sample at the largest slide is recorded too.
 
     Parameters
     ----------
     run : Run
     steps : int
-        Number of the step.
+        Number of the step at which to end.
     samples : MarchSamples
         Extremes, phasors and the sample of the largest slide are added.
 
@@ -55,13 +59,13 @@ def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
     table = None
     largest_at = -1
     while run.done < steps and run.outcome is None:
-        # A fraction of a cycle comes first.
+        # The march begins with the fraction of a cycle, so that complete cycles follow.
         size = (steps - run.done) % cycle_steps or cycle_steps
         count = 1
         if size == cycle_steps:
             next_check = cycles_to_next_check(run.done // cycle_steps)
             count = min((steps - run.done) // size, next_check)
-        rows, first_row = run.step_table(size * count)
+        rows, first_row = run.get_step_table(size * count)
         is_new_size = folded.trace.shape[1] != size + 1
         if is_new_size:
             folded = folded._replace(trace=_make_trace(run, size))
@@ -95,7 +99,7 @@ def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
 
 
 def _make_folded_cycles(run: Run) -> FoldedCycles:
-    """Return the arrays in which the cycles of a march are folded, without a trace."""
+    """Return the arrays that record the cycles of a march without samples."""
     largest = LargestSlide(
         row=np.zeros(2 * run.modes.omega.size + N_SAMPLE_COLUMNS),
         kept=np.zeros(run.width + N_SUMS),
@@ -110,7 +114,7 @@ def _make_folded_cycles(run: Run) -> FoldedCycles:
         bounds=bounds,
         largest=largest,
         ledger=run.ledger,
-        sums=np.zeros(len(SumPlace)),
+        sums=np.zeros(len(SumIndex)),
         totals=run.totals,
         trace=np.zeros((len(TraceRow), 0)),
         workspace=np.zeros((2 * N_BLOCK_ROWS, BLOCK)),
@@ -118,7 +122,7 @@ def _make_folded_cycles(run: Run) -> FoldedCycles:
 
 
 def _make_trace(run: Run, size: int) -> np.ndarray:
-    """Return the trace of a cycle of `size` steps from here, with the waves of the drive."""
+    """Return the output record of a cycle with the cosine and sine of the drive at its steps."""
     cycle_steps = run.prop.steps
     phase = 2 * np.pi * (run.done % cycle_steps + np.arange(size + 1)) / cycle_steps
     return np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])

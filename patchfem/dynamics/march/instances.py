@@ -1,7 +1,7 @@
-"""The compiled loops: one instance of the text per contact, set of laws and load.
+"""Compiled loops of the march: one instance of the source per contact, set of laws and load.
 
 `loop_kernels` runs with any contact, `interfaces.element_kernels` and its solver with any law. A law passed to a compiled
-function as an argument is never found on disk again, so `compiled.instantiate` writes the loop once per law instead.
+function as an argument cannot be cached on disk, so `compiled.instantiate` writes the loop once per law instead.
 """
 
 from functools import cache
@@ -9,9 +9,9 @@ from functools import cache
 from ... import compiled
 from ..interfaces.dispatch import COULOMB_LAW, load_law
 
-FOLDER = "dynamics.march"
-SHEARED_LISTS = "dynamics.interfaces.shear_list_kernels"  # lists of bonds behind shear modes
-# Kinds of loads: constant, varying on the whole interface, varying on each point.
+PACKAGE = "dynamics.march"
+SHEARED_LISTS_MODULE = "dynamics.interfaces.shear_list_kernels"  # module of the contact of lists of bonds behind shear modes
+# Kinds of loads: constant, varying resultant on the interface, varying load on each point.
 CONSTANT_LOAD = ""
 COMMON_LOAD = "whole"
 POINT_LOADS = "points"
@@ -19,9 +19,9 @@ POINT_LOADS = "points"
 
 @cache
 def load_contact(kind: tuple):
-    """Return the compiled contact of a ContactModel's kind (contact, law)."""
+    """Load the compiled functions of a contact of a given kind (contact module, law module)."""
     contact, law = kind
-    if contact == SHEARED_LISTS:
+    if contact == SHEARED_LISTS_MODULE:
         return compiled.instantiate(
             contact,
             {
@@ -48,7 +48,7 @@ def load_loop(
     is_coupled: bool = False,
     has_planes: bool = False,
 ):
-    """Return the loop of a rig, with its functions `march` and `follow`.
+    """Load the compiled loop of a march, with its functions `march` and `follow`.
 
     Parameters
     ----------
@@ -80,16 +80,18 @@ def load_loop(
         "HAS_PLANES": has_planes,
         "LOAD_VARIES": load != CONSTANT_LOAD,
         "HAS_POINTS": load == POINT_LOADS,
-        "HAS_LISTS": kind[0] == SHEARED_LISTS,
+        "HAS_LISTS": kind[0] == SHEARED_LISTS_MODULE,
     }
     text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items()
     )
-    parts = compiled.write_kernel_module(f"{FOLDER}.parts_{compiled.hash_text(text)}_kernels", text)
+    parts = compiled.write_kernel_module(
+        f"{PACKAGE}.parts_{compiled.hash_text(text)}_kernels", text
+    )
     if laws:
         law = load_law(laws)
         named["coupling"] = compiled.instantiate(
-            f"{FOLDER}.faces_kernels",
+            f"{PACKAGE}.faces_kernels",
             {
                 "law": law,
                 "contact": contact,
@@ -98,28 +100,28 @@ def load_loop(
                     "dynamics.interfaces.element_solve_kernels", {"law": law}
                 ),
                 "together": compiled.instantiate(
-                    f"{FOLDER}.together_kernels", {"law": law, "parts": parts}
+                    f"{PACKAGE}.together_kernels", {"law": law, "parts": parts}
                 ),
             },
         )
     if load != CONSTANT_LOAD:
         named["pressing"] = compiled.instantiate(
-            f"{FOLDER}.pressing_kernels", {"contact": contact, "parts": parts} | named
+            f"{PACKAGE}.pressing_kernels", {"contact": contact, "parts": parts} | named
         )
     return compiled.instantiate(
-        f"{FOLDER}.loop_kernels", {"contact": contact, "parts": parts} | named
+        f"{PACKAGE}.loop_kernels", {"contact": contact, "parts": parts} | named
     )
 
 
 def march(model, *arguments) -> tuple:
-    """March a model by `loop_kernels.march`; return the number of steps done and the status."""
+    """March a model by its compiled loop; return the number of completed steps and the status."""
     has_contact = not model.joints or getattr(model, "patch", None) is not None
     loop = load_loop(
         model.kind,
         model.laws,
         model.loading,
         has_contact=has_contact,
-        # a loop of several laws is one text
+        # several laws of elements are combined in one loop
         is_coupled=len(model.joints) + has_contact > 1 or len(model.laws) > 1,
         has_planes=any(joint.mate for joint in model.joints),
     )
@@ -127,7 +129,7 @@ def march(model, *arguments) -> tuple:
 
 
 def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:
-    """Move a contact along a prescribed path by `loop_kernels.follow`.
+    """Move a contact along a prescribed slide path by its compiled loop.
 
     Parameters
     ----------
@@ -136,15 +138,15 @@ def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:
     dt : float
         Length of a step [s].
     kind : tuple of str
-        Kind of the contact.
+        Modules of the contact and of its law.
     contact : tuple
         Arrays of a contact.
     goal : float
         Residual of a step over the friction limit.
     energies : (k, 2) array
-        See `loop_kernels.follow`; it is written.
+        See `loop_kernels.follow`; output.
     forces : (k, 3) array
-        See `loop_kernels.follow`; it is written.
+        See `loop_kernels.follow`; output.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Interfaces and nonlinear springs in addition to the patch or in its place, in a march."""
+"""Models of interfaces and nonlinear springs that act with a patch or in its place."""
 
 from dataclasses import dataclass, replace
 
@@ -10,20 +10,26 @@ from .models import IDLE_KIND, ContactModel, Joint, frictionless_model
 
 
 def make_cubic_spring(port: int, stiffness: float) -> Joint:
-    """Return a spring on a port with the restoring force k_3 q^3 [N]; stiffness is k_3 [N/m3]."""
+    """Return a cubic spring on a port, with the restoring force k_3 q^3 [N].
+
+    stiffness: k_3 [N/m3].
+
+    """
     return _make_spring(port, [0.0, stiffness, 0.0, 1.0], lambda q: 0.25 * stiffness * q**4)
 
 
 def make_interlocking_spring(port: int, stiffness: float, wavelength: float) -> Joint:
-    """Return a spring on a port with the force k lambda/(2 pi) sin(2 pi q/lambda) [N] of interlocking peaks.
+    """Return a spring on a port with the sinusoidal restoring force of interlocking peaks.
+
+    The force is k lambda/(2 pi) sin(2 pi q/lambda) [N].
 
     Parameters
     ----------
     port : int
     stiffness : float
-        k [N/m], at rest.
+        Stiffness k at rest [N/m].
     wavelength : float
-        lambda [m].
+        Wavelength lambda [m].
 
     Returns
     -------
@@ -43,10 +49,10 @@ def _make_spring(port: int, numbers, potential) -> Joint:
 
 
 def pair_plane_joints(joints, planes) -> list:
-    """Return joints of interfaces (i,) with those of the second directions of the ones that slide in a plane.
+    """Return the joints of interfaces (i,), with a second joint for each that slides in a plane.
 
-    They act on the ports of their numbers, and the second directions on ports from i on; planes (i,) says
-    which have one.
+    The first directions act on the ports 0 to i - 1, the second directions on ports from i on; planes (i,) states
+    which interfaces slide in a plane.
     """
     count = len(joints)
     second = [k for k, plane in enumerate(planes) if plane]
@@ -59,16 +65,16 @@ def pair_plane_joints(joints, planes) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
-    """Elements in addition to a contact, or in its place.
+    """Model of friction elements and springs in addition to a patch, or in its place.
 
     A patch with set-valued friction becomes the first of the joints, because all set-valued elements are
     solved together.
 
     - `patch`: the contact on port 0, or None.
     - `joints`: the elements.
-    - `rows` (p, n): slide of every port per coordinate.
-    - `scale`: force to which residuals of springs are compared [N].
-    - `also`: modules of further laws that the loop has, so that models of several sets of laws share one
+    - `rows` (p, n): slide of every port per modal coordinate.
+    - `scale`: reference force for the residuals of springs [N].
+    - `also`: modules of further laws in the loop, so that models with several sets of laws share one
       loop.
     """
 
@@ -86,19 +92,19 @@ class JointsModel:
 
     @property
     def limit(self) -> float:
-        """Friction limit of patch and joints together [N]."""
+        """Sum of the friction limits of patch and joints [N]."""
         return (self.patch.limit if self.patch is not None else 0.0) + sum(
             joint.element.limit for joint in self.joints if joint.mate >= 0
         )
 
     @property
     def length(self) -> float:
-        """Bond length of the patch, or else of the first interface [m]."""
+        """Bond length [m] of the patch, or of the first interface without a patch."""
         return self.patch.length if self.patch is not None else self.joints[0].element.length
 
     @property
     def reduction(self):
-        """ShearModes from which the patch was reduced (`ContactModel.reduction`).
+        """Shear modes from which the patch was reduced (`ContactModel.reduction`).
 
         The result is None without patch.
         """
@@ -106,27 +112,31 @@ class JointsModel:
 
     @property
     def set_valued(self) -> bool:
-        """Whether the patch, or else the first interface, holds without any stretch."""
+        """Whether the patch, or the first interface without a patch, sticks without any stretch."""
         return (
             self.patch.set_valued if self.patch is not None else not self.joints[0].element.kernels
         )
 
     @property
     def laws(self) -> tuple:
-        """Modules of the compiled laws, each once."""
+        """Distinct modules of the compiled laws of the joints."""
         return tuple(
             sorted({*self.also, *(joint.element.kernels or COULOMB_LAW for joint in self.joints)})
         )
 
     @property
     def kind(self) -> tuple:
-        """Kind of the patch's contact (`ContactModel.kind`); that of an idle contact without a patch."""
+        """Modules of the contact of the patch and of its law (`ContactModel.kind`).
+
+        Without a patch they are those of an idle contact.
+
+        """
         return self.patch.kind if self.patch is not None else IDLE_KIND
 
-    def picture_fields(self, contact) -> dict:
-        """Return the fields of the patch's memory for pictures (`ContactModel.picture_fields`)."""
-        return self.patch.picture_fields(contact) if self.patch is not None else {}
+    def get_plot_fields(self, contact) -> dict:
+        """Return the memory of the patch as fields for plotting."""
+        return self.patch.get_plot_fields(contact) if self.patch is not None else {}
 
     def build(self):
-        """Return the contact of the patch with newly allocated arrays; an idle point without a patch."""
+        """Allocate the contact arrays of the patch, or of an idle point without a patch."""
         return (self.patch or frictionless_model()).build()

@@ -1,29 +1,35 @@
-"""Sizes and rows of the arrays of `lanes_kernels`."""
+"""Sizes and row names of the arrays of `lanes_kernels`."""
 
 from enum import IntEnum
 
-LANES = 32  # number of cases that march side by side
-N_POINTS = 6  # points of the interface of a case
-N_PIECE_MODES = 2  # shear modes of the pieces of a case
-N_RIG_MODES = 2  # modes of the rig
-N_UNKNOWNS = 1 + N_PIECE_MODES  # increments of the slide and of the coordinates of the pieces
-N_LOSS_COEFFICIENTS = 6  # coefficients of the quadratic form of the viscous loss of a mode
-N_SAMPLE = 2 * N_RIG_MODES + 2  # numbers of a sample: coordinates, rates, force, slip
+LANES = (
+    32  # number of cases that march side by side; a multiple of the vector length of the processor
+)
+N_POINTS = 6  # number of points of the interface of a case
+N_PIECE_MODES = 2  # number of shear modes of the pieces of a case
+N_RIG_MODES = 2  # number of modes of the rig
+N_UNKNOWNS = (
+    1 + N_PIECE_MODES
+)  # number of unknowns of a step: increments of the slide and of the coordinates of the pieces
+N_LOSS_COEFFICIENTS = (
+    6  # number of coefficients of the quadratic form of the viscous loss of a mode
+)
+N_SAMPLE = 2 * N_RIG_MODES + 2  # number of values in a sample: coordinates, rates, force, slip
 
 # number of rows of each quantity of a case in the workspace
 WORKSPACE_ROWS = {
     # state
-    "RIG_POSITION": N_RIG_MODES,  # coordinates of the rig
-    "RIG_RATE": N_RIG_MODES,  # their rates
+    "RIG_POSITION": N_RIG_MODES,  # modal coordinates of the rig
+    "RIG_RATE": N_RIG_MODES,  # rates of the modal coordinates of the rig
     "PIECE_POSITION": N_PIECE_MODES,  # coordinates of the pieces [m]
     "STRETCHES": N_POINTS,  # mean stretch of the bonds of the points [bond lengths]
     "SQUARES": N_POINTS,  # mean square of the stretch [bond lengths squared]
     # solution of a step
-    "INCREMENTS": N_UNKNOWNS,  # unknowns [m]
-    "LAST_INCREMENTS": N_UNKNOWNS,  # those of the last step [m]
-    "INCREMENTS_BEFORE": N_UNKNOWNS,  # those of the step before it [m]
-    "NEWTON_STEP": N_UNKNOWNS,  # last step of Newton's method [m]
-    "DESCENT": 1,  # decrease that this step predicts
+    "INCREMENTS": N_UNKNOWNS,  # increments of slide and piece coordinates [m]
+    "LAST_INCREMENTS": N_UNKNOWNS,  # increments of the last step [m]
+    "INCREMENTS_BEFORE": N_UNKNOWNS,  # increments of the step before the last [m]
+    "NEWTON_STEP": N_UNKNOWNS,  # last Newton step [m]
+    "DESCENT": 1,  # decrease of the potential that the Newton step predicts
     "IS_SOLVED": 1,  # 1 if the step is solved
     "FREE_SLIDE": 1,  # increment of the slide without friction [m]
     # sample
@@ -31,8 +37,8 @@ WORKSPACE_ROWS = {
     "INTERFACE_ENERGY": 1,  # energy of bonds and pieces [J]
     "SLIP": 1,  # mean slip of the points [m]
     "OUTPUT": 1,  # displacement of the output [m]
-    "OUTPUT_RATE": 1,  # its rate [m/s]
-    "LAST_OUTPUT": 1,  # the same at the start of the step
+    "OUTPUT_RATE": 1,  # rate of the output [m/s]
+    "LAST_OUTPUT": 1,  # output at the start of the step [m], followed by its rate
     "LAST_OUTPUT_RATE": 1,
     "RIG_SLIDE": 1,  # slide of the rig [m]
     "MEAN_FORCE": 1,  # mean friction force of the step [N]
@@ -40,8 +46,8 @@ WORKSPACE_ROWS = {
     "VISCOUS_LOSS": 1,  # viscous loss in the step [J]
     "RATE_SQUARES": 1,  # sum of v^2 + omega^2 z^2 of the modes
     # numbers of the case
-    "DRIVE": 1,  # amplitude of its drive over that of the table
-    "BOND_LENGTH": 1,  # [m]
+    "DRIVE": 1,  # amplitude of the drive of the case over that of the table
+    "BOND_LENGTH": 1,  # bond length [m]
     "LIMIT": 1,  # friction limit [N]
     "POINT_LIMITS": N_POINTS,  # friction limits of the points [N]
     "SHAPES": N_PIECE_MODES * N_POINTS,  # slides of the points per coordinate of the pieces
@@ -71,7 +77,7 @@ N_WORKSPACE_ROWS = sum(WORKSPACE_ROWS.values())
 
 
 def _stack_rows(row_counts: dict, row_length: int) -> dict:
-    """Return the position of the first number of each quantity, stored one after the other."""
+    """Return the position of the first number of each quantity in a stacked array."""
     positions = {}
     end = 0
     for name, count in row_counts.items():
@@ -80,15 +86,17 @@ def _stack_rows(row_counts: dict, row_length: int) -> dict:
     return positions
 
 
-# First element of each quantity in the flat workspace: lane i of its row k is `At.NAME + k * LANES + i`.
+# Position of the first number of each quantity in the flat workspace: lane i of its row k is `At.NAME + k * LANES + i`.
 At = IntEnum("At", _stack_rows(WORKSPACE_ROWS, LANES), module=__name__)
 
 
 class RigRow(IntEnum):
-    """Rows of a mode of the rig: its step as `propagator.Propagator` has it, for forces instead of accelerations.
+    """Rows of the propagator of a rig mode, per friction force.
+
+    They follow from `propagator.Propagator`, whose coefficients are per acceleration.
 
     - ZZ to VV: free motion of coordinate and rate
-    - BY_Z, BY_V: motion per force
+    - BY_Z, BY_V: coordinate and rate at the end of the step per force
     - REACH_Z, REACH_V: increment of the slide per coordinate and rate
     - LOSS: first of the coefficients of the quadratic form of the viscous loss
     - SLIDE_SHAPE, OUTPUT_SHAPE: slide and output per coordinate
@@ -112,12 +120,12 @@ class RigRow(IntEnum):
 
 
 class StepColumn(IntEnum):
-    """Columns of the table of the steps, for a drive of 1 m s-2.
+    """Columns of the drive table of the steps, for a drive amplitude of 1 m s-2.
 
-    - BY_DRIVE: what the drive adds to coordinates and rates
-    - WORK_FORMS, LOSS_FORMS: coefficients of its work and of the viscous loss
+    - BY_DRIVE: contribution of the drive to coordinates and rates
+    - WORK_FORMS, LOSS_FORMS: coefficients of the drive work and of the viscous loss
     - REMAINDERS: constant parts of work and loss
-    - PORT_SLIDE: increment of the slide
+    - PORT_SLIDE: contribution of the drive to the slide
     - WAVES: cosine and sine of the drive at the start of the step
     """
 
@@ -133,7 +141,7 @@ N_COLUMNS = StepColumn.WAVES + 2
 
 
 def get_rows(workspace, position: At):
-    """Return a view of the rows of a quantity in a workspace.
+    """Return a view of the rows of one quantity in a workspace of cases.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""March of patches with bonds behind shear modes in lanes: input, march and results."""
+"""March of many patches with bonds behind shear modes, side by side in lanes."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -25,7 +25,7 @@ from .lane_rows import (
 LANES_KERNELS = "dynamics.march.lanes_kernels"
 
 
-# position in the workspace of each sum of a run
+# position in the workspace of each energy sum of a run
 LEDGER_POSITIONS = {
     "work_in": At.WORK_IN,
     "viscous": At.VISCOUS_SUM,
@@ -41,9 +41,9 @@ LEDGER_POSITIONS = {
 
 
 class PointsCase(NamedTuple):
-    """Points of a case.
+    """Bond points and drive amplitude of a case.
 
-    - `limit` (p,): friction limits [N].
+    - `limit` (p,): friction limits of the points [N].
     - `shape` (p, r), `stiffness` (r,): slides of the points per coordinate of the pieces, and stiffness of
       these [N/m].
     - `length`: bond length [m].
@@ -58,10 +58,10 @@ class PointsCase(NamedTuple):
 
 
 class MarchedCases(NamedTuple):
-    """Results of n cases that were marched.
+    """Results of n marched cases: cycle extremes, energies and samples.
 
     - `extremes` (n, c, 2), `phasors` (n, c): of the output in each cycle [m].
-    - `book`: sums of the run by name, (n,) [J].
+    - `book`: energy sums of the run by name, (n,) [J].
     - `z`, `rate` (s, modes, n), `force` (s, n), `slip` (s, n): samples of the last cycles.
     - `worked` (n,): friction work of the last cycles [J].
     - `reach` (n,): largest slide [m].
@@ -81,12 +81,12 @@ class MarchedCases(NamedTuple):
 
 
 def can_march(modes: ModalBasis) -> bool:
-    """Return whether lanes can march a rig."""
+    """Return whether a rig has the number of modes that the lanes are compiled for."""
     return modes.omega.size <= N_RIG_MODES and modes.damping is None
 
 
 def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
-    """Return the rows of a rig as the kernels take them.
+    """Return the propagator rows of a rig for the lane kernels (`RigRow`).
 
     Parameters
     ----------
@@ -104,14 +104,14 @@ def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
     ):
         out[first : first + len(rows), :n] = rows
     out[RigRow.STEP] = prop.beta[0, 0], modes.mass, prop.dt
-    # these coefficients apply to forces [N] instead of accelerations
+    # the kernels apply these coefficients to forces [N] instead of accelerations
     out[[RigRow.BY_Z, RigRow.BY_V, RigRow.LOSS + 3, RigRow.LOSS + 4]] /= modes.mass
     out[RigRow.LOSS + 5] /= modes.mass**2
     return out
 
 
 def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
-    """Return the table of the steps of a cycle under a drive of 1 m s-2.
+    """Return the drive table of the steps of a cycle for a drive amplitude of 1 m s-2.
 
     Parameters
     ----------
@@ -124,11 +124,11 @@ def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
     n = modes.omega.size
     table = prop.tables(replace(drive, acceleration=1.0), 0, steps)
     out = np.zeros((steps, N_COLUMNS))
-    for k in range(8):  # one column of each kind per mode
+    for k in range(8):  # each of the eight blocks has one column per mode
         out[:, k * N_RIG_MODES : k * N_RIG_MODES + n] = table[:, k * n : (k + 1) * n]
     angle = 2 * np.pi * np.arange(steps) / steps
     for forms in (StepColumn.WORK_FORMS, StepColumn.LOSS_FORMS):
-        # the last coefficients apply to forces [N] instead of accelerations
+        # the kernels apply the last coefficients to forces [N] instead of accelerations
         out[:, forms + 2 * N_RIG_MODES : forms + 3 * N_RIG_MODES] /= modes.mass
     out[:, StepColumn.REMAINDERS : StepColumn.REMAINDERS + 2] = table[:, 8 * n : 8 * n + 2]
     out[:, StepColumn.PORT_SLIDE] = table[:, 8 * n + 3]
@@ -137,7 +137,7 @@ def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
 
 
 def _make_workspace(cases: list) -> np.ndarray:
-    """Return the workspace of cases at rest; the last case fills lanes that are left over."""
+    """Return the workspace of cases at rest; surplus lanes repeat the last case."""
     workspace = np.zeros((N_WORKSPACE_ROWS, LANES))
     for i in range(LANES):
         case = cases[min(i, len(cases) - 1)]
@@ -147,7 +147,7 @@ def _make_workspace(cases: list) -> np.ndarray:
         get_rows(lane, At.BOND_LENGTH)[:] = case.length
         get_rows(lane, At.LIMIT)[:] = case.limit.sum()
         get_rows(lane, At.POINT_LIMITS)[:n_points, 0] = case.limit
-        # coordinates that a case does not have stay at 0 with any stiffness
+        # unused coordinates of the pieces stay at 0 with any stiffness
         get_rows(lane, At.STIFFNESSES)[:] = case.stiffness.max()
         get_rows(lane, At.STIFFNESSES)[:n_modes, 0] = case.stiffness
         for k, shape in enumerate(case.shape.T):
@@ -160,7 +160,7 @@ def _make_workspace(cases: list) -> np.ndarray:
 def march(
     modes: ModalBasis, drive: SineDrive, cases: list, cycles: int, steps: int, window: int
 ) -> MarchedCases:
-    """March cases over cycles of a drive from rest, each under its own amplitude.
+    """March cases from rest over cycles of a drive, each with its own drive amplitude.
 
     Parameters
     ----------

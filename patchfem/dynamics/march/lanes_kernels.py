@@ -1,9 +1,9 @@
-"""March of patches with bonds behind shear modes, one case per lane.
+"""March of patches with bonds behind shear modes, one case per lane (compiled).
 
-The steps are those of `passing_kernels`.
+The time step is that of `passing_kernels`.
 
 The cases share the modes of their rig and the frequency of their drive, and have N_POINTS points behind N_PIECE_MODES modes
-of the pieces each. In every step all lanes take as many turns of Newton's method as the slowest of them needs. The workspace
+of the pieces each. In every step all lanes take as many Newton iterations as the slowest of them needs. The workspace
 is a flat array as in `lanes.rows_kernels`, whose rows `lane_rows` names. Stretches are over the bond length
 and squares over its square, for bonds whose density is constant. A test compares a case with `march.Run`. Cost: 20 ns per
 step and case on a core with vectors of eight numbers.
@@ -15,21 +15,25 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from .lane_rows import LANES, N_POINTS, N_RIG_MODES, At, RigRow, StepColumn
 
-NEWTON_TOL = 4e-6  # last step of Newton's method, in bond lengths, as in `shear_solve_kernels`
-MAX_TURNS = 60  # turns of Newton's method
-BEND_TOL = 1e-9  # bend of the forces over the last step of Newton's method that is neglected, over the limit
-MAX_SERIES = 0.5  # slide, in bond lengths, up to which the series is used
-MAX_EXPONENT = 40.0  # slide, in bond lengths, beyond which exp(-x) of the bonds is below round-off
+NEWTON_TOL = 4e-6  # largest last Newton step [bond lengths], as in `shear_solve_kernels`
+MAX_SWEEPS = 60  # largest number of Newton iterations in a step
+CURVATURE_TOL = (
+    1e-9  # neglected force change by curvature over the last Newton step, over the friction limit
+)
+MAX_SERIES_SLIDE = 0.5  # largest slide [bond lengths] for which the series is used
+MAX_EXPONENTIAL_SLIDE = (
+    40.0  # slide [bond lengths] beyond which exp(-x) of the bonds is below round-off
+)
 
 
 @njit(**NJIT_INLINE)
-def path_shapes(x, far):
-    """Return the shape functions f1 and f2 of the mean force over a slide of x bond lengths, and exp(-x).
+def evaluate_force_shapes(x, is_long):
+    """Evaluate the shape functions f1, f2 of the mean bond force over a slide, and exp(-x).
 
-    See `friction.bonds.point_kernels`. The series of half of x is doubled by f2(2 y) = f2(y)/2 + f1(y)^2/4. A
-    larger x takes exp(-x) from its 256th part, so no branch and no call is needed.
+    x: slide in bond lengths. See `friction.bonds.point_kernels`. The series of half of x is doubled by f2(2 y) =
+    f2(y)/2 + f1(y)^2/4. A larger x takes exp(-x) from that of x/256, so no branch and no call is needed.
     """
-    y = 0.5 * (min(x, MAX_SERIES) if far else x)
+    y = 0.5 * (min(x, MAX_SERIES_SLIDE) if is_long else x)
     f2 = 0.5 - y * (
         1 / 6
         - y
@@ -55,8 +59,8 @@ def path_shapes(x, far):
     f2 = 0.5 * f2 + 0.25 * f1 * f1
     f1 = 0.5 * f1 * (1 + e)
     e = e * e
-    if far:
-        y = min(x, MAX_EXPONENT) / 256
+    if is_long:
+        y = min(x, MAX_EXPONENTIAL_SLIDE) / 256
         d = 1 - y * (
             1
             - y
@@ -71,33 +75,33 @@ def path_shapes(x, far):
         d = d * d
         d = d * d
         d = d * d
-        over = 1 / max(x, MAX_SERIES)
+        over = 1 / max(x, MAX_SERIES_SLIDE)
         one = (1 - d) * over
-        f1 = one if x > MAX_SERIES else f1
-        f2 = (1 - one) * over if x > MAX_SERIES else f2
-        e = d if x > MAX_SERIES else e
+        f1 = one if x > MAX_SERIES_SLIDE else f1
+        f2 = (1 - one) * over if x > MAX_SERIES_SLIDE else f2
+        e = d if x > MAX_SERIES_SLIDE else e
     return f1, f2, e
 
 
 @njit(**NJIT_INLINE)
-def add_point(s, workspace, lane, j, y, over, far):
-    """Add a point to the residual and the lower triangle of the Hessian, s (9,), at increments y.
+def add_point_derivatives(s, workspace, lane, j, y, inverse_length, is_long):
+    """Add the contribution of a bond point to residual and Hessian of a step.
 
     Parameters
     ----------
     s : tuple of float
         Residual (3,), then rows of the lower half of the Hessian (6,).
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     j : int
         Number of the point.
     y : tuple of float
         Increments of the slide and of the coordinates of the pieces [m].
-    over : float
+    inverse_length : float
         1 over the bond length [1/m].
-    far : bool
-        Whether a slide may exceed MAX_SERIES; a constant of the call.
+    is_long : bool
+        Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
 
     Returns
     -------
@@ -109,11 +113,11 @@ def add_point(s, workspace, lane, j, y, over, far):
     limit = workspace[At.POINT_LIMITS + j * LANES + lane]
     stretch = workspace[At.STRETCHES + j * LANES + lane]
     xi = y[0] - a * y[1] - b * y[2]
-    way = 1.0 if xi > 0.0 else -1.0
-    x = abs(xi) * over
-    f1, f2, _ = path_shapes(x, far)
-    force = limit * (stretch * f1 + way * x * f2)
-    slope = limit * over * (f1 - f2) * max(1 - way * stretch, 0.0)
+    direction = 1.0 if xi > 0.0 else -1.0
+    x = abs(xi) * inverse_length
+    f1, f2, _ = evaluate_force_shapes(x, is_long)
+    force = limit * (stretch * f1 + direction * x * f2)
+    slope = limit * inverse_length * (f1 - f2) * max(1 - direction * stretch, 0.0)
     return (
         g0 + force,
         g1 - a * force,
@@ -128,18 +132,18 @@ def add_point(s, workspace, lane, j, y, over, far):
 
 
 @njit(**NJIT_INLINE)
-def take_newton_turn(workspace, lane, beta, far):
-    """Take a Newton step in a lane, or take back half of the last step if it went too far.
+def take_newton_step(workspace, lane, beta, is_long):
+    """Take a Newton step in a lane, or halve its last step if the residual did not decrease.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     beta : float
-        Give of the slide in a step [m/N].
-    far : bool
-        Whether a slide may exceed MAX_SERIES; a constant of the call.
+        Compliance of the slide in a step [m/N].
+    is_long : bool
+        Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
     """
     y0 = workspace[At.INCREMENTS + lane]
     y1 = workspace[At.INCREMENTS + LANES + lane]
@@ -150,7 +154,7 @@ def take_newton_turn(workspace, lane, beta, far):
     length = workspace[At.BOND_LENGTH + lane]
     fall = workspace[At.DESCENT + lane]
     done = workspace[At.IS_SOLVED + lane]
-    over = 1 / length
+    inverse_length = 1 / length
     one = 0.5 * workspace[At.STIFFNESSES + lane]
     two = 0.5 * workspace[At.STIFFNESSES + LANES + lane]
     y = (y0, y1, y2)
@@ -166,12 +170,14 @@ def take_newton_turn(workspace, lane, beta, far):
         two,
     )
     # unrolled, because the compiler does not vectorise a loop over them across the lanes
-    s = add_point(s, workspace, lane, 0, y, over, far)
-    s = add_point(s, workspace, lane, 1, y, over, far)
-    s = add_point(s, workspace, lane, 2, y, over, far)
-    s = add_point(s, workspace, lane, 3, y, over, far)
-    s = add_point(s, workspace, lane, 4, y, over, far)
-    g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point(s, workspace, lane, 5, y, over, far)
+    s = add_point_derivatives(s, workspace, lane, 0, y, inverse_length, is_long)
+    s = add_point_derivatives(s, workspace, lane, 1, y, inverse_length, is_long)
+    s = add_point_derivatives(s, workspace, lane, 2, y, inverse_length, is_long)
+    s = add_point_derivatives(s, workspace, lane, 3, y, inverse_length, is_long)
+    s = add_point_derivatives(s, workspace, lane, 4, y, inverse_length, is_long)
+    g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point_derivatives(
+        s, workspace, lane, 5, y, inverse_length, is_long
+    )
     back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
     r00 = 1 / h00
     l1 = h01 * r00
@@ -189,9 +195,9 @@ def take_newton_turn(workspace, lane, beta, far):
     size = abs(n0) + one * abs(n1) + two * abs(n2)
     least = abs(y0) - one * abs(y1) - two * abs(y2)
     # where no point reverses in this step, the curvature of the forces over it follows from their slopes, which are 0
-    # while all points slip
+    # as long as all points slip
     near = size <= NEWTON_TOL * length or (
-        least > size and slopes * size * size <= BEND_TOL * workspace[At.LIMIT + lane] * length
+        least > size and slopes * size * size <= CURVATURE_TOL * workspace[At.LIMIT + lane] * length
     )
     on = 0.0 if done > 0.0 else 1.0
     workspace[At.INCREMENTS + lane] = y0 + on * (-0.5 * p0 if back else n0)
@@ -205,82 +211,84 @@ def take_newton_turn(workspace, lane, beta, far):
 
 
 @njit(**NJIT_INLINE)
-def move_point(s, workspace, lane, j, y, over, far):
-    """Move a point by the increments and add it to the sums s (4,).
+def update_point(s, workspace, lane, j, y, inverse_length, is_long):
+    """Update a bond point after a solved step, and add its force and energies to the sums.
 
     Parameters
     ----------
     s : tuple of float
-        Work over the limit, increase of the squares, force and squares of the points.
+        Sums (4,): work over the limit, increase of the squares, force and squares of the points.
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     j : int
         Number of the point.
     y : tuple of float
         Increments of the slide and of the coordinates of the pieces [m].
-    over : float
+    inverse_length : float
         1 over the bond length [1/m].
-    far : bool
-        Whether a slide may exceed MAX_SERIES; a constant of the call.
+    is_long : bool
+        Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
 
     Returns
     -------
     tuple of float
     """
-    worked, rise, force, square = s
+    worked, energy_increase, force, square = s
     a = workspace[At.SHAPES + j * LANES + lane]
     b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
     limit = workspace[At.POINT_LIMITS + j * LANES + lane]
     stretch = workspace[At.STRETCHES + j * LANES + lane]
     old = workspace[At.SQUARES + j * LANES + lane]
     xi = y[0] - a * y[1] - b * y[2]
-    way = 1.0 if xi > 0.0 else -1.0
-    x = abs(xi) * over
-    f1, f2, e = path_shapes(x, far)
-    far_x = min(x, MAX_EXPONENT)
-    new = e * (old + 2 * way * stretch * x + x * x) + (2 - e * (far_x * far_x + 2 * far_x + 2))
-    new = new if x < MAX_EXPONENT else 2.0
-    one = stretch * e + way * (1 - e)
+    direction = 1.0 if xi > 0.0 else -1.0
+    x = abs(xi) * inverse_length
+    f1, f2, e = evaluate_force_shapes(x, is_long)
+    far_x = min(x, MAX_EXPONENTIAL_SLIDE)
+    new = e * (old + 2 * direction * stretch * x + x * x) + (
+        2 - e * (far_x * far_x + 2 * far_x + 2)
+    )
+    new = new if x < MAX_EXPONENTIAL_SLIDE else 2.0
+    one = stretch * e + direction * (1 - e)
     workspace[At.STRETCHES + j * LANES + lane] = one
     workspace[At.SQUARES + j * LANES + lane] = new
     return (
-        worked + limit * (stretch * f1 + way * x * f2) * xi,
-        rise + limit * (new - old),
+        worked + limit * (stretch * f1 + direction * x * f2) * xi,
+        energy_increase + limit * (new - old),
         force + limit * one,
         square + limit * new,
     )
 
 
 @njit(**NJIT_INLINE)
-def commit_step(workspace, lane, beta, far):
-    """Move the points and the pieces of a lane by its solved step and add to their sums.
+def commit_step(workspace, lane, beta, is_long):
+    """Update the bond points and pieces of a lane after its solved step.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     beta : float
-        Give of the slide in a step [m/N].
-    far : bool
-        Whether a slide may exceed MAX_SERIES; a constant of the call.
+        Compliance of the slide in a step [m/N].
+    is_long : bool
+        Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
     """
     y0 = workspace[At.INCREMENTS + lane]
     y1 = workspace[At.INCREMENTS + LANES + lane]
     y2 = workspace[At.INCREMENTS + 2 * LANES + lane]
     length = workspace[At.BOND_LENGTH + lane]
     used = (workspace[At.FREE_SLIDE + lane] - y0) / beta
-    over = 1 / length
+    inverse_length = 1 / length
     y = (y0, y1, y2)
     b1 = workspace[At.PIECE_POSITION + lane] + y1
     b2 = workspace[At.PIECE_POSITION + LANES + lane] + y2
-    s = move_point((0.0, 0.0, 0.0, 0.0), workspace, lane, 0, y, over, far)
-    s = move_point(s, workspace, lane, 1, y, over, far)
-    s = move_point(s, workspace, lane, 2, y, over, far)
-    s = move_point(s, workspace, lane, 3, y, over, far)
-    s = move_point(s, workspace, lane, 4, y, over, far)
-    worked, rise, force, square = move_point(s, workspace, lane, 5, y, over, far)
+    s = update_point((0.0, 0.0, 0.0, 0.0), workspace, lane, 0, y, inverse_length, is_long)
+    s = update_point(s, workspace, lane, 1, y, inverse_length, is_long)
+    s = update_point(s, workspace, lane, 2, y, inverse_length, is_long)
+    s = update_point(s, workspace, lane, 3, y, inverse_length, is_long)
+    s = update_point(s, workspace, lane, 4, y, inverse_length, is_long)
+    worked, rise, force, square = update_point(s, workspace, lane, 5, y, inverse_length, is_long)
     energy = 0.5 * (
         length * square
         + workspace[At.STIFFNESSES + lane] * b1 * b1
@@ -301,7 +309,7 @@ def commit_step(workspace, lane, beta, far):
     workspace[At.INTERFACE_GAIN + lane] -= gone if gone < -noise else 0.0
     workspace[At.FRICTION + lane] = force
     workspace[At.INTERFACE_ENERGY + lane] = energy
-    # the next guess is a quadratic extrapolation of the last three steps
+    # the initial guess of the next step is a quadratic extrapolation of the last three steps
     for k in range(3):
         here = workspace[At.INCREMENTS + k * LANES + lane]
         last = workspace[At.LAST_INCREMENTS + k * LANES + lane]
@@ -314,12 +322,12 @@ def commit_step(workspace, lane, beta, far):
 
 @njit(**NJIT_INLINE)
 def move_mode(workspace, lane, k, mode, push):
-    """Move a mode of the rig of a lane by a step, and add its outputs and energies.
+    """Advance a rig mode of a lane by a step, and add its slide, output and energies.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     k : int
         Number of the mode.
@@ -368,17 +376,17 @@ def move_mode(workspace, lane, k, mode, push):
 
 
 @njit(**NJIT_INLINE)
-def start_sums(workspace, lane, work, lost, cosine, sine):
-    """Start the sums over the modes in a step with the terms that depend on the drive alone.
+def initialise_sums(workspace, lane, work, viscous_loss, cosine, sine):
+    """Initialise the sums over the rig modes in a step with the terms of the drive alone.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     work : float
         Constant part of the work of the drive [J].
-    lost : float
+    viscous_loss : float
         Constant part of the viscous loss [J].
     cosine : float
         Cosine of the drive at the start of the step.
@@ -391,20 +399,20 @@ def start_sums(workspace, lane, work, lost, cosine, sine):
     workspace[At.LAST_OUTPUT + lane] = out
     workspace[At.LAST_OUTPUT_RATE + lane] = workspace[At.OUTPUT_RATE + lane]
     workspace[At.DRIVE_WORK + lane] = square * work
-    workspace[At.VISCOUS_LOSS + lane] = square * lost
+    workspace[At.VISCOUS_LOSS + lane] = square * viscous_loss
     workspace[At.RIG_SLIDE + lane] = workspace[At.OUTPUT + lane] = workspace[
         At.OUTPUT_RATE + lane
     ] = workspace[At.RATE_SQUARES + lane] = 0.0
 
 
 @njit(**NJIT_INLINE)
-def finish_sums(workspace, lane, half_mass):
-    """Add a step of a lane to the sums of its run and of its cycle.
+def add_step_sums(workspace, lane, half_mass):
+    """Add the energies and output of a step to the run and cycle sums of a lane.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     half_mass : float
         Half of the modal mass [kg].
@@ -432,12 +440,12 @@ def finish_sums(workspace, lane, half_mass):
 
 @njit(**NJIT_INLINE)
 def set_free_slide(workspace, lane, rig, row):
-    """Set the free slide of a step from the motion at its start.
+    """Compute the slide increment of a step without friction from the motion at its start.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     lane : int
     rig : (N_RIG_ROWS + 1, 3) array
         Rows of the modes of the rig.
@@ -459,7 +467,7 @@ def set_free_slide(workspace, lane, rig, row):
 
 @njit(**NJIT_INLINE)
 def count_long_slides(workspace, lengths):
-    """Return the number of lanes in which a point may slide `lengths` bond lengths or more."""
+    """Return the number of lanes in which a point may slide a number of bond lengths or more."""
     near = 0.0
     for lane in range(LANES):
         far = (
@@ -474,7 +482,7 @@ def count_long_slides(workspace, lengths):
 
 @njit(**NJIT_INLINE)
 def count_unsolved(workspace):
-    """Return the number of lanes whose step is not solved."""
+    """Return the number of lanes whose step has not converged."""
     done = 0.0
     for lane in range(LANES):
         done += workspace[At.IS_SOLVED + lane]
@@ -483,7 +491,11 @@ def count_unsolved(workspace):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def update_extremes(workspace, dt):
-    """Update the extremes of the cycle with those inside a step, as `passing_kernels.read_cycle` finds them."""
+    """Update the output extremes of the cycle with those inside a step.
+
+    They are those of cubics as in `passing_kernels.find_cycle_output`.
+
+    """
     turns = 0.0
     for lane in range(LANES):
         turns += (
@@ -510,12 +522,12 @@ def update_extremes(workspace, dt):
 
 @njit(**NJIT_INLINE)
 def march_step(workspace, rig, row):
-    """March all lanes by a step.
+    """Advance all lanes by one time step.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     rig : (N_RIG_ROWS + 1, 3) array
         Rows of the modes of the rig.
     row : (N_COLUMNS,) array
@@ -524,31 +536,31 @@ def march_step(workspace, rig, row):
     beta = rig[RigRow.STEP, 0]
     for lane in range(LANES):
         set_free_slide(workspace, lane, rig, row)
-    for _ in range(MAX_TURNS):
-        if count_long_slides(workspace, MAX_SERIES) == 0.0:
+    for _ in range(MAX_SWEEPS):
+        if count_long_slides(workspace, MAX_SERIES_SLIDE) == 0.0:
             for lane in range(LANES):
-                take_newton_turn(workspace, lane, beta, False)
+                take_newton_step(workspace, lane, beta, False)
         else:
             for lane in range(LANES):
-                take_newton_turn(workspace, lane, beta, True)
+                take_newton_step(workspace, lane, beta, True)
         if count_unsolved(workspace) == 0.0:
             break
     if count_unsolved(workspace) > 0.0:
         for lane in range(LANES):
             workspace[At.N_UNSOLVED + lane] += 1.0 - workspace[At.IS_SOLVED + lane]
-    if count_long_slides(workspace, MAX_SERIES) == 0.0:
+    if count_long_slides(workspace, MAX_SERIES_SLIDE) == 0.0:
         for lane in range(LANES):
             commit_step(workspace, lane, beta, False)
     else:
         for lane in range(LANES):
             commit_step(workspace, lane, beta, True)
     work = row[StepColumn.REMAINDERS]
-    lost = row[StepColumn.REMAINDERS + 1]
+    viscous_loss = row[StepColumn.REMAINDERS + 1]
     cosine = row[StepColumn.WAVES]
     sine = row[StepColumn.WAVES + 1]
     half_mass = 0.5 * rig[RigRow.STEP, 1]
     for lane in range(LANES):
-        start_sums(workspace, lane, work, lost, cosine, sine)
+        initialise_sums(workspace, lane, work, viscous_loss, cosine, sine)
     for k in range(N_RIG_MODES):
         mode = (
             rig[RigRow.ZZ, k],
@@ -580,13 +592,13 @@ def march_step(workspace, rig, row):
         for lane in range(LANES):
             move_mode(workspace, lane, k, mode, push)
     for lane in range(LANES):
-        finish_sums(workspace, lane, half_mass)
+        add_step_sums(workspace, lane, half_mass)
     update_extremes(workspace, rig[RigRow.STEP, 2])
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def store_samples(workspace, sample):
-    """Write the samples (N_SAMPLE, LANES) of all lanes."""
+    """Write the present sample of all lanes into an array (N_SAMPLE, LANES)."""
     for lane in range(LANES):
         for k in range(2 * N_RIG_MODES):
             sample[k, lane] = workspace[k * LANES + lane]
@@ -596,22 +608,22 @@ def store_samples(workspace, sample):
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
 def march(workspace, rig, table, history, samples, work):
-    """March all lanes over cycles, of which the last ones are kept.
+    """March all lanes over cycles, and store the samples of the last ones.
 
     Parameters
     ----------
     workspace : array
-        Rows of the lanes, see `lane_rows`.
+        Workspace of all lanes, see `lane_rows`.
     rig : (N_RIG_ROWS + 1, 3) array
         Rows of the modes of the rig.
     table : (s, N_COLUMNS) array
         Rows of the steps of a cycle.
     history : (c, 4, LANES) array
-        Smallest and largest output of each cycle, and its phasor [m]; it is written.
+        Smallest and largest output of each cycle, and phasor of the output [m]; output array.
     samples : (w s + 1, N_SAMPLE, LANES) array
-        Samples of the last w cycles; it is written.
+        Samples of the last w cycles; output array.
     work : (LANES,) array
-        Friction work before these cycles [J]; it is written.
+        Friction work before these cycles [J]; output array.
     """
     steps = table.shape[0]
     cycles = history.shape[0]

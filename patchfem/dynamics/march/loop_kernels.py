@@ -1,10 +1,10 @@
-"""The compiled loop of the march, and its counterpart for a prescribed slide.
+"""Compiled time loop of a march, and its counterpart for a prescribed slide.
 
 Over a step the modes move exactly under the path means of the friction forces along the straight increments of slide,
 which do exactly the work of the laws: the sum of all energies never grows by itself. The interface is one contact, or
-elements beside it or in its place (`faces_kernels`); the load is constant or varies (`pressing_kernels`). A contact is a
+elements with it or in its place (`faces_kernels`); the load is constant or varies (`pressing_kernels`). A contact is a
 module with `solve_step`, `apply_increment`, `commit_step` and `read_state`, see `interfaces.element_kernels`. `instances`
-makes an instance of this text per contact and set of parts, and what a rig does not have is not compiled.
+compiles this source for each contact and set of features; features that a rig does not have are not compiled.
 """
 
 from typing import NamedTuple
@@ -23,8 +23,8 @@ from ..modal_kernels import (
     move_modes,
     project_modes,
     write_friction_accelerations,
-    write_interface,
-    write_modes,
+    write_interface_sample,
+    write_modal_sample,
 )
 from . import faces_kernels as coupling
 from . import parts_kernels as parts
@@ -35,18 +35,18 @@ HAS_ELEMENTS = parts.HAS_ELEMENTS
 HAS_STOPS = parts.HAS_STOPS
 LOAD_VARIES = parts.LOAD_VARIES
 HAS_LISTS = parts.HAS_LISTS
-# Status of a march, beside EXCEEDS_TRAVEL and NOT_FINITE of `modal_kernels.write_interface`.
+# Status of a march, in addition to EXCEEDS_TRAVEL and NOT_FINITE of `modal_kernels.write_interface_sample`.
 FINISHED = 0
 MEMORY_FULL = 2
 NO_CONTACT_SET = 4
 
 
 class InterfaceSample(NamedTuple):
-    """Sample of modes and interface.
+    """Sampled motion of the modes and state of the interface.
 
-    - modal: slide, speed and output
+    - modal: slide, slide speed and output
     - reading: force, energy and slip of the interface
-    - energy_beside: energy of springs and preloaded contact [J]
+    - energy_beside: additional energy of springs and preloaded contact [J]
     """
 
     modal: ModalSample
@@ -56,7 +56,7 @@ class InterfaceSample(NamedTuple):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def sample_interface(i, is_last, drive, system, row):
-    """Sample modes and interface at the start of a step and write them into a row.
+    """Sample the modes and the interface at the start of a step, and write the sample row.
 
     Parameters
     ----------
@@ -68,13 +68,13 @@ def sample_interface(i, is_last, drive, system, row):
         Acceleration of the base in the step before [m s-2].
     system : element_arrays.MarchArrays
     row : (k,) array
-        Row of samples of `march`; it is written.
+        Sample row of `march`; output.
 
     Returns
     -------
     InterfaceSample
     """
-    modal = write_modes(row, system.motion, system.modal_system)
+    modal = write_modal_sample(row, system.motion, system.modal_system)
     energy_beside = 0.0
     if LOAD_VARIES:
         energy_beside = pressing.sample_load(i, is_last, system, row)
@@ -94,18 +94,18 @@ def sample_interface(i, is_last, drive, system, row):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def march(first, steps, system, rows):
-    """March a number of steps, at 0.1 to 0.3 us per step and a few ns per point.
+    """March modes and interface over a number of time steps, and record a sample per step.
 
     Parameters
     ----------
     first : int
-        Row of the table for the first step; the rows are used in turns.
+        Row of the drive table for the first step; the rows repeat cyclically.
     steps : int
         Number of steps.
     system : element_arrays.MarchArrays
         Motion, memories and ledger are updated in place.
     rows : (steps + 1, k) array
-        Samples, which are written. Columns: modes and their rates; of the contact, or else the first element,
+        Output samples. Columns: modal coordinates and rates; of the contact, or of the first element without one,
         slide, speed, force, slip, mean force of the step that follows, energy, friction work of the step that
         follows; of every element slide, speed, force, slip and mean force of the step that follows; under a load
         that varies load, moment, energy of the preloaded contact, heave and pitch.
@@ -113,7 +113,7 @@ def march(first, steps, system, rows):
     Returns
     -------
     int
-        Number of steps that are done.
+        Number of completed steps.
     int
         Status, named at the top of the module.
     """
@@ -134,7 +134,7 @@ def march(first, steps, system, rows):
             if system.press.slot[0] < 0:
                 return i, NO_CONTACT_SET
         energy_beside = sample.energy_beside + modal_energy(motion, modal_system)
-        status = write_interface(
+        status = write_interface_sample(
             rows[i, : size + SampleColumn.STEP_WORK],
             sample.reading,
             sample.modal.output,
@@ -168,9 +168,9 @@ def march(first, steps, system, rows):
                 pressing.add_press_accelerations(system.press, modal_system.mass, accel)
         move_modes(motion, modal_system, table, at, accel, ledger)
         if HAS_STOPS:
-            blow_energy = coupling.strike_modes(motion, modal_system.mass, elements)
-            work += blow_energy
-            ledger[Ledger.FRICTION_LOSS] += blow_energy
+            impulse_energy = coupling.apply_end_impulses(motion, modal_system.mass, elements)
+            work += impulse_energy
+            ledger[Ledger.FRICTION_LOSS] += impulse_energy
         count_iterations(step.iterations, work, ledger)
         rows[i, size + SampleColumn.STEP_WORK] = work
         if HAS_ELEMENTS:
@@ -193,13 +193,13 @@ def march(first, steps, system, rows):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def solve_contact_step(start, at, system):
-    """Solve a step of a contact that acts alone.
+def solve_contact_step(start, table_row, system):
+    """Solve a step of a single contact without other elements.
 
     Parameters
     ----------
     start : interfaces.arrays.StepStart
-    at : int
+    table_row : int
         Row of the table for this step.
     system : element_arrays.MarchArrays
 
@@ -208,7 +208,7 @@ def solve_contact_step(start, at, system):
     interfaces.arrays.SolvedStep
     """
     modal_system = system.modal_system
-    free = free_increment(system.motion, modal_system, 0, system.table, at)
+    free = free_increment(system.motion, modal_system, 0, system.table, table_row)
     beta = modal_system.beta
     step = contact.solve_step(free, beta, start, system.interface, system.elements.goal[0])
     return SolvedStep(step.increment, (free - step.increment) / beta, step.iterations)
@@ -216,7 +216,7 @@ def solve_contact_step(start, at, system):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def follow(path, dt, interface, goal, energies, forces):
-    """Move a contact along a prescribed slide.
+    """Move a contact along a prescribed slide path, and record energies and forces.
 
     Parameters
     ----------
@@ -227,16 +227,16 @@ def follow(path, dt, interface, goal, energies, forces):
     interface : tuple
         Arrays of the contact on port 0, in `interfaces.arrays`.
     goal : float
-        Tolerance of a step [N].
+        Tolerance of the force in a step [N].
     energies : (k, 2) array
-        Energy dissipated in the step that follows and energy stored at the sample [J]; it is written.
+        Energy dissipated in the following step and energy stored at the sample [J]; output.
     forces : (k, 3) array
-        Force at the sample, mean force of the step that follows [N] and irreversible slip [m]; it is written.
+        Force at the sample, mean force of the following step [N] and irreversible slip [m]; output.
 
     Returns
     -------
     int
-        Number of steps that did not converge or found the memory of the contact full.
+        Number of steps that did not converge or exceeded the memory of the contact.
     """
     n_failed = 0
     last_velocity = 0.0

@@ -1,4 +1,4 @@
-"""The march of a model over cycles of its drive, and what is kept of it."""
+"""March of a contact model over cycles of its drive, with selected samples and results."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -17,17 +17,17 @@ from .run import Run
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MarchResult:
-    """Samples, cycles, energies and outcome of a march.
+    """Result of a march: selected samples, cycle extremes, energies and outcome.
 
-    - `response`: the samples that are kept.
+    - `response`: histories of the samples that were kept.
     - `window`, `step_force`, `window_work`: samples of the last cycles, mean forces of their steps [N] and
       friction work [J].
     - `amplitudes` (c, 2), `phasors` (c,): extremes and phasor of the output in each cycle [m].
     - `ledger`: energies [J] by name, as `Run.energy_balance` returns them.
     - `outcome`, `message`: how the march ended, None and "" if it reached its last step.
     - `snapshots`: states of the interface in the last cycle.
-    - `cycles_done`: number of cycles.
-    - `marks`: the `Mark` of each number of cycles that was asked for.
+    - `cycles_done`: number of completed cycles.
+    - `marks`: the `Mark` at each requested number of cycles.
     """
 
     response: Response
@@ -44,13 +44,13 @@ class MarchResult:
     marks: tuple = ()
 
 
-def _run_class(model):
-    """Return the class that marches a model: `Run`, or the one that the model names."""
+def _get_run_class(model):
+    """Return the class that integrates a model in time: `Run`, or the class set by the model."""
     return getattr(model, "runner", None) or Run
 
 
 def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) -> None:
-    """Load the compiled loop of a model, or compile it, by a march without steps.
+    """Load or compile the loop of a model by a march without steps.
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
     drive : SineDrive
     model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
     say : callable or None
-        Callback that is told before the loop is compiled.
+        Callback that reports when the loop has to be compiled.
     """
-    runner = _run_class(model)
+    runner = _get_run_class(model)
     kind = None
     if runner is Run:
         slides_in_plane = any(joint.mate for joint in model.joints)
@@ -72,13 +72,13 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
         _LOADED_KINDS.update({kind} - {None})
 
 
-_LOADED_KINDS = set()  # kinds of patches that have marched, so that their compiled code is loaded
+_LOADED_KINDS = set()  # kinds of contacts whose compiled code has been loaded by a march
 
 
 def start_run(
     modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float = np.inf, start=None
 ):
-    """Return the march of a model at its start.
+    """Create the march of a model in its initial state.
 
     Parameters
     ----------
@@ -89,13 +89,15 @@ def start_run(
     travel : float
         Largest displacement of the output [m].
     start : core.InitialState or None
-        Rest if None.
+        Initial state; rest if None.
 
     Returns
     -------
     Run
     """
-    return _run_class(model)(modes, drive, model, steps_per_cycle, travel, load_instances(), start)
+    return _get_run_class(model)(
+        modes, drive, model, steps_per_cycle, travel, load_instances(), start
+    )
 
 
 def march(
@@ -122,10 +124,10 @@ def march(
     ----------
     modes : ModalBasis
     drive : SineDrive
-        Or another drive; a motion is only found to be periodic under a sine.
+        Or another drive; the check for a periodic motion needs a sinusoidal drive.
     model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
     cycles : float
-        Number of cycles of the drive; a fraction of a cycle comes first.
+        Number of cycles of the drive; the march begins with the fraction of a cycle.
     steps_per_cycle : int
     window : int
         Number of whole cycles at the end whose samples are all kept.
@@ -134,9 +136,9 @@ def march(
     frames : int
         Number of snapshots of the interface during the last cycle.
     say : callable or None
-        Callback that is told if the loop has to be compiled first.
+        Callback that reports when the loop has to be compiled first.
     progress : callable or None
-        Callback that is told the fraction of the march that is done.
+        Callback for the completed fraction of the march.
     start : core.InitialState or None
     marks : sequence of float
         Numbers of whole cycles after which a `Mark` is kept.
@@ -166,7 +168,7 @@ def march(
     run = restart()
     n_last = max(window, 2)
     mark_steps = sorted({round(mark * steps_per_cycle) for mark in marks})
-    plan = _Plan(round(cycles * steps_per_cycle), steps_per_cycle, window, frames, mark_steps)
+    plan = _MarchPlan(round(cycles * steps_per_cycle), steps_per_cycle, window, frames, mark_steps)
     samples = MarchSamples(deque(maxlen=n_last))
     checkpoint = open_checkpoint(
         run,
@@ -179,7 +181,7 @@ def march(
     keeps_folded = keeps_extremes and can_fold(run) and not mark_steps
     if keeps_folded:
         if not march_folded(run, before_last, samples):
-            # The march ends before its last cycles, so it is repeated cycle by cycle with all samples.
+            # The march ended before its last cycles, so it is repeated cycle by cycle with all samples.
             run = restart()
             samples = MarchSamples(samples.last)
             keeps_folded = False
@@ -202,8 +204,16 @@ def march(
     return _make_result(run, recorder, plan, snapshots)
 
 
-class _Plan(NamedTuple):
-    """Number of steps of a march and of a cycle, cycles of the window, snapshots of the last cycle, steps of marks."""
+class _MarchPlan(NamedTuple):
+    """Lengths of a march and its records in steps and cycles.
+
+    - n_steps: number of steps of the march
+    - steps_per_cycle: number of steps of a cycle
+    - window: number of last cycles with all samples
+    - frames: number of snapshots in the last cycle
+    - mark_steps: steps after which a `Mark` is kept
+
+    """
 
     n_steps: int
     steps_per_cycle: int
@@ -211,24 +221,24 @@ class _Plan(NamedTuple):
     frames: int
     mark_steps: list
 
-    def next_mark(self, done: int) -> int:
-        """Return the number of steps at the next mark, or at the end."""
-        return min((step for step in self.mark_steps if step > done), default=self.n_steps)
+    def next_mark(self, n_completed: int) -> int:
+        """Return the step of the next mark after a completed step, or the last step."""
+        return min((step for step in self.mark_steps if step > n_completed), default=self.n_steps)
 
 
-def _march_recorded(run, recorder: Recorder, plan: _Plan, checkpoint, progress) -> list:
-    """March to the end of a plan and record the cycles; return the snapshots of the last cycle.
+def _march_recorded(run, recorder: Recorder, plan: _MarchPlan, checkpoint, progress) -> list:
+    """March to the end of a plan and record the cycles.
 
-    A motion that has become periodic is not marched on; see `Run.is_periodic`.
+    Returns the snapshots of the last cycle. The remaining cycles of a periodic motion are skipped; see `Run.is_periodic`.
     """
     samples = recorder.samples
     snapshots = []
-    # A fraction of a cycle comes first, so that the window has whole cycles.
+    # The march begins with the fraction of a cycle, so that the window has complete cycles.
     size = (plan.n_steps - run.done) % plan.steps_per_cycle or plan.steps_per_cycle
     while run.done < plan.n_steps and run.outcome is None:
-        stop = plan.next_mark(run.done)
-        frames = plan.frames if stop == plan.n_steps else 0
-        for cycles in run.march_cycles(size, stop, frames, snapshots):
+        next_stop = plan.next_mark(run.done)
+        frames = plan.frames if next_stop == plan.n_steps else 0
+        for cycles in run.march_cycles(size, next_stop, frames, snapshots):
             recorder.add(run, cycles)
         if run.done in plan.mark_steps:
             cycles = list(samples.last)[-plan.window :]
@@ -244,27 +254,27 @@ def _march_recorded(run, recorder: Recorder, plan: _Plan, checkpoint, progress) 
     return snapshots
 
 
-def _make_result(run, recorder: Recorder, plan: _Plan, snapshots: list) -> MarchResult:
-    """Return the result of a march that is done."""
+def _make_result(run, recorder: Recorder, plan: _MarchPlan, snapshots: list) -> MarchResult:
+    """Return the result of a finished march from its recorded samples."""
     samples = recorder.samples
     extremes = samples.extremes
     phasors = samples.phasors
     if not recorder.keeps_extremes:
         extremes = read_output_extremes(samples.last, run)
         phasors = []
-    end = make_mark(run, list(samples.last)[-plan.window :], extremes)
+    last_mark = make_mark(run, list(samples.last)[-plan.window :], extremes)
     rows, first_step = join_cycles(samples.last)
     number = np.concatenate([*samples.early_numbers, first_step + np.arange(len(rows))])
     return MarchResult(
         response=run.make_response(np.concatenate([*samples.early_rows, rows]), number),
-        window=end.window,
-        step_force=end.step_force,
-        amplitudes=end.amplitudes,
+        window=last_mark.window,
+        step_force=last_mark.step_force,
+        amplitudes=last_mark.amplitudes,
         phasors=np.array(phasors),
-        ledger=end.ledger,
+        ledger=last_mark.ledger,
         outcome=run.outcome,
         snapshots=snapshots,
-        window_work=end.work,
+        window_work=last_mark.work,
         cycles_done=run.done / plan.steps_per_cycle,
         message=run.message,
         marks=tuple(make_mark(*mark, mark[0]) for mark in samples.marks),

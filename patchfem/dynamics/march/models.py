@@ -1,4 +1,4 @@
-"""From a law under its load to the arrays of a contact in the compiled loops."""
+"""Contact models: friction laws under load as arrays for the compiled loops of a march."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,31 +14,37 @@ from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import growth_numbers, points_element, unpack_bonds
 from ...friction.protocol import Element
 from ..interfaces import arrays
-from ..interfaces.arrays import DragRow, FlowPlace, PointRow
+from ..interfaces.arrays import FlowIndex, FullSlipRow, PointRow
 from ..interfaces.dispatch import COULOMB_LAW
 
 INTERFACES_FOLDER = "dynamics.interfaces"
 ELEMENT_KERNELS = f"{INTERFACES_FOLDER}.element_kernels"
-N_FIRST_ENTRIES = 256  # initial entries of the list of a point, in addition to those of one step
-# width [bond lengths] over which the initial bonds of a point are distributed, so that their force has no jump
+N_FIRST_ENTRIES = (
+    256  # initial number of entries of the list of a point, in addition to those of one step
+)
+# width [bond lengths] over which the initial bonds of a point are distributed, so that their force is continuous
 FIRST_BOND_WIDTH = 1e-6
-POINTS_MULTIPLE = 16  # number of points that compiled loops take at once; points are filled up to a multiple of it
-# kind of a contact that is never evaluated
+POINTS_MULTIPLE = 16  # number of points is padded to a multiple of this, the number that compiled loops process at once
+# kind of an idle contact, which is never evaluated
 IDLE_KIND = ELEMENT_KERNELS, "friction.laws.elastic_plastic_kernels"
 
 
 def load_instances(say=None):
-    """Load the module `instances`; `say` is called if its loops have to be compiled first."""
+    """Load the module of the compiled loops.
+
+    say: callback that reports when loops have to be compiled.
+
+    """
     return load("dynamics.march.instances", say)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Joint:
-    """A law on one port.
+    """Friction law or spring on one port of a march.
 
     - `port`: number of the row of slides.
     - `element`: the law under its load.
-    - `potential`: energy [J] of a slide [m] of a spring, None for friction.
+    - `potential`: function of the slide [m] that returns the energy of a spring [J]; None for friction.
     - `mate`: for an element that slides in a plane, the distance in the list to the joint of its second
       direction, negative for that joint itself; 0 for all others.
     """
@@ -51,13 +57,13 @@ class Joint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactModel:
-    """Description of an interface for the loop; every `build` allocates new arrays.
+    """Model of a contact for the compiled loop of a march.
 
     - `contact`: module of the compiled contact.
     - `limit`: friction limit [N].
-    - `fields`: arrays of `tuple_of`.
-    - `length`: bond length for the criterion of sticking [m].
-    - `law`: module of the compiled law, "" if the contact has none to choose.
+    - `fields`: initial arrays of `tuple_of`; `build` copies them.
+    - `length`: bond length of the criterion for sticking [m].
+    - `law`: module of the compiled law, "" if the contact has a fixed law.
     - `reduction`: the JenkinsSet or ShearModes from which the arrays were made.
     - `element`: the law of an `interfaces.arrays.Element`.
     """
@@ -75,26 +81,29 @@ class ContactModel:
 
     @property
     def kind(self) -> tuple:
-        """Contact and law, by which `instances` makes an instance of the loop."""
+        """Modules of contact and law, for which the loop is compiled."""
         return self.contact, self.law
 
     @property
     def set_valued(self) -> bool:
-        """Whether the contact holds without any stretch."""
+        """Whether the contact sticks without any stretch (rigid Coulomb friction)."""
         return self.law == COULOMB_LAW
 
     @property
     def laws(self) -> tuple:
-        """Modules of the compiled laws of `joints`."""
+        """Modules of the compiled laws of the elements (`joints`)."""
         return (COULOMB_LAW,) if self.set_valued else ()
 
     @property
     def joints(self) -> tuple:
-        """Elements in place of the contact: a set-valued one, because all of them are solved together."""
+        """Set-valued element in place of the contact; all such elements are solved together."""
         return (Joint(0, self.element),) if self.set_valued else ()
 
-    def picture_fields(self, contact) -> dict:
-        """Return the fields of the memory for a picture: "stretch" (t,) of elements, or "bonds" (5, m)."""
+    def get_plot_fields(self, contact) -> dict:
+        """Return the memory of a contact as fields for plotting.
+
+        The fields are "stretch" (t,) of elements, or "bonds" (5, m).
+        """
         form = self.element.form if self.element is not None else ""
         if form == "parallel":
             return {"stretch": contact.mem[0, 3:].copy()}
@@ -103,7 +112,7 @@ class ContactModel:
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
-            # all bonds of a point count as equally stretched
+            # all bonds of a point are plotted with their mean stretch
             load = contact.points[PointRow.LOAD]
             share = contact.statuses[:, STATUS.force]
             here = load * point_pressures(contact)
@@ -126,7 +135,7 @@ class ContactModel:
                     m,
                     z,
                     s2,
-                    contact.flow[FlowPlace.TOTAL_SLIDE] - self.reduction.shape @ contact.b,
+                    contact.flow[FlowIndex.TOTAL_SLIDE] - self.reduction.shape @ contact.b,
                     play,
                 ]
             ),
@@ -134,13 +143,13 @@ class ContactModel:
         }
 
     def build(self):
-        """Return the contact with newly allocated arrays."""
-        made = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
-        return self.tuple_of(**made)
+        """Allocate the contact with a copy of its initial arrays."""
+        fields = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
+        return self.tuple_of(**fields)
 
 
 def element_model(element: Element, reduction=None) -> ContactModel:
-    """Return a contact of one law on one slide."""
+    """Return the contact model of one law on one slide."""
     bound = element.limit if element.is_bounded else np.inf
     fields = {
         "num": element.numbers[None],
@@ -162,17 +171,17 @@ def element_model(element: Element, reduction=None) -> ContactModel:
 
 @cache
 def frictionless_model() -> ContactModel:
-    """Return a contact without friction."""
+    """Return the contact model of an interface without friction."""
     return jenkins_model([0.0], [1.0])
 
 
 def coulomb_model(static: float, kinetic: float) -> ContactModel:
-    """Return a rigid Coulomb contact with static and kinetic friction force [N]."""
+    """Return the model of a rigid Coulomb contact with static and kinetic friction force [N]."""
     return element_model(Coulomb(kinetic, static).element(1.0))
 
 
 def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel:
-    """Return parallel Jenkins elements of stiffness (t,) [N/m] and yield slide (t,) [m].
+    """Return the contact model of parallel Jenkins elements.
 
     Parameters
     ----------
@@ -184,7 +193,7 @@ def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
-    """Return bond points of the stretch reading with order 1.
+    """Return the contact model of bond points in the stretch reading with order 1.
 
     Parameters
     ----------
@@ -196,7 +205,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     shear : ShearModes or None
         Shear of the pieces; None for pieces that are rigid in shear.
     pattern : tuple or None
-        Places x and pressures of a pressure that stays on the lower piece; `area` and `sigma` then belong to the
+        Positions x and pressures of a pressure that is fixed to the lower piece; `area` and `sigma` then belong to the
         points of the upper one. It cannot be combined with `shear`.
 
     Returns
@@ -237,7 +246,9 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 def point_lists_model(
     law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None
 ) -> ContactModel:
-    """Return lists of bonds behind shear modes, one per point, of any order and either reading.
+    """Return the contact model of points behind shear modes, each with a list of bonds.
+
+    The bonds have any order and either reading.
 
     Parameters
     ----------
@@ -253,7 +264,7 @@ def point_lists_model(
     merge : float
         Widest merged strip in bond lengths at zero age; 0 merges nothing.
     under : dict or None
-        Result of `lower_pressure_fields` or `nodal_load_fields` for a pressure that changes; `limit` and `sigma` are then a
+        Result of `lower_pressure_fields` or `nodal_load_fields` for a varying pressure; `limit` and `sigma` are then a
         measure of it.
 
     Returns
@@ -269,7 +280,7 @@ def point_lists_model(
     )
     fields = arrays.make_sheared_fields(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][PointRow.LOAD] = sigma
-    fields["drag"][DragRow.MEAN_SLIDE, 1:] = shape.T @ limit / limit.sum()
+    fields["drag"][FullSlipRow.MEAN_SLIDE, 1:] = shape.T @ limit / limit.sum()
     fields |= {
         "bondlist": np.zeros((N_ROWS, limit.size * capacity)),
         "status": numbers.make_status(capacity),
@@ -302,12 +313,12 @@ def point_lists_model(
 
 
 def lower_pressure_fields(x, sigma, measure: float) -> dict:
-    """Return fields of `point_lists_model` for points under a pressure that stays on the lower piece.
+    """Return fields of `point_lists_model` for a pressure fixed to the lower piece.
 
     Parameters
     ----------
     x : (m,) array
-        Places of the points [m].
+        Positions of the points [m].
     sigma : (m,) array
         Pressures [Pa].
     measure : float
@@ -325,7 +336,7 @@ def lower_pressure_fields(x, sigma, measure: float) -> dict:
 
 
 def nodal_load_fields(force, measure) -> dict:
-    """Return fields of `point_lists_model` for points under nodal forces that change.
+    """Return fields of `point_lists_model` for points under varying nodal forces.
 
     Both arguments are (m,) arrays [N]; `measure` has the forces of the friction limits.
     """
@@ -333,7 +344,7 @@ def nodal_load_fields(force, measure) -> dict:
 
 
 def point_pressures(contact) -> np.ndarray:
-    """Return the present pressures (m,) of the points of a `ShearedLists`, over those of their limits."""
+    """Return the present pressures (m,) of points with bond lists, over those of their limits."""
     if contact.pattern.size:
         x, pressure = contact.pattern
         return np.interp(
@@ -345,7 +356,9 @@ def point_pressures(contact) -> np.ndarray:
 
 
 def bond_list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
-    """Return one list of bonds for a rigid slide, of any order and either reading.
+    """Return the contact model of one list of bonds under a uniform slide.
+
+    The bonds have any order and either reading.
 
     Parameters
     ----------

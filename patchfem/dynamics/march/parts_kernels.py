@@ -1,14 +1,15 @@
-"""Flags of the loop for one contact under a constant load; `instances` writes others.
+"""Feature flags of the march loop for one contact under a constant load.
 
-Numba leaves out the branches of a flag that is False, so nothing is compiled that a rig does not have.
+`instances` writes modules with other flags. Numba omits the branches of a flag that is False, so features that a rig
+does not have are not compiled.
 """
 
-HAS_ELEMENTS = False  # there are elements, with the contact or in its place
-HAS_STOPS = False  # some elements are set-valued
-HAS_SLOPES = False  # some elements have a slope
-HAS_CONTACT = True  # there is a contact; elements may take its place
-IS_COUPLED = False  # elements and contact are more than one
-HAS_PLANES = False  # some elements slide in a plane, with two directions each
-LOAD_VARIES = False  # the load varies
-HAS_POINTS = False  # points bear their own fraction of a load that varies
-HAS_LISTS = False  # points are lists of bonds
+HAS_ELEMENTS = False  # whether there are elements, with the contact or in its place
+HAS_STOPS = False  # whether some elements are set-valued
+HAS_SLOPES = False  # whether some elements have a force-slide slope
+HAS_CONTACT = True  # whether there is a contact on port 0; elements may take its place
+IS_COUPLED = False  # whether there is more than one element or contact
+HAS_PLANES = False  # whether some elements slide in a plane, with two directions each
+LOAD_VARIES = False  # whether the normal load varies
+HAS_POINTS = False  # whether points carry their own fraction of a varying load
+HAS_LISTS = False  # whether the points have lists of bonds

@@ -1,10 +1,10 @@
-"""March of bonds behind shear modes without stored samples.
+"""March of bonds behind shear modes without stored samples (compiled).
 
 Extremes, phasors and energies of the cycles are accumulated in the march.
 
 The steps are those of `loop_kernels.march` with the contact `interfaces.shear_kernels`; a test compares both. While all
-points slip one way the friction is constant, and the modes of the pieces alternate about their mean from one step to the
-next. What is left of such a step are the modes of the rig, at 25 ns in place of 150.
+points slip in one direction the friction is constant, and the modes of the pieces alternate about their mean from one
+step to the next. Such a step only advances the modes of the rig, in 25 ns instead of 150.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..interfaces import shear_kernels as contact
-from ..interfaces.arrays import DragRow, FlowPlace, StepStart
+from ..interfaces.arrays import FlowIndex, FullSlipRow, StepStart
 from ..ledger import N_SAMPLE_COLUMNS, Ledger, SampleColumn
 from ..modal_kernels import (
     count_iterations,
@@ -23,21 +23,23 @@ from ..modal_kernels import (
     move_modes,
     project_modes,
     write_friction_accelerations,
-    write_interface,
-    write_modes,
+    write_interface_sample,
+    write_modal_sample,
 )
-from .folded_arrays import N_BLOCK_ROWS, BlockRow, CycleColumn, SumPlace, TraceRow
+from .folded_arrays import N_BLOCK_ROWS, BlockRow, CycleColumn, SumIndex, TraceRow
 
-RATE_TOL = 1e-12  # product of two rates over the square of the largest one above which they have the same sign
+# round-off level of the product of two successive rates over the square of the largest rate; at a stop it is no
+# reversal
+RATE_TOL = 1e-12
 
 
-class PieceSwing(NamedTuple):
-    """Shear modes of the pieces in the next step of a drag.
+class PieceStep(NamedTuple):
+    """Change of the shear modes of the pieces in a step of full slip.
 
-    - min_increment: increment of the slide that all points need to slip on [m].
-    - taken: work that the points do on the modes [J].
+    - min_increment: smallest slide increment at which all points continue to slip [m].
+    - taken: work of the point forces on the modes of the pieces [J].
     - energy: energy of the interface at the start of the step [J].
-    - rise: increase of the energy of the modes [J].
+    - rise: energy increase of the modes of the pieces in the step [J].
     """
 
     min_increment: float
@@ -47,36 +49,36 @@ class PieceSwing(NamedTuple):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def add_step(work, rise, q, after, mean, folded):
-    """Add a step to the sums.
+def add_step_energies(work, energy_increase, start_slide, end_slide, mean_force, folded):
+    """Add the friction energies of a step to the sums of the cycle.
 
     Parameters
     ----------
     work : float
         Work of the step [J].
-    rise : float
+    energy_increase : float
         Increase of the energy of the interface [J].
-    q : float
-        Slide at the start [m].
-    after : float
-        Slide at the end [m].
-    mean : float
-        Mean of the forces at both ends [N].
+    start_slide : float
+        Slide at the start of the step [m].
+    end_slide : float
+        Slide at the end of the step [m].
+    mean_force : float
+        Mean of the friction forces at both ends [N].
     folded : folded_arrays.FoldedCycles
     """
     sums = folded.sums
-    lost = work - rise
-    noise = folded.bounds.force * (1e-12 * abs(after - q) + 1e-15 * abs(q))
-    sums[SumPlace.WORK] += work
-    sums[SumPlace.LOSS] += lost if lost > -noise else 0.0
-    sums[SumPlace.CREATED] -= lost if lost < -noise else 0.0
-    sums[SumPlace.SAMPLED_WORK] += mean * (after - q)
-    sums[SumPlace.WORK_SIZE] += abs(work)
+    dissipated = work - energy_increase
+    noise = folded.bounds.force * (1e-12 * abs(end_slide - start_slide) + 1e-15 * abs(start_slide))
+    sums[SumIndex.WORK] += work
+    sums[SumIndex.LOSS] += dissipated if dissipated > -noise else 0.0
+    sums[SumIndex.CREATED] -= dissipated if dissipated < -noise else 0.0
+    sums[SumIndex.SAMPLED_WORK] += mean_force * (end_slide - start_slide)
+    sums[SumIndex.WORK_SIZE] += abs(work)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def keep_largest(number, folded):
-    """Keep the present sample, in the form of `Run.cycles`, if its slide is the largest so far.
+def store_largest_slide(number, folded):
+    """Store the present sample if its slide is the largest so far.
 
     Parameters
     ----------
@@ -85,22 +87,22 @@ def keep_largest(number, folded):
     folded : folded_arrays.FoldedCycles
     """
     row = folded.largest.row
-    kept = folded.largest.kept
+    stored = folded.largest.kept
     n = row.size - N_SAMPLE_COLUMNS
-    if not abs(row[n]) > abs(kept[n]):
+    if not abs(row[n]) > abs(stored[n]):
         return
     n_copied = n + SampleColumn.STEP_WORK
     for k in range(n_copied):
-        kept[k] = row[k]
+        stored[k] = row[k]
     for k in range(3):
-        kept[n_copied + k] = folded.totals[k] + folded.sums[k]
-    kept[n_copied + 3] = 0.0
+        stored[n_copied + k] = folded.totals[k] + folded.sums[k]
+    stored[n_copied + 3] = 0.0
     folded.largest.number[0] = number
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def swing_pieces(interface, n_steps, slides):
-    """Advance the shear modes of the pieces over steps in which all points slip in one direction.
+def advance_piece_modes(interface, n_steps, slides):
+    """Advance the shear modes of the pieces over steps of full slip in one direction.
 
     The forces of the points are then constant. Each mode coordinate jumps in every step to the mirror image about its
     equilibrium, so its increments are equal with alternating sign. `interface.last` gets the increments of the last two
@@ -115,29 +117,31 @@ def swing_pieces(interface, n_steps, slides):
     slides : (n_steps,) array
         Increments of the slide [m].
     """
-    way = interface.flow[FlowPlace.DRAG_DIRECTION]
+    direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
     last = interface.last
     for k in range(interface.y.shape[1]):
-        swing = 0.0
+        mode_increment = 0.0
         if k > 0:
-            middle = way * interface.drag[DragRow.FORCE, k] / interface.kappa[k - 1]
-            swing = 2 * (middle - interface.b[k - 1])
+            equilibrium = direction * interface.drag[FullSlipRow.FORCE, k] / interface.kappa[k - 1]
+            mode_increment = 2 * (equilibrium - interface.b[k - 1])
         for m in range(max(0, n_steps - 3), n_steps):
             if k == 0:
-                here = slides[m]
+                increment = slides[m]
             else:
-                here = swing if m % 2 == 0 else -swing
-            interface.y[0, k] = 3 * (here - last[0, k]) + last[1, k]
+                increment = mode_increment if m % 2 == 0 else -mode_increment
+            interface.y[0, k] = 3 * (increment - last[0, k]) + last[1, k]
             last[1, k] = last[0, k]
-            last[0, k] = here
+            last[0, k] = increment
         if k > 0 and n_steps % 2:
-            interface.b[k - 1] += swing
+            interface.b[k - 1] += mode_increment
     interface.ready[:] = 0.0
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def move_mode(k, count, at, accel, system, workspace):
-    """Move a mode by steps under a constant force, and add its outputs and energies to the workspace.
+def move_mode(k, count, table_row, accel, system, workspace):
+    """Advance a rig mode over steps under a constant friction force.
+
+    Its slide, output and energies are added to the workspace.
 
     Parameters
     ----------
@@ -145,8 +149,8 @@ def move_mode(k, count, at, accel, system, workspace):
         Number of the mode.
     count : int
         Number of steps.
-    at : int
-        Row of the table for the first step.
+    table_row : int
+        Row of the drive table for the first step.
     accel : float
         Modal acceleration of the friction [m s-2].
     system : folded_arrays.FoldedMarch
@@ -175,7 +179,7 @@ def move_mode(k, count, at, accel, system, workspace):
     f = modal_system.loss[4, k] * accel
     g = modal_system.loss[5, k] * accel * accel
     for s in range(count):
-        row = at + s
+        row = table_row + s
         workspace[BlockRow.DRIVE_WORK, s] += (
             table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
         )
@@ -198,38 +202,41 @@ def move_mode(k, count, at, accel, system, workspace):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def compute_piece_swing(interface):
-    """Return the `PieceSwing` of the next step in which all points slip in one direction."""
-    way = interface.flow[FlowPlace.DRAG_DIRECTION]
+def find_piece_step(interface):
+    """Return the change of the shear modes of the pieces in the next step of full slip."""
+    direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
     min_increment = 0.0
-    taken = 0.0
-    energy = interface.eps[0] * interface.drag[DragRow.FORCE, 0]
-    rise = 0.0
+    work = 0.0
+    energy = interface.eps[0] * interface.drag[FullSlipRow.FORCE, 0]
+    energy_increase = 0.0
     for k in range(interface.b.size):
-        y = 2 * (way * interface.drag[DragRow.FORCE, k + 1] / interface.kappa[k] - interface.b[k])
-        min_increment += interface.drag[DragRow.MAX_SLIDE, k + 1] * abs(y)
-        taken += way * interface.drag[DragRow.FORCE, k + 1] * y
+        y = 2 * (
+            direction * interface.drag[FullSlipRow.FORCE, k + 1] / interface.kappa[k]
+            - interface.b[k]
+        )
+        min_increment += interface.drag[FullSlipRow.MAX_SLIDE, k + 1] * abs(y)
+        work += direction * interface.drag[FullSlipRow.FORCE, k + 1] * y
         energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
-        rise += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
-    return PieceSwing(min_increment, taken, energy, rise)
+        energy_increase += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
+    return PieceStep(min_increment, work, energy, energy_increase)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def add_drag_steps(block, i, q, at, force, system):
-    """Add the steps of a block to ledger, sums and trace until the points no longer all slip.
+def record_full_slip_steps(n_block, first_sample, slide, table_row, force, system):
+    """Record the steps of a block in full slip, until some point no longer slips.
 
-    The row SLIDE_ROW of the workspace then has the increments of the slide in these steps.
+    The steps are added to ledger, sums and output trace; row SLIDE of the workspace then has the slide increments.
 
     Parameters
     ----------
-    block : int
+    n_block : int
         Number of steps in the workspace.
-    i : int
-        Number of the sample in the cycle.
-    q : float
-        Slide at the start [m].
-    at : int
-        Row of the table for the first step.
+    first_sample : int
+        Number of the sample in the cycle at the start.
+    slide : float
+        Slide at the start of the step [m].
+    table_row : int
+        Row of the drive table for the first step.
     force : float
         Friction force [N].
     system : folded_arrays.FoldedMarch
@@ -242,63 +249,63 @@ def add_drag_steps(block, i, q, at, force, system):
     interface = system.interface
     table = system.table
     folded = system.folded
-    way = interface.flow[FlowPlace.DRAG_DIRECTION]
+    direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
     size = 2 * system.motion.shape[1]
     ledger = folded.ledger
     workspace = folded.workspace
-    pieces = compute_piece_swing(interface)
+    pieces = find_piece_step(interface)
     n_steps = 0
-    for s in range(block):
-        after = workspace[BlockRow.SLIDE, s]
-        dq = after - q
-        if way * dq <= pieces.min_increment:
+    for s in range(n_block):
+        end_slide = workspace[BlockRow.SLIDE, s]
+        increment = end_slide - slide
+        if direction * increment <= pieces.min_increment:
             break
         # the modes of the pieces move forward in one step and back in the next one
         n_steps = s + 1
         sign = 1.0 if s % 2 == 0 else -1.0
         is_forward = 0.5 * (1.0 + sign)
-        power = workspace[BlockRow.DRIVE_WORK, s] + table[at + s, 4 * size]
-        add_step(force * dq, sign * pieces.rise, q, after, force, folded)
+        power = workspace[BlockRow.DRIVE_WORK, s] + table[table_row + s, 4 * size]
+        add_step_energies(force * increment, sign * pieces.rise, slide, end_slide, force, folded)
         ledger[Ledger.DRIVE_WORK] += power
         ledger[Ledger.VISCOUS_LOSS] += (
-            workspace[BlockRow.VISCOUS_LOSS, s] + table[at + s, 4 * size + 1]
+            workspace[BlockRow.VISCOUS_LOSS, s] + table[table_row + s, 4 * size + 1]
         )
         ledger[Ledger.DRIVE_POWER] += abs(power)
-        ledger[Ledger.FRICTION_LOSS] += force * dq - sign * pieces.taken
+        ledger[Ledger.FRICTION_LOSS] += force * increment - sign * pieces.taken
         energy_of_modes = 0.5 * system.modal_system.mass * workspace[BlockRow.SQUARES, s]
         ledger[Ledger.MAX_STORED] = max(
             ledger[Ledger.MAX_STORED], pieces.energy + is_forward * pieces.rise + energy_of_modes
         )
-        ledger[Ledger.FRICTION_WORK] += force * dq
-        folded.trace[TraceRow.OUTPUT, i + n_steps] = workspace[BlockRow.OUTPUT, s]
-        folded.trace[TraceRow.RATE, i + n_steps] = workspace[BlockRow.RATE, s]
-        q = after
-        workspace[BlockRow.SLIDE, s] = dq
-        interface.flow[FlowPlace.TOTAL_SLIDE] += dq
-        is_finite = np.isfinite(q + workspace[BlockRow.SPEED, s])
+        ledger[Ledger.FRICTION_WORK] += force * increment
+        folded.trace[TraceRow.OUTPUT, first_sample + n_steps] = workspace[BlockRow.OUTPUT, s]
+        folded.trace[TraceRow.RATE, first_sample + n_steps] = workspace[BlockRow.RATE, s]
+        slide = end_slide
+        workspace[BlockRow.SLIDE, s] = increment
+        interface.flow[FlowIndex.TOTAL_SLIDE] += increment
+        is_finite = np.isfinite(slide + workspace[BlockRow.SPEED, s])
         if not (abs(workspace[BlockRow.OUTPUT, s]) <= folded.bounds.travel and is_finite):
             break
     return n_steps
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
-def march_drag(first, count, i, q, system):
-    """March as long as all points slip in the same direction.
+def march_full_slip(first, count, first_sample, slide, system):
+    """March as long as all points slip in the same direction (full slip).
 
-    The sample at the end of the last step is not read; no sample before it has a larger slide in its direction.
-    The modes go over a block of steps one after the other, and once more over the steps before the drag ends in
+    The sample after the last step is not recorded; no sample before it has a larger slide in its direction.
+    Each mode advances over a block of steps at once, and again over the steps before full slip ends in
     the block.
 
     Parameters
     ----------
     first : int
-        Row of the table for the first step; the rows are used in turns.
+        Row of the drive table for the first step; the rows repeat cyclically.
     count : int
         Number of steps.
-    i : int
-        Number of the sample in the cycle.
-    q : float
-        Slide at the start [m].
+    first_sample : int
+        Number of the sample in the cycle at the start.
+    slide : float
+        Slide at the start of the step [m].
     system : folded_arrays.FoldedMarch
 
     Returns
@@ -312,7 +319,7 @@ def march_drag(first, count, i, q, system):
     workspace = system.folded.workspace
     n = motion.shape[1]
     at = first % system.table.shape[0]
-    force = interface.flow[FlowPlace.DRAG_DIRECTION] * interface.drag[DragRow.FORCE, 0]
+    force = interface.flow[FlowIndex.FULL_SLIP_DIRECTION] * interface.drag[FullSlipRow.FORCE, 0]
     accel = modal_system.workspace[0]
     start = modal_system.workspace[1:]
     write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
@@ -324,25 +331,25 @@ def march_drag(first, count, i, q, system):
         start[0, k] = motion[0, k]
         start[1, k] = motion[1, k]
         move_mode(k, block, at, accel[k], system, workspace)
-    n_steps = add_drag_steps(block, i, q, at, force, system)
+    n_steps = record_full_slip_steps(block, first_sample, slide, at, force, system)
     if n_steps < block:
         for k in range(n):
             motion[0, k] = start[0, k]
             motion[1, k] = start[1, k]
             move_mode(k, n_steps, at, accel[k], system, workspace[N_BLOCK_ROWS:])
     if n_steps:
-        swing_pieces(interface, n_steps, workspace[BlockRow.SLIDE])
+        advance_piece_modes(interface, n_steps, workspace[BlockRow.SLIDE])
     return n_steps
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def march_step(at, start, system):
-    """March a step in which points may stick or slip; return the friction work [J].
+def march_step(table_row, start, system):
+    """March one step in which points may stick or slip; return the friction work [J].
 
     Parameters
     ----------
-    at : int
-        Row of the table for this step.
+    table_row : int
+        Row of the drive table for this step.
     start : interfaces.arrays.StepStart
     system : folded_arrays.FoldedMarch
 
@@ -354,12 +361,12 @@ def march_step(at, start, system):
     modal_system = system.modal_system
     folded = system.folded
     accel = modal_system.workspace[0]
-    free = free_increment(motion, modal_system, 0, system.table, at)
+    free = free_increment(motion, modal_system, 0, system.table, table_row)
     step = contact.solve_step(free, modal_system.beta, start, system.interface, folded.bounds.goal)
     force = (free - step.increment) / modal_system.beta
     write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
     work = force * step.increment
-    move_modes(motion, modal_system, system.table, at, accel, folded.ledger)
+    move_modes(motion, modal_system, system.table, table_row, accel, folded.ledger)
     count_iterations(step.iterations, work, folded.ledger)
     end_velocity = project_modes(modal_system.slide, motion[1])
     loss, _ = contact.commit_step(step.increment, force, start, end_velocity, system.interface)
@@ -369,20 +376,20 @@ def march_step(at, start, system):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def march_folded_cycle(first, system):
-    """March a cycle.
+    """March one cycle without stored samples, and accumulate its energies and output.
 
     Parameters
     ----------
     first : int
-        Row of the table for the first step; the rows are used in turns.
+        Row of the drive table for the first step; the rows repeat cyclically.
     system : folded_arrays.FoldedMarch
 
     Returns
     -------
     int
-        Number of steps that are done.
+        Number of completed steps.
     int
-        Status of `loop_kernels`.
+        Status, as in `loop_kernels`.
     """
     motion = system.motion
     modal_system = system.modal_system
@@ -399,10 +406,10 @@ def march_folded_cycle(first, system):
     start_force = 0.0
     start_energy = 0.0
     while True:
-        modal = write_modes(row, motion, modal_system)
+        modal = write_modal_sample(row, motion, modal_system)
         reading = contact.read_state(interface, modal.slide, modal.speed)
         stored = reading.stored_energy + modal_energy(motion, modal_system)
-        status = write_interface(
+        status = write_interface_sample(
             row[: 2 * n + SampleColumn.STEP_WORK],
             reading,
             modal.output,
@@ -413,14 +420,14 @@ def march_folded_cycle(first, system):
         if is_step_open:
             rise = reading.stored_energy - start_energy
             mean_force = 0.5 * (start_force + reading.force)
-            add_step(work, rise, start_slide, modal.slide, mean_force, folded)
+            add_step_energies(work, rise, start_slide, modal.slide, mean_force, folded)
         trace[TraceRow.OUTPUT, i] = modal.output
         trace[TraceRow.RATE, i] = project_modes(modal_system.output, motion[1])
-        keep_largest(first + i, folded)
+        store_largest_slide(first + i, folded)
         if status or i == count:
             return i, status
-        if interface.flow[FlowPlace.DRAG_DIRECTION] != 0.0 and modal_system.dense.size == 0:
-            n_steps = march_drag(first + i, count - i, i, modal.slide, system)
+        if interface.flow[FlowIndex.FULL_SLIP_DIRECTION] != 0.0 and modal_system.dense.size == 0:
+            n_steps = march_full_slip(first + i, count - i, i, modal.slide, system)
             if n_steps:
                 i = i + n_steps
                 is_step_open = False
@@ -436,19 +443,19 @@ def march_folded_cycle(first, system):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def read_cycle(trace, dt, cycles):
-    """Compute the extremes of the output between the samples of a cycle, and its phasor.
+def find_cycle_output(trace, dt, cycles):
+    """Compute the extremes and the phasor of the output of a cycle from its samples.
 
-    The output is a cubic through values and rates, as in `cycles.find_hermite_extremes`.
+    The output is interpolated by cubics through values and rates, as in `cycles.find_hermite_extremes`.
 
     Parameters
     ----------
     trace : (4, s + 1) array
-        Samples of the output and waves of the drive, named at the top of the module.
+        Samples of the output, and cosine and sine of the drive, see `folded_arrays.TraceRow`.
     dt : float
         Length of a step [s].
     cycles : (4,) array
-        Extremes and phasor, which are written.
+        Extremes and phasor; output.
     """
     count = trace.shape[1] - 1
     low = np.inf
@@ -490,22 +497,22 @@ def read_cycle(trace, dt, cycles):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def march_folded_cycles(first, cycles, system):
-    """March cycles of which the extremes, phasors and sums are kept.
+    """March cycles without stored samples, and record their extremes, phasors and energies.
 
     Parameters
     ----------
     first : int
-        Row of the table for the first step; the rows are used in turns.
+        Row of the drive table for the first step; the rows repeat cyclically.
     cycles : (k, 4) array
-        Extremes and phasors of the cycles, which are written.
+        Extremes and phasors of the cycles; output.
     system : folded_arrays.FoldedMarch
 
     Returns
     -------
     int
-        Number of steps that are done.
+        Number of completed steps.
     int
-        Status of `loop_kernels`.
+        Status, as in `loop_kernels`.
     """
     trace = system.folded.trace
     count = trace.shape[1] - 1
@@ -513,5 +520,5 @@ def march_folded_cycles(first, cycles, system):
         n_steps, status = march_folded_cycle(first + cycle * count, system)
         if status:
             return cycle * count + n_steps, status
-        read_cycle(trace, system.modal_system.dt, cycles[cycle])
+        find_cycle_output(trace, system.modal_system.dt, cycles[cycle])
     return cycles.shape[0] * count, 0

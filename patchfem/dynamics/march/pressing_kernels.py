@@ -1,4 +1,4 @@
-"""Varying load: normal force and moment of the contact, or a load prescribed in time.
+"""Varying load in a march: unilateral contact under heave and pitch, or a prescribed load.
 
 Heave h (positive away) and pitch t (positive if it opens +x) move the upper holder, so the approach d = -h closes it. Over
 a step the modes move exactly under constant forces. Those of the normal contact are the path mean of its forces along the
@@ -18,14 +18,14 @@ from ...contact.press_path_kernels import path_mean
 from ...contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT, REFERENCE_STIFFNESS
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
-from ..interfaces.arrays import LoadPlace, SolvedStep
+from ..interfaces.arrays import LoadIndex, SolvedStep
 from ..modal_kernels import free_increment, free_rate, project_modes
 from . import faces_kernels as coupling
 from . import parts_kernels as parts
 from .element_arrays import (
     N_LOAD_COLUMNS,
     ComplianceRow,
-    ContactPlace,
+    ContactIndex,
     ElementRow,
     LoadColumn,
     ModalRow,
@@ -35,19 +35,24 @@ from .element_arrays import (
 # Numba leaves out the branches of flags that are False.
 HAS_STOPS = parts.HAS_STOPS
 HAS_POINTS = parts.HAS_POINTS
-# Tolerance of the force on which friction and normal contact agree, over the tolerance of the friction.
-COUPLING_FACTOR = 0.01
-# Largest number of guesses of this force; the bracket of the secant closes within 60.
+# Tolerance of the friction force in the coupled solution of friction and normal contact, over that of friction alone.
+COUPLING_TOL_FACTOR = 0.01
+# Largest number of secant steps for this force; the bracket closes within 60.
 MAX_GUESSES = 80
-BISECT_EVERY = 8  # guesses after which the secant method takes the middle of its bracket
-BRACKET_TOL = 4e-16  # width of a bracket over its ends below which it is closed
-MAX_ITERATIONS = 100  # Newton steps for heave and pitch
-MIN_STEP_FRACTION = 1e-9  # fraction of a Newton step below which it is not halved again
-ROUND_OFF = 4e-16  # round-off error of a sum over its largest term
+BISECTION_INTERVAL = 8  # number of secant steps after which one is replaced by a bisection
+BRACKET_TOL = 4e-16  # relative width below which a bracket is closed
+MAX_ITERATIONS = 100  # largest number of Newton steps for heave and pitch
+MIN_STEP_FRACTION = 1e-9  # smallest fraction of a Newton step in the line search
+ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
 
 
 class Secant(NamedTuple):
-    """Bracket of the force on which friction and normal contact agree; last guess and residual [N]."""
+    """Secant iteration for the friction force [N] that is consistent with the normal contact.
+
+    - low, high: bracket of the force
+    - guess, residual: last guess and its residual
+
+    """
 
     low: float
     high: float
@@ -56,11 +61,11 @@ class Secant(NamedTuple):
 
 
 class PressStep(NamedTuple):
-    """Solution of heave and pitch in a step.
+    """Solution of the normal contact for heave and pitch in a step.
 
-    - end_set: contact set at the end of the step, negative if none fits
+    - end_set: number of the contact set at the end of the step, negative if none fits
     - iterations: number of iterations
-    - residual: as a force [N]
+    - residual: residual as a force [N]
     """
 
     end_set: int
@@ -70,18 +75,18 @@ class PressStep(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def start_march(press):
-    """Clear the workspace of a load at the start of a march, and set the load."""
+    """Initialise the load and its workspace at the start of a march."""
     press.few[:] = 0.0
-    press.few[LoadPlace.LOAD] = press.sets.reference[REFERENCE_LOAD]
+    press.few[LoadIndex.LOAD] = press.sets.reference[REFERENCE_LOAD]
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_press_step(press, free_heave, free_pitch):
-    """Solve heave and pitch of a step by Newton's method with step halving.
+    """Solve the heave and pitch of a step by Newton's method with a line search.
 
-    The increments are the free ones minus beta times the mean forces. The forces have a convex potential, so the
-    solution is unique; inside a single contact set one step finds it. The guess of the increments is in press.few,
-    where increments, mean forces and slopes are written.
+    The increments are those without contact forces minus beta times the mean forces. The forces have a convex
+    potential, so the solution is unique; within a single contact set one step finds it. The guess of the increments is
+    in press.few, where increments, mean forces and their derivatives are written.
 
     Parameters
     ----------
@@ -95,9 +100,9 @@ def solve_press_step(press, free_heave, free_pitch):
     -------
     PressStep
     """
-    start = press.few[LoadPlace.START : LoadPlace.START + 5]
-    increments = press.few[LoadPlace.GUESS : LoadPlace.GUESS + 2]
-    out = press.few[LoadPlace.OUT : LoadPlace.OUT + 9]
+    start = press.few[LoadIndex.START : LoadIndex.START + 5]
+    increments = press.few[LoadIndex.GUESS : LoadIndex.GUESS + 2]
+    out = press.few[LoadIndex.OUT : LoadIndex.OUT + 9]
     arm = press.arm[0]
     b11 = press.beta[1, 1]
     b12 = press.beta[1, 2]
@@ -163,7 +168,7 @@ def solve_press_step(press, free_heave, free_pitch):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def sample_load(i, is_last, system, row):
-    """Write load, moment, contact energy, heave and pitch of a sample into the row.
+    """Write load, moment, contact energy, heave and pitch into a sample row of a march.
 
     system.press.slot is negative if no contact set fits.
 
@@ -175,7 +180,7 @@ def sample_load(i, is_last, system, row):
         Whether it is the last sample.
     system : element_arrays.MarchArrays
     row : (k,) array
-        Row of samples of `loop_kernels.march`; it is written.
+        Sample row of `loop_kernels.march`; output.
 
     Returns
     -------
@@ -184,8 +189,8 @@ def sample_load(i, is_last, system, row):
     """
     press = system.press
     sets = press.sets
-    start = press.few[LoadPlace.START : LoadPlace.START + 5]
-    load = press.few[LoadPlace.LOAD]
+    start = press.few[LoadIndex.START : LoadIndex.START + 5]
+    load = press.few[LoadIndex.LOAD]
     moment = sets.reference[REFERENCE_MOMENT]
     heave = project_modes(press.rows[1], system.motion[0])
     pitch = project_modes(press.rows[2], system.motion[0])
@@ -206,7 +211,7 @@ def sample_load(i, is_last, system, row):
         moment = moment - start[4]
         if HAS_POINTS or is_last:
             press_state(sets, press.slot[0], -heave, pitch, press.now)
-    press.few[LoadPlace.LOAD] = load
+    press.few[LoadIndex.LOAD] = load
     first_column = row.size - N_LOAD_COLUMNS
     row[first_column + LoadColumn.LOAD] = load
     row[first_column + LoadColumn.MOMENT] = moment
@@ -216,7 +221,7 @@ def sample_load(i, is_last, system, row):
     set_loads(load, load, system)
     if HAS_STOPS:
         elements = system.elements
-        coupling.cap_forces(elements)
+        coupling.limit_sampled_forces(elements)
         accel = elements.modal[ModalRow.OTHER_ACCELERATION]
         set_press_accelerations(start[3:5], system.modal_system.mass, press, accel)
     return start[2]
@@ -224,16 +229,16 @@ def sample_load(i, is_last, system, row):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_loads(start_load, end_load, system):
-    """Set the loads of friction at both ends of a step.
+    """Set the normal loads of the friction law at both ends of a step.
 
-    The loads of points at the end of the step are in press.now.
+    The loads of the points at the end of the step are in press.now.
 
     Parameters
     ----------
     start_load : float
         Load at the start of the step [N].
     end_load : float
-        Load at its end [N].
+        Load at the end of the step [N].
     system : element_arrays.MarchArrays
     """
     press = system.press
@@ -250,7 +255,7 @@ def set_loads(start_load, end_load, system):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def set_press_accelerations(force, mass, press, accel):
-    """Write the modal accelerations under forces that resist heave and pitch into accel (n,).
+    """Write the modal accelerations (n,) due to contact forces on heave and pitch.
 
     Parameters
     ----------
@@ -268,7 +273,7 @@ def set_press_accelerations(force, mass, press, accel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def add_press_accelerations(press, mass, accel):
-    """Add the modal accelerations of the mean forces of a step on heave and pitch to accel (n,).
+    """Add the modal accelerations (n,) due to the mean contact forces of a step.
 
     Parameters
     ----------
@@ -280,24 +285,24 @@ def add_press_accelerations(press, mass, accel):
     """
     for i in range(accel.size):
         accel[i] -= (
-            press.rows[1, i] * press.few[LoadPlace.MEAN_PRESS]
-            + press.rows[2, i] * press.few[LoadPlace.MEAN_PRESS + 1]
+            press.rows[1, i] * press.few[LoadIndex.MEAN_PRESS]
+            + press.rows[2, i] * press.few[LoadIndex.MEAN_PRESS + 1]
         ) / mass
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_friction_step(start, force, is_whole, at, system):
-    """Solve the friction of a step under given mean forces on heave and pitch.
+def solve_friction_step(start, force, ignores_events, table_row, system):
+    """Solve the friction of a step under prescribed mean forces on heave and pitch.
 
     Parameters
     ----------
     start : interfaces.arrays.StepStart
     force : (2,) array
         Mean force on the heave [N] and moment on the pitch [N m].
-    is_whole : bool
-        Whether stops and releases inside the step are left out.
-    at : int
-        Row of the table for this step.
+    ignores_events : bool
+        Whether stops and releases inside the step are ignored.
+    table_row : int
+        Row of the drive table for this step.
     system : element_arrays.MarchArrays
 
     Returns
@@ -309,7 +314,7 @@ def solve_friction_step(start, force, is_whole, at, system):
     elements = system.elements
     beta = press.beta
     free = (
-        free_increment(system.motion, modal_system, 0, system.table, at)
+        free_increment(system.motion, modal_system, 0, system.table, table_row)
         - beta[0, 1] * force[0]
         - beta[0, 2] * force[1]
     )
@@ -317,31 +322,33 @@ def solve_friction_step(start, force, is_whole, at, system):
         accel = elements.modal[ModalRow.OTHER_ACCELERATION]
         set_press_accelerations(force, modal_system.mass, press, accel)
         elements.port[PortRow.FREE_SLIDE, 0] = free
-        if beta[0, 0] == 0.0:  # no interface slides
+        if beta[0, 0] == 0.0:  # no mode moves the interface tangentially
             return SolvedStep(coupling.slide_freely(0.0, elements), 0.0, 1)
         elements.port[PortRow.FREE_SPEED, 0] = (
-            free_rate(system.motion, modal_system.slide, modal_system, system.table, at)
+            free_rate(system.motion, modal_system.slide, modal_system, system.table, table_row)
             - elements.compliances[ComplianceRow.SPEED, 0, 1] * force[0]
             - elements.compliances[ComplianceRow.SPEED, 0, 2] * force[1]
         )
-        if is_whole:
+        if ignores_events:
             _, n_iterations = coupling.solve_coupled_forces(start, system)
-            elements.contact[ContactPlace.STOPS_KNOWN] = 0.0
+            elements.contact[ContactIndex.STOPS_KNOWN] = 0.0
         else:
-            n_iterations = coupling.solve_step(start, at, system).iterations
+            n_iterations = coupling.solve_step(start, table_row, system).iterations
         return SolvedStep(
             elements.state[ElementRow.INCREMENT, 0],
             elements.state[ElementRow.FORCE, 0],
             n_iterations,
         )
     else:
-        tolerance = COUPLING_FACTOR * press.goal[0]
+        tolerance = COUPLING_TOL_FACTOR * press.goal[0]
         return contact.solve_step(free, beta[0, 0], start, system.interface, tolerance)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_press_part(heave, pitch, friction, press):
-    """Solve heave and pitch of a step under a mean friction force, and keep their mean forces in press.few.
+def solve_press_under_friction(heave, pitch, friction, press):
+    """Solve the heave and pitch of a step under a prescribed mean friction force.
+
+    Their mean forces are written to press.few.
 
     Parameters
     ----------
@@ -360,18 +367,18 @@ def solve_press_part(heave, pitch, friction, press):
     free_pitch = pitch - press.beta[2, 0] * friction
     step = solve_press_step(press, free_heave, free_pitch)
     if step.end_set >= 0:
-        few[LoadPlace.MEAN_PRESS] = few[LoadPlace.OUT]
-        few[LoadPlace.MEAN_PRESS + 1] = few[LoadPlace.OUT + 1]
+        few[LoadIndex.MEAN_PRESS] = few[LoadIndex.OUT]
+        few[LoadIndex.MEAN_PRESS + 1] = few[LoadIndex.OUT + 1]
         if HAS_POINTS:
-            approach = -(few[LoadPlace.START] + few[LoadPlace.GUESS])
-            tilt = few[LoadPlace.START + 1] + few[LoadPlace.GUESS + 1]
+            approach = -(few[LoadIndex.START] + few[LoadIndex.GUESS])
+            tilt = few[LoadIndex.START + 1] + few[LoadIndex.GUESS + 1]
             press_state(press.sets, step.end_set, approach, tilt, press.now)
     return step
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def is_closed(secant):
-    """Return whether the bracket is closed to round-off."""
+def is_bracket_closed(secant):
+    """Return whether the bracket of the secant iteration is closed to round-off."""
     low = secant.low
     high = secant.high
     is_bracket = high < np.inf and low > -np.inf
@@ -379,8 +386,8 @@ def is_closed(secant):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def next_guess(secant, guess, force, turn):
-    """Take a secant step inside the bracket.
+def take_secant_step(secant, guess, force, n_guesses):
+    """Take a safeguarded secant step for the friction force.
 
     Every eighth step is a bisection, because jumps can make the secant steps alternate.
 
@@ -388,8 +395,8 @@ def next_guess(secant, guess, force, turn):
     ----------
     secant : Secant
     guess, force : float
-        Force that was assumed, and the one that followed from it [N].
-    turn : int
+        Assumed force, and the force that results from it [N].
+    n_guesses : int
         Number of the guess, from 1.
 
     Returns
@@ -408,19 +415,20 @@ def next_guess(secant, guess, force, turn):
     following = force
     if secant.residual < np.inf and residual != secant.residual:
         following = guess - residual * (guess - secant.guess) / (residual - secant.residual)
-    if not (low < following < high) or turn % BISECT_EVERY == 0:
+    if not (low < following < high) or n_guesses % BISECTION_INTERVAL == 0:
         is_bracket = low > -np.inf and high < np.inf
         following = 0.5 * (low + high) if is_bracket else force
     return Secant(low, high, guess, residual), following
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_coupled_forces(i, start, at, system):
-    """Solve friction and normal contact over a step, each under the mean force of the other.
+def solve_coupled_forces(i, start, table_row, system):
+    """Solve the coupled friction and normal contact over a step.
 
-    If friction moves heave or pitch too, the secant method in a bracket finds the force on which both agree. The
-    force jumps where a stop inside the step comes or goes with the guess. If no force agrees with itself then,
-    the mean force of the whole step is found instead, which does not jump between stick and slip at one
+    Each is solved under the mean force of the other. If friction also moves heave or pitch, a safeguarded secant method
+    finds the consistent force. The
+    force jumps where a stop inside the step appears or disappears with the guess. If no force is consistent then,
+    the mean force over the entire step is found instead, which does not jump between stick and slip at one
     coefficient. The mean forces on heave and pitch are in press.few then.
 
     Parameters
@@ -428,8 +436,8 @@ def solve_coupled_forces(i, start, at, system):
     i : int
         Number of the sample at which the step starts.
     start : interfaces.arrays.StepStart
-    at : int
-        Row of the table for this step.
+    table_row : int
+        Row of the drive table for this step.
     system : element_arrays.MarchArrays
 
     Returns
@@ -440,14 +448,14 @@ def solve_coupled_forces(i, start, at, system):
     press = system.press
     few = press.few
     beta = press.beta
-    load = few[LoadPlace.LOAD]
+    load = few[LoadIndex.LOAD]
     preload = press.sets.reference[REFERENCE_LOAD]
     goal = press.goal[0]
     is_prescribed = press.loads.size > 0
     moves = not is_prescribed and (beta[1, 1] != 0 or beta[2, 2] != 0)
     is_coupled = moves and (beta[0, 1] != 0 or beta[0, 2] != 0)
-    heave = free_increment(system.motion, system.modal_system, 1, system.table, at)
-    pitch = free_increment(system.motion, system.modal_system, 2, system.table, at)
+    heave = free_increment(system.motion, system.modal_system, 1, system.table, table_row)
+    pitch = free_increment(system.motion, system.modal_system, 2, system.table, table_row)
     end_load = load
     if is_prescribed:
         end_load = press.loads[i + 1]
@@ -465,39 +473,39 @@ def solve_coupled_forces(i, start, at, system):
     is_bad = False
     is_whole = False
     last_turn = MAX_GUESSES
-    for turn in range(1, 2 * MAX_GUESSES + 1):
+    for n_guesses in range(1, 2 * MAX_GUESSES + 1):
         if moves:
-            press_step = solve_press_part(heave, pitch, guess, press)
+            press_step = solve_press_under_friction(heave, pitch, guess, press)
             end_set = press_step.end_set
             if end_set < 0:
                 press.slot[0] = end_set
                 return SolvedStep(increment, force, n_iterations)
             press_residual = press_step.residual
             n_iterations += press_step.iterations
-            end_load = 2 * max(preload - few[LoadPlace.OUT], 0.0) - load
+            end_load = 2 * max(preload - few[LoadIndex.OUT], 0.0) - load
         set_loads(load, end_load, system)
-        press_force = few[LoadPlace.MEAN_PRESS : LoadPlace.MEAN_PRESS + 2]
-        step = solve_friction_step(start, press_force, is_whole, at, system)
+        press_force = few[LoadIndex.MEAN_PRESS : LoadIndex.MEAN_PRESS + 2]
+        step = solve_friction_step(start, press_force, is_whole, table_row, system)
         increment = step.increment
         force = step.mean_force
         n_iterations += abs(step.iterations)
         is_bad = step.iterations < 0 or press_residual > goal
         residual = force - guess
-        if not is_coupled or abs(residual) <= COUPLING_FACTOR * goal:
+        if not is_coupled or abs(residual) <= COUPLING_TOL_FACTOR * goal:
             break
-        if turn < last_turn and not is_closed(secant):
-            secant, guess = next_guess(secant, guess, force, turn)
+        if n_guesses < last_turn and not is_bracket_closed(secant):
+            secant, guess = take_secant_step(secant, guess, force, n_guesses)
             continue
         if HAS_STOPS:
             mean_load = 0.5 * (load + max(end_load, 0.0))
             if press.force[1] * mean_load <= abs(guess) <= press.force[0] * mean_load:
-                # A force between kinetic and static friction: the step starts to slip.
+                # The force lies between kinetic and static friction, so slip begins in this step.
                 force = guess
                 increment = coupling.slide_freely(force, system.elements)
                 break
             if not is_whole:
                 is_whole = True
-                last_turn = turn + MAX_GUESSES
+                last_turn = n_guesses + MAX_GUESSES
                 secant = Secant(-np.inf, np.inf, 0.0, np.inf)
                 continue
         is_bad = is_bad or abs(residual) > goal
@@ -505,5 +513,5 @@ def solve_coupled_forces(i, start, at, system):
     press.mean[0] = force
     press.slot[0] = end_set
     if moves:
-        few[LoadPlace.LOAD] = max(preload - few[LoadPlace.OUT + 3], 0.0)
+        few[LoadIndex.LOAD] = max(preload - few[LoadIndex.OUT + 3], 0.0)
     return SolvedStep(increment, force, -n_iterations if is_bad else n_iterations)

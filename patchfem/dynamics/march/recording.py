@@ -1,4 +1,4 @@
-"""Samples of a march that are kept: all of the last cycles, and selected earlier ones."""
+"""Recording of a march: all samples of the last cycles, and selected earlier ones."""
 
 from dataclasses import dataclass
 
@@ -9,18 +9,18 @@ from ..checkpoint import MarchedCycle, MarchSamples
 from ..cycles import find_cycle_extremes, find_cycle_phasors, select_cycle_samples
 from ..ledger import SampleColumn
 
-# Sums since the start, which stand in front of the friction work of a step in a sample that is kept: friction work,
-# dissipated and created energy [J].
+# Column offset of the running sums since the start (friction work, dissipated and created energy [J]), which are
+# inserted before the friction work of the step in a recorded sample.
 FIRST_SUM = SampleColumn.STEP_WORK
 N_SUMS = 3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mark:
-    """Last cycles of a march at a requested number of cycles, and the march at that time.
+    """State of a march at a requested number of cycles, with samples of the cycles before it.
 
-    - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `MarchResult`.
-    - `after`: the `Run` to continue from.
+    - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `march.MarchResult`.
+    - `after`: the `Run` from which to continue.
     """
 
     window: Response
@@ -32,12 +32,12 @@ class Mark:
 
 
 class Recorder:
-    """Recorder of a march: all samples of the last cycles, and selected earlier samples.
+    """Recorder of march samples: all of the last cycles, and selected earlier ones.
 
-    - `samples`: the `checkpoint.MarchSamples` that are kept.
+    - `samples`: the recorded `checkpoint.MarchSamples`.
     - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
       of all cycles.
-    - `capacity`: number of samples from before the last cycles that may still be kept.
+    - `capacity`: remaining number of samples from before the last cycles that may be kept.
     """
 
     def __init__(
@@ -48,36 +48,40 @@ class Recorder:
         self.keeps_extremes = keeps_extremes
         self.capacity = samples.capacity
         self._n_even = n_even
-        self._picks = {}  # first step of a cycle -> numbers of its samples that are worth keeping
+        self._picks = {}  # first step of a cycle -> indices of its selected samples
 
     def add(self, run, cycles: list) -> None:
-        """Record cycles of equal length that follow each other."""
+        """Record successive marched cycles of equal length."""
         rows = np.stack([cycle.rows for cycle in cycles])
-        picks = [None] * len(cycles)
+        indices_of_cycles = [None] * len(cycles)
         if self.keeps_samples and self.capacity > 0 and rows.shape[1] > 1:
-            picks = select_cycle_samples(rows, run, self._n_even)
+            indices_of_cycles = select_cycle_samples(rows, run, self._n_even)
         last = self.samples.last
-        for cycle, pick in zip(cycles, picks):
+        for cycle, indices in zip(cycles, indices_of_cycles):
             if self.keeps_samples and len(last) == last.maxlen and self.capacity > 0:
                 self._keep_samples(run, last[0], self._picks.pop(last[0].first_step, None))
             last.append(cycle)
-            self._picks[cycle.first_step] = pick
+            self._picks[cycle.first_step] = indices
         if self.keeps_extremes:
             first_step = cycles[0].first_step
             self.samples.extremes += find_cycle_extremes(rows, run.modes, run.prop.dt)
             self.samples.phasors += find_cycle_phasors(rows, run.modes, first_step, run.prop.steps)
 
-    def _keep_samples(self, run, cycle: MarchedCycle, pick=None) -> None:
-        """Keep samples of a cycle that is none of the last ones; `pick` has their numbers if they are known."""
-        if pick is None:
-            pick = select_cycle_samples(cycle.rows[None], run)[0]
-        self.samples.keep_early(cycle.rows[pick], cycle.first_step + pick)
-        self.capacity -= len(pick)
+    def _keep_samples(self, run, cycle: MarchedCycle, indices=None) -> None:
+        """Keep selected samples of a cycle that no longer belongs to the last cycles.
+
+        indices: indices of the samples, None to select them.
+
+        """
+        if indices is None:
+            indices = select_cycle_samples(cycle.rows[None], run)[0]
+        self.samples.keep_early(cycle.rows[indices], cycle.first_step + indices)
+        self.capacity -= len(indices)
 
     def repeat_last(self, run, count: int) -> None:
-        """Skip `count` cycles that are equal to the last one.
+        """Skip cycles of a periodic motion by repeating the samples of the last cycle.
 
-        The samples of the last cycle are kept again for the skipped ones, with the sums that have grown since.
+        The running energy sums of the repeated samples increase from cycle to cycle.
         """
         samples = self.samples
         first_step, rows, _ = samples.last[-1]
@@ -87,20 +91,22 @@ class Recorder:
         samples.last.clear()
         samples.extremes += [samples.extremes[-1]] * count
         samples.phasors += [samples.phasors[-1]] * count
-        pick = select_cycle_samples(rows[None], run)[0]
-        n_kept = min(count, -(-max(0, samples.capacity) // len(pick)))
+        indices = select_cycle_samples(rows[None], run)[0]
+        n_kept = min(count, -(-max(0, samples.capacity) // len(indices)))
         numbers = np.arange(1, 1 + n_kept)[:, None]
-        begin = 2 * run.modes.omega.size + FIRST_SUM
-        sums = slice(begin, begin + N_SUMS)
-        later = np.tile(rows[pick], (n_kept, 1))
-        later[:, sums] += np.repeat(numbers * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
-        samples.keep_early(later, (first_step + pick + run.prop.steps * numbers).ravel())
+        first_sum = 2 * run.modes.omega.size + FIRST_SUM
+        sums = slice(first_sum, first_sum + N_SUMS)
+        repeated_rows = np.tile(rows[indices], (n_kept, 1))
+        repeated_rows[:, sums] += np.repeat(
+            numbers * (rows[-1, sums] - rows[0, sums]), len(indices), axis=0
+        )
+        samples.keep_early(repeated_rows, (first_step + indices + run.prop.steps * numbers).ravel())
         run.skip_cycles(count)
         self.capacity = samples.capacity
 
 
 def read_output_extremes(cycles, run) -> list:
-    """Return the smallest and largest output [m] of each marched cycle."""
+    """Return the smallest and largest output [m] of each recorded cycle."""
     extremes = []
     for cycle in cycles:
         extremes += find_cycle_extremes(cycle.rows[None], run.modes, run.prop.dt)
@@ -108,7 +114,7 @@ def read_output_extremes(cycles, run) -> list:
 
 
 def make_mark(run, cycles, extremes, after=None) -> Mark:
-    """Return the `Mark` of the cycles that end here.
+    """Return the mark of a march: its last cycles, energies and present state.
 
     Parameters
     ----------
@@ -135,6 +141,10 @@ def make_mark(run, cycles, extremes, after=None) -> Mark:
 
 
 def join_cycles(cycles) -> tuple:
-    """Return the rows of successive cycles without their shared samples, and the number of the first step."""
+    """Join the samples of successive cycles; return the rows and the number of the first step.
+
+    The sample that two cycles share is kept once.
+
+    """
     parts = [cycle.rows[:-1] for cycle in cycles]
     return np.concatenate([*parts, cycles[-1].rows[-1:]]), cycles[0].first_step

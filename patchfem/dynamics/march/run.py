@@ -1,4 +1,4 @@
-"""State of a march, and the pieces of one or some drive cycles in which it goes on."""
+"""State of a march in time, and its integration by one or several drive cycles at once."""
 
 from collections import deque
 from copy import copy
@@ -30,23 +30,25 @@ from .element_arrays import (
     LoadColumn,
     MarchArrays,
 )
-from .faces import STEP_TOL, make_faces
+from .faces import STEP_TOL, make_element_arrays
 from .models import frictionless_model
 from .recording import FIRST_SUM, N_SUMS, Mark, make_mark, read_output_extremes
 
-# Status of `loop_kernels.march`: the output exceeds the travel, a list of bonds is full, the motion is not finite, and
+# Status of `loop_kernels.march`: the output exceeds the travel, a list of bonds is full, the motion is not finite, or
 # no contact set fits the motion.
 EXCEEDS_TRAVEL = 1
 MEMORY_FULL = 2
 NOT_FINITE = 3
 NO_CONTACT_SET = 4
-# A step has not followed the motion if its displacement exceeds the travel by this factor.
-DIVERGED_FACTOR = 10.0
-MAX_PIECE_STEPS = 8000  # number of steps of a piece of a march
-MAX_PIECE_CYCLES = 16  # number of cycles of a piece of a march
-PERIODIC_TOL = 1e-12  # change of a periodic motion in all cycles that are left, over its size
-# Positions in the ledger that grow from cycle to cycle.
-SUMS = [
+# Displacement over the travel above which the motion has diverged within a step.
+DIVERGENCE_RATIO = 10.0
+MAX_STEPS_AT_ONCE = (
+    8000  # largest number of steps that are marched at once, which bounds the memory for samples
+)
+MAX_CYCLES_AT_ONCE = 16  # largest number of cycles that are marched at once
+PERIODIC_TOL = 1e-12  # largest relative change of a periodic motion in all remaining cycles
+# Ledger positions of sums that increase from cycle to cycle.
+SUM_POSITIONS = [
     Ledger.DRIVE_WORK,
     Ledger.VISCOUS_LOSS,
     Ledger.DRIVE_POWER,
@@ -58,14 +60,14 @@ SUMS = [
 
 
 def _make_response(rows, number, dt, modes, drive) -> Response:
-    """Return the histories of samples.
+    """Return the time histories of march samples.
 
     Parameters
     ----------
     rows : (k, w) array
-        Samples, as the loop writes them.
+        Sample rows of the march.
     number : (k,) array
-        Numbers of their steps.
+        Step numbers of the samples.
     dt : float
         Length of the step [s].
     modes : ModalBasis
@@ -74,7 +76,7 @@ def _make_response(rows, number, dt, modes, drive) -> Response:
     """
     n = modes.omega.size
     first_sum = 2 * n + FIRST_SUM
-    # friction work, stored, dissipated and created energy
+    # columns of friction work, stored, dissipated and created energy
     ledger_columns = [first_sum, 2 * n + SampleColumn.ENERGY, first_sum + 1, first_sum + 2]
     return make_histories(
         modes,
@@ -87,7 +89,7 @@ def _make_response(rows, number, dt, modes, drive) -> Response:
 
 
 def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
-    """Return the `ModalArrays` of a basis and its propagator."""
+    """Return the arrays of the modes for the compiled loops (`ModalArrays`)."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     arrays_of_modes = (
         modes.omega,
@@ -113,15 +115,15 @@ def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
 
 
 class Run:
-    """State of a march: its arrays and the number of steps done.
+    """Time integration of a modal basis with a contact model: its state and arrays.
 
-    - `state` (2, n): coordinates and rates of the modes.
+    - `state` (2, n): modal coordinates and rates.
     - `contact`, `faces`, `load`: arrays of the contact, the elements and the load, in `interfaces.arrays`.
     - `ledger` (9,): energy balance of `loop_kernels.march`.
     - `totals` (3,): friction work, dissipated and created energy since the start [J].
-    - `second` (2,): friction work from the samples, and sum of the absolute works of the steps [J].
-    - `done`: number of steps that are done.
-    - `outcome`, `message`: how it ended.
+    - `second` (2,): friction work from the samples, and sum of the absolute friction works of the steps [J].
+    - `done`: number of completed steps.
+    - `outcome`, `message`: how the march ended; None and "" while it continues.
     """
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
@@ -140,13 +142,13 @@ class Run:
         self.outcome = None
         self.message = ""
         self.totals = np.zeros(N_SUMS)
-        # friction work from the samples, and energy exchanged in both directions [J]
+        # friction work from the samples, and sum of the absolute friction works of the steps [J]
         self.second = np.zeros(2)
-        # energy that is stored at the start counts as work input
+        # energy stored at the start counts as work input
         self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy()
         self.modal_system = make_modal_arrays(modes, self.prop)
-        self.faces = make_faces(model, self.prop, self.modal_system, modes.mass)
-        self.load = self._initial_load()
+        self.faces = make_element_arrays(model, self.prop, self.modal_system, modes.mass)
+        self.load = self._make_initial_load()
         self.width = 2 * modes.omega.size + N_SAMPLE_COLUMNS
         self.width += N_ELEMENT_COLUMNS * len(model.joints)
         if model.loading:
@@ -156,30 +158,30 @@ class Run:
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
-        # `is_periodic` uses the states at the last check and one cycle before the next one, their sizes, and the
-        # energies one cycle before.
+        # `is_periodic` compares with the states at the last check and one cycle before this one, their sizes, and the
+        # energy sums one cycle before.
         self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
         self.books = np.zeros(14)
         self.change = np.inf
 
     def fork(self, drive):
-        """Return a copy of the march as it is, which continues under another drive."""
-        twin = copy(self)
-        twin.drive = drive
-        twin.periodic = None
+        """Return an independent copy of the march that continues under another drive."""
+        copied_run = copy(self)
+        copied_run.drive = drive
+        copied_run.periodic = None
         for name, value in vars(self).items():
             if isinstance(value, np.ndarray):
-                setattr(twin, name, value.copy())
-        twin.contact, twin.faces, twin.load = map(
+                setattr(copied_run, name, value.copy())
+        copied_run.contact, copied_run.faces, copied_run.load = map(
             arrays.copy_arrays, (self.contact, self.faces, self.load)
         )
-        return twin
+        return copied_run
 
     def _carried_state(self) -> list:
-        """Return the state that the march carries to the next step, as rows of numbers of one kind.
+        """Return the state at the end of a step as rows of comparable numbers.
 
-        The first row has the coordinates and the rates over the frequency of the drive, the others the
-        memories. The list is empty if no period brings the state back.
+        The first row has the coordinates and the rates over the drive frequency, the others the
+        memories of the laws. The list is empty if the state cannot become periodic.
         """
         model = self.model
         element = getattr(model, "element", None) or frictionless_model().element
@@ -192,57 +194,58 @@ class Run:
             rows += arrays.split_element_memory(joint.element, memory)
         return rows
 
-    def _sums_so_far(self) -> np.ndarray:
-        """Return the ledger, the totals and the second energies, (14,)."""
+    def _collect_sums(self) -> np.ndarray:
+        """Return all energy sums of the march, (14,): ledger, totals and `second`."""
         return np.concatenate([self.ledger, self.totals, self.second])
 
     def is_periodic(self, n_left: int) -> bool:
-        """Return whether the motion has become periodic, so that `n_left` more cycles may be skipped.
+        """Return whether the motion has become periodic and the remaining cycles may be skipped.
 
-        It is to be called at the end of every cycle, or of those that `dynamics.periodicity.cycles_to_next_check` names.
+        n_left: number of remaining cycles. Call this at the end of every cycle, or of those given by
+        `dynamics.periodicity.cycles_to_next_check`.
         """
-        number = self.done // self.prop.steps
+        n_cycles = self.done // self.prop.steps
         size = self.looks.shape[1]
         if (
             not size
             or self.periodic is None
-            or not (is_checked_after(number) or is_checked_after(number + 1))
+            or not (is_checked_after(n_cycles) or is_checked_after(n_cycles + 1))
         ):
             return False
         rows = self._carried_state()
-        now = np.concatenate(rows)
-        if not is_checked_after(number):
-            self.looks[1] = now
-            self.books = self._sums_so_far()
+        state = np.concatenate(rows)
+        if not is_checked_after(n_cycles):
+            self.looks[1] = state
+            self.books = self._collect_sums()
             return False
         sizes = np.repeat([np.abs(row).max(initial=0.0) for row in rows], [*map(len, rows)])
         self.looks[2] = np.maximum(self.looks[2], sizes)
         scale = np.where(self.looks[2] > 0, self.looks[2], 1.0)
-        change = float(np.max(np.abs(now - self.looks[0]) / scale))
-        last_change = float(np.max(np.abs(now - self.looks[1]) / scale))
-        before = self.change
+        change = float(np.max(np.abs(state - self.looks[0]) / scale))
+        last_change = float(np.max(np.abs(state - self.looks[1]) / scale))
+        previous_change = self.change
         self.change = change
-        self.looks[0] = now
-        # changes over two intervals between checks are known
-        known = n_left > 0 and number >= 4 * FIRST_CHECK
+        self.looks[0] = state
+        # the changes over two intervals between checks must be known
+        has_two_intervals = n_left > 0 and n_cycles >= 4 * FIRST_CHECK
         return (
-            known
+            has_two_intervals
             and max(change, last_change) <= PERIODIC_TOL
-            and bound_remaining_change(change, before, n_left, number) <= PERIODIC_TOL
+            and bound_remaining_change(change, previous_change, n_left, n_cycles) <= PERIODIC_TOL
         )
 
     def skip_cycles(self, count: int) -> None:
-        """Skip `count` cycles that are equal to the last one, directly after `is_periodic`."""
-        grown = count * (self._sums_so_far() - self.books)
-        self.ledger[SUMS] += grown[SUMS]
-        self.totals += grown[9:12]
-        self.second += grown[12:]
+        """Skip cycles that are equal to the last one, directly after `is_periodic`."""
+        increase = count * (self._collect_sums() - self.books)
+        self.ledger[SUM_POSITIONS] += increase[SUM_POSITIONS]
+        self.totals += increase[9:12]
+        self.second += increase[12:]
         self.done += count * self.prop.steps
 
     def move_to(self, place, rate) -> None:
-        """Move the march to coordinates and rates (n,) at the start of a cycle.
+        """Set the modal coordinates and rates (n,) of the march at the start of a cycle.
 
-        The contact slides there slowly.
+        The contact slides to the new position slowly.
         """
         path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
         if path[0] != path[1]:
@@ -251,7 +254,7 @@ class Run:
         self.done = 0
 
     def _slide_contact(self, path) -> None:
-        """Move the memory of the contact along a slide path (2,) [m] in a second."""
+        """Update the memory of the contact for a slide along a path (2,) [m] in one second."""
         self.loops.follow_path(
             path,
             1.0,
@@ -263,7 +266,7 @@ class Run:
         )
 
     def reset_balance(self) -> None:
-        """Start the energy balance here, with the present energies, at the start of a cycle."""
+        """Restart the energy balance with the present energies at the start of a cycle."""
         self.ledger[:] = 0.0
         self.totals[:] = 0.0
         self.second[:] = 0.0
@@ -271,27 +274,27 @@ class Run:
         self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy() + self.find_interface_energy()
 
     def march_to_mark(self, cycles: int, window: int) -> Mark:
-        """March more cycles and return the `Mark` of the last `window` of them."""
-        parts = deque(maxlen=window)
+        """March further cycles, and return the `Mark` of the last `window` of them."""
+        marched_cycles = deque(maxlen=window)
         for _ in range(cycles):
-            parts.append(self.march_cycle(self.prop.steps, 0, []))
+            marched_cycles.append(self.march_cycle(self.prop.steps, 0, []))
             if self.outcome is not None:
                 break
-        return make_mark(self, list(parts), read_output_extremes(parts, self))
+        return make_mark(self, list(marched_cycles), read_output_extremes(marched_cycles, self))
 
-    def step_table(self, count: int) -> tuple:
-        """Return a table of `propagator.tables` for the next steps, and the row of the first of them."""
+    def get_step_table(self, count: int) -> tuple:
+        """Return the drive table for the next steps, and its row for the first of them."""
         if self.periodic is not None:
             return self.periodic, self.done % len(self.periodic)
         return self.prop.tables(self.drive, self.done, max(count, 1)), 0
 
     def make_response(self, rows, number) -> Response:
-        """Return the histories of the samples with step numbers `number` (k,)."""
-        out = _make_response(rows, number, self.prop.dt, self.modes, self.drive)
-        return self._add_elements(out, rows) if hasattr(self.model, "patch") else out
+        """Return the time histories of samples with given step numbers (k,)."""
+        response = _make_response(rows, number, self.prop.dt, self.modes, self.drive)
+        return self._add_elements(response, rows) if hasattr(self.model, "patch") else response
 
-    def _add_elements(self, out, rows) -> Response:
-        """Add the elements to the histories.
+    def _add_elements(self, response, rows) -> Response:
+        """Add slides, forces and slips of the elements to the time histories.
 
         `extra` gets slides, slide_rates, forces and slips (k, i) of the interfaces, spring_forces (k, s), and
         for elements in a plane lateral_slides and so on (k, i), which are 0 for the other elements.
@@ -303,11 +306,11 @@ class Run:
         is_second = mates < np.arange(mates.size)
         is_interface = (is_friction == 1) & ~is_second
         forces = columns[:, :, SampleColumn.FORCE]
-        push = -np.einsum("ke,en->kn", forces, faces.rows[ports]) / modes.mass
+        element_acceleration = -np.einsum("ke,en->kn", forces, faces.rows[ports]) / modes.mass
         if self.model.patch is None:
-            # that of the first element is counted already
-            push += np.outer(out.force, modes.slide) / modes.mass
-        extra = out.extra | {"spring_forces": forces[:, ~(is_interface | is_second)]}
+            # the histories already include the force of the first element
+            element_acceleration += np.outer(response.force, modes.slide) / modes.mass
+        extra = response.extra | {"spring_forces": forces[:, ~(is_interface | is_second)]}
         names = ("slides", "slide_rates", "forces", "slips")
         if is_interface.any():
             extra |= {name: columns[:, is_interface, k] for k, name in enumerate(names)}
@@ -315,25 +318,31 @@ class Run:
             lateral = np.zeros((len(rows), is_interface.sum()))
             lateral[:, mates[is_second]] = columns[:, is_second, k]
             extra[f"lateral_{name}"] = lateral
-        return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)
+        return replace(
+            response,
+            acceleration=response.acceleration + element_acceleration @ modes.output,
+            extra=extra,
+        )
 
     def _element_columns(self, rows) -> np.ndarray:
-        """Return the columns of the elements (k, e, 5) of samples."""
+        """Return the sample columns of the elements (k, e, 5)."""
         count = len(self.model.joints)
-        begin = 2 * self.modes.omega.size + N_SAMPLE_COLUMNS + rows.shape[1] - self.width
-        columns = rows[:, begin : begin + N_ELEMENT_COLUMNS * count]
+        first_column = 2 * self.modes.omega.size + N_SAMPLE_COLUMNS + rows.shape[1] - self.width
+        columns = rows[:, first_column : first_column + N_ELEMENT_COLUMNS * count]
         return columns.reshape(len(rows), count, N_ELEMENT_COLUMNS)
 
     def march_without_samples(self, steps: int, after_piece=None) -> bool:
-        """March to a step in long pieces without keeping samples.
+        """March to a step without keeping samples.
 
-        Returns whether the march reached the step. `after_piece` is called after each piece.
+        Returns whether the march reached the step. after_piece: callback after each part of the march.
         """
         size = self.prop.steps
         while self.done < steps and self.outcome is None:
             next_check = self.done // size + cycles_to_next_check(self.done // size)
-            look = next_check * size - self.done
-            count = min(steps - self.done, MAX_PIECE_STEPS, MAX_PIECE_CYCLES * size, look)
+            n_steps_to_check = next_check * size - self.done
+            count = min(
+                steps - self.done, MAX_STEPS_AT_ONCE, MAX_CYCLES_AT_ONCE * size, n_steps_to_check
+            )
             rows = self._march_rows(count, 0, [])
             self.totals += self._step_energies(rows).sum(axis=1)
             n_left = (steps - self.done) // size
@@ -343,18 +352,18 @@ class Run:
                 after_piece()
         return self.outcome is None
 
-    def march_cycles(self, size: int, stop: int, frames: int, snapshots: list) -> list:
-        """March a cycle, or several whole cycles at once.
+    def march_cycles(self, size: int, last_step: int, frames: int, snapshots: list) -> list:
+        """March one cycle, or several complete cycles at once.
 
-        No cycle goes beyond the step `stop` or the next look of `is_periodic`. With frames the last cycle is
-        marched by itself, in as many pieces, with a snapshot after each.
+        No cycle goes beyond the step `stop` or the next check of `is_periodic`. With frames the last cycle is
+        marched separately, in as many parts, with a snapshot after each.
 
         Parameters
         ----------
         size : int
             Number of steps.
-        stop : int
-            Number of a step.
+        last_step : int
+            Number of the step at which to stop.
         frames : int
             Number of snapshots.
         snapshots : list
@@ -363,40 +372,46 @@ class Run:
         Returns
         -------
         list of list of MarchedCycle
-            Whole cycles, and then the part of the next one that was begun if the march ends.
+            Complete cycles, followed by the incomplete cycle if the march ended in it.
         """
         first = self.done
         cycle_steps = self.prop.steps
         n_cycles = min(
-            MAX_PIECE_CYCLES,
-            MAX_PIECE_STEPS // cycle_steps,
-            (stop - first) // cycle_steps,
+            MAX_CYCLES_AT_ONCE,
+            MAX_STEPS_AT_ONCE // cycle_steps,
+            (last_step - first) // cycle_steps,
             cycles_to_next_check(-(-first // cycle_steps)),
         )
-        if frames and first + n_cycles * cycle_steps == stop:
+        if frames and first + n_cycles * cycle_steps == last_step:
             n_cycles -= 1
         count = max(1, n_cycles) if size == cycle_steps else 1
-        rows = self._march_rows(count * size, frames if first + size == stop else 0, snapshots)
+        rows = self._march_rows(count * size, frames if first + size == last_step else 0, snapshots)
         works = self._step_works(rows)
         first_sum = 2 * self.modes.omega.size + FIRST_SUM
-        sums = self._running_sums(rows).T
+        sums = self._accumulate_energies(rows).T
         samples = np.concatenate([rows[:, :first_sum], sums, rows[:, first_sum:]], axis=1)
-        n_whole = (len(rows) - 1) // size if size else 0
-        end = n_whole * size
-        parts = []
-        if n_whole:
+        n_complete = (len(rows) - 1) // size if size else 0
+        end = n_complete * size
+        cycle_lists = []
+        if n_complete:
             cycle_rows = sliding_window_view(samples, size + 1, axis=0)[::size].swapaxes(1, 2)
-            cycle_works = works[:end].reshape(n_whole, size).sum(axis=1)
+            cycle_works = works[:end].reshape(n_complete, size).sum(axis=1)
             first_steps = range(first, first + end, size)
-            parts.append([*map(MarchedCycle, first_steps, cycle_rows, cycle_works)])
-        if end < len(rows) - 1 or not n_whole:
-            parts.append(
-                [MarchedCycle(first + end, samples[end:], works[None, end:].sum(axis=1)[0])]
+            cycle_lists.append([*map(MarchedCycle, first_steps, cycle_rows, cycle_works)])
+        if end < len(rows) - 1 or not n_complete:
+            cycle_lists.append(
+                [
+                    MarchedCycle(
+                        first + end,
+                        samples[end:],
+                        works[None, end:].sum(axis=1)[0],
+                    )
+                ]
             )
-        return parts
+        return cycle_lists
 
     def march_cycle(self, size: int, frames: int, snapshots: list) -> MarchedCycle:
-        """March `size` steps as one cycle.
+        """March a number of steps and return them as one cycle.
 
         Parameters
         ----------
@@ -415,7 +430,7 @@ class Run:
         return cycle
 
     def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
-        """Return the rows (steps + 1, width) of `size` steps as the loop writes them.
+        """March a number of steps and return their sample rows (steps + 1, width).
 
         The arguments are those of `march_cycles`.
 
@@ -429,25 +444,27 @@ class Run:
             Snapshots, which are appended.
         """
         parts = []
-        edges = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
-        for piece in np.diff(edges) if size else [0]:
-            rows = np.empty((piece + 1, self.width))
-            rows[-1] = 0.0  # the entries of the step that follows the last one are not known yet
+        part_ends = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
+        for part_steps in np.diff(part_ends) if size else [0]:
+            rows = np.empty((part_steps + 1, self.width))
+            rows[-1] = 0.0  # the values of the step after the last sample are not known yet
             saved_state = copy_state(self.contact, *self._changing_arrays())
-            start = self._copy_before_piece()
-            n_steps, status = self._march_steps(int(piece), rows)
+            saved_arrays = self._copy_for_softening_springs()
+            n_steps, status = self._march_steps(int(part_steps), rows)
             while status == MEMORY_FULL:
-                place = f"at step {self.done + n_steps}"
+                location = f"at step {self.done + n_steps}"
                 self.contact = enlarge_list(
-                    self.contact, saved_state, place, *self._changing_arrays()
+                    self.contact, saved_state, location, *self._changing_arrays()
                 )
-                n_steps, status = self._march_steps(int(piece), rows)
-            if start and self._has_diverged(rows[: n_steps + 1]):
-                for array, start_array in zip((*self.contact, *self._changing_arrays()), start):
-                    array[...] = start_array
+                n_steps, status = self._march_steps(int(part_steps), rows)
+            if saved_arrays and self._has_diverged(rows[: n_steps + 1]):
+                for array, saved_array in zip(
+                    (*self.contact, *self._changing_arrays()), saved_arrays
+                ):
+                    array[...] = saved_array
                 n_steps, _ = self._march_steps(n_steps - 1, rows)
                 status = EXCEEDS_TRAVEL
-                distance = format_length(self._output_distance(rows[n_steps]), 3)
+                distance = format_length(self._find_output_distance(rows[n_steps]), 3)
                 self.message = (
                     f"beyond a displacement of {distance} the motion grows without limit, because the "
                     "force of the softening spring no longer pulls the block back; the run ended there"
@@ -456,7 +473,7 @@ class Run:
             parts.append(rows[: n_steps + 1])
             self.set_outcome(status)
             if frames:
-                snapshots.append(self._snapshot(rows[n_steps]))
+                snapshots.append(self._make_snapshot(rows[n_steps]))
             if self.outcome is not None:
                 break
         rows = parts[0]
@@ -465,91 +482,95 @@ class Run:
         self.second += self._sampled_works(rows).sum(), np.abs(self._step_works(rows)).sum()
         return rows
 
-    def _copy_before_piece(self) -> tuple:
-        """Return copies of all arrays that steps change if a spring is nonlinear, else nothing."""
+    def _copy_for_softening_springs(self) -> tuple:
+        """Return copies of all arrays that steps change if a spring is nonlinear, otherwise ()."""
         if all(joint.potential is None for joint in self.model.joints):
             return ()
         return tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
 
     def _has_diverged(self, rows) -> bool:
-        """Return whether the last step ends far beyond the travel, or is not finite."""
+        """Return whether the last step ends far beyond the travel or is not finite."""
         return len(rows) > 1 and not (
-            self._output_distance(rows[-1]) <= DIVERGED_FACTOR * self.travel
+            self._find_output_distance(rows[-1]) <= DIVERGENCE_RATIO * self.travel
             and np.isfinite(rows[-1]).all()
         )
 
-    def _output_distance(self, row) -> float:
-        """Return the distance of the output from rest [m] in a row."""
+    def _find_output_distance(self, row) -> float:
+        """Return the absolute displacement of the output [m] in a sample row."""
         with np.errstate(invalid="ignore", over="ignore"):
             return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
     def _march_steps(self, count: int, rows) -> tuple:
-        """March `count` steps into rows (count + 1, width); return the number of steps done and the status."""
-        table, row = self.step_table(count)
-        return self.loops.march(self.model, row, count, self._make_system(table, count), rows)
+        """March steps by the compiled loop into rows (count + 1, width).
 
-    def _make_system(self, table, count: int) -> MarchArrays:
-        """Return the arrays that the compiled loop takes for the next steps."""
+        Returns the number of completed steps and the status.
+
+        """
+        table, row = self.get_step_table(count)
+        return self.loops.march(self.model, row, count, self._make_march_arrays(table, count), rows)
+
+    def _make_march_arrays(self, table, count: int) -> MarchArrays:
+        """Return the arguments of the compiled loop for the next steps."""
         return MarchArrays(
             motion=self.state,
             modal_system=self.modal_system,
             table=table,
             interface=self.contact,
             elements=self.faces,
-            press=self._load_of_steps(count),
+            press=self._make_step_load(count),
             ledger=self.ledger,
             travel=float(self.travel),
         )
 
-    def _initial_load(self):
-        """Return the load at the start; here it is constant."""
+    def _make_initial_load(self):
+        """Return the arrays of the load at the start: a constant load."""
         return arrays.ConstantLoad(np.zeros(0))
 
-    def _load_of_steps(self, count: int):
-        """Return the arrays of the load in the next steps."""
+    def _make_step_load(self, count: int):
+        """Return the arrays of the load for the next steps."""
         return self.load
 
-    def _running_sums(self, rows) -> np.ndarray:
-        """Return friction work, dissipated and created energy since the start at the rows (3, steps + 1) [J].
+    def _accumulate_energies(self, rows) -> np.ndarray:
+        """Return the energies (3, steps + 1) [J] accumulated since the start at each sample.
 
-        `march_cycles` inserts them into the rows as further columns.
+        They are friction work, dissipated and created energy; `march_cycles` inserts them into the rows as columns.
         """
-        parts = self._step_energies(rows)
-        sums = np.empty((3, parts.shape[1] + 1))
+        step_energies = self._step_energies(rows)
+        sums = np.empty((3, step_energies.shape[1] + 1))
         sums[:, 0] = self.totals
-        np.cumsum(parts, axis=1, out=sums[:, 1:])
+        np.cumsum(step_energies, axis=1, out=sums[:, 1:])
         sums[:, 1:] += self.totals[:, None]
         self.totals = sums[:, -1].copy()
         return sums
 
     def _step_energies(self, rows) -> np.ndarray:
-        """Return the friction work, the dissipated and the created energy of the steps between the rows (3, steps) [J].
+        """Return friction work, dissipated and created energy of each step, (3, steps) [J].
 
-        The dissipated energy is the work less the increase of the energy of the interface.
+        The dissipated energy is the work minus the increase of the stored energy of the interface.
         """
         n = 2 * self.modes.omega.size
-        parts = np.zeros((3, len(rows) - 1))
-        parts[0] = self._step_works(rows)
-        lost = parts[0] - np.diff(rows[:, n + SampleColumn.ENERGY])
-        if lost.min(initial=0.0) == 0.0:
-            parts[1] = lost
-            return parts
+        energies = np.zeros((3, len(rows) - 1))
+        energies[0] = self._step_works(rows)
+        dissipated = energies[0] - np.diff(rows[:, n + SampleColumn.ENERGY])
+        if dissipated.min(initial=0.0) == 0.0:
+            energies[1] = dissipated
+            return energies
         # error of the work due to the tolerance of the step solution and to round-off of the slide
         noise = self.model.limit * (
             1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])
         )
-        np.copyto(parts[1], lost, where=lost > -noise)
-        np.copyto(parts[2], -lost, where=lost < -noise)
-        return parts
+        np.copyto(energies[1], dissipated, where=dissipated > -noise)
+        np.copyto(energies[2], -dissipated, where=dissipated < -noise)
+        return energies
 
     def _step_works(self, rows) -> np.ndarray:
-        """Return the friction work of the steps between the rows [J]."""
+        """Return the friction work of each step between samples [J]."""
         return rows[:-1, 2 * self.modes.omega.size + SampleColumn.STEP_WORK]
 
     def _sampled_works(self, rows) -> np.ndarray:
-        """Return the friction work of the steps between the rows [J] from slides and forces alone.
+        """Return the friction work of each step [J] from the sampled slides and forces alone.
 
-        Blows at the end of a step, of slides that stop, have no slide from which their work could be read;
+        Impulses at the end of a step, when a slide stops, have no slide from which their work could be computed;
         their work is added if all friction is set-valued.
         """
         n = 2 * self.modes.omega.size
@@ -558,7 +579,7 @@ class Run:
         works = np.zeros(len(rows) - 1)
         if has_smooth_friction:
             works = sampled_work(rows[:, n], rows[:, n + SampleColumn.FORCE])
-        blows = rows[:-1, n + SampleColumn.STEP_WORK].copy()
+        impulse_works = rows[:-1, n + SampleColumn.STEP_WORK].copy()
         for joint, columns in zip(model.joints, self._element_columns(rows).transpose(1, 2, 0)):
             if joint.potential is not None:
                 continue
@@ -568,19 +589,19 @@ class Run:
             works += sampled_work(
                 slide, columns[SampleColumn.FORCE], None if is_smooth else mean_force
             )
-            blows -= mean_force * np.diff(slide)
+            impulse_works -= mean_force * np.diff(slide)
             has_smooth_friction |= is_smooth
-        return works if has_smooth_friction else works + blows
+        return works if has_smooth_friction else works + impulse_works
 
     def _changing_arrays(self) -> list:
-        """Return the arrays that a step changes, without those of the contact."""
+        """Return the arrays that a step changes, apart from those of the contact."""
         arrays_of_elements = [*self.faces[:-1]]
         if self.model.joints:
             arrays_of_elements += self.faces.stops
         return [self.state, self.ledger, *arrays_of_elements]
 
     def set_outcome(self, status: int) -> None:
-        """Set outcome and message from the status of a compiled loop."""
+        """Set the outcome and message of the march from the status of the compiled loop."""
         if status == EXCEEDS_TRAVEL:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         if status == NOT_FINITE:
@@ -596,7 +617,7 @@ class Run:
                 "accuracy.steps_per_cycle"
             )
 
-    def _snapshot(self, row) -> dict:
+    def _make_snapshot(self, row) -> dict:
         n = 2 * self.modes.omega.size
         return {
             "time": self.done * self.prop.dt,
@@ -604,10 +625,10 @@ class Run:
             "rate": row[n + SampleColumn.SPEED],
             "force": row[n + SampleColumn.FORCE],
             "slip": row[n + SampleColumn.SLIP],
-        } | self.model.picture_fields(self.contact)
+        } | self.model.get_plot_fields(self.contact)
 
     def check_steps(self) -> None:
-        """Set the outcome to not_converged if a step missed its residual; the samples are kept."""
+        """Set the outcome to not_converged if a step did not meet its tolerance."""
         if self.ledger[Ledger.N_UNCONVERGED]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -616,7 +637,11 @@ class Run:
             )
 
     def read_rates_and_slips(self, rows) -> tuple:
-        """Return slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in the rows of `march_cycles`."""
+        """Return the slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in samples.
+
+        rows: sample rows of `march_cycles`.
+
+        """
         n = 2 * self.modes.omega.size
         columns = self._element_columns(rows)
         rates = [rows[:, n + SampleColumn.SPEED], columns[:, :, SampleColumn.SPEED]]
@@ -624,7 +649,7 @@ class Run:
         return np.column_stack(rates), np.column_stack(slips)
 
     def find_modal_energy(self) -> float:
-        """Return the kinetic and elastic energy of the modes [J]."""
+        """Return the sum of kinetic and elastic energy of the modes [J]."""
         return (
             0.5
             * self.modes.mass
@@ -636,7 +661,9 @@ class Run:
         n = 2 * self.modes.omega.size
         rows = np.zeros((1, self.width))
         table = np.zeros((1, 4 * n + 3))
-        system = self._make_system(table, 0)._replace(travel=np.inf, ledger=np.zeros(len(Ledger)))
+        system = self._make_march_arrays(table, 0)._replace(
+            travel=np.inf, ledger=np.zeros(len(Ledger))
+        )
         self.loops.march(self.model, 0, 0, system, rows)
         energy = rows[0, n + SampleColumn.ENERGY]
         if self.model.loading:
@@ -647,7 +674,7 @@ class Run:
         return float(energy)
 
     def energy_balance(self) -> dict:
-        """Return the energy balance [J] and the counters by name."""
+        """Return the energies [J] and iteration counters of the march by name."""
         names = (
             "work_in",
             "viscous",

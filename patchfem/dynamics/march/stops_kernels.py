@@ -1,15 +1,15 @@
-"""Stops and releases of set-valued faces inside a step, and the forces on the faces.
+"""Stops and releases of set-valued elements (faces) inside a step, and their forces.
 
-A march moves the modes under mean forces, so a stop or a release inside the step would be off by up to a step, and a slide
-that is held would keep a speed. Here the forces h(x) that would hold all faces change linearly over the step, 0 <= x <= 1,
+A march moves the modes under mean forces, so a stop or a release inside the step would be wrong by up to a step, and a slide
+that sticks would keep a speed. Here the forces h(x) that would hold all faces change linearly over the step, 0 <= x <= 1,
 and a slide accelerates by the difference between h and the friction. So every stop and every release is the root of a line
 or a parabola. Between events some faces rest and the others slide. Faces that rest share the force that the others and the
-modes ask of them; dependent ones share it by least squares, and one that would be overloaded while the others hold it
+modes exert on them; dependent ones share it by least squares, and one that would be overloaded while the others hold it
 carries its static friction. The limits may change linearly over the step, as under a load that varies.
 
-The step then needs slides and speeds at its end. Mean forces give the slides, and blows at the end give the speeds; both
-are of second order in the step. `find_blows` computes the work of all friction. If the friction would do work on the modes,
-the loop steps by mean forces alone. Read `follow_step` first.
+The step then needs slides and speeds at its end. Mean forces give the slides, and impulses at the end give the speeds; both
+are of second order in the step. `find_impulses` computes the work of all friction. If the friction would do work on the
+modes, the loop steps by mean forces alone. Read `follow_step` first.
 
 Stiff elastic-plastic faces do not replace this module, because they have one coefficient of friction: a kinetic
 coefficient below the static one cannot be given to them. With equal coefficients, on 119 random rigs, 98 % of the errors
@@ -28,22 +28,22 @@ from ..dense_kernels import factorise, solve_factorised
 from ..modal_kernels import project_modes, write_accelerations
 from .element_arrays import ComplianceRow, FaceRow, LimitRow
 
-# Number of the law in `num` of an element that holds without a stretch; it is set-valued.
+# Number of the law in `num` of a set-valued element, which sticks without a stretch.
 SET_VALUED = 0
-# Relative shift of the diagonal, which makes the equations of dependent faces regular.
+# Relative shift of the diagonal that regularises the equations of dependent faces.
 DIAGONAL_SHIFT = 1e-10
-# compliance of a face while the others are held, over its compliance; below it the others hold the face
+# compliance of a face with the other faces fixed, over its compliance; below this ratio the others hold the face
 DEPENDENT_TOL = 1e-7
-OVERLOAD_TOL = 1e-9  # fraction by which a force may exceed the static friction
-SAME_TIME_TOL = 1e-12  # fraction of a speed below which equal faces stop at once
-ZERO_SLIDE_TOL = 1e-14  # fraction of its terms below which an increment of slide is zero
-TINY = 1e-300  # keeps a divisor above 0
+OVERLOAD_TOL = 1e-9  # relative excess over the static friction that counts as round-off
+SAME_TIME_TOL = 1e-12  # relative speed below which faces stop at the same time
+ZERO_SLIDE_TOL = 1e-14  # relative slide increment that counts as zero, over its terms
+TINY = 1e-300  # smallest divisor, so that it stays above 0
 
 
 class StepEvent(NamedTuple):
-    """Next stop or release in a step.
+    """Next stop or release of a face within a step.
 
-    - distance: from the present time, in lengths of the step
+    - distance: time from now to the event, as a fraction of the step
     - face: number of the face, -1 for no event
     - slip_sign: sign of the slide after a release, 0 for a stop
     """
@@ -54,41 +54,41 @@ class StepEvent(NamedTuple):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def friction_bound(which, e, x, stops):
-    """Return the static or kinetic friction [N] of a face at a fraction of the step.
+def find_friction_limit(which, face, step_fraction, stops):
+    """Return the static or kinetic friction limit [N] of a face at a fraction of the step.
 
     Parameters
     ----------
     which : int
-        STATIC or KINETIC.
-    e : int
+        LimitRow.STATIC or LimitRow.KINETIC.
+    face : int
         Number of the face.
-    x : float
-        Place in the step, from 0 at its start to 1.
+    step_fraction : float
+        Fraction of the step, from 0 at its start to 1.
     stops : element_arrays.SetValuedElements
 
     Returns
     -------
     float
     """
-    return stops.limit[which, e] + x * (
-        stops.limit[which + LimitRow.AT_END, e] - stops.limit[which, e]
+    return stops.limit[which, face] + step_fraction * (
+        stops.limit[which + LimitRow.AT_END, face] - stops.limit[which, face]
     )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_shared_forces(which, count, stops):
-    """Solve A x = b for the forces x that the faces `stops.names[:count]` share.
+    """Solve for the forces of coupled faces from their compliances and right-hand sides.
 
-    A is stops.compliances[which] of these faces, b their row RIGHT_SIDE of stops.field, and x is written into the row
-    SOLUTION, both in the order of the names. Of forces that depend on each other the smallest x is found: a shift
-    of the diagonal makes A regular, and one step of iterative refinement removes the shift where it has no
-    effect.
+    The faces are `stops.names[:count]`. The equations are A x = b with A = stops.compliances[which] of these faces and
+    b their row RIGHT_SIDE of stops.field; x is written into the row SOLUTION, both in the order of the names. For
+    dependent faces the x of least norm is found: a shift of the diagonal makes A regular, and one step of iterative
+    refinement removes the shift where it has no effect.
 
     Parameters
     ----------
     which : int
-        BETA, GAMMA or ACCELERANCE.
+        ComplianceRow.SLIDE, SPEED or ACCELERATION.
     count : int
         Number of faces.
     stops : element_arrays.SetValuedElements
@@ -127,8 +127,8 @@ def solve_shared_forces(which, count, stops):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def list_resting(stops):
-    """Write the numbers of the faces that rest into stops.names; return how many."""
+def list_resting_faces(stops):
+    """Write the numbers of the resting faces into stops.names; return their count."""
     count = 0
     for e in range(stops.names.size):
         if stops.field[FaceRow.SLIP_STATE, e] == 0.0:
@@ -138,23 +138,23 @@ def list_resting(stops):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def find_forces(x, stops):
-    """Write the forces of all faces and their slopes into stops.field.
+def find_face_forces(x, stops):
+    """Compute the forces of all faces and their slopes at a fraction of the step.
 
-    Returns whether they exist.
+    The results are in stops.field. Returns whether the equations have a solution.
     """
     f = stops.field
     force = f[FaceRow.FORCE]
     force_slope = f[FaceRow.FORCE_SLOPE]
     holding_start = f[FaceRow.HOLDING_START]
     slip_state = f[FaceRow.SLIP_STATE]
-    count = list_resting(stops)
+    count = list_resting_faces(stops)
     for e in range(stops.names.size):
         is_static = abs(slip_state[e]) == 2.0
         which = LimitRow.STATIC if is_static else LimitRow.KINETIC
         slip_sign = np.sign(slip_state[e])
         limit_rise = stops.limit[which + LimitRow.AT_END, e] - stops.limit[which, e]
-        force[e] = slip_sign * friction_bound(which, e, x, stops)
+        force[e] = slip_sign * find_friction_limit(which, e, x, stops)
         force_slope[e] = slip_sign * limit_rise
     for derivative in range(2):
         for i in range(count):
@@ -181,7 +181,7 @@ def find_forces(x, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def release_face(e, slip_sign, stops):
-    """Let a face slide, or carry its static friction if the other resting faces hold it.
+    """Release a face: it slides, or carries its static friction if other faces hold it.
 
     Parameters
     ----------
@@ -192,10 +192,10 @@ def release_face(e, slip_sign, stops):
     stops : element_arrays.SetValuedElements
     """
     f = stops.field
-    # the face no longer belongs to the resting ones
+    # the face must not be listed among the resting faces
     f[FaceRow.SLIP_STATE, e] = slip_sign
     f[FaceRow.SLIDES_ON, e] = 0.0
-    count = list_resting(stops)
+    count = list_resting_faces(stops)
     for i in range(count):
         f[FaceRow.RIGHT_SIDE, i] = stops.compliances[ComplianceRow.ACCELERATION, stops.names[i], e]
     if count == 0 or not solve_shared_forces(ComplianceRow.ACCELERATION, count, stops):
@@ -211,10 +211,10 @@ def release_face(e, slip_sign, stops):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def choose_states(x, stops):
-    """Choose which faces rest, slide or carry at a fraction of the step.
+def choose_slip_states(x, stops):
+    """Determine which faces rest, slide or carry static friction at a fraction of a step.
 
-    Returns whether it succeeds.
+    Returns whether consistent states are found.
     """
     f = stops.field
     slip_state = f[FaceRow.SLIP_STATE]
@@ -222,13 +222,14 @@ def choose_states(x, stops):
         if abs(slip_state[e]) == 2.0:
             slip_state[e] = 0.0
     for _ in range(2 * stops.names.size + 2):
-        if not find_forces(x, stops):
+        if not find_face_forces(x, stops):
             return False
         worst_overload = OVERLOAD_TOL
         worst_face = -1
         for e in range(stops.names.size):
             overload = (
-                abs(f[FaceRow.FORCE, e]) / max(friction_bound(LimitRow.STATIC, e, x, stops), TINY)
+                abs(f[FaceRow.FORCE, e])
+                / max(find_friction_limit(LimitRow.STATIC, e, x, stops), TINY)
                 - 1
             )
             if slip_state[e] == 0.0 and overload > worst_overload:
@@ -241,8 +242,10 @@ def choose_states(x, stops):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def first_zero(speed, rate, half_slope):
-    """Return the first y >= 0 at which speed + rate y + half_slope y^2 falls to 0, infinite if it does not.
+def find_first_zero(speed, rate, half_slope):
+    """Return the first zero y >= 0 of a decreasing speed that is quadratic in time.
+
+    The speed is speed + rate y + half_slope y^2; the result is infinite without a zero.
 
     The speed must not be negative, and `rate` not negative where the speed is 0.
 
@@ -266,15 +269,15 @@ def first_zero(speed, rate, half_slope):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def speed_rates(e, x, dt, stops):
-    """Return the change of the speed of a face per length of the step, and half of its slope.
+def find_speed_rates(e, x, dt, stops):
+    """Return the speed change of a face per step length, and half of its derivative.
 
     Parameters
     ----------
     e : int
         Number of the face.
     x : float
-        Place in the step, from 0 at its start to 1.
+        Fraction of the step, from 0 at its start to 1.
     dt : float
         Length of the step [s].
     stops : element_arrays.SetValuedElements
@@ -301,12 +304,12 @@ def speed_rates(e, x, dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_next_event(x, dt, stops):
-    """Find the next stop or release after a fraction of the step.
+    """Find the next stop or release of a face after a fraction of the step.
 
     Parameters
     ----------
     x : float
-        Place in the step, from 0 at its start to 1.
+        Fraction of the step, from 0 at its start to 1.
     dt : float
         Length of the step [s].
     stops : element_arrays.SetValuedElements
@@ -322,8 +325,8 @@ def find_next_event(x, dt, stops):
     slip_sign = 0.0
     for e in range(stops.names.size):
         if abs(slip_state[e]) == 1.0:
-            rate, half_slope = speed_rates(e, x, dt, stops)
-            root = first_zero(
+            rate, half_slope = find_speed_rates(e, x, dt, stops)
+            root = find_first_zero(
                 slip_state[e] * f[FaceRow.SPEED, e],
                 slip_state[e] * rate,
                 slip_state[e] * half_slope,
@@ -340,7 +343,10 @@ def find_next_event(x, dt, stops):
                 )
                 if rise > 0:
                     root = max(
-                        (friction_bound(LimitRow.STATIC, e, x, stops) - sign * f[FaceRow.FORCE, e])
+                        (
+                            find_friction_limit(LimitRow.STATIC, e, x, stops)
+                            - sign * f[FaceRow.FORCE, e]
+                        )
                         / rise,
                         0.0,
                     )
@@ -353,14 +359,14 @@ def find_next_event(x, dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def advance_faces(x, distance, face, dt, stops):
-    """Move all faces on from a fraction of the step up to an event.
+    """Advance the slides and speeds of all faces to the next event.
 
     Parameters
     ----------
     x : float
-        Place in the step, from 0 at its start to 1.
+        Fraction of the step, from 0 at its start to 1.
     distance : float
-        Distance in lengths of the step.
+        Time to the event as a fraction of the step.
     face : int
         Number of the face that has the event, -1 for none; it stops if it slides.
     dt : float
@@ -375,7 +381,7 @@ def advance_faces(x, distance, face, dt, stops):
             f[FaceRow.FORCE, e] + 0.5 * distance * f[FaceRow.FORCE_SLOPE, e]
         )
         if abs(slip_state[e]) == 1.0:
-            rate, half_slope = speed_rates(e, x, dt, stops)
+            rate, half_slope = find_speed_rates(e, x, dt, stops)
             f[FaceRow.SLIDE, e] += (
                 distance * dt * (speed[e] + distance * (0.5 * rate + distance * half_slope / 3))
             )
@@ -398,10 +404,14 @@ def advance_faces(x, distance, face, dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def follow_events(dt, stops):
-    """Follow the faces from event to event into stops.field; return whether that succeeds."""
+    """Follow all faces from event to event to the end of a step; return whether it succeeds.
+
+    The results are in stops.field.
+
+    """
     x = 0.0
     for _ in range(6 * stops.names.size + 12):
-        if not choose_states(x, stops):
+        if not choose_slip_states(x, stops):
             return False
         event = find_next_event(x, dt, stops)
         advance_faces(x, event.distance, event.face, dt, stops)
@@ -414,10 +424,10 @@ def follow_events(dt, stops):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def check_all_slide(stops):
-    """Return whether all faces slide on to the end of the step.
+def do_all_slide(stops):
+    """Return whether all faces keep sliding in one direction to the end of the step.
 
-    If so, stops.field gets their speeds.
+    If so, their speeds are written to stops.field.
     """
     f = stops.field
     slip_state = f[FaceRow.SLIP_STATE]
@@ -431,7 +441,7 @@ def check_all_slide(stops):
         dq = f[FaceRow.FREE_SLIDE, e]
         end = f[FaceRow.FREE_SPEED, e]
         for k in range(count):
-            force = slip_state[k] * friction_bound(LimitRow.KINETIC, k, 0.5, stops)
+            force = slip_state[k] * find_friction_limit(LimitRow.KINETIC, k, 0.5, stops)
             dq -= stops.compliances[ComplianceRow.SLIDE, e, k] * force
             end -= stops.compliances[ComplianceRow.SPEED, e, k] * force
         if slip_state[e] * dq < 0 or slip_state[e] * end <= 0:
@@ -442,13 +452,13 @@ def check_all_slide(stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_holding_forces(dt, stops):
-    """Find the forces that would hold the faces at both ends of the step.
+    """Find the forces that would hold the faces at rest at both ends of the step.
 
-    Returns whether they exist.
+    The results are in stops.field. Returns whether the equations have a solution.
 
-    They are found for all faces at once, and then for the resting ones as the step itself asks of them beside
-    those that slide: accelerations are known to the first order of the step only, which would place a release
-    anywhere.
+    They are found for all faces at once, and then for the resting faces with the friction of
+    those that slide: accelerations are known to first order of the step only, which would misplace a release
+    by up to a step.
     """
     f = stops.field
     mean_force = f[FaceRow.MEAN_FORCE]
@@ -460,12 +470,12 @@ def find_holding_forces(dt, stops):
             for e in range(n_faces):
                 stops.names[e] = e
         else:
-            count = list_resting(stops)
+            count = list_resting_faces(stops)
             if count == 0 or count == n_faces:
                 return True
-            if not find_forces(0.0, stops):
+            if not find_face_forces(0.0, stops):
                 return False
-        # mean forces give the slides, and forces weighted by the time to the end give the speeds
+        # mean forces determine the slides, and forces weighted by the time to the end determine the speeds
         if not solve_holding_forces(ComplianceRow.SLIDE, stage, count, dt, stops):
             return False
         for i in range(count):
@@ -491,14 +501,16 @@ def find_holding_forces(dt, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_holding_forces(which, stage, count, dt, stops):
-    """Solve for the forces on the faces `stops.names[:count]` that leave them no slide, or no change of speed.
+    """Solve for the forces on listed faces that prevent their slide, or their change of speed.
+
+    The faces are `stops.names[:count]`.
 
     Parameters
     ----------
     which : int
         ComplianceRow.SLIDE or ComplianceRow.SPEED.
     stage : int
-        0 for all faces, 1 for the resting ones beside those that slide.
+        0 for all faces, 1 for the resting faces under the friction of those that slide.
     count : int
         Number of faces.
     dt : float
@@ -531,7 +543,11 @@ def solve_holding_forces(which, stage, count, dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def follow_step(dt, stops):
-    """Follow the faces through a step into stops.field; return whether that succeeds."""
+    """Follow the stops and releases of all faces through a step; return whether it succeeds.
+
+    The results are in stops.field.
+
+    """
     f = stops.field
     start_speed = f[FaceRow.START_SPEED]
     is_resolved = True
@@ -543,7 +559,7 @@ def follow_step(dt, stops):
             and stops.compliances[ComplianceRow.SPEED, e, e] > 0.5 * compliance
         )
         start_speed[e] = 0.0 if f[FaceRow.WAS_RESTING, e] == 1.0 else start_speed[e]
-    if check_all_slide(stops):
+    if do_all_slide(stops):
         return True
     if not is_resolved or not find_holding_forces(dt, stops):
         return False
@@ -558,9 +574,9 @@ def follow_step(dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def match_mean_forces(stops):
-    """Find mean forces of all faces that cause the slides in stops.field.
+    """Find the mean forces of all faces over a step that produce their slides.
 
-    Returns whether they exist.
+    The results are in stops.field. Returns whether the equations have a solution.
     """
     f = stops.field
     free_slide = f[FaceRow.FREE_SLIDE]
@@ -569,7 +585,7 @@ def match_mean_forces(stops):
     count = 0
     for e in range(stops.names.size):
         if f[FaceRow.SLIDES_ON, e] == 1.0:
-            mean_force[e] = f[FaceRow.SLIP_STATE, e] * friction_bound(
+            mean_force[e] = f[FaceRow.SLIP_STATE, e] * find_friction_limit(
                 LimitRow.KINETIC, e, 0.5, stops
             )
         else:
@@ -594,9 +610,9 @@ def match_mean_forces(stops):
         increment[e] = free_slide[e]
         scale = abs(free_slide[e])
         for k in range(stops.names.size):
-            share = stops.compliances[ComplianceRow.SLIDE, e, k] * mean_force[k]
-            increment[e] -= share
-            scale += abs(share)
+            contribution = stops.compliances[ComplianceRow.SLIDE, e, k] * mean_force[k]
+            increment[e] -= contribution
+            scale += abs(contribution)
         if (
             f[FaceRow.SLIDE, e] == 0.0
             and f[FaceRow.SLIDES_ON, e] == 0.0
@@ -607,14 +623,18 @@ def match_mean_forces(stops):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def find_blows(stops):
-    """Find the impulses that cause the speeds of the faces; return the friction work [J]."""
+def find_impulses(stops):
+    """Find the impulses at the end of a step that produce the end speeds of the faces.
+
+    Returns the friction work of the step [J].
+
+    """
     f = stops.field
     free_speed = f[FaceRow.FREE_SPEED]
     count = 0
     work = 0.0
     for e in range(stops.names.size):
-        f[FaceRow.BLOW, e] = 0.0
+        f[FaceRow.IMPULSE, e] = 0.0
         work += f[FaceRow.MEAN_FORCE, e] * f[FaceRow.INCREMENT, e]
         for k in range(stops.names.size):
             free_speed[e] -= stops.compliances[ComplianceRow.SPEED, e, k] * f[FaceRow.MEAN_FORCE, k]
@@ -630,18 +650,18 @@ def find_blows(stops):
         return -np.inf
     for i in range(count):
         e = stops.names[i]
-        f[FaceRow.BLOW, e] = f[FaceRow.SOLUTION, i]
+        f[FaceRow.IMPULSE, e] = f[FaceRow.SOLUTION, i]
         work += 0.5 * f[FaceRow.SOLUTION, i] * (free_speed[e] + f[FaceRow.SPEED, e])
     return work
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def find_stopping_blows(motion, stops):
-    """Find the blows that stop the faces without a slide, after a step by mean forces alone."""
+def find_stopping_impulses(motion, stops):
+    """Find the impulses that stop the faces without a slide after a step with mean forces."""
     f = stops.field
     count = 0
     for e in range(stops.names.size):
-        f[FaceRow.BLOW, e] = 0.0
+        f[FaceRow.IMPULSE, e] = 0.0
         f[FaceRow.SLIP_STATE, e] = np.sign(f[FaceRow.INCREMENT, e])
         if f[FaceRow.INCREMENT, e] == 0.0:
             f[FaceRow.RIGHT_SIDE, count] = project_modes(stops.rows[e], motion[1])
@@ -649,12 +669,12 @@ def find_stopping_blows(motion, stops):
             count += 1
     if count and solve_shared_forces(ComplianceRow.ACCELERATION, count, stops):
         for i in range(count):
-            f[FaceRow.BLOW, stops.names[i]] = f[FaceRow.SOLUTION, i]
+            f[FaceRow.IMPULSE, stops.names[i]] = f[FaceRow.SOLUTION, i]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def apply_blows(motion, mass, stops):
-    """Strike the modes by the blows; return the energy that the blows take [J].
+def apply_impulses(motion, mass, stops):
+    """Apply the impulses of the faces to the modes; return the dissipated energy [J].
 
     Parameters
     ----------
@@ -673,7 +693,7 @@ def apply_blows(motion, mass, stops):
     for k in range(motion.shape[1]):
         change = 0.0
         for e in range(stops.names.size):
-            change -= stops.rows[e, k] * f[FaceRow.BLOW, e] / mass
+            change -= stops.rows[e, k] * f[FaceRow.IMPULSE, e] / mass
         loss -= mass * change * (motion[1, k] + 0.5 * change)
         motion[1, k] += change
     for e in range(stops.names.size):
@@ -683,7 +703,7 @@ def apply_blows(motion, mass, stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_reactions(motion, modal_system, drive, accel, stops):
-    """Find the forces on the resting faces that leave them no acceleration at an instant.
+    """Find the forces on the resting faces that keep them at rest at an instant.
 
     They are written into the row SOLUTION of stops.field, in the order of stops.names.
 
@@ -701,10 +721,10 @@ def find_reactions(motion, modal_system, drive, accel, stops):
     Returns
     -------
     int
-        Number of the forces, 0 if none are found.
+        Number of forces, 0 if there is no solution.
     """
     write_accelerations(motion, modal_system, drive, accel, modal_system.workspace[1:])
-    count = list_resting(stops)
+    count = list_resting_faces(stops)
     for i in range(count):
         stops.field[FaceRow.RIGHT_SIDE, i] = 0.0
         for k in range(accel.size):
@@ -716,7 +736,7 @@ def find_reactions(motion, modal_system, drive, accel, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rests_through_step(stops):
-    """Return whether all faces rest through the step under mean forces below their static friction."""
+    """Return whether mean forces below the static friction hold all faces through the step."""
     f = stops.field
     n_faces = stops.names.size
     for e in range(n_faces):
@@ -741,9 +761,9 @@ def rests_through_step(stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rests_at_end(motion, modal_system, drive, accel, stops):
-    """Return whether static friction holds the faces at the end of a step through which they rest.
+    """Return whether static friction still holds the resting faces at the end of a step.
 
-    A straight line between the holding forces at both ends would miss a peak of them beyond the end.
+    Linear interpolation of the holding forces between both ends would miss their increase near the end.
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Newton's method on all elements of a step, for slow convergence of the block descent.
+"""Newton's method on the forces of all elements in a step, for slow block descent.
 
-With y_i what the forces take from coordinate i over the step, the slides are d = free - R y, and y minimises
-sum y_i^2/(2 S_i) + sum Psi_e(d_e), where Psi_e' is the path-mean force of element e and S_i the give of a coordinate [m/N].
-`solve_smooth` takes Newton's direction and searches along it by the sign of the slope, so it cannot be thrown to and fro
-between elements that depend on each other, however many there are. `newton_step` solves the equations of the forces
-instead, which laws without a potential have too.
+With y_i the reduction of coordinate i by the forces over the step, the slides are d = free - R y, and y minimises
+sum y_i^2/(2 S_i) + sum Psi_e(d_e), where Psi_e' is the path-mean force of element e and S_i the compliance of a
+coordinate [m/N]. `solve_smooth` takes the Newton direction and a line search by the sign of the slope, so it cannot
+oscillate between elements that depend on each other, however many there are. `take_newton_step` solves the equations of the
+forces instead, which laws without a potential have too.
 """
 
 import numpy as np
@@ -22,15 +22,15 @@ HAS_PLANES = parts.HAS_PLANES
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def element_slide(e, y, elements):
-    """Return the slide of an element [m] at y.
+def find_element_slide(e, y, elements):
+    """Return the slide increment of an element [m] for given coordinate reductions.
 
     Parameters
     ----------
     e : int
         Number of the element.
     y : (n,) array
-        What the forces take from the coordinates.
+        Reductions of the modal coordinates by the forces.
     elements : element_arrays.PortElements
 
     Returns
@@ -45,18 +45,20 @@ def element_slide(e, y, elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def slope_along(t, y, step, trial, elements, dt):
-    """Return the slope of the function that is minimised along a step, at y + t step.
+def find_slope_along_step(t, y, step, trial, elements, dt):
+    """Return the slope of the minimised potential along a Newton step.
+
+    It is evaluated at y + t step.
 
     Parameters
     ----------
     t : float
-        Factor of the step.
+        Fraction of the step.
     y : (n,) array
-        What the forces take from the coordinates.
+        Reductions of the modal coordinates by the forces.
     step : (n,) array
     trial : (n,) array
-        Space for y + t step.
+        Workspace for y + t step.
     elements : element_arrays.PortElements
     dt : float
         Length of the step [s].
@@ -74,7 +76,7 @@ def slope_along(t, y, step, trial, elements, dt):
             elements.num[e],
             elements.mem[e],
             elements.state[ElementRow.SLIDE, e],
-            element_slide(e, trial, elements),
+            find_element_slide(e, trial, elements),
             elements.state[ElementRow.BOND_LENGTH, e],
             dt,
         )[0]
@@ -84,15 +86,15 @@ def slope_along(t, y, step, trial, elements, dt):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_equations(y, step, elements, dt, hess):
-    """Write minus the gradient at y into `step`, and the Hessian.
+def write_newton_equations(y, step, elements, dt, hess):
+    """Write the Newton equations of the potential: negative gradient and Hessian at y.
 
     The forces of the laws are written into elements.state.
 
     Parameters
     ----------
     y : (n,) array
-        What the forces take from the coordinates.
+        Reductions of the modal coordinates by the forces.
     step : (n,) array
     elements : element_arrays.PortElements
     dt : float
@@ -118,7 +120,7 @@ def newton_equations(y, step, elements, dt, hess):
             elements.num[e],
             elements.mem[e],
             elements.state[ElementRow.SLIDE, e],
-            element_slide(e, y, elements),
+            find_element_slide(e, y, elements),
             elements.state[ElementRow.BOND_LENGTH, e],
             dt,
         )
@@ -138,9 +140,9 @@ def newton_equations(y, step, elements, dt, hess):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_smooth(elements, dt):
-    """Solve the forces of a step by Newton's method.
+    """Solve the forces of all elements in a step by Newton's method with a line search.
 
-    Returns the iterations, negative if it fails.
+    Returns the number of iterations, negative if it fails.
     """
     y = elements.modal[ModalRow.SCRATCH]
     step = elements.modal[ModalRow.SCRATCH + 1]
@@ -156,22 +158,22 @@ def solve_smooth(elements, dt):
                 * elements.rows[elements.links[LinkRow.PORT, e], i]
                 * elements.state[ElementRow.FORCE, e]
             )
-    for turn in range(1, 80):
-        worst = newton_equations(y, step, elements, dt, hess)
-        if turn > 1 and worst <= 0.1:
-            return turn
+    for n_iterations in range(1, 80):
+        worst = write_newton_equations(y, step, elements, dt, hess)
+        if n_iterations > 1 and worst <= 0.1:
+            return n_iterations
         if not factorise(hess):
-            return -turn
+            return -n_iterations
         solve_factorised(hess, step)
-        begin = slope_along(0.0, y, step, trial, elements, dt)
+        start = find_slope_along_step(0.0, y, step, trial, elements, dt)
         low = 0.0
         high = np.inf
         t = 1.0
         for _ in range(40):
-            here = slope_along(t, y, step, trial, elements, dt)
-            if abs(here) <= 0.1 * abs(begin):
+            slope = find_slope_along_step(t, y, step, trial, elements, dt)
+            if abs(slope) <= 0.1 * abs(start):
                 break
-            if here > 0:
+            if slope > 0:
                 high = t
             else:
                 low = t
@@ -182,11 +184,12 @@ def solve_smooth(elements, dt):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def force_equations(elements, dt, known):
-    """Write the Newton equations of the residual forces - law(free - beta forces) into elements.system.
+def write_force_equations(elements, dt, known):
+    """Write the Newton equations for the forces of all elements.
 
-    An element that holds has the equation of no slide, with a trace of give where elements that depend on each
-    other could share their force in several ways; an element that slips keeps its force.
+    The residual is forces - law(free - beta forces); the matrix is elements.system.
+    A resting element has the equation of zero slide, with a small compliance where dependent elements
+    could share their force in several ways; a slipping element keeps its force.
 
     Parameters
     ----------
@@ -194,7 +197,7 @@ def force_equations(elements, dt, known):
     dt : float
         Length of the step [s].
     known : bool
-        Whether the slides of the faces that do not slip all the way are known, in elements.stops.
+        Whether elements.stops has the slides of the faces that stop or rest in the step.
     """
     count = elements.links.shape[1]
     beta = elements.compliances[ComplianceRow.SLIDE]
@@ -222,7 +225,7 @@ def force_equations(elements, dt, known):
         if HAS_PLANES:
             if elements.links[LinkRow.MATE, e] != e:
                 if elements.links[LinkRow.MATE, e] > e:
-                    plane_equations(e, elements.links[LinkRow.MATE, e], dq, elements)
+                    write_plane_equations(e, elements.links[LinkRow.MATE, e], dq, elements)
                 continue
         force, slope = law.mean_force(
             elements.num[e],
@@ -239,8 +242,8 @@ def force_equations(elements, dt, known):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def plane_equations(e, f, dx, elements):
-    """Write the two Newton equations of an element in a plane.
+def write_plane_equations(e, f, dx, elements):
+    """Write the two Newton equations of an element that slides in a plane.
 
     Parameters
     ----------
@@ -274,8 +277,8 @@ def plane_equations(e, f, dx, elements):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def newton_step(elements, dt, known):
-    """Take a Newton step on the forces of all elements at once; return whether it succeeds.
+def take_newton_step(elements, dt, known):
+    """Take a Newton step on the forces of all elements; return whether it succeeds.
 
     Parameters
     ----------
@@ -283,7 +286,7 @@ def newton_step(elements, dt, known):
     dt : float
         Length of the step [s].
     known : bool
-        Whether the slides of the faces that do not slip all the way are known, in elements.stops.
+        Whether elements.stops has the slides of the faces that stop or rest in the step.
 
     Returns
     -------
@@ -291,16 +294,16 @@ def newton_step(elements, dt, known):
     """
     force = elements.state[ElementRow.FORCE]
     count = elements.links.shape[1]
-    miss = elements.state[ElementRow.RESIDUAL]
-    force_equations(elements, dt, known)
-    # no row exchanges are needed: 1 + slope beta dominates its row for laws that resist the slide
-    if not solve_by_elimination(elements.system, miss):
+    residual = elements.state[ElementRow.RESIDUAL]
+    write_force_equations(elements, dt, known)
+    # no pivoting is needed: 1 + slope beta is diagonally dominant for laws that resist the slide
+    if not solve_by_elimination(elements.system, residual):
         return False
     for e in range(count):
-        if not np.isfinite(miss[e]):
+        if not np.isfinite(residual[e]):
             return False
     for e in range(count):
-        force[e] += miss[e]
+        force[e] += residual[e]
         if elements.num[e, 0] == SET_VALUED:
             limit = elements.num[e, 1] if known else elements.state[ElementRow.MAX_FORCE, e]
             force[e] = min(max(force[e], -limit), limit)

@@ -1,9 +1,9 @@
-"""March of modes under normal force, moment and friction of a contact with varying load.
+"""March of modes under the normal force, moment and friction of a contact with varying load.
 
 The upper holder moves from its solved preload by the heave h = normal . z and the pitch th = pitch . z. The nodal forces are
 those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes are
 measured from the preloaded equilibrium: the modal force is normal (N - N0) + pitch (M - M0) - slide F. The rotational
-spring of the holder is in series with the pitch, as a compliance x_i x_j/K beside that of the pieces.
+spring of the holder is in series with the pitch, as a compliance x_i x_j/K in addition to that of the pieces.
 """
 
 from dataclasses import dataclass, replace
@@ -21,34 +21,37 @@ from ...friction.laws.stretch import growth_numbers
 from ...friction.laws.tanh import TanhLaw
 from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
 from ..interfaces import arrays
-from ..interfaces.arrays import LoadPlace, PointRow, PressedPlace
+from ..interfaces.arrays import LoadIndex, PointRow, PressedIndex
 from ..interfaces.dispatch import COULOMB_LAW
 from ..ledger import SampleColumn
 from .faces import STEP_TOL
-from .instances import COMMON_LOAD, POINT_LOADS, SHEARED_LISTS
+from .instances import COMMON_LOAD, POINT_LOADS, SHEARED_LISTS_MODULE
 from .march import march as run
 from .models import IDLE_KIND, Joint, element_model, nodal_load_fields, point_lists_model
 from .run import Run
 
-# Kinds of laws.
+# Kinds of friction laws: rigid Coulomb, elastic-plastic points, bond points, bond lists, velocity-dependent.
 COULOMB = 0
 PLASTIC = 1
 POINTS = 2
 LISTS = 3
 RATE = 4
-LIST_TOL_FACTOR = 1e4  # residual that sums over bonds can reach, over the tolerance of other laws
-MIN_PRESSURE_FRACTION = 1.0  # smallest pressure of a node in the weights of the shear modes, over the mean of the preload
+LIST_TOL_FACTOR = (
+    1e4  # attainable residual of sums over lists of bonds, over the tolerance of other laws
+)
+# smallest pressure of a node in the weights of the shear modes, over the mean pressure of the preload
+MIN_PRESSURE_FRACTION = 1.0
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadLaw:
-    """A friction law under a load that varies.
+    """Friction law of a contact under a varying load.
 
     - `kind`: COULOMB, PLASTIC, POINTS, LISTS or RATE.
     - `static`: mu_s, which times the preload is the scale of the residuals.
     - `force`: first numbers of `interfaces.arrays.PressedPoints`, with v_0 of a rate law in place of mu_k.
-    - `growth`: numbers of the growth of bonds.
+    - `growth`: parameters of the growth of bonds.
     - `length`: bond length [m].
     - `list_options`: the Bonds of a list with its cut-off and its merge width, as `models.bond_list_model` takes them.
     """
@@ -62,26 +65,30 @@ class VaryingLoadLaw:
 
 
 def make_coulomb_law(static: float, kinetic: float | None = None) -> VaryingLoadLaw:
-    """Return set-valued Coulomb friction on the resultant load."""
+    """Return the set-valued Coulomb law under the resultant load."""
     return VaryingLoadLaw(
         COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0)
     )
 
 
 def make_tanh_law(static: float, speed: float) -> VaryingLoadLaw:
-    """Return the law mu N tanh(v/v_0) of eq. 2.4, v_0 in m/s."""
+    """Return the regularised law mu N tanh(v/v_0) of eq. 2.4 under the resultant load.
+
+    speed: v_0 [m/s].
+
+    """
     return VaryingLoadLaw(RATE, static, (static, speed, 0.0, 1.0))
 
 
 def make_elastic_plastic_law(static: float, length: float) -> VaryingLoadLaw:
-    """Return the elastic-plastic law of eq. 3.12 at every point under its own load."""
+    """Return the elastic-plastic law of eq. 3.12 at each point under its own load."""
     return VaryingLoadLaw(PLASTIC, static, (static, static, length, 1.0), length=length)
 
 
 def make_bonds_law(law) -> VaryingLoadLaw:
-    """Return the stretch reading of bonds with order 1 at every point.
+    """Return the law of bonds in the stretch reading with order 1 at each point.
 
-    PatchfemError is raised for other bonds.
+    Raises PatchfemError for other bonds.
     """
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
         raise PatchfemError(
@@ -102,9 +109,9 @@ def make_bonds_law(law) -> VaryingLoadLaw:
 
 
 def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
-    """Return the printed reading of bonds, a list of bonds at every point.
+    """Return the law of bonds in the printed reading, with a list of bonds at each point.
 
-    PatchfemError is raised for the stretch reading.
+    Raises PatchfemError for the stretch reading.
 
     Bonds keep the pressure under which they formed. In the stretch reading bonds are released as the load
     falls.
@@ -136,7 +143,7 @@ def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
 
 
 def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
-    """Return the contact sets around the solved state of a patch.
+    """Return the contact sets of a patch around its solved contact state.
 
     `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
     layer, for strips and for a patch that carries no load.
@@ -160,18 +167,18 @@ def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
 
 
 def port_rows(modes: ModalBasis) -> np.ndarray:
-    """Return slide, heave and pitch per coordinate, (3, n)."""
-    none = np.zeros(modes.omega.size)
+    """Return slide, heave and pitch per modal coordinate, (3, n)."""
+    no_motion = np.zeros(modes.omega.size)
     return np.stack(
         [
-            none if part is None else np.asarray(part, float)
+            no_motion if part is None else np.asarray(part, float)
             for part in (modes.slide, modes.normal, modes.pitch)
         ]
     )
 
 
 def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tuple:
-    """Return the fields of a fresh `interfaces.arrays.PressedPoints` for points under nodal forces.
+    """Return the initial fields of `interfaces.arrays.PressedPoints` under nodal forces.
 
     Parameters
     ----------
@@ -181,7 +188,7 @@ def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tup
     shear : ShearModes or None
         Shear of the pieces; None for pieces that are rigid in shear.
     limit : float
-        Scale of the residuals [N].
+        Friction limit, the scale of the residuals [N].
 
     Returns
     -------
@@ -191,7 +198,7 @@ def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tup
     size = normal.size
     plastic = law.kind == PLASTIC
     memory[1 if plastic else 0] = (
-        normal if plastic else normal * law.force[PressedPlace.INITIAL_DENSITY]
+        normal if plastic else normal * law.force[PressedIndex.INITIAL_DENSITY]
     )
     psi, kappa = (np.zeros((size, 0)), ()) if shear is None else (shear.shape, shear.stiffness)
     weight = np.full(size, law.static / (1.0 if plastic else law.length))
@@ -207,12 +214,12 @@ def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tup
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadModel:
-    """Description of a varying load for `march.march`.
+    """Model of a contact under a varying load for `march.march`.
 
     - `law`: friction law.
     - `sets`: contact sets.
-    - `rows` (3, n): slide, heave and pitch per coordinate.
-    - `load`: function of times (k,) [s] to a prescribed load [N] on one point, in place of the contact.
+    - `rows` (3, n): slide, heave and pitch per modal coordinate.
+    - `load`: function of times (k,) [s] that returns a prescribed load [N] on one point, in place of the contact.
     - `shear`: ShearModes on every node, from `choose_shear_modes`.
     """
 
@@ -224,68 +231,68 @@ class VaryingLoadModel:
 
     @property
     def preload(self) -> float:
-        """Load at the start [N]."""
+        """Normal load at the start [N]."""
         return self.sets.load if self.load is None else float(self.load(np.zeros(1))[0])
 
     @property
     def limit(self) -> float:
-        """Scale of the residuals [N]: static friction of the preload, or the load without friction."""
+        """Force scale of the residuals [N]: static friction limit, or the load without friction."""
         return (self.law.static or 1.0) * max(self.preload, 1e-9)
 
     @property
     def length(self) -> float:
-        """Bond length [m], 0 for a law without bonds."""
+        """Bond length of the law [m]; 0 without bonds."""
         return self.law.length
 
     @property
     def reduction(self):
-        """ShearModes; None for pieces that are rigid in shear."""
+        """Shear modes of the pieces; None if they are rigid in shear."""
         return self.shear
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law holds without any stretch."""
+        """Whether the law sticks without any stretch (rigid Coulomb friction)."""
         return self.law.kind == COULOMB
 
     @property
     def runner(self):
-        """Class that marches the model."""
+        """Class that integrates the model in time."""
         return VaryingLoadRun
 
     @property
     def has_point_loads(self) -> bool:
-        """Whether points bear their own fraction of the load."""
+        """Whether each point carries its own fraction of the load."""
         return self.law.kind in (PLASTIC, POINTS, LISTS)
 
     @property
     def loading(self) -> str:
-        """Kind of the load in `instances`: on the whole interface or on each point."""
+        """Kind of the load (`instances`): resultant on the interface, or load on each point."""
         return POINT_LOADS if self.has_point_loads else COMMON_LOAD
 
     @property
     def laws(self) -> tuple:
-        """Modules of the compiled laws of `joints`."""
+        """Modules of the compiled laws of the elements (`joints`)."""
         return (COULOMB_LAW,) if self.set_valued else ()
 
     @property
     def joints(self) -> tuple:
-        """The set-valued element, under the preload."""
+        """Set-valued friction element under the preload."""
         if not self.set_valued:
             return ()
-        law = Coulomb(self.law.force[PressedPlace.MU_KINETIC], self.law.static)
+        law = Coulomb(self.law.force[PressedIndex.MU_KINETIC], self.law.static)
         return (Joint(0, law.element(self.preload)),)
 
     @property
     def kind(self) -> tuple:
-        """Contact and law without the joints, for which `instances` makes a loop."""
+        """Modules of contact and law without the elements, for which the loop is compiled."""
         if self.law.kind == LISTS:
-            return SHEARED_LISTS, ""
+            return SHEARED_LISTS_MODULE, ""
         if self.has_point_loads:
             return "dynamics.interfaces.pressed_points_kernels", ""
         return IDLE_KIND if self.set_valued else (IDLE_KIND[0], "friction.laws.tanh_kernels")
 
     def build(self):
-        """Return the contact with newly allocated arrays, under the preload."""
+        """Allocate the contact arrays under the preload."""
         law = self.law
         if self.has_point_loads:
             return self.points(
@@ -293,12 +300,12 @@ class VaryingLoadModel:
             )
         return element_model(
             TanhLaw(
-                law.static, law.force[PressedPlace.MU_KINETIC] if law.kind == RATE else 1.0
+                law.static, law.force[PressedIndex.MU_KINETIC] if law.kind == RATE else 1.0
             ).element(self.preload)
         ).build()
 
     def points(self, force):
-        """Return fresh points under the nodal forces (m,) [N] of the preload."""
+        """Allocate the contact points under the nodal forces (m,) [N] of the preload."""
         law = self.law
         if law.kind != LISTS:
             return arrays.PressedPoints(*make_pressed_fields(law, force, self.shear, self.limit))
@@ -312,22 +319,27 @@ class VaryingLoadModel:
             nodal_load_fields(force, measure),
         ).build()
 
-    def picture_fields(self, contact) -> dict:
-        """Return nothing: the memory of the interface is that of the run."""
+    def get_plot_fields(self, contact) -> dict:
+        """Return an empty dict, because the run stores the memory of the interface."""
         return {}
 
 
 def choose_shear_modes(
-    giving, law: VaryingLoadLaw, force, weight, count: int | None = None, tolerance: float = 1e-3
+    compliance,
+    law: VaryingLoadLaw,
+    force,
+    weight,
+    count: int | None = None,
+    tolerance: float = 1e-3,
 ):
-    """Return the ShearModes of pieces whose contact set changes.
+    """Choose the shear modes of pieces whose contact set changes.
 
     Modes are weighted with mu_s times the preload plus FLOOR of its mean pressure, so nodes that are open
     at first count too; with m modes they are exact for any weights.
 
     Parameters
     ----------
-    giving : (m, m) array
+    compliance : (m, m) array
         Tangential compliance on every node [m/N].
     law : VaryingLoadLaw
     force : (m,) array
@@ -335,7 +347,7 @@ def choose_shear_modes(
     weight : (m,) array
         Nodal areas.
     count : int or None
-        Number of modes; None: as many as a tenth of the tolerance asks for.
+        Number of modes; None for as many as a tenth of the tolerance needs.
     tolerance : float
 
     Returns
@@ -343,31 +355,31 @@ def choose_shear_modes(
     ShearModes
     """
     limit = law.static * (force + MIN_PRESSURE_FRACTION * force.sum() * weight / weight.sum())
-    # a patch that could jump without a change of the drive is refused, by its preload as under a constant load
+    # an unstable patch, which could jump without a change of the drive, is refused as under a constant load
     if law.growth[0] >= 0:
         shear_modes(
-            giving,
+            compliance,
             law.static * force,
             law.length,
             1,
             law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf,
         )
     if count is not None:
-        return shear_modes(giving, limit, law.length, count)
-    return enough_modes(giving, limit, law.length, N_SHEAR_MODES, 0.1 * tolerance)
+        return shear_modes(compliance, limit, law.length, count)
+    return enough_modes(compliance, limit, law.length, N_SHEAR_MODES, 0.1 * tolerance)
 
 
 def make_model(
     modes: ModalBasis, law: VaryingLoadLaw, sets: ContactSets | None, load=None, shear=None
 ) -> VaryingLoadModel:
-    """Return the model of a basis on contact sets, or under a prescribed load on one point.
+    """Return the model of a contact under a varying load.
 
     Parameters
     ----------
     modes : ModalBasis
     law : VaryingLoadLaw
     sets : ContactSets or None
-        What touches at each load and tilt; None where the load of a point is prescribed.
+        Nodes in contact at each load and tilt; None if the load of one point is prescribed.
     load : callable or None
         Prescribed load [N] at times (k,) [s], in place of the contact.
     shear : ShearModes or None
@@ -402,12 +414,12 @@ def make_model(
 
 
 class VaryingLoadRun(Run):
-    """State of a march under a load that varies."""
+    """Time integration of a modal basis under a varying load."""
 
-    def _initial_load(self) -> arrays.VaryingLoad:
-        """Return the load at the start, and set the points of the contact under it.
+    def _make_initial_load(self) -> arrays.VaryingLoad:
+        """Return the arrays of the initial load, and load the points of the contact.
 
-        The contact sets are kept apart, because other runs may ask them.
+        The contact sets are copied, because other runs may use them.
         """
         model = self.model
         press = compiled("contact.press_kernels")
@@ -417,14 +429,14 @@ class VaryingLoadRun(Run):
         else:
             self.sets = _make_point_sets(model.preload)
         x = self.sets.x
-        now = np.full(x.size, model.preload)
+        nodal_forces = np.full(x.size, model.preload)
         if model.load is None:
-            heave, turn = model.rows[1:] @ self.state[0]
+            heave, pitch = model.rows[1:] @ self.state[0]
             name = name_set(self.sets, model.sets.reference.in_contact)
-            slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, turn)
-            press.press_state(self.sets, slot, -heave, turn, now)
+            slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, pitch)
+            press.press_state(self.sets, slot, -heave, pitch, nodal_forces)
         if model.has_point_loads:
-            self.contact = model.points(now)
+            self.contact = model.points(nodal_forces)
         goal = STEP_TOL * model.limit * (LIST_TOL_FACTOR if model.law.kind == LISTS else 1.0)
         return arrays.VaryingLoad(
             (),
@@ -432,19 +444,19 @@ class VaryingLoadRun(Run):
             self.prop.beta.copy(),
             np.array([float(np.ptp(x) / 2) or 1.0]),
             np.array(model.law.force[:2]),
-            now,
+            nodal_forces,
             np.zeros(0),
             np.array([slot]),
             np.zeros(1),
             np.array([goal]),
-            np.zeros(LoadPlace.START + 5),
+            np.zeros(LoadIndex.START + 5),
         )
 
     def _changing_arrays(self) -> list:
         press = self.load
         return [*super()._changing_arrays(), press.now, press.slot, press.mean, press.few]
 
-    def _load_of_steps(self, count: int) -> arrays.VaryingLoad:
+    def _make_step_load(self, count: int) -> arrays.VaryingLoad:
         loads = self.load.loads
         if self.model.load is not None:
             loads = np.array(
@@ -453,7 +465,7 @@ class VaryingLoadRun(Run):
         return self.load._replace(sets=self.sets, loads=loads)
 
     def _step_energies(self, rows) -> np.ndarray:
-        """Return the same as `Run._step_energies`, with the noise of a load that varies.
+        """Return the step energies of `Run._step_energies` with the noise of a varying load.
 
         The noise is that of the largest force, of the mean force, which is computed from the slide that it
         takes (2e-16 of it over `beta`, which is much if the modes hardly slide), of the last digit of the
@@ -461,7 +473,7 @@ class VaryingLoadRun(Run):
         """
         n = 2 * self.modes.omega.size
         work = self._step_works(rows)
-        lost = work - np.diff(rows[:, n + SampleColumn.ENERGY])
+        dissipated = work - np.diff(rows[:, n + SampleColumn.ENERGY])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + SampleColumn.MEAN_FORCE]))
         digit = np.abs(rows[:, : n // 2]) @ np.abs(self.modes.slide)
         slip_path = np.abs(np.diff(rows[:, n]))
@@ -474,33 +486,41 @@ class VaryingLoadRun(Run):
             * np.maximum(rows[:-1, n + SampleColumn.ENERGY], rows[1:, n + SampleColumn.ENERGY])
         )
         return np.stack(
-            [work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)]
+            [
+                work,
+                np.where(dissipated > -noise, dissipated, 0.0),
+                np.where(dissipated < -noise, -dissipated, 0.0),
+            ]
         )
 
-    def _snapshot(self, row) -> dict:
+    def _make_snapshot(self, row) -> dict:
         nodal = self.load.now.copy()
-        found = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
+        contact_state = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
-        if self.model.law.kind == LISTS:  # all bonds of a point count as equally stretched
+        if self.model.law.kind == LISTS:  # all bonds of a point are plotted with their mean stretch
             force = self.model.law.static * c.points[PointRow.LOAD] * c.statuses[:, STATUS.force]
             law = self.model.law
-            found = {
+            contact_state = {
                 "b": c.b.copy(),
                 "memory": np.stack([nodal, law.length / law.static * force, 0 * nodal]),
                 "bend": c.b @ c.psi,
             }
         elif self.model.has_point_loads:
-            found = {"b": c.b.copy(), "memory": c.memory.copy(), "bend": c.b @ c.modes}
-        return super()._snapshot(row) | {"heave": row[-2], "turn": row[-1], "nodal": nodal} | found
+            contact_state = {"b": c.b.copy(), "memory": c.memory.copy(), "bend": c.b @ c.modes}
+        return (
+            super()._make_snapshot(row)
+            | {"heave": row[-2], "turn": row[-1], "nodal": nodal}
+            | contact_state
+        )
 
     def energy_balance(self) -> dict:
-        """Return the energy balance [J], and the numbers of contact sets, pivots and new tableaus."""
+        """Return the energies [J] by name, and the numbers of contact sets, pivots and tableaus."""
         return super().energy_balance() | dict(
             zip(("contact_sets", "pivots", "renewed"), map(int, self.sets.counters[N_BUILT:]))
         )
 
     def make_response(self, rows, number) -> Response:
-        """Return the histories.
+        """Return the time histories of samples, with load, heave and pitch.
 
         `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad].
         """
@@ -510,16 +530,19 @@ class VaryingLoadRun(Run):
         extra = out.extra | dict(zip(PRESS_COLUMNS, rows[:, -5:].T))
         if model.load is not None:
             return replace(out, extra=extra)
-        pull = np.stack([rows[:, -5] - model.sets.load, rows[:, -4] - model.sets.moment], axis=1)
+        press_force = np.stack(
+            [rows[:, -5] - model.sets.load, rows[:, -4] - model.sets.moment], axis=1
+        )
         return replace(
             out,
-            acceleration=out.acceleration + pull @ model.rows[1:] @ modes.output / modes.mass,
+            acceleration=out.acceleration
+            + press_force @ model.rows[1:] @ modes.output / modes.mass,
             extra=extra,
         )
 
 
 def _make_point_sets(load: float) -> SetArrays:
-    """Return arrays of contact sets that no kernel reads, for a prescribed load on one point."""
+    """Return placeholder arrays of contact sets for a prescribed load on one point."""
     point = np.zeros(1)
     reference = (load, 0.0, 0.0, 1.0, 1.0)
     return make_set_arrays(np.ones((1, 1)), point, point, reference, np.zeros(1, bool), n_slots=1)
@@ -541,7 +564,7 @@ def march(
     progress=None,
     shear=None,
 ):
-    """March a basis on contact sets, or under a prescribed load, from rest or from `start`.
+    """March a modal basis under a varying load, from rest or from an initial state.
 
     The other arguments, the result and the errors are those of `march.march`.
 
@@ -550,7 +573,7 @@ def march(
     modes : ModalBasis
     drive
     sets : ContactSets or None
-        What touches at each load and tilt; None where the load of a point is prescribed.
+        Nodes in contact at each load and tilt; None if the load of one point is prescribed.
     law : VaryingLoadLaw
     cycles
     steps_per_cycle

@@ -15,7 +15,7 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
 from ..events.drive_kernels import Instant, drive_value
 from ..tableau_kernels import (
-    EXTENSION_WEIGHTS,
+    DENSE_OUTPUT_WEIGHTS,
     FIRST_COLUMNS,
     N_STAGES,
     ORDER_3_WEIGHTS,
@@ -300,9 +300,9 @@ def extend_step(motion, h):
             motion.work[12, c] + motion.work[0, c]
         )
         for k in range(4):
-            term = EXTENSION_WEIGHTS[k, 0] * motion.work[0, c]
+            term = DENSE_OUTPUT_WEIGHTS[k, 0] * motion.work[0, c]
             for j in range(5, N_STAGES):
-                term += EXTENSION_WEIGHTS[k, j] * motion.work[j, c]
+                term += DENSE_OUTPUT_WEIGHTS[k, j] * motion.work[j, c]
             motion.work[Work.EXTENSION + 3 + k, c] = h * term
 
 

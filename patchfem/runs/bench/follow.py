@@ -106,7 +106,7 @@ def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathRespo
             n_failed_in_block = follow_block(contact, begin, end)
         n_failed += n_failed_in_block
         if end in frames:
-            states.append((slide[end], next(iter(model.picture_fields(contact).values()), None)))
+            states.append((slide[end], next(iter(model.get_plot_fields(contact).values()), None)))
         if end == last or end - reported >= N_BLOCK_SAMPLES:
             task.options.report(end / last)
             reported = end

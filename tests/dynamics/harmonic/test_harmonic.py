@@ -21,7 +21,7 @@ from patchfem.dynamics import (
     pack_harmonics,
     points_model,
 )
-from patchfem.dynamics.harmonic.harmonic import Balance, solve_newton, unpack_harmonics
+from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
 from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
 from patchfem.dynamics.harmonic.point import make_group
 from patchfem.friction import Bonds
@@ -186,12 +186,12 @@ def test_exact_the_jacobian_of_the_balance():
         group = LawGroup(
             modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024
         )
-        balance = Balance(modes, group.rows, group)
-        x = np.random.default_rng(4).normal(size=balance.size(1.1, 3)) * 0.5
-        here = balance.system(x, 1.1, 0.7, 3)
+        balance = HarmonicBalance(modes, group.rows, group)
+        x = np.random.default_rng(4).normal(size=balance.count_unknowns(1.1, 3)) * 0.5
+        here = balance.evaluate(x, 1.1, 0.7, 3)
 
         def residual(v, omega=1.1, level=0.7, balance=balance):
-            return balance.system(v, omega, level, 3).residual
+            return balance.evaluate(v, omega, level, 3).residual
 
         eps = 1e-6
         found = np.stack(
@@ -299,7 +299,7 @@ def test_exact_both_rows_of_a_group():
         a = a + np.outer(row, row) * k / modes.mass
     assert found.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
     balance = make_balance(modes, make_group(modes, laws), 64)
-    receptance = balance.faces @ balance.linear(1.9, 3).inverse @ balance.faces.T
+    receptance = balance.faces @ balance.get_linear_part(1.9, 3).inverse @ balance.faces.T
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
 
@@ -335,13 +335,13 @@ def test_refuses_what_cannot_be_balanced():
     with pytest.raises(PatchfemError, match="finite stiffness > 0"):
         Jenkins([1.0, -1.0], [1.0, 1.0])
     with pytest.raises(PatchfemError, match="no mode moves"):
-        Balance(modes, np.zeros((1, 1)), None)
+        HarmonicBalance(modes, np.zeros((1, 1)), None)
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
 def test_exact_rows_that_depend_on_others_are_left_out_at_any_size(size):
     rows = size * np.array([[1.0, 0.5, 0, 0, 0.2], [0, 1.0, 0.1, 0, 0], [2.0, 2.0, 0.1, 0, 0.4]])
-    balance = Balance(five(), rows, None)
+    balance = HarmonicBalance(five(), rows, None)
     assert balance.lift.shape == (3, 2) and balance.faces.shape == (2, 5)
     np.testing.assert_allclose(balance.lift @ balance.faces, rows, rtol=0, atol=1e-14 * size)
 

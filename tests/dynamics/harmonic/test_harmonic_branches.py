@@ -22,7 +22,7 @@ from patchfem.dynamics import (
 from patchfem.dynamics.harmonic.backbone import trace_free_motions
 from patchfem.dynamics.harmonic.branch import find_backbone, trace_over_level
 from patchfem.dynamics.harmonic.continuation import PathSettings, follow_curve
-from patchfem.dynamics.harmonic.harmonic import Balance
+from patchfem.dynamics.harmonic.harmonic import HarmonicBalance
 from patchfem.dynamics.harmonic.laws import Jenkins
 from patchfem.dynamics.harmonic.stability import find_motion_monodromy
 from patchfem.dynamics.periodic import find_multipliers
@@ -240,16 +240,17 @@ def test_exact_the_jacobian_of_the_free_balance():
     """Against central differences, with a law of the rate and coupled modes."""
     modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
     group = LawGroup(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), bonds(0.5, 0.4)], 1024)
-    equations = FreeBalance(Balance(modes, group.rows, group), 1, 3, 2.0)
+    equations = FreeBalance(HarmonicBalance(modes, group.rows, group), 1, 3, 2.0)
     x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
     found = np.stack(
         [
-            (equations.system(x + d, 0.6).residual - equations.system(x - d, 0.6).residual) / 2e-6
+            (equations.evaluate(x + d, 0.6).residual - equations.evaluate(x - d, 0.6).residual)
+            / 2e-6
             for d in 1e-6 * np.eye(9)
         ],
         axis=1,
     )
-    assert equations.system(x, 0.6).jacobian == pytest.approx(found, abs=1e-7)
+    assert equations.evaluate(x, 0.6).jacobian == pytest.approx(found, abs=1e-7)
 
 
 def test_exact_the_free_motion_balances_every_mode():
@@ -258,7 +259,10 @@ def test_exact_the_free_motion_balances_every_mode():
     group = LawGroup(modes, Jenkins(*many(20)), 512)
     omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), 1)
     for free in trace_free_motions(
-        FreeBalance(Balance(modes, group.rows, group), 1, 5, omega), [0.05, 0.3], omega, shape
+        FreeBalance(HarmonicBalance(modes, group.rows, group), 1, 5, omega),
+        [0.05, 0.3],
+        omega,
+        shape,
     ):
         for k in range(6):
             a = np.diag(modes.omega**2 - (k * free.omega) ** 2) + 1j * k * free.omega * (

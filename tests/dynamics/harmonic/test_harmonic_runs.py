@@ -85,7 +85,7 @@ def test_exact_many_interfaces_on_few_modes():
     p = find_point(modes, drive, laws, tolerance=1e-4)
     assert p.coefficients.shape[0] == 30 and p.error < 1e-4
     r = make_cycle_response(p, modes, drive, 1024)
-    forces = make_group(modes, laws).forces(p.coefficients, drive.omega, 1024)
+    forces = make_group(modes, laws).compute_forces(p.coefficients, drive.omega, 1024)
     dt = drive.period / 1024
     slip = sum((forces[i] * (r.modal_rate[:-1] @ faces[i])).sum() for i in range(30)) * dt
     viscous = modes.mass * dt * ((r.modal_rate[:-1] ** 2) @ (2 * modes.zeta * modes.omega)).sum()

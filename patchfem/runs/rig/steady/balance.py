@@ -289,7 +289,7 @@ class BalanceFinder:
         extremes = np.array([[middle - top, middle + top]])
         run = EngineResult(response, response, extremes, np.zeros(1), book)
         reader = BalanceReader(self.model, self.numerics, self.patch, steps=samples)
-        reader.turns = motion.turns()
+        reader.turns = motion.find_reversals()
         return CycleMeasures(reader.values(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
