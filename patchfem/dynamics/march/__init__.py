@@ -8,9 +8,9 @@ dq of the slide. The modes then move exactly (`dynamics.propagator`), so the inc
 
     dq = free - beta F(dq),
 
-where `free` are the increments without friction and beta is the compliance of the ports in a step. The mean force times dq
-is exactly the work of the law, so the sum of all energies never grows by itself, for any step. The method is of second order.
-The table lists the module that solves the equation.
+where `free` are the increments without friction and beta is the compliance of the ports in a step. The mean force times
+dq is exactly the work of the law, so the sum of all energies never grows by itself, for any step. The method is of
+second order. The table lists the module that solves the equation.
 
 ========================================= ============================ ==============================================
 interface                                 module                       method
