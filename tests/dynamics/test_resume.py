@@ -64,7 +64,7 @@ RIGS = {
 @pytest.fixture
 def often(monkeypatch):
     """Marches keep their state after every second cycle; the list has a number per state."""
-    monkeypatch.setattr(march_run, "MAX_PIECE_CYCLES", 2)
+    monkeypatch.setattr(march_run, "MAX_CYCLES_AT_ONCE", 2)
     saved = []
     save = checkpoint.save_checkpoint
 

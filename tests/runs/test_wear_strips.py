@@ -110,7 +110,7 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
         )
         assert share == pytest.approx((20 * 12.7e-3) ** 2 / 24, rel=0.25)
         assert (
-            f"{100 * share:.2g} % longer" in said[0]
+            f"lengthen the sliding path of the last cycle by {100 * share:.2g} %" in said[0]
             and "the friction and the wear are computed without" in said[0]
         )
 

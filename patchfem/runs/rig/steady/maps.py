@@ -158,7 +158,9 @@ class MapFinder(TracedCurve):
             amplitude = measure_half_range(
                 window.time, window.modal @ gauge, window.modal_rate @ gauge
             )
-        waves = harmonic_measures(*map(float, run.reading.waves), find_max_acceleration(drive))
+        waves = harmonic_measures(
+            *map(float, run.reading.acceleration_harmonics), find_max_acceleration(drive)
+        )
         values = _curve_measures(amplitude, run.acceleration, waves)
         is_stuck = PieceReader(self.model, self.numerics, self.patch, self.contact_elements).sticks(
             run
