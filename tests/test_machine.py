@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
+from enum import IntEnum
 from math import exp, tan
 from threading import Barrier
 from time import sleep
@@ -26,6 +27,11 @@ class Outer(NamedTuple):
     inner: Inner
     count: int
     grid: np.ndarray
+
+
+class Column(IntEnum):
+    FORCE = 0
+    SLIDE = 1
 
 
 def weighed(first, outer, step, out):
@@ -308,3 +314,19 @@ def test_exact_without_compiled_code_the_same_motions(monkeypatch):
     (compiled, _), (plain, numba) = answers
     assert numba and all(np.ravel(compiled))
     np.testing.assert_allclose(plain, compiled, rtol=1e-9)
+
+
+def compare_members(table):
+    total = 0.5 if Column.SLIDE > 0.5 else 0.0
+    for i in range(Column.FORCE, Column.SLIDE + 1):
+        table[Column.SLIDE, i] = Column.SLIDE
+        total += table[i, Column.SLIDE]
+    return total
+
+
+def test_members_of_an_integer_enum_are_integers_in_kernels():
+    """Kernels compare members with floats and store them in arrays of floats, which numba alone rejects."""
+    compiled_table, table = np.zeros((2, 2, 2))
+    result = jit.njit(cache=False)(compare_members).get_standalone()(compiled_table)
+    assert result == compare_members(table) == 1.5
+    np.testing.assert_array_equal(compiled_table, table)

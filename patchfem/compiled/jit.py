@@ -19,6 +19,7 @@ from numba.core.registry import CPUDispatcher
 from numba.core.types.functions import BaseFunction
 
 from .cache_files import store_on_disk
+from .integer_enums import register_integer_enums
 from .pass_by_reference import get_argument_type
 
 # Option of numba that omits the wrapper through which C calls a function.
@@ -68,6 +69,8 @@ LIBRARY_METHODS = (
     "_finalize_dynamic_globals",
     "get_pointer_to_function",
 )
+
+register_integer_enums()
 
 
 def njit(cache: bool = False, **options):

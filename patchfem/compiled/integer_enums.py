@@ -1,0 +1,31 @@
+"""Members of an `IntEnum` as integers in kernels.
+
+Kernels index arrays with the members of `IntEnum` classes. Numba before 0.68 types a member as an enum, which it
+rejects as an index, and every version refuses to compare a member with a float. Here `Class.MEMBER` in a kernel is an
+integer constant, as in Python.
+"""
+
+from numba.core import types
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+
+
+class IntegerMember(AttributeTemplate):
+    """Typing of `Class.MEMBER` for a subclass of `IntEnum`."""
+
+    key = types.IntEnumClass
+
+    def generic_resolve(self, enum_class, name: str):
+        """Return the integer type if the class has this member, otherwise None."""
+        return types.intp if name in enum_class.instance_class.__members__ else None
+
+
+def _lower_member(context, builder, enum_class, value, name: str):
+    """Return the member as a constant of LLVM."""
+    return context.get_constant(types.intp, int(enum_class.instance_class[name]))
+
+
+def register_integer_enums() -> None:
+    """Register the typing and the lowering with numba."""
+    infer_getattr(IntegerMember)
+    lower_getattr_generic(types.IntEnumClass)(_lower_member)
