@@ -17,7 +17,7 @@ from patchfem.core import Measure
 from patchfem.export import measure_object
 from patchfem.export.pages.sentences import format_with_error
 from patchfem.response import TABLE
-from patchfem.runs import meaning
+from patchfem.runs import describe_measure
 
 RIG = POINT + COULOMB + SHORT
 TWO = """\
@@ -319,7 +319,7 @@ def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):
 def test_always_every_measure_says_what_it_is(name, runs):
     for key, one in runs[name].measures.items():
         assert (
-            one.text == meaning(key)
+            one.text == describe_measure(key)
             and one.text[0].islower()
             and one.unit
             and repr(one).startswith(str(one))
@@ -328,8 +328,8 @@ def test_always_every_measure_says_what_it_is(name, runs):
 
 def test_exact_a_number_behind_a_name_counts_interfaces_or_strips(runs):
     assert runs["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
-    assert meaning("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
-    assert meaning("relative_displacement_amplitude_steady").startswith(
+    assert describe_measure("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
+    assert describe_measure("relative_displacement_amplitude_steady").startswith(
         "steady amplitude under a periodic drive"
     )
 

@@ -58,7 +58,7 @@ def run(
             "state; run the scene again without --resume"
         )
     if verbose:
-        compiles = plan.compile_words(run_plan.compile_seconds)
+        compiles = plan.describe_compile_time(run_plan.compile_seconds)
         talk(
             f"about {run_plan.seconds:.1f} s of computing time{compiles}, {run_plan.steps} steps, engine {run_plan.engine}"
         )

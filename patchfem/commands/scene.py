@@ -148,7 +148,7 @@ def _print_plan(plan_data: dict, probe: bool, verbose: bool) -> None:
     verbose: whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
-    compiles = plans.compile_words(plan_data["compile_seconds"])
+    compiles = plans.describe_compile_time(plan_data["compile_seconds"])
     print(
         f"cost     about {plan_data['seconds']:.1f} s of computing time{compiles}, "
         f"{plan_data['bytes'] / 1e6:.0f} MB of memory"

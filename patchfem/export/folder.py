@@ -10,7 +10,7 @@ from .. import __version__
 from ..core import Missing, NotConverged, PatchfemError
 from ..disk.atomic_write import write_text
 from ..runs.results.result import Result, shorten_file_names
-from ..runs.run import StateFile, marches, run
+from ..runs.run import StateFile, is_march, run
 from . import netcdf, report
 from .fields import bodies as body_fields
 from .histories import result_contents
@@ -98,7 +98,7 @@ def _partial_result(error: NotConverged) -> Result:
 
 def saves_state(run_plan) -> bool:
     """Return whether the run of a plan saves its state."""
-    return (run_plan.model.wear is not None and run_plan.model.patch is not None) or marches(
+    return (run_plan.model.wear is not None and run_plan.model.patch is not None) or is_march(
         run_plan
     )
 

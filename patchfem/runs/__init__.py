@@ -31,7 +31,7 @@ PUBLIC = {
         "FAILED_OUTCOME",
     ),
     "batch.meshes": (
-        "Shared",
+        "SharedMeshes",
         "with_shared_meshes",
     ),
     "batch.watched": ("MotionObserver",),
@@ -74,17 +74,17 @@ PUBLIC = {
     "plan": (
         "GROUPS",
         "Plan",
-        "compile_words",
+        "describe_compile_time",
     ),
     "results.patch_rows": (
         "TABLE",
         "minimum_value",
-        "unknown_measures",
+        "find_unknown_measures",
     ),
     "results.result": (
         "Result",
-        "choices",
-        "meaning",
+        "collect_used_settings",
+        "describe_measure",
         "measure_engines",
         "patch_surface",
         "shorten_file_names",
@@ -115,7 +115,7 @@ PUBLIC = {
     "rig.solve": ("solve",),
     "run": (
         "StateFile",
-        "marches",
+        "is_march",
     ),
     "wear.evolve": ("evolve",),
 }

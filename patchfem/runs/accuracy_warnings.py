@@ -27,11 +27,11 @@ PROPOSED_TOLERANCE_RATIO = 0.1
 # largest number of halvings of the steps to which the order observed over two halvings is extrapolated
 MAX_HALVINGS = 4
 # fraction of the allowed error that the steps may have if other causes use up all of it
-MIN_STEP_SHARE = 0.2
+MIN_STEP_ERROR_FRACTION = 0.2
 # largest number of strips that is proposed; four times the strips take about twenty times as long
 MAX_STRIPS = 64
 # measures whose error falls with the first power of the number of strips
-FIRST_ORDER = (
+FIRST_ORDER_MEASURES = (
     "pressure_peak",
     "loaded_fraction",
 )
@@ -40,13 +40,15 @@ SAMPLED_MEASURES = (
     "stick_fraction",
     "slip_start_phase",
 )
-RING = "ring_"  # prefix of the measures of ringing, which an engine without steps may lack
-STEADY = "relative_displacement_amplitude_steady"
+RINGING_PREFIX = (
+    "ring_"  # prefix of the measures of ringing, which an engine without steps may lack
+)
+STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 USE_ERROR = "use the value with its stated error"
 NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR}"
 ELEMENT_SIZE = "contact.element_size"
 # main measures of a run, which a warning names before all others
-MAIN = (
+MAIN_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "loop_area",
@@ -122,9 +124,9 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
                 patch=still[0],
             )
             meshes = still[1:] or coarse
-        warnings = [_warning(finding, static, _static_remedy(at_rest, static, meshes))]
+        warnings = [_format_warning(finding, static, _static_remedy(at_rest, static, meshes))]
     if moving:
-        warnings.append(_warning(finding, moving, _motion_remedy(finding, moving, coarse)))
+        warnings.append(_format_warning(finding, moving, _motion_remedy(finding, moving, coarse)))
     return warnings
 
 
@@ -145,15 +147,21 @@ def _named_measures(finding: Finding, excess: dict) -> list[str]:
     the largest error over the allowed error.
     """
     known = finding.measures
-    main = [name for name in MAIN if name in excess and known[name].error < abs(known[name].value)]
-    others = {name: times for name, times in excess.items() if not name.startswith(RING)} or excess
+    main = [
+        name
+        for name in MAIN_MEASURES
+        if name in excess and known[name].error < abs(known[name].value)
+    ]
+    others = {
+        name: times for name, times in excess.items() if not name.startswith(RINGING_PREFIX)
+    } or excess
     return main or [max(others, key=others.get)]
 
 
-def _warning(finding: Finding, excess: dict, remedy: str) -> str:
+def _format_warning(finding: Finding, excess: dict, remedy: str) -> str:
     """Return an accuracy warning with errors, tolerance and remedy."""
     names = _named_measures(finding, excess)
-    first, *more = (f"of {_error_words(finding.measures[name])}" for name in names)
+    first, *more = (f"of {_format_error(finding.measures[name])}" for name in names)
     listed = "".join(f", {name} {words}" for name, words in zip(names[1:], more, strict=True))
     count = len(excess) - len(names)
     others = ""
@@ -163,7 +171,7 @@ def _warning(finding: Finding, excess: dict, remedy: str) -> str:
     return f"{names[0]} has an estimated error {first}{listed}; the tolerance is {tolerance:g}{others}; {remedy}"
 
 
-def _error_words(measure) -> str:
+def _format_error(measure) -> str:
     """Return the relative error of a measure as text."""
     if abs(measure.error) < abs(measure.value):
         return f"{abs(measure.error / measure.value):.2g} of its value"
@@ -189,7 +197,9 @@ def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
         return _strip_remedy(patch_model, excess)
     # the ladder of meshes ends where all decisive measures meet the tolerance, or at its limit
     return _mesh_remedy(
-        finding.model, [(finding, coarse)], is_at_limit=excess.keys() <= set(patch_rows.DECISIVE)
+        finding.model,
+        [(finding, coarse)],
+        is_at_limit=excess.keys() <= set(patch_rows.MESH_MEASURES),
     )
 
 
@@ -200,7 +210,9 @@ def _strip_remedy(patch_model, excess: dict) -> str:
     in the width of a strip. The errors of all other measures are of second order, like those of the
     mesh.
     """
-    ratio = max(times if name in FIRST_ORDER else times**0.5 for name, times in excess.items())
+    ratio = max(
+        times if name in FIRST_ORDER_MEASURES else times**0.5 for name, times in excess.items()
+    )
     count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_STRIPS:
         return NO_REMEDY
@@ -299,11 +311,11 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
             return " and ".join(f"leave out accuracy.{key}" for key in pinned)
         proposed = PROPOSED_TOLERANCE_RATIO * model.accuracy.tolerance
         return f"set accuracy.tolerance = {proposed:.3g} to refine the sum over bonds"
-    if name == STEADY:  # in a longer run the transient decays further
+    if name == STEADY_AMPLITUDE:  # in a longer run the transient decays further
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED_MEASURES):
         return NO_REMEDY
-    return notes.more_harmonics(extra["harmonics"], _harmonics_of_friction(finding))
+    return notes.propose_harmonics(extra["harmonics"], _harmonics_of_friction(finding))
 
 
 def _main_cause(finding: Finding, name: str) -> str:
@@ -337,18 +349,20 @@ def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
         if model.accuracy.steps_per_cycle is not None:
             exact = f"leave out accuracy.steps_per_cycle and {exact}"
     if order is None:
-        return f"{_no_order(name, steps)}{_remedy_without_order(model, steps, excess, exact)}"
+        return f"{_describe_missing_order(name, steps)}{_remedy_without_order(model, steps, excess, exact)}"
     total = sum(part.get(name, 0.0) for part in parts["parts"].values())
     of_steps = parts["parts"].get("steps", {}).get(name, 1.0)
     allowed = total / excess[name]
-    target = max(allowed - (total - of_steps), MIN_STEP_SHARE * allowed)
+    target = max(allowed - (total - of_steps), MIN_STEP_ERROR_FRACTION * allowed)
     halvings = max(1, ceil(log2(of_steps / target) / order))
-    if exact and halvings > MAX_HALVINGS and not name.startswith(RING):
+    if exact and halvings > MAX_HALVINGS and not name.startswith(RINGING_PREFIX):
         return exact
-    return f"set accuracy.steps_per_cycle = {steps * 2 ** min(halvings, notes.FARTHEST)}"
+    return (
+        f"set accuracy.steps_per_cycle = {steps * 2 ** min(halvings, notes.MAX_PROPOSED_HALVINGS)}"
+    )
 
 
-def _no_order(name: str, steps: int) -> str:
+def _describe_missing_order(name: str, steps: int) -> str:
     """Return the clause that a measure does not converge with the steps."""
     return (
         f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed "

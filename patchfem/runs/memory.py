@@ -13,7 +13,7 @@ from .cost import CODE_TO_COMPILE
 MAPPED_BYTES = 60e6  # address space [bytes] that the packages map in addition to the memory in use
 COMPILER_BYTES = 150e6  # address space [bytes] of the compiler library
 MIN_NAMED_FRACTION = 0.3  # fraction of the total memory from which a plan names the largest part
-CURES = {
+REMEDIES = {
     "contact.element_size": "make contact.element_size larger",
     "contact.mesh": "give contact.mesh fewer nodes on the interface",
     "accuracy.tail": "raise accuracy.tail or accuracy.merge",
@@ -44,7 +44,9 @@ def free_bytes(*, needs_compiler: bool = False) -> float:
     used, mapped = process_bytes()
     beside = mapped - used + MAPPED_BYTES + (COMPILER_BYTES if needs_compiler else 0.0)
     return min(
-        _available() + used, free_in_control_group(used), *(limit - beside for limit in _limits())
+        _available_bytes() + used,
+        free_in_control_group(used),
+        *(limit - beside for limit in _process_limits()),
     )
 
 
@@ -58,7 +60,7 @@ def process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
     return float(resident * page), float(size * page)
 
 
-def _available() -> float:
+def _available_bytes() -> float:
     """Return the available memory of the system [bytes]; inf if unknown."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
@@ -68,7 +70,7 @@ def _available() -> float:
         return float("inf")
 
 
-def _limits() -> list:
+def _process_limits() -> list:
     """Return the limits on address space and data of this process [bytes]; inf if unlimited."""
     try:
         import resource
@@ -154,11 +156,11 @@ def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
     text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
     if largest is None or largest.bytes < 0.1 * total:
         return f"{text}; free some memory, or run on a machine with more memory"
-    remedy = CURES.get(largest.key, f"lower {largest.key}")
+    remedy = REMEDIES.get(largest.key, f"lower {largest.key}")
     return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {remedy}"
 
 
-def refuse(parts: tuple) -> None:
+def refuse_large_memory(parts: tuple) -> None:
     """Raise Missing if a run would need more memory than is free."""
     if text := reason_of_refusal(parts):
         raise Missing(text, "")

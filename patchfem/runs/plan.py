@@ -23,11 +23,11 @@ from .cost import Cost, MemoryPart
 from .patch import plan as patch_plan
 from .rig import engines
 from .rig import plan as of_rig
-from .tolerance_forecast import NOTHING_FORESEEN, Forecast, forecast_tolerance
+from .tolerance_forecast import EMPTY_FORECAST, Forecast, forecast_tolerance
 from .wear import plan as of_wear
 
 PACKAGE_BYTES = 80e6  # memory of the packages that every run imports [bytes]
-LONGEST = 1e6  # largest predicted CPU time [s] of a run that is started, twelve days
+MAX_CPU_SECONDS = 1e6  # largest predicted CPU time [s] of a run that is started, twelve days
 SKIPPING_ENGINES = (
     "march",
     "exact",
@@ -91,7 +91,7 @@ class Plan:
     groups: dict
     verdict: tuple
     compile_seconds: float = 0.0
-    tolerance: Forecast = NOTHING_FORESEEN
+    tolerance: Forecast = EMPTY_FORECAST
 
     @property
     def engine(self) -> str:
@@ -125,7 +125,7 @@ class Plan:
         sizes = ", ".join(sizes)
         lines = [
             f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
-            f"{self.steps} steps, about {self.seconds:.1f} s{compile_words(self.compile_seconds)} and "
+            f"{self.steps} steps, about {self.seconds:.1f} s{describe_compile_time(self.compile_seconds)} and "
             f"{self.bytes / 1e6:.0f} MB"
         ]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
@@ -155,7 +155,7 @@ class Plan:
         }
 
 
-def compile_words(seconds: float) -> str:
+def describe_compile_time(seconds: float) -> str:
     """Return the words on the compile time, or "" if nothing is compiled."""
     return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
@@ -192,7 +192,7 @@ def _make_plan(model: Model) -> Plan:
         model = replace(
             model,
             rig=of_rig.remove_expected_joint(
-                model.rig, patch_plan.chain(model.patch) | _link(model)
+                model.rig, patch_plan.chain(model.patch) | _interface_links(model)
             ),
         )
     on_motion = []
@@ -213,14 +213,14 @@ def _make_plan(model: Model) -> Plan:
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
             on_patch += patch_plan.describe_patch(model.rig.friction.names[number], interface)
-    cost = _cost(model)
+    cost = _predict_cost(model)
     on_law += cost.words
     if model.kind == "bench":
         groups = of_bench.groups(model) | groups
     if model.friction is not None:
-        chain |= _link(model)
+        chain |= _interface_links(model)
         groups |= _law_groups(model)
-        on_law += _groove_words(model)
+        on_law += _describe_grooves(model)
     if model.rig is not None:
         on_motion += of_rig.describe_stick(model.rig, groups, chain)
     if (
@@ -242,13 +242,13 @@ def _make_plan(model: Model) -> Plan:
         cost,
         chain,
         groups,
-        tuple(_verdict(model, groups, cost.parts, (on_motion, on_patch, on_law))),
+        tuple(_write_verdict(model, groups, cost.parts, (on_motion, on_patch, on_law))),
         0.0 if is_compiled else cost.compile_seconds,
         foreseen,
     )
 
 
-def _cost(model: Model) -> Cost:
+def _predict_cost(model: Model) -> Cost:
     """Return the predicted cost of all steps of a run.
 
     The memory parts are ordered from the largest to the smallest.
@@ -312,7 +312,7 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
 
 
-def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
+def _write_verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
     """Return the verdict of a plan as sentences.
 
     said: sentences on the motion, the patch and the friction law.
@@ -340,10 +340,10 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
     return sentences
 
 
-def refuse_size(what: Plan) -> None:
+def refuse_large_run(what: Plan) -> None:
     """Raise Missing if a run needs too much memory or CPU time."""
-    memory.refuse(what.cost.parts)
-    if what.seconds > LONGEST:
+    memory.refuse_large_memory(what.cost.parts)
+    if what.seconds > MAX_CPU_SECONDS:
         key = ""
         if what.model.accuracy.steps_per_cycle is not None:
             key = "accuracy.steps_per_cycle or "
@@ -353,12 +353,12 @@ def refuse_size(what: Plan) -> None:
             key += "drive.cycles"
         raise Missing(
             f"the run would need a computing time of about {what.seconds:.2g} s ({what.steps:.2g} time "
-            f"steps), more than the limit of {LONGEST:.0e} s; lower {key or 'the number of elements'}",
+            f"steps), more than the limit of {MAX_CPU_SECONDS:.0e} s; lower {key or 'the number of elements'}",
             "",
         )
 
 
-def _link(model: Model) -> dict:
+def _interface_links(model: Model) -> dict:
     """Return the links of the stiffness chain at the interface: grooves and bonds."""
     load = model.nominal_load
     if not load > 0:
@@ -390,7 +390,7 @@ def _law_groups(model: Model) -> dict:
     return {"share_of_the_spread": spread.carried_fraction(model.pad, model.spread)}
 
 
-def _groove_words(model: Model) -> list:
+def _describe_grooves(model: Model) -> list:
     """Return the sentence of a plan on the grooves that the load climbs."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:

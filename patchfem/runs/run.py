@@ -22,16 +22,16 @@ from .accuracy_warnings import Finding, tolerance_warnings
 from .bench import result as bench_result
 from .patch import faces, strength
 from .patch import result as patch_result
-from .plan import Plan, compiled_kind, plan, refuse_size
-from .results.patch_rows import unknown_measures
-from .results.result import Result, RunInputs, shorten_file_names, with_meanings
+from .plan import Plan, compiled_kind, plan, refuse_large_run
+from .results.patch_rows import find_unknown_measures
+from .results.result import Result, RunInputs, add_meanings, shorten_file_names
 from .rig import engines, rig
 from .self_checks.checks import mark_failed_checks
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
 NO_MOTION = "no friction acts and no motion was computed"
-AT_REST = "no motion was found; the measures are those of the pressed patch at rest"
+NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed patch at rest"
 
 
 class StateFile(NamedTuple):
@@ -99,7 +99,7 @@ def run(
     """
     what = what if isinstance(what, Plan) else plan(what)
     with locate_errors(what.model.source):
-        refuse_size(what)
+        refuse_large_run(what)
         return _run(what, say, progress, kept, estimate=estimate, fresh=fresh)
 
 
@@ -116,7 +116,7 @@ def _run(
     if model.rig is not None:
         warnings += engines.describe_unused_settings(model, what.engine)
     if model.patch is not None:
-        meshes = _press(model, estimate=estimate, fresh=fresh)
+        meshes = _press_patch(model, estimate=estimate, fresh=fresh)
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.structure.without_joint is not None:
             model = joint.remove_joint(model, meshes.patch)
@@ -139,17 +139,17 @@ def _run(
     else:
         evolved = None
         if model.wear is not None and meshes.patch is not None:
-            evolved = _evolve(inputs, kept)
+            evolved = _wear_patch(inputs, kept)
             unworn = (meshes.patch, *meshes.coarse)
             meshes = PatchMeshes(evolved.patch, tuple(evolved.coarse), meshes.static, unworn)
             inputs = _worn_inputs(inputs, evolved)
         try:
             with _saving_context(kept, what, meshes.patch):
-                result = _solve(inputs)
+                result = _run_kind(inputs)
         except NotConverged as error:
             if meshes.patch is not None and what.kind != "patch":
                 at_rest = patch_result.static(
-                    replace(inputs, plan=what, warnings=[*warnings, AT_REST])
+                    replace(inputs, plan=what, warnings=[*warnings, NO_MOTION_FOUND])
                 )
                 at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
                 unworn = PatchMeshes(meshes.patch, meshes.coarse)
@@ -164,7 +164,7 @@ def _run(
     return _complete_result(mark_failed_checks(result), notes, begin, meshes)
 
 
-def _press(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
+def _press_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
     """Press the patch of [contact] on the meshes that the run and its errors need."""
     tolerance = model.accuracy.tolerance
     patch, *coarse = patch_result.solve_all(model.patch, tolerance, estimate, fresh)
@@ -194,7 +194,7 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
     return warnings
 
 
-def _solve(inputs: RunInputs) -> Result:
+def _run_kind(inputs: RunInputs) -> Result:
     """Run a plan with the function for its kind of scene."""
     if inputs.plan.kind == "patch":
         return patch_result.static(inputs)
@@ -228,7 +228,7 @@ def _result_without_load(inputs: RunInputs) -> Result:
     )
 
 
-def _evolve(inputs: RunInputs, kept: StateFile | None):
+def _wear_patch(inputs: RunInputs, kept: StateFile | None):
     """Compute the wear of a patch, continuing from a saved state if there is one."""
     model = inputs.plan.model
     patch = inputs.patch
@@ -285,7 +285,7 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
     notes = [*notes, *result.extra.get("notes", [])]
     yielding_faces = _yielding_faces(result)
     outcome = result.outcome
-    if outcome is Outcome.DONE and unknown_measures(result.measures):
+    if outcome is Outcome.DONE and find_unknown_measures(result.measures):
         outcome = Outcome.NOT_CONVERGED
     path = model.source.path
     notes = [*shorten_file_names(notes, path), *yielding_faces.values()]
@@ -296,7 +296,7 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
         result,
         outcome=outcome,
         patch=patch,
-        measures=with_meanings(result.measures, "interface" if model.patch is None else "strip"),
+        measures=add_meanings(result.measures, "interface" if model.patch is None else "strip"),
         warnings=shorten_file_names(warnings, path),
         extra=result.extra | {"notes": notes, "yielding_faces": yielding_faces},
     )
@@ -320,7 +320,7 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
         If there is no state from which to continue.
     """
     model = what.model
-    if kept is None or not marches(what):
+    if kept is None or not is_march(what):
         return nullcontext()
 
     def path_of_march(number: int) -> Path:
@@ -361,7 +361,7 @@ def state_key(model, patch, version: str) -> str:
     return digest.hexdigest()
 
 
-def marches(what: Plan) -> bool:
+def is_march(what: Plan) -> bool:
     """Return whether a run is a march in time, which saves its state."""
     if what.model.rig is None:
         return False

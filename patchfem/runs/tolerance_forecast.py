@@ -4,7 +4,7 @@ In: a Model, before anything is computed. Out: a `Forecast`. A scene that leaves
 settings to the tolerance mostly meets it. A key that fixes a setting can prevent this: steps
 per cycle, the element size, a method, the neglected part of a sum over bonds. The rules below
 compare such a key with what the tolerance requires. They apply only where measured runs nearly
-always missed the tolerance (`FEWER_STEPS`, `OF_ELEMENT`); otherwise the run itself warns.
+always missed the tolerance (`MIN_RIG_STEP_RATIO`, `MIN_ELEMENT_ERROR_RATIO`); otherwise the run itself warns.
 """
 
 from dataclasses import replace
@@ -22,24 +22,24 @@ from .rig import costs, engines, lists, numerics
 # Ratio of present to required steps per cycle of a rig, below which runs missed the tolerance: of 60 random
 # rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it below
 # these ratios.
-FEWER_STEPS = 2 / 3
+MIN_RIG_STEP_RATIO = 2 / 3
 # The same ratio for a bench, by whether its law has bonds.
-FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}
+MIN_BENCH_STEP_RATIOS = {True: 1 / 3, False: 1 / 8}
 # Ratio of proposed to required steps per cycle of a rig, with which all measures met the tolerance, not
 # only the displacement.
-ENOUGH_STEPS = 4.0
-ENOUGH_STEPS_OF_BENCH = 2.0  # the same ratio for a bench: a triangle needs 1.1, a sine at most 1
+RIG_STEP_FACTOR = 4.0
+BENCH_STEP_FACTOR = 2.0  # the same ratio for a bench: a triangle needs 1.1, a sine at most 1
 # Smallest ratio of the relative error of a patch to (element size / contact length); patches with equal
 # elements had 0.2 to 7 (crowns, tilts, flat ends).
-OF_ELEMENT = 0.2
-FINEST_PATCH = (
+MIN_ELEMENT_ERROR_RATIO = 0.2
+MIN_PATCH_ERROR = (
     1e-6  # relative error on the finest mesh of a static patch, which takes some CPU seconds
 )
 # relative error on the finest mesh of a patch that slips in part in a rig, coarser because of the time
 # steps
-FINEST_MOTION = 3e-5
+MIN_SLIP_PATCH_ERROR = 3e-5
 SAFE_TOLERANCE = 1e-3  # tolerance that a cure proposes, because the meshes of all patches meet it
-STEPLESS = ("exact", "piecewise", "smooth")  # engines that choose their own steps
+STEPLESS_ENGINES = ("exact", "piecewise", "smooth")  # engines that choose their own steps
 MAX_CYCLES = 1e5  # largest number of drive cycles that a cure proposes
 
 
@@ -84,7 +84,7 @@ class Forecast(NamedTuple):
         }
 
 
-NOTHING_FORESEEN = Forecast(0.0, ())
+EMPTY_FORECAST = Forecast(0.0, ())
 
 
 def _cure_words(cure: dict) -> str:
@@ -102,7 +102,7 @@ def forecast_tolerance(model: Model) -> Forecast:
     tolerance = model.accuracy.tolerance
     if cause := _mesh_cause(model, tolerance):
         return Forecast(tolerance, (cause,))
-    causes = [_even_mesh_cause(model, tolerance)]
+    causes = [_uniform_mesh_cause(model, tolerance)]
     if model.kind in ("rig", "linear"):
         causes += [_rig_steps_cause(model), _bond_sum_cause(model, tolerance)]
     elif model.kind == "bench":
@@ -117,14 +117,14 @@ def _replace_accuracy(model: Model, **keys) -> Model:
 
 def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
     """Return the Cause if no mesh of the pieces meets the tolerance in acceptable time."""
-    if model.kind == "patch" and model.patch.mesh.file is None and tolerance < FINEST_PATCH / 2:
-        finest = FINEST_PATCH
+    if model.kind == "patch" and model.patch.mesh.file is None and tolerance < MIN_PATCH_ERROR / 2:
+        finest = MIN_PATCH_ERROR
     elif (
         model.kind == "rig"
         and (model.partial_slip or model.rig.friction.has_partial_slip)
-        and tolerance < FINEST_MOTION
+        and tolerance < MIN_SLIP_PATCH_ERROR
     ):
-        finest = FINEST_MOTION
+        finest = MIN_SLIP_PATCH_ERROR
     else:
         return None
     cure = {"accuracy.tolerance": SAFE_TOLERANCE}
@@ -139,7 +139,7 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
     return Cause(f"by any mesh: the finest one leaves errors of about {finest:g} or more", cure)
 
 
-def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
+def _uniform_mesh_cause(model: Model, tolerance: float) -> Cause | None:
     """Return the Cause if elements of a fixed size are too long for the contact."""
     patch = model.patch
     if patch is None or patch.mesh.is_automatic:
@@ -150,7 +150,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
         return None
     size = patch.uniform_element_size
     share = size / patch_grids.make_base_grids(patch).contact.width
-    if tolerance > OF_ELEMENT * share:
+    if tolerance > MIN_ELEMENT_ERROR_RATIO * share:
         return None
     words = f"with contact.element_size = {format_length(size, 3)} ({format_number(share, 2)} of the length in contact)"
     return Cause(words, {"contact.element_size": None})
@@ -166,12 +166,12 @@ def _rig_steps_cause(model: Model) -> Cause | None:
         return None
     steps = numerics.choose_numerics(model).steps
     wanted = costs.required_steps_per_cycle(model)
-    if steps > FEWER_STEPS * wanted:
+    if steps > MIN_RIG_STEP_RATIO * wanted:
         return None
     words = f"with the {steps} steps per cycle of this run"
     if model.accuracy.steps_per_cycle is not None:
         words = f"with accuracy.steps_per_cycle = {steps}"
-    return Cause(words, _steps_cure(model) | _more_cycles(model))
+    return Cause(words, _steps_cure(model) | _cycles_cure(model))
 
 
 def _steps_cure(model: Model) -> dict:
@@ -181,17 +181,17 @@ def _steps_cure(model: Model) -> dict:
     """
     accuracy = model.accuracy
     free = engines.choose_engine(_replace_accuracy(model, method="auto", steps_per_cycle=None))
-    if free.name in STEPLESS:
+    if free.name in STEPLESS_ENGINES:
         dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
         return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
     steps = numerics.choose_numerics(model).steps
-    enough = ENOUGH_STEPS * costs.required_steps_per_cycle(model)
+    enough = RIG_STEP_FACTOR * costs.required_steps_per_cycle(model)
     if steps >= enough:
         return {}
-    return {"accuracy.steps_per_cycle": _rounded_steps(enough)}
+    return {"accuracy.steps_per_cycle": _round_steps(enough)}
 
 
-def _rounded_steps(steps: float) -> int:
+def _round_steps(steps: float) -> int:
     """Return steps per cycle rounded up to two digits and to a multiple of four.
 
     Half and a quarter of the steps are then whole numbers.
@@ -200,7 +200,7 @@ def _rounded_steps(steps: float) -> int:
     return 4 * ceil(ceil(steps / unit) * unit / 4)
 
 
-def _more_cycles(model: Model) -> dict:
+def _cycles_cure(model: Model) -> dict:
     """Return the number of cycles after which the transient is below the tolerance, by key.
 
     The slowest mode counts; {} if the scene has enough cycles.
@@ -240,7 +240,7 @@ def _bench_steps_cause(model: Model) -> Cause | None:
         return None  # a law without memory has a closed form
     steps = bench_engine.steps_per_cycle(model)
     wanted = bench_engine.steps_per_cycle(_replace_accuracy(model, steps_per_cycle=None))
-    if steps > FEWER_STEPS_OF_BENCH[law_has_trait(model.friction.law, "bonds")] * wanted:
+    if steps > MIN_BENCH_STEP_RATIOS[law_has_trait(model.friction.law, "bonds")] * wanted:
         return None
-    enough = _rounded_steps(ENOUGH_STEPS_OF_BENCH * wanted)
+    enough = _round_steps(BENCH_STEP_FACTOR * wanted)
     return Cause(f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": enough})

@@ -4,7 +4,7 @@ import pytest
 
 from patchfem import load
 from patchfem.friction import Bonds
-from patchfem.runs.results.notes import unbounded_bonds
+from patchfem.runs.results.notes import warn_of_unbounded_bonds
 from patchfem.runs.run import run
 
 BENCH = (
@@ -46,6 +46,6 @@ def test_exact_the_printed_initial_bonds_that_do_not_grow_are_noted(text):
 def test_exact_initial_bonds_of_negative_order_are_warned_of_in_rigs_too():
     found, _ = notes(RIG.replace("cycles = 10", "cycles = 1"), 'reading = "report"\norder = -0.5\n')
     assert any("infinite at the first instant" in line for line in found.warnings)
-    assert not unbounded_bonds(
+    assert not warn_of_unbounded_bonds(
         Bonds(0.3, 1e-6, -0.5, "report", initial=0.0)
-    ) and not unbounded_bonds(Bonds(0.3, 1e-6))
+    ) and not warn_of_unbounded_bonds(Bonds(0.3, 1e-6))

@@ -15,7 +15,7 @@ from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 from patchfem import plan
 from patchfem.core import Missing
 from patchfem.runs import choose_numerics, memory, run
-from patchfem.runs.plan import UPPER_LIMIT_NOTE, refuse_size
+from patchfem.runs.plan import UPPER_LIMIT_NOTE, refuse_large_run
 from patchfem.runs.rig import costs
 from patchfem.scene import loads
 
@@ -109,7 +109,7 @@ def test_exact_a_run_of_centuries_is_refused_with_its_key():
     with pytest.raises(Missing, match=r"computing time of about .* s .*; lower drive\.cycles$"):
         long = planned(RIG, MARCH, "drive.cycles=1e15")
         # the memory is refused before
-        refuse_size(replace(long, cost=replace(long.cost, parts=())))
+        refuse_large_run(replace(long, cost=replace(long.cost, parts=())))
 
 
 def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):

@@ -41,7 +41,7 @@ def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
         is_of_mesh = result.measures[name].value == on_mesh[name]
         assert (
             is_of_mesh
-            if words == patch_rows.ON_FINEST_MESH
+            if words == patch_rows.FINEST_MESH_SOURCE
             else on_mesh[name] == 0 or not is_of_mesh
         ), name
 

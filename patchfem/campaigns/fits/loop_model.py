@@ -182,7 +182,7 @@ class BenchModel:
             except PatchfemError:
                 continue  # The search meets the same error and counts it as a failed evaluation.
         self.first_error = first_error
-        self.meshes = meshes.Shared(models, False)
+        self.meshes = meshes.SharedMeshes(models, False)
         return self.meshes
 
     def _row_times(self) -> np.ndarray:

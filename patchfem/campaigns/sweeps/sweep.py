@@ -21,7 +21,7 @@ from ...model.similar_models import SimilarModels
 from ...runs import plan
 from ...runs.batch import batches
 from ...runs.batch.case_results import CaseResults
-from ...runs.batch.meshes import Shared
+from ...runs.batch.meshes import SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
@@ -56,7 +56,7 @@ class Work:
         sweep, so that they need not be sent back.
     estimate : bool
         Whether errors are computed for cases that run one by one.
-    meshes : Shared or None
+    meshes : SharedMeshes or None
         Meshes that the cases share, chosen from all of them by `choose_meshes`.
     """
 
@@ -66,7 +66,7 @@ class Work:
     keep: Callable | None = None
     write: Callable | None = None
     estimate: bool = True
-    meshes: Shared | None = None
+    meshes: SharedMeshes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +209,7 @@ def choose_meshes(work: Work) -> Work:
         models.append(_build_case_model(work, number))
         if isinstance(models[-1], Model) and models[-1].patch is None:
             return work
-    return replace(work, meshes=Shared(models, len(numbers) == len(work.cases)))
+    return replace(work, meshes=SharedMeshes(models, len(numbers) == len(work.cases)))
 
 
 def _min_chunk_size(work: Work) -> int:

@@ -17,7 +17,7 @@ from ...response.outcome import OPEN_LOOP, UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import add_interface_number, remove_interface_number
 from ...runs.results.patch_rows import TABLE as STATIC
-from ...runs.results.patch_rows import minimum_value, unknown_measures
+from ...runs.results.patch_rows import find_unknown_measures, minimum_value
 from ...runs.results.result import Result
 from ..summary import measure_object
 from .document import sentence_html
@@ -264,7 +264,7 @@ def _unknown_measures(measures: dict) -> str:
         name: Measure(**{key: measure[key] for key in ("value", "unit", "error")})
         for name, measure in measures.items()
     }
-    return " and of ".join(unknown_measures(measure_records))
+    return " and of ".join(find_unknown_measures(measure_records))
 
 
 def verdict_sentence(summary: dict) -> str:

@@ -19,7 +19,7 @@ from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
 from ...disk.atomic_write import write_text
 from ...runs.batch.case_results import CaseResults
-from ...runs.results.result import meaning
+from ...runs.results.result import describe_measure
 from ..pages import sweep
 from ..pages.headline import SweepHeadline
 from ..read_results import MAX_NUMBER, require_valid
@@ -68,7 +68,7 @@ def sweep_table(
     measures = {
         name: {
             "unit": results.units[name],
-            "means": meaning(name),
+            "means": describe_measure(name),
             "values": results.values[name],
             "errors": results.errors[name],
             "floors": results.floors[name],

@@ -20,7 +20,7 @@ from ...disk.atomic_write import write_rows
 from ...response import rows
 from ...runs.batch.case_results import CaseResults
 from ...runs.results.patch_rows import TABLE as STATIC
-from ...runs.results.result import meaning
+from ...runs.results.result import describe_measure
 from ...scene.keys import types
 from ...scene.keys.lookup import find_key
 from .. import netcdf
@@ -61,7 +61,7 @@ def measure_columns(results: CaseResults, name: str) -> list[Column]:
     """Return the columns of a measure: its values and their errors."""
     unit = results.units[name]
     return [
-        Column(name, results.values[name], unit, meaning(name)),
+        Column(name, results.values[name], unit, describe_measure(name)),
         Column(
             f"{name}_error", results.errors[name], unit, f"estimated numerical half-width of {name}"
         ),

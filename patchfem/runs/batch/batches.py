@@ -185,7 +185,7 @@ def solve_models(
         assignment = _assign(model, study) if keep is None else Assignment()
         groups.setdefault(assignment, []).append(case)
     for assignment, cases in groups.items():
-        keep_case = keep and partial(_keep_case, keep, cases)
+        keep_case = keep and partial(_report_case, keep, cases)
         run_singly = partial(one_by_one.solve, say=say, keep=keep_case, estimate=estimate)
         part = _solve_group(assignment, select_models(models, cases), run_singly, say)
         results.insert(cases, part)
@@ -250,7 +250,7 @@ def _describe_failure(batch: Batch | None, error: Exception) -> str:
     return f"{name}{type(error).__name__}: {error}"
 
 
-def _keep_case(keep: Callable, cases: list, index: int, result) -> None:
+def _report_case(keep: Callable, cases: list, index: int, result) -> None:
     """Pass a case and its Result to the callback of the caller."""
     keep(cases[index], result)
 

@@ -32,6 +32,6 @@ def group(model: Model) -> Hashable:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Compute the case results of a group of benches."""
-    return patches.pressed_first(
+    return patches.press_and_solve(
         models, MAX_CASES_PER_CALL, lambda part: one_by_one.solve(part, say)
     )

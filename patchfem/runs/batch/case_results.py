@@ -24,13 +24,13 @@ MIN_CASES_ON_DISK = 50_000
 FAILED_OUTCOME = "failed"  # outcome of a case that was refused or did not finish
 
 
-class OnDisk:
+class ArrayOnDisk:
     """Array of floats in a file, which needs memory only while it is used.
 
     An access maps the file into memory, and releases the map with the result.
     """
 
-    def __init__(self, file, shape: tuple, whole: OnDisk | None = None):
+    def __init__(self, file, shape: tuple, whole: ArrayOnDisk | None = None):
         # the original array is kept, because its file is closed together with it
         self.file = file
         self.shape = shape
@@ -57,9 +57,9 @@ class OnDisk:
     def __setitem__(self, at, values) -> None:
         np.asarray(self)[at] = values
 
-    def reshape(self, shape: tuple) -> OnDisk:
+    def reshape(self, shape: tuple) -> ArrayOnDisk:
         """Return an array with the same file in another shape."""
-        return OnDisk(self.file, tuple(shape), self)
+        return ArrayOnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
@@ -115,11 +115,11 @@ class CaseResults:
                 columns[name] = self._column()
                 columns[name][:] = np.nan
 
-    def _column(self) -> np.ndarray | OnDisk:
+    def _column(self) -> np.ndarray | ArrayOnDisk:
         """Return an empty column (n,), in memory or on disk."""
         if self.room is None:
             return np.empty(len(self))
-        return OnDisk(TemporaryFile(dir=self.room), (len(self),))
+        return ArrayOnDisk(TemporaryFile(dir=self.room), (len(self),))
 
     def fail(self, case: int, message: str) -> None:
         """Mark a case as failed, with its error message."""

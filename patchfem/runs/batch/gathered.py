@@ -36,8 +36,8 @@ from ..rig.lists import choose_bond_sum
 from . import pressed
 from .case_results import CaseResults, has_unreadable_table
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
-from .lumped.pieces import known_values
-from .samples import Samples, peaks
+from .lumped.pieces import select_known_values
+from .samples import Samples, find_peaks
 
 MAX_CASES_PER_CALL = 256  # largest number of patches that are pressed in one call
 # largest number of kept samples of all cases in one call, which need 200 MB with their evaluation
@@ -79,7 +79,7 @@ def refuses(model: Model) -> str:
 
 def group(model: Model) -> Hashable:
     """Return a key that is equal for models that march side by side; None for single runs."""
-    if no_lanes(model):
+    if why_no_lanes(model):
         return None
     modes = model.rig.modes
     arrays = modes.omega, modes.zeta, modes.slide, modes.base, modes.output
@@ -89,7 +89,7 @@ def group(model: Model) -> Hashable:
     return tuple(key)
 
 
-def no_lanes(model: Model) -> str:
+def why_no_lanes(model: Model) -> str:
     """Return why a model cannot march side by side with others, or ""."""
     rig = model.rig
     law = model.bonds
@@ -153,7 +153,7 @@ class _GatheredPoints(NamedTuple):
 
 def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
     """Reduce a pressed patch to a few contact points; None if the case is run by itself."""
-    if no_lanes(model) or numerics.steps % 4:
+    if why_no_lanes(model) or numerics.steps % 4:
         return None
     if choose_bond_sum(model, numerics).engine != "recursion":
         return None
@@ -345,7 +345,7 @@ def _evaluate(
         if searched is not None:
             may_ring &= searched
         accelerations = samples.acceleration()
-        peak_errors = peaks(np.abs(accelerations))[1]
+        peak_errors = find_peaks(np.abs(accelerations))[1]
     for name in RING_MEASURES:
         values[name] = np.full(len(models), np.nan)
     stated_errors = [{"absolute_acceleration_peak": float(error)} for error in peak_errors]
@@ -393,7 +393,9 @@ def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -
     errors = {name: np.zeros(len(models)) for name in columns[0]}
     parts = []
     for case, (model, pressed_case) in enumerate(zip(models, cases)):
-        values, half, quarter, coarse = (known_values(measures, case) for measures in columns)
+        values, half, quarter, coarse = (
+            select_known_values(measures, case) for measures in columns
+        )
         kinds = (
             step_errors(values, half, quarter, steps=steps),
             coarser_errors(quarter, coarse, order=2.0),

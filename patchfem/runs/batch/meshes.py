@@ -13,7 +13,7 @@ from ...model.model import Model
 from ..patch import meshes as patch_meshes
 
 
-class Shared:
+class SharedMeshes:
     """Shared meshes of a sweep, by geometry of the patch and tolerance.
 
     They depend on all models that choose them, but not on their order. Therefore a sweep makes them
@@ -24,8 +24,8 @@ class Shared:
         self.meshes = {}
         groups = {}
         for model in models:
-            if _wants(model):
-                groups.setdefault(_key(model), []).append(model.patch)
+            if _may_share_meshes(model):
+                groups.setdefault(_mesh_key(model), []).append(model.patch)
         for key, patches in groups.items():
             if len(patches) < 2:
                 continue
@@ -37,7 +37,9 @@ class Shared:
 
     def with_shared_meshes(self, model: Model | PatchfemError) -> Model | PatchfemError:
         """Return a model with its shared meshes, or the same model if it has none."""
-        meshes = self.meshes.get(_key(model)) if self.meshes and _wants(model) else None
+        meshes = (
+            self.meshes.get(_mesh_key(model)) if self.meshes and _may_share_meshes(model) else None
+        )
         if meshes is None:
             return model
         return replace(model, patch=model.patch.with_mesh(shared=meshes))
@@ -48,15 +50,15 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
 
     A single patch of a geometry keeps the mesh that its own run chooses.
     """
-    shared = Shared(models)
+    shared = SharedMeshes(models)
     return [shared.with_shared_meshes(model) for model in models]
 
 
-def _wants(model: Model | PatchfemError) -> bool:
+def _may_share_meshes(model: Model | PatchfemError) -> bool:
     """Return whether a model may share its meshes with other models."""
     return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
 
 
-def _key(model: Model) -> tuple:
+def _mesh_key(model: Model) -> tuple:
     """Return the key of a model for its patch geometry and tolerance."""
     return patch_meshes.geometry_key(model.patch), model.accuracy.tolerance

@@ -14,12 +14,12 @@ from ...core import PatchfemError
 from ...model.model import Model
 from ...model.similar_models import select_models
 from ..plan import plan
-from ..results.result import choices
+from ..results.result import collect_used_settings
 from ..run import run
 from .case_results import CaseResults
 
 CASE_ERRORS = (PatchfemError, MemoryError)  # errors of a case, as opposed to faults of the program
-NO_MEMORY = "not enough memory; make contact.element_size larger, or make the run shorter"
+NO_MEMORY_MESSAGE = "not enough memory; make contact.element_size larger, or make the run shorter"
 
 
 def solve(
@@ -50,13 +50,13 @@ def solve(
             if keep is not None:
                 keep(case, result)
         except CASE_ERRORS as error:
-            results.fail(case, str(error) or NO_MEMORY)
+            results.fail(case, str(error) or NO_MEMORY_MESSAGE)
         # a fault of the program in one case must not lose the results of a thousand others
         except Exception as error:
             results.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:
             results.put(case, result.outcome, result.measures, 0.0)
-            results.numerics[case] = choices(result)
+            results.numerics[case] = collect_used_settings(result)
             if result.warnings:
                 results.warnings[case] = list(result.warnings)
             if notes := result.extra.get("notes"):
@@ -65,7 +65,7 @@ def solve(
     return results
 
 
-def solve_rest(
+def solve_singly(
     results: CaseResults, models: Sequence[Model], cases: np.ndarray, say: Callable | None = None
 ) -> None:
     """Replace the results of some cases by those of single runs.

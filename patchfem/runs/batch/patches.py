@@ -21,13 +21,17 @@ from ..patch import result as of_patch
 from ..patch import static, store
 from ..patch.meshes import geometry_key
 from ..patch.strength import yielding_faces
-from ..results.patch_rows import POSITIVE, TABLE
+from ..results.patch_rows import POSITIVE_MESH_MEASURES, TABLE
 from ..results.result import file_name_shortener, shorten_file_names
 from . import one_by_one
 from .case_results import CaseResults
 
-AT_ONCE = 2048  # largest number of cases whose nodal forces are in memory at the same time
-TINY = 1e-300  # absolute error that is always allowed, so that a value of 0 meets the tolerance
+MAX_CASES_PER_CALL = (
+    2048  # largest number of cases whose nodal forces are in memory at the same time
+)
+MIN_ALLOWED_ERROR = (
+    1e-300  # absolute error that is always allowed, so that a value of 0 meets the tolerance
+)
 
 
 class _Nodes(NamedTuple):
@@ -60,7 +64,7 @@ def parts(models: Sequence[Model]) -> dict:
     return {group(models.first): range(len(models))} if alike else {}
 
 
-def solved_together(models: Sequence[Model]) -> list[Model]:
+def press_together(models: Sequence[Model]) -> list[Model]:
     """Return the models with the solutions of patches that are pressed together.
 
     Of patches that are equal, e.g. for several drive levels or friction laws, one is pressed for
@@ -81,7 +85,7 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
     return out
 
 
-def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
+def press_and_solve(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
     """Press the patches of models together, then compute the results of the models.
 
     Parameters
@@ -96,7 +100,7 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
     for first in range(0, len(models), together):
         # in these small systems, BLAS threads wait longer for each other than the solution takes
         with one_thread():
-            part = solved_together(models[first : first + together])
+            part = press_together(models[first : first + together])
             out.insert(range(first, first + len(part)), solve(part))
     return out
 
@@ -104,8 +108,8 @@ def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> Ca
 def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
     """Compute the case results of a group of static patches."""
     out = CaseResults.blank(len(models))
-    for start in range(0, len(models), AT_ONCE):
-        cases = range(start, min(start + AT_ONCE, len(models)))
+    for start in range(0, len(models), MAX_CASES_PER_CALL):
+        cases = range(start, min(start + MAX_CASES_PER_CALL, len(models)))
         out.insert(cases, _solve_cases(select_models(models, cases), say))
     return out
 
@@ -126,7 +130,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     wide = ~good
     tolerance = first.accuracy.tolerance
     values_by_name = {name: estimate.value for name, estimate in found.estimates.items()}
-    decisive = [found.estimates[name] for name in POSITIVE]
+    decisive = [found.estimates[name] for name in POSITIVE_MESH_MEASURES]
     unknown = np.any([estimate.error >= estimate.value for estimate in decisive], axis=0)
     floors = {
         name: np.broadcast_to(least, good.shape)
@@ -142,7 +146,9 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
             columns[name][:] = np.where(good, given, np.nan)
         wide = wide | (
             estimate.error
-            > np.maximum(compute_allowed_error(tolerance, estimate.value, floors[name]), TINY)
+            > np.maximum(
+                compute_allowed_error(tolerance, estimate.value, floors[name]), MIN_ALLOWED_ERROR
+            )
         )
     out.outcome[good] = str(Outcome.DONE)
     out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)

@@ -17,7 +17,7 @@ from ...model.source import locate_errors
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as patch_result
 from ..results.result import shorten_file_names
-from ..results.travel import outcome_on_piece, warn_of_large_slide
+from ..results.travel import judge_outcome_on_piece, warn_of_large_slide
 from ..rig.engines import describe_unused_settings
 from ..rig.motion_warnings import law_warnings
 from ..rig.numerics import choose_numerics
@@ -70,7 +70,7 @@ def solve(models: Sequence[Model], batch: PatchBatch, say: Callable | None = Non
     say : callable, optional
         Callback for a line of text.
     """
-    return patches.pressed_first(
+    return patches.press_and_solve(
         models, batch.cases_per_call, lambda part: _solve_cases(part, batch, say)
     )
 
@@ -92,7 +92,7 @@ def _solve_cases(models: list, batch: PatchBatch, say: Callable | None) -> CaseR
         )
         part.seconds[:] = (perf_counter() - begin) / len(models)
         results.insert(cases, part)
-    one_by_one.solve_rest(results, models, runs_singly, say)
+    one_by_one.solve_singly(results, models, runs_singly, say)
     return results
 
 
@@ -150,7 +150,9 @@ def add_patch_results(
     """
     slides = np.array([slide])
     motion = results.known_measures(case)
-    outcome = outcome_on_piece(Outcome(results.outcome[case]), model.patch, pressed.patch, slides)
+    outcome = judge_outcome_on_piece(
+        Outcome(results.outcome[case]), model.patch, pressed.patch, slides
+    )
     results.outcome[case] = str(outcome)
     results.fill(case, pressed.measures)
     drift = {name: motion[name] for name in ("drift_per_cycle",) if name in motion}

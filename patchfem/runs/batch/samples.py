@@ -82,7 +82,7 @@ class Samples:
         """
         first, third = (self.harmonic(number) for number in (1, 3))
         out = {
-            "absolute_acceleration_peak": peaks(np.abs(self.acceleration()))[0],
+            "absolute_acceleration_peak": find_peaks(np.abs(self.acceleration()))[0],
             "friction_force_peak": np.abs(self.found.force).max(axis=0),
             "normal_load": load,
             "drift_per_cycle": self.drift(),
@@ -340,7 +340,7 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
     return np.array([best, np.where(ends, np.nan, pull)])
 
 
-def peaks(size) -> tuple:
+def find_peaks(size) -> tuple:
     """Return the peaks (n,) of samples (s, n), and by how much they may be too small.
 
     The method is that of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.

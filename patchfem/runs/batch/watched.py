@@ -25,7 +25,7 @@ from ..rig.numerics import choose_numerics
 from ..rig.steady import balance as rig_balance
 from ..rig.steady import maps
 
-SAMPLES = 400  # number of samples of a cycle of a motion without friction
+SAMPLES_PER_CYCLE = 400  # number of samples of a cycle of a motion without friction
 UNBOUNDED_OUTCOMES = (
     Outcome.GROWS,
     Outcome.NOT_CONVERGED,
@@ -131,7 +131,7 @@ class MotionObserver:
         if any(k == 1 for k, *_ in found.free):
             return None
         z = found.inverse[1] @ (1j * drive.acceleration * modes.base)
-        time = np.linspace(0.0, drive.period, SAMPLES + 1)
+        time = np.linspace(0.0, drive.period, SAMPLES_PER_CYCLE + 1)
         turn = np.exp(1j * omega * time)
         modal, rate = (np.outer(turn, z * factor).real for factor in (1.0, 1j * omega))
         push = drive.values(time)
@@ -203,7 +203,7 @@ class MotionObserver:
         one = self._get_or_make(
             "events", lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.say)
         )
-        return _last_cycles(one.point(drive)[0])
+        return _observe_solution(one.point(drive)[0])
 
     def _run(self, drive, near) -> ObservedMotion | None:
         """Compute the last cycles of the motion by a run from rest."""
@@ -211,7 +211,7 @@ class MotionObserver:
         # histories from before the evaluated window are not needed
         few = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
-            return _last_cycles(solve.solve(model, few, self.patch, 0, self.say))
+            return _observe_solution(solve.solve(model, few, self.patch, 0, self.say))
 
         contact, done, *_ = march.march_model(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED_OUTCOMES:
@@ -220,7 +220,7 @@ class MotionObserver:
         return _observe(done.window, values)
 
 
-def _last_cycles(raw) -> ObservedMotion | None:
+def _observe_solution(raw) -> ObservedMotion | None:
     """Convert a Solution to an ObservedMotion; None for an unbounded motion."""
     return None if raw.outcome in UNBOUNDED_OUTCOMES else _observe(raw.window, raw.values)
 

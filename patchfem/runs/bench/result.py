@@ -14,24 +14,24 @@ from ...response.errors import add_errors
 from ...response.outcome import OPEN_LOOP
 from ...response.rows import set_final_floors
 from ..results.notes import (
-    climbing_as_one,
-    growth_notes,
+    note_on_groove_slope,
+    note_on_growth,
     note_on_heating,
-    unbounded_bonds,
+    warn_of_unbounded_bonds,
     warn_of_unformed_bonds,
-    work_check_warning,
+    warn_of_work_check,
 )
 from ..results.result import (
-    FRAMES,
+    N_FRAMES,
     Result,
     has_known_mesh_error,
-    interface_frames,
+    make_interface_frames,
     remove_unknown_errors,
 )
 from ..results.travel import (
     MAX_SLIDE_FRACTION,
-    largest_slide,
-    outcome_on_piece,
+    find_largest_slide,
+    judge_outcome_on_piece,
     warn_of_large_slide,
 )
 from . import bench, shear
@@ -62,7 +62,7 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     """
     model = plan.model
     steps = steps_per_cycle(model)
-    frames = FRAMES if patch is not None else 0
+    frames = N_FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
     seconds["bench"] = fine.seconds
     coarse_passes = PassErrors([], 0.0, None)
@@ -76,13 +76,13 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
         *_law_warnings(model),
         *_warn_of_created_energy(model, fine),
         *note_on_heating(model, patch, fine),
-        *work_check_warning(measures, steps),
+        *warn_of_work_check(measures, steps),
         *_warn_if_open(model, patch, fine, steps),
     ]
     fields = {}
     if patch is not None:
         warnings += _warn_of_overhang(model.patch, patch, fine)
-        fields = interface_frames(
+        fields = make_interface_frames(
             patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames]
         )
     measures = remove_unknown_errors(
@@ -91,14 +91,14 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     extra = {
         "engine": fine.engine.name,
         "steps": steps,
-        "notes": [*_growth_notes(model, fine), *climbing_as_one(model, patch)],
+        "notes": [*_growth_notes(model, fine), *note_on_groove_slope(model, patch)],
         "left_open": coarse_passes.open_kinds,
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count
     return Result(
         plan,
-        outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
+        judge_outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
         set_final_floors(measures, model.accuracy.tolerance),
         fine,
         fine,
@@ -115,7 +115,7 @@ def _law_warnings(model) -> list:
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     warnings = [
-        *unbounded_bonds(model.bonds),
+        *warn_of_unbounded_bonds(model.bonds),
         *warn_of_unformed_bonds(model.bonds, model.speed_scale),
     ]
     if model.friction.reading == "report" and model.load_varies:
@@ -148,7 +148,7 @@ def _growth_notes(model, fine) -> list:
     peak = None
     if friction.static > 0 and not model.load_varies:
         peak = fine.values["friction_ratio_peak"] / friction.static
-    return growth_notes(model.bonds, peak)
+    return note_on_growth(model.bonds, peak)
 
 
 def _loop_closing_error(fine) -> float:
@@ -211,7 +211,7 @@ def _warn_of_overhang(patch_model, patch, fine) -> list:
     warnings = []
     lateral = 0.0
     if fine.lateral is not None:
-        lateral = largest_slide(fine.lateral) / patch_model.pieces.width
+        lateral = find_largest_slide(fine.lateral) / patch_model.pieces.width
     if lateral > MAX_SLIDE_FRACTION:
         warnings.append(
             f"the slide across the sliding direction is {lateral:.2g} of the width of the pieces, but the "

@@ -16,7 +16,7 @@ from ...friction import record
 from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
-from ..results.result import at_rest, interface_frames, patch_surface
+from ..results.result import collect_rest_frame, make_interface_frames, patch_surface
 from . import jenkins_elements, result, store
 from .press import Patch
 from .values import values
@@ -161,7 +161,7 @@ def faces_with_frames(model, snapshots) -> tuple:
     out = []
     for face in press_faces(model):
         interface = model.rig.friction.interfaces[face.number]
-        fields = at_rest(face.patch)
+        fields = collect_rest_frame(face.patch)
         jenkins_set = (
             make_elements(interface, model.accuracy.tolerance)[2] if face.partial_slip else None
         )
@@ -171,7 +171,7 @@ def faces_with_frames(model, snapshots) -> tuple:
                 record.make_law(interface.numbers, interface.load).element(interface.load).length
             )
             tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
-            fields = interface_frames(
+            fields = make_interface_frames(
                 face.patch,
                 np.array([shot["time"] for shot in snapshots]),
                 tau,

@@ -18,7 +18,7 @@ from ...formatting import format_length
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
-from ..results.patch_rows import DECISIVE, TABLE
+from ..results.patch_rows import MESH_MEASURES, TABLE
 from .condensed import pair_on_same_meshes
 from .limits import extrapolate
 from .press import Patch, press_patch
@@ -69,7 +69,7 @@ class Estimate(NamedTuple):
         With floor None, the floor of the table applies.
         """
         row = TABLE[name]
-        engine = patch_rows.ON_FINEST_MESH
+        engine = patch_rows.FINEST_MESH_SOURCE
         if self.is_extrapolated:
             engine = patch_rows.EXTRAPOLATED_SOURCE
         return Measure(
@@ -118,7 +118,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     for name, found in ({} if fine.points is None else fine.points.measures).items():
         if found.error < out[name].error:
             out[name] = replace(
-                out[name], value=found.value, error=found.error, engine=patch_rows.ON_POINTS
+                out[name], value=found.value, error=found.error, engine=patch_rows.HALF_SPACE_SOURCE
             )
     reason = _reason_for_unbounded_pressure(fine)
     for name in PEAK_MEASURES if reason else ():
@@ -257,7 +257,7 @@ def max_error_ratio(measures_by_name: dict, tolerance: float) -> float:
 
     Above 1, a measure misses the tolerance. A missing value or error counts as 0.
     """
-    return max(measures_by_name[name].error_ratio(tolerance) for name in DECISIVE)
+    return max(measures_by_name[name].error_ratio(tolerance) for name in MESH_MEASURES)
 
 
 def _reason_for_unbounded_pressure(patch: Patch) -> str:

@@ -17,7 +17,7 @@ from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
 from ..results.patch_rows import TABLE
-from ..results.result import Result, RunInputs, at_rest
+from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .ladder import solve_all, solve_static_ladder
 from .measures import add_strip_errors, measures, plane_state_sentences
@@ -154,7 +154,7 @@ def static(inputs: RunInputs) -> Result:
         response=None,
         window=None,
         patch=patch,
-        fields=at_rest(patch),
+        fields=collect_rest_frame(patch),
         seconds=inputs.seconds,
         warnings=warnings,
         extra=extra,

@@ -18,13 +18,15 @@ MAX_FORMING_RATIO = 0.3  # slip while a bond forms over the bond length, above w
 MIN_EXCESS_RATIO = (
     1e-3  # excess of the friction force over mu_s N, relative to it, above which a run notes it
 )
-FARTHEST = 8  # largest number of halvings of the steps that a warning proposes
+MAX_PROPOSED_HALVINGS = 8  # largest number of halvings of the steps that a warning proposes
 HARMONICS_FACTOR = 4  # ratio of proposed to present harmonics of a balance
-MIN_HARMONICS = 31  # smallest number of harmonics that is proposed
-MOST_HARMONICS = 500  # largest number of harmonics that is proposed for a sharp friction law
+MIN_PROPOSED_HARMONICS = 31  # smallest number of harmonics that is proposed
+MAX_PROPOSED_HARMONICS = (
+    500  # largest number of harmonics that is proposed for a sharp friction law
+)
 
 
-def climbing_as_one(model, patch) -> list:
+def note_on_groove_slope(model, patch) -> list:
     """Return the note on the slope of grooves under pieces that are compliant in shear.
 
     The note says how far a point may be from the position at which the slope is taken.
@@ -62,7 +64,7 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
         work = float(np.trapezoid(response.force, response.slide))
         if response.lateral is not None:
             work += float(np.trapezoid(response.lateral_force, response.lateral))
-    return heating_sentences(model, patch, work, float(response.time[-1]))
+    return describe_heating(model, patch, work, float(response.time[-1]))
 
 
 def warn_of_unformed_bonds(law, speed: float) -> list:
@@ -107,7 +109,7 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
     ]
 
 
-def unbounded_bonds(law) -> list:
+def warn_of_unbounded_bonds(law) -> list:
     """Return a warning if initial bonds of negative order have an infinite traction.
 
     Their traction is infinite at the first instant. Bonds that form later are bounded: theirs is at
@@ -121,7 +123,7 @@ def unbounded_bonds(law) -> list:
     ]
 
 
-def growth_notes(law, peak: float | None) -> list:
+def note_on_growth(law, peak: float | None) -> list:
     """Return the notes on the effects of growing bonds.
 
     peak: largest friction force of the run over mu_s N [1]; None if the load changes.
@@ -151,7 +153,7 @@ def growth_notes(law, peak: float | None) -> list:
     return notes
 
 
-def work_check_warning(values: dict, steps: int | None, harmonics: int | None = None) -> list:
+def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
     """Return a warning if the friction work from samples and from energies differs.
 
     The trapezoidal rule for the samples is of second order; a difference that is smaller than its error
@@ -172,8 +174,8 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     # only on average
     halvings = 1 + ceil(log2(ratio) / 2)
     if harmonics:
-        remedy = more_harmonics(harmonics)
-    elif steps and halvings > FARTHEST:
+        remedy = propose_harmonics(harmonics)
+    elif steps and halvings > MAX_PROPOSED_HALVINGS:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
     elif steps:
         remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}"
@@ -185,16 +187,18 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     ]
 
 
-def more_harmonics(n_harmonics: int, sharp: float = 0.0) -> str:
-    """Return the advice to use more harmonics.
+def propose_harmonics(n_harmonics: int, sharp: float = 0.0) -> str:
+    """Return the advice to use more harmonics in the harmonic balance.
 
-    A balance with few harmonics says little about its convergence, so that at least MIN_HARMONICS are
+    A balance with few harmonics says little about its convergence, so that at least MIN_PROPOSED_HARMONICS are
     proposed. sharp: number of harmonics that the friction law itself needs.
     """
-    return f"set accuracy.harmonics = {max(HARMONICS_FACTOR * n_harmonics, MIN_HARMONICS, min(ceil(sharp), MOST_HARMONICS))}"
+    n_needed = min(ceil(sharp), MAX_PROPOSED_HARMONICS)
+    n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
+    return f"set accuracy.harmonics = {n_proposed}"
 
 
-def heating_sentences(model, patch, work: float, duration: float) -> list:
+def describe_heating(model, patch, work: float, duration: float) -> list:
     """Return the note on the rise of the surface temperature by friction.
 
     The list is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one
@@ -225,7 +229,7 @@ def heating_sentences(model, patch, work: float, duration: float) -> list:
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):
         return []
-    period = _cycle(model)
+    period = _motion_period(model)
     flux = work / duration / area
     stuff = (known.conductivity, known.heat_capacity * kind.density)
     rises = [
@@ -242,7 +246,7 @@ def heating_sentences(model, patch, work: float, duration: float) -> list:
     ]
 
 
-def _cycle(model) -> float | None:
+def _motion_period(model) -> float | None:
     """Return the period [s] of the prescribed motion, or None if it does not repeat."""
     if model.rig is not None:
         return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None

@@ -165,13 +165,13 @@ ROWS = (
     ),
 )
 # The following texts name the method that computed a static measure, in `numerics.measures` of summary.json.
-ON_FINEST_MESH = "finite elements, finest mesh"
+FINEST_MESH_SOURCE = "finite elements, finest mesh"
 # The extrapolated value may be that of a coarser mesh, if its error is smaller.
 EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
-ON_POINTS = "points on layered half-spaces"
+HALF_SPACE_SOURCE = "points on layered half-spaces"
 WORN_SOURCE = "wear in jumps of cycles"
 # names of the measures whose errors choose the mesh of a patch
-DECISIVE = (
+MESH_MEASURES = (
     "pressure_peak",
     "contact_fraction",
     "approach",
@@ -180,7 +180,7 @@ DECISIVE = (
     "tangential_stiffness",
 )
 TABLE = {row.name: row for row in ROWS}
-POSITIVE = tuple(name for name in DECISIVE if TABLE[name].minimum == 0.0)
+POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if TABLE[name].minimum == 0.0)
 
 
 def minimum_value(name: str) -> float:
@@ -192,10 +192,10 @@ def minimum_value(name: str) -> float:
     return -inf if row is None else row.minimum
 
 
-def unknown_measures(measures: dict) -> list:
+def find_unknown_measures(measures: dict) -> list:
     """Return the positive measures that choose the mesh and are not known, by their errors."""
     names = []
-    for name in POSITIVE:
+    for name in POSITIVE_MESH_MEASURES:
         measure = measures.get(name)
         if measure is not None and measure.value is not None and measure.error:
             if measure.error >= measure.value:

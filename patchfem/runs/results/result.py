@@ -16,8 +16,8 @@ from ...formatting import rewrite_powers_of_ten
 from ...response import rows
 from . import patch_rows
 
-FRAMES = 16  # number of frames of the interface fields in the last cycle
-COUNTS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
+N_FRAMES = 16  # number of frames of the interface fields in the last cycle
+COUNT_SETTINGS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 _FOLDER_OF_PATH = re.compile(
     r"/[^:]*/(?=[^/:]+: )"
 )  # pattern of the folder of an absolute path at the start of a remark
@@ -86,15 +86,15 @@ def _count_words(count: int, word: str) -> str:
     return f"{count or 'no'} {word}{'s' * (count != 1)}"
 
 
-def with_meanings(measures: dict, apart: str) -> dict:
+def add_meanings(measures: dict, apart: str) -> dict:
     """Return measures with their meanings as texts.
 
     apart: what a number after a name counts, "interface" or "strip".
     """
-    return {name: replace(m, text=meaning(name, apart)) for name, m in measures.items()}
+    return {name: replace(m, text=describe_measure(name, apart)) for name, m in measures.items()}
 
 
-def meaning(name: str, apart: str = "interface") -> str:
+def describe_measure(name: str, apart: str = "interface") -> str:
     """Return the meaning of a measure in one sentence without full stop.
 
     slip_amplitude_2 is the measure of the second interface, or of what `apart` names.
@@ -107,7 +107,7 @@ def meaning(name: str, apart: str = "interface") -> str:
     return row.text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
 
 
-def at_rest(patch) -> dict:
+def collect_rest_frame(patch) -> dict:
     """Return the fields of a pressed patch without motion, (1, n) each.
 
     The fields are normal_stress [Pa], gap [m] and status of the finest solution, on the points of its
@@ -129,7 +129,7 @@ def _pressed_frame(surface) -> dict:
 def patch_surface(patch, fields: dict):
     """Return the surface on whose points the fields of a pressed patch are given.
 
-    After a motion the points are the nodes of the mesh, otherwise those of `at_rest`. The result is None
+    After a motion the points are the nodes of the mesh, otherwise those of `collect_rest_frame`. The result is None
     without a patch.
     """
     if patch is None:
@@ -137,7 +137,7 @@ def patch_surface(patch, fields: dict):
     return patch.surface if "shear_stress" in fields else patch.finest_surface
 
 
-def interface_frames(patch, time, tau, local, slide) -> dict:
+def make_interface_frames(patch, time, tau, local, slide) -> dict:
     """Return the fields of the interface, frame by frame, from tractions and slips.
 
     Parameters
@@ -203,7 +203,7 @@ def remove_unknown_errors(found: dict, estimate: bool) -> dict:
     return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
 
 
-def choices(result) -> dict:
+def collect_used_settings(result) -> dict:
     """Return the numerical settings that a run used.
 
     Settings that the run did not use are left out. The others are engine, steps per cycle or those that a
@@ -221,7 +221,7 @@ def choices(result) -> dict:
     steps = extra.get("steps")
     if steps is not None:
         settings["steps_per_cycle"] = int(steps)
-    settings |= {name: int(extra[name]) for name in COUNTS if extra.get(name) is not None}
+    settings |= {name: int(extra[name]) for name in COUNT_SETTINGS if extra.get(name) is not None}
     if (local := extra.get("step_tolerance")) is not None:
         settings |= {"step_tolerance": float(local), "steps": int(extra["steps_taken"])}
     if (summed := extra.get("quadrature")) is not None:

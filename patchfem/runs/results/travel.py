@@ -14,7 +14,7 @@ MAX_SLIDE_FRACTION = (
 )
 
 
-def largest_slide(slide) -> float:
+def find_largest_slide(slide) -> float:
     """Return the largest |slide| [m] of samples (k,) [m]; inf if the motion overflowed."""
     largest = float(np.abs(slide).max(initial=0.0))
     return largest if np.isfinite(largest) else np.inf
@@ -32,7 +32,7 @@ def contact_length(patch) -> float:
 
 def warn_of_large_slide(patch, slide) -> list:
     """Return a warning if the slide (k,) [m] exceeds a fraction of the contact length."""
-    largest = largest_slide(slide)
+    largest = find_largest_slide(slide)
     contact = contact_length(patch)
     if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:
         return []
@@ -45,7 +45,7 @@ def warn_of_large_slide(patch, slide) -> list:
     ]
 
 
-def outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
+def judge_outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
     """Return the outcome of a run, or LEAVES_CONTACT if the slide exceeded the piece.
 
     See `response.outcome.check_piece_length`.
@@ -65,7 +65,7 @@ def outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
         return outcome
     pieces = patch_model.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
-    outcome = check_piece_length(outcome, largest_slide(slide), mean_length)
+    outcome = check_piece_length(outcome, find_largest_slide(slide), mean_length)
     if lateral is None:
         return outcome
-    return check_piece_length(outcome, largest_slide(lateral), pieces.width)
+    return check_piece_length(outcome, find_largest_slide(lateral), pieces.width)

@@ -12,7 +12,7 @@ from ...friction import record
 from ...slip import fields
 from ..bench import averaged
 from ..bench import shear as bench_shear
-from ..results.result import FRAMES, at_rest, interface_frames
+from ..results.result import N_FRAMES, collect_rest_frame, make_interface_frames
 
 
 def collect_frames(model, numerics, patch, raw) -> dict:
@@ -29,7 +29,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     f = model.friction
     # strips that slide independently have no common shear stress
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
-        return at_rest(patch)
+        return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_frames(patch, raw)
     if not raw.snapshots:
@@ -37,7 +37,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
             np.linspace(
                 max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
                 len(raw.window.time) - 1,
-                FRAMES,
+                N_FRAMES,
             )
             .round()
             .astype(int)
@@ -46,14 +46,14 @@ def collect_frames(model, numerics, patch, raw) -> dict:
         if f is not None and law_has_trait(f.law, "averaged"):
             tau = averaged.limit_tractions(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
-        return interface_frames(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
+        return make_interface_frames(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
 
     shots = raw.snapshots
     if model.partial_slip and model.grooves is not None:
         tau, local = bench_shear.groove_fields(
             patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
         )
-        return interface_frames(
+        return make_interface_frames(
             patch,
             np.array([s["time"] for s in shots]),
             tau,
@@ -73,7 +73,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
-    return interface_frames(patch, time, tau, local, np.array([s["slide"] for s in shots]))
+    return make_interface_frames(patch, time, tau, local, np.array([s["slide"] for s in shots]))
 
 
 def _collect_varying_load_frames(patch, raw) -> dict:

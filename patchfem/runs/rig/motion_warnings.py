@@ -12,13 +12,13 @@ from ...response.outcome import changing_note, warn_if_ringing
 from ...structure.drive_sizes import find_min_decay_rate
 from ..patch import faces
 from ..results.notes import (
-    climbing_as_one,
-    growth_notes,
+    note_on_groove_slope,
+    note_on_growth,
     note_on_heating,
-    unbounded_bonds,
     warn_of_creep,
+    warn_of_unbounded_bonds,
     warn_of_unformed_bonds,
-    work_check_warning,
+    warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
 from . import pieces, strips
@@ -72,7 +72,7 @@ def collect_warnings(run) -> list:
             model, solution.contact.shear.stiffness.size, solution.contact.shear.points.size
         )
     warnings += [
-        *work_check_warning(measures, steps, harmonics),
+        *warn_of_work_check(measures, steps, harmonics),
         *changing_note(run.outcome, run.drive),
         *solution.notes,
     ]
@@ -182,7 +182,10 @@ def collect_notes(run) -> list:
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
             *ended,
         ]
-    notes = [*_note_on_bond_growth(model, run.patch, solution), *climbing_as_one(model, run.patch)]
+    notes = [
+        *_note_on_bond_growth(model, run.patch, solution),
+        *note_on_groove_slope(model, run.patch),
+    ]
     f = model.friction
     if len(rig.friction.interfaces):
         notes += _note_on_elements(run)
@@ -272,7 +275,7 @@ def _note_on_bond_growth(model, patch, solution) -> list:
         return []
     limit = f.static * normal_load(model, patch)
     steady = limit > 0 and not model.rig.friction.load_varies
-    return growth_notes(
+    return note_on_growth(
         model.bonds, float(np.abs(solution.response.force).max()) / limit if steady else None
     )
 
@@ -335,7 +338,7 @@ def law_warnings(model, outcome, measures, peak: float) -> list:
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     return [
-        *unbounded_bonds(model.bonds),
+        *warn_of_unbounded_bonds(model.bonds),
         *warn_of_unformed_bonds(model.bonds, peak),
         *warn_of_creep(model.bonds, outcome, measures),
     ]

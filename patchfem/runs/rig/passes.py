@@ -17,7 +17,7 @@ from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
 from ..results.result import RunInputs, has_known_mesh_error
-from ..results.travel import outcome_on_piece
+from ..results.travel import judge_outcome_on_piece
 from . import decays, flutter, levels, motion_warnings
 from .engines import ENGINES, describe_balance_error
 from .numerics import Numerics
@@ -216,10 +216,12 @@ def judge_outcome_on_pieces(run: CoupledRun) -> Outcome:
     """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
     model = run.model
     response = run.solution.response
-    outcome = outcome_on_piece(run.outcome, model.patch, run.patch, response.slide)
+    outcome = judge_outcome_on_piece(run.outcome, model.patch, run.patch, response.slide)
     if model.has_interface_patches:
         for face in faces.press_faces(model):
-            outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(response))
+            outcome = judge_outcome_on_piece(
+                outcome, face.model.patch, face.patch, face.slide(response)
+            )
     return outcome
 
 

@@ -12,7 +12,7 @@ from ...core import NotConverged
 from ...response.coarser import estimate_errors
 from ...response.rows import NEEDS_RUN
 from ..patch import faces
-from ..results.result import FRAMES, RunInputs
+from ..results.result import N_FRAMES, RunInputs
 from . import motion_warnings
 from .engines import ENGINES
 from .numerics import Numerics
@@ -65,7 +65,7 @@ class Runner:
             say = self.inputs.say
             has_fields = self.inputs.patch is not None and not model.patch.mesh.can_gather_points
             if has_fields or model.rig.friction.has_partial_slip:
-                frames = FRAMES
+                frames = N_FRAMES
         patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
         report = self.progress.make_callback(numerics.steps)
         solution = solve(model, numerics, patch, frames, say, report)

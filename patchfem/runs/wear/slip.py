@@ -14,7 +14,7 @@ from ..bench import bench
 from ..bench.closed import integrate_steps
 from ..bench.engine import steps_per_cycle
 from ..patch.press import areas
-from ..results.travel import outcome_on_piece
+from ..results.travel import judge_outcome_on_piece
 from ..rig import fields, numerics, solve
 
 UNBOUNDED_OUTCOMES = (
@@ -113,7 +113,7 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
     run = bench.run(model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles)
-    outcome = outcome_on_piece(None, model.patch, patch, run.slide)
+    outcome = judge_outcome_on_piece(None, model.patch, patch, run.slide)
     if is_uniform:
         cycle = _last_bench_cycle(run)
         slip = _uniform_slip(model, patch, cycle, cycle.load[0])
@@ -148,7 +148,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
         model.accuracy.tolerance,
         model.rig.drive.signal,
     )
-    outcome = outcome_on_piece(
+    outcome = judge_outcome_on_piece(
         outcome if outcome in UNBOUNDED_OUTCOMES else None,
         model.patch,
         patch,

@@ -206,7 +206,7 @@ def numbers_of_contact(model) -> tuple:
 
 def stretch_law(model) -> list:
     """Numbers of a law whose force follows from one stretch."""
-    law = lane_numbers.law_numbers(model)
+    law = lane_numbers.collect_law_numbers(model)
     return [*law.numbers, law.length]
 
 
@@ -226,7 +226,7 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
         for row in (numbers_of_rig, numbers_of_contact, *([stretch_law] if smooth else [])):
             np.testing.assert_array_equal(collect_columns(alike, row), collect_columns(single, row))
-        for mine, theirs in zip(columns.collect_sizes(alike), columns.collect_sizes(single)):
+        for mine, theirs in zip(columns.collect_scales(alike), columns.collect_scales(single)):
             np.testing.assert_array_equal(mine, theirs)
         few = collect_columns(alike.select([4, 2]), numbers_of_contact)
         np.testing.assert_array_equal(few, collect_columns(single, numbers_of_contact)[:, [4, 2]])

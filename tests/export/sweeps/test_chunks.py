@@ -222,7 +222,7 @@ def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monk
     assert 7 <= len(list((out / "chunks").iterdir())) <= 14
     total = CaseResults.blank(11, tmp_path)
     total.measure("loop_area", "J")
-    assert isinstance(total.values["loop_area"], kept.OnDisk)
+    assert isinstance(total.values["loop_area"], kept.ArrayOnDisk)
     total.values["loop_area"][[3, 5]] = 1.5, 2.5
     assert (
         total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5]

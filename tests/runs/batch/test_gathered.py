@@ -98,9 +98,9 @@ def test_a_table_of_measured_responses_keeps_no_batch_away_unless_it_cannot_be_r
     table = tmp_path / "rows.csv"
     table.write_text("frequency [Hz],input [g],displacement [mil],flag\n143,5,0.4,\n")
     beside = pf.build(SCENE + f'[measured]\nfile = "{table}"\n')
-    assert gathered.no_lanes(beside) == ""
+    assert gathered.why_no_lanes(beside) == ""
     lost = replace(beside, measured=beside.measured._replace(path=tmp_path / "none.csv"))
-    assert "table of measured responses cannot be read" in gathered.no_lanes(lost)
+    assert "table of measured responses cannot be read" in gathered.why_no_lanes(lost)
     found = batches.solve_models([lost], study=32)
     assert "none.csv" in found.messages[0]
 

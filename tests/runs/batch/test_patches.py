@@ -131,7 +131,7 @@ def test_exact_cases_of_every_kind_beside_each_other():
 def test_exact_patches_solved_together_are_those_of_their_own(tables):
     """What moves a patch takes of it: pressure, gap, compliance, and the rest that the pressed patch carries."""
     models = family(tables, -1e-4, 1e-5, 3e-4)
-    for model, other in zip(models, patches.solved_together(models)):
+    for model, other in zip(models, patches.press_together(models)):
         assert model.patch.solved is None and other.patch.solved is not None
         for mine, own in zip(other.patch.solved.patches, solve_all(model.patch, 1e-2)):
             top = own.pressure.sigma_n.max()

@@ -54,7 +54,7 @@ MAIN_MEASURE = "relative_displacement_amplitude"
 PHASE_MEASURE = "slip_start_phase"
 
 
-class Sizes(NamedTuple):
+class CaseScales(NamedTuple):
     """Scales of n models for their errors and outcomes, (n,) each.
 
     - tolerance: relative tolerance [1].
@@ -71,9 +71,9 @@ class Sizes(NamedTuple):
     decay: np.ndarray
 
 
-def collect_sizes(models) -> Sizes:
+def collect_scales(models) -> CaseScales:
     """Return the scales of models as columns."""
-    return Sizes(
+    return CaseScales(
         *collect_columns(
             models,
             lambda model: (
@@ -133,7 +133,7 @@ class Runs:
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
-class Assembled(NamedTuple):
+class AssembledRuns(NamedTuple):
     """Case results of n runs, with the cases that need another run.
 
     - results: CaseResults.
@@ -149,7 +149,7 @@ class Assembled(NamedTuple):
 
 def assemble_results(
     models, runs: Runs, numerics: dict, is_repeated: Callable | None = None
-) -> Assembled:
+) -> AssembledRuns:
     """Evaluate the runs of models as case results.
 
     Parameters
@@ -157,13 +157,13 @@ def assemble_results(
     models : sequence of Model
     runs : Runs
     numerics : dict
-        Settings as in `results.result.choices`.
+        Settings as in `results.result.collect_used_settings`.
     is_repeated : callable, optional
         Function of the results that returns which cases (n,) are computed again; these have no
         warnings of large errors.
     """
     n = len(models)
-    sizes = collect_sizes(models)
+    sizes = collect_scales(models)
     values, errors = _values_and_errors(runs)
     outcomes, steady, steady_error = _judge_outcomes(
         sizes,
@@ -213,9 +213,9 @@ def assemble_results(
         results.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
     if is_repeated is not None:
         is_wide &= ~is_repeated(results)
-    rings = _rings(sizes, runs, outcomes, values[MAIN_MEASURE])
+    rings = _warn_of_ringing(sizes, runs, outcomes, values[MAIN_MEASURE])
     _insert_warnings(models, results, outcomes, is_wide, rings)
-    return Assembled(results, runs_singly, is_resolved)
+    return AssembledRuns(results, runs_singly, is_resolved)
 
 
 def _values_and_errors(runs: Runs) -> tuple[dict, dict]:
@@ -232,7 +232,7 @@ def _values_and_errors(runs: Runs) -> tuple[dict, dict]:
     return values, errors
 
 
-def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Sizes) -> tuple:
+def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: CaseScales) -> tuple:
     """Insert measures with their errors in case results.
 
     Returns which cases (n,) have all errors, except that of the steady estimate, within the tolerance,
@@ -316,7 +316,7 @@ class _SteadyOutcomes(NamedTuple):
     error: np.ndarray
 
 
-def _judge_outcomes(sizes: Sizes, runs: Runs, drifts) -> _SteadyOutcomes:
+def _judge_outcomes(sizes: CaseScales, runs: Runs, drifts) -> _SteadyOutcomes:
     """Judge the outcomes of runs, and estimate their steady amplitudes.
 
     drifts: which motions (n,) have a midpoint that drifts, so that they are not steady.
@@ -352,7 +352,7 @@ def _judge_outcomes(sizes: Sizes, runs: Runs, drifts) -> _SteadyOutcomes:
     return _SteadyOutcomes(outcomes, *steady)
 
 
-def _rings(sizes: Sizes, runs: Runs, outcomes: list, amplitude) -> dict:
+def _warn_of_ringing(sizes: CaseScales, runs: Runs, outcomes: list, amplitude) -> dict:
     """Return the warnings on cases that stick but still vibrate."""
     n = len(amplitude)
     floor = np.broadcast_to(error_floor(MAIN_MEASURE, sizes.displacement), n)
@@ -391,7 +391,7 @@ def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
         )
 
 
-def _insert_reasons(models, sizes: Sizes, runs: Runs, results: CaseResults) -> None:
+def _insert_reasons(models, sizes: CaseScales, runs: Runs, results: CaseResults) -> None:
     """Insert the reasons why measures of cases lack a value in case results."""
     names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:

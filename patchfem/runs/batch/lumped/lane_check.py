@@ -17,7 +17,7 @@ from ....model.model import Model
 from ....model.similar_models import select_models
 from ..case_results import CaseResults
 from .columns import PHASE_MEASURE
-from .lane_numbers import LaneCases, lane_kind, select_rows
+from .lane_numbers import LaneCases, find_lane_law, select_rows
 from .lane_refinement import march_side_by_side
 from .lane_steps import STRETCH_STEPS
 
@@ -63,7 +63,7 @@ def solve_and_check(
         Function (indices, is_check) that returns the exact results of some cases.
     """
     begin = perf_counter()
-    law = lane_kind(models[0])
+    law = find_lane_law(models[0])
     results, is_exact, steps, reach = march_side_by_side(models, cases, steps)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     numbers = np.column_stack(cases.cases)

@@ -17,7 +17,7 @@ from ....model.similar_models import collect_columns
 from ....structure.drive_sizes import find_max_acceleration
 
 # name of the friction law in `dynamics.lanes`, by the law of the scene
-KINDS = {
+LANE_LAWS = {
     "coulomb": "rigid",
     "elastic-plastic": "yielding",
     "iwan": "masing",
@@ -77,9 +77,9 @@ def count_evaluated_cycles(cycles: int) -> int:
     return min(10, cycles // 10)
 
 
-def lane_kind(model: Model) -> str:
+def find_lane_law(model: Model) -> str:
     """Return the friction law of a model in `dynamics.lanes`."""
-    return KINDS[model.friction.law] if model.patch is None else "table"
+    return LANE_LAWS[model.friction.law] if model.patch is None else "table"
 
 
 class StretchLaw(NamedTuple):
@@ -93,7 +93,7 @@ class StretchLaw(NamedTuple):
     length: float
 
 
-def law_numbers(model: Model) -> StretchLaw:
+def collect_law_numbers(model: Model) -> StretchLaw:
     """Return the parameters of a stretch law."""
     friction = model.friction
     load = model.point.load
@@ -131,7 +131,7 @@ class ContactNumbers(NamedTuple):
     others: tuple = ()
 
 
-def contact_of_point(model: Model) -> ContactNumbers:
+def make_point_contact(model: Model) -> ContactNumbers:
     """Return the contact parameters of a model with a single point."""
     friction = model.friction
     static = model.friction_limits(model.point.load)[0]
@@ -143,8 +143,8 @@ def contact_of_point(model: Model) -> ContactNumbers:
         half = np.minimum(1.0, (0.5 / early_slip) ** (1 / (chi + 2)))
         length = max_yield_displacement(static, friction.stiffness, chi, friction.beta)
         return ContactNumbers(friction.stiffness, length, (chi + 1, fraction, half))
-    if march.has_one_stretch(KINDS[friction.law]):
-        law = law_numbers(model)
+    if march.has_one_stretch(LANE_LAWS[friction.law]):
+        law = collect_law_numbers(model)
         stiffness = 0.0 if friction.law == "tanh" else static / law.length
         return ContactNumbers(stiffness, law.length, law.numbers)
     if friction.law == "elastic-plastic":
@@ -160,7 +160,7 @@ def may_create_energy(model: Model):
             friction.initial_bonds, 1.0
         )
     if friction.law == "lugre":  # with more damping, the power of the friction may be negative
-        sliding_force = law_numbers(model).numbers[1]
+        sliding_force = collect_law_numbers(model).numbers[1]
         return np.greater(friction.micro_damping * model.rig.speed_scale, 4 * sliding_force)
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
@@ -168,13 +168,13 @@ def may_create_energy(model: Model):
 def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Scales]:
     """Return the cases of models in units of their drives, and their scales in SI units.
 
-    contacts: numbers (m, n) of the contacts as from `_contact_row`; None: those of single points.
+    contacts: numbers (m, n) of the contacts as from `_collect_contact_numbers`; None: those of single points.
     """
-    rig = _RigNumbers(*collect_columns(models, _rig_row))
+    rig = _RigNumbers(*collect_columns(models, _collect_rig_numbers))
     if contacts is None:
-        contacts = collect_columns(models, _contact_row)
+        contacts = collect_columns(models, _collect_contact_numbers)
     static, kinetic, load, spring, length, *others = contacts
-    law = lane_kind(models[0])
+    law = find_lane_law(models[0])
     omega = rig.drive_omega
     slide = rig.slide
     scale = slide**2 / (rig.mass * omega**2)
@@ -235,7 +235,7 @@ class _RigNumbers(NamedTuple):
     max_acceleration: np.ndarray
 
 
-def _rig_row(model: Model) -> _RigNumbers:
+def _collect_rig_numbers(model: Model) -> _RigNumbers:
     """Return the parameters of the rig of a model."""
     modes = model.rig.modes
     drive = model.rig.drive.signal
@@ -257,13 +257,13 @@ def _rig_row(model: Model) -> _RigNumbers:
     )
 
 
-def _contact_row(model: Model) -> list:
+def _collect_contact_numbers(model: Model) -> list:
     """Return the friction limits, load and contact parameters of a model for `make_cases`.
 
     They are static and kinetic friction [N], load [N], and those of its ContactNumbers.
     """
     static, kinetic = model.friction_limits(model.point.load)
-    if lane_kind(model) != "rigid" or model.friction.kinetic is None:
+    if find_lane_law(model) != "rigid" or model.friction.kinetic is None:
         kinetic = static
-    contact = contact_of_point(model)
+    contact = make_point_contact(model)
     return [static, kinetic, model.point.load, contact.stiffness, contact.length, *contact.others]

@@ -16,7 +16,7 @@ from ....response.rows import larger_term
 from ..case_results import CaseResults
 from . import lane_runs
 from .columns import MAIN_MEASURE, assemble_results
-from .lane_numbers import LaneCases, lane_kind, select_rows
+from .lane_numbers import LaneCases, find_lane_law, select_rows
 from .lane_ringing import RINGING_MEASURES
 from .lane_runs import MeasuredMarch, march_and_measure
 from .lane_settling import SETTLING_LAWS
@@ -72,7 +72,7 @@ class _Refinement:
         self.cases = cases
         self.steps = steps.copy()
         self.min_steps = steps // 2
-        self.law = lane_kind(models[0])
+        self.law = find_lane_law(models[0])
         self.cycles = int(models[0].rig.drive.cycles)
         self.has_one_stretch = march.has_one_stretch(self.law)
         self.results = CaseResults.blank(n)
@@ -214,7 +214,7 @@ def has_large_error(
     for name, values in results.values.items():
         if name in RINGING_MEASURES:  # a fit of the ringing in a single run is no more accurate
             continue
-        if name.endswith("_steady") and lane_kind(models[0]) not in SETTLING_LAWS:
+        if name.endswith("_steady") and find_lane_law(models[0]) not in SETTLING_LAWS:
             # an extrapolation has the same error with finer steps, and with the exact engine
             continue
         mesh_error = (mesh_errors or {}).get(name.removesuffix("_steady"), 0.0)

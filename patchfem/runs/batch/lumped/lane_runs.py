@@ -20,7 +20,7 @@ from ....response.measures import energy_balance
 from ....response.settling import window_amplitude_means
 from ...rig.pieces import evaluate_reading
 from .columns import N_FINAL_WINDOWS, Runs
-from .lane_numbers import Scales, count_evaluated_cycles, lane_kind
+from .lane_numbers import Scales, count_evaluated_cycles, find_lane_law
 from .lane_ringing import find_ringing
 from .lane_settling import SETTLING_LAWS, march_until_settled
 
@@ -146,7 +146,7 @@ def collect_runs(
     mesh_errors : dict
         Errors due to the mesh, (n,) by name.
     """
-    law = lane_kind(models[0])
+    law = find_lane_law(models[0])
     cases, scales = cases
     values = measured.values
     marched = measured.marched

@@ -22,9 +22,9 @@ MIN_TOLERANCE = 1e-4  # smallest tolerance that lanes can meet
 MAX_EXTENSION = 10
 # Lengths of the continued marches over that of the case, after each of which the settling is tested; they
 # begin with short ones, so that cases that settle soon cost little.
-EXTENSIONS = (0.25, 0.25, 0.5, *(MAX_EXTENSION - 1) * (1.0,))
+EXTENSION_FRACTIONS = (0.25, 0.25, 0.5, *(MAX_EXTENSION - 1) * (1.0,))
 SETTLED_TOL = 1e-5  # largest relative change of a steady motion over the cycles of the case [1]
-LATE_FACTOR = 100  # factor on SETTLED_TOL at the end of the march
+LATE_TOL_FACTOR = 100  # factor on SETTLED_TOL at the end of the march
 # Ratio of the error of an extrapolated range to the error that the extrapolation states, and smallest error
 # over the range: 1 of 571 random cases erred more.
 EXTRAPOLATION_ERROR_FACTOR = 2.5
@@ -69,7 +69,7 @@ def march_until_settled(law: str, cases, measured, amplitudes, is_free) -> Settl
     open_cases = np.flatnonzero(is_free)
     motion = marched.motion[is_free]
     history = marched.history[open_cases]
-    for fraction in EXTENSIONS:
+    for fraction in EXTENSION_FRACTIONS:
         if not open_cases.size:
             break
         before = motion
@@ -79,10 +79,10 @@ def march_until_settled(law: str, cases, measured, amplitudes, is_free) -> Settl
         history = np.concatenate([history, more], axis=1)
         is_late = history.shape[1] > MAX_EXTENSION * cycles
         free_motion = _bound_free_motion(some_cases, before, motion, more.shape[1])
-        tolerance = (LATE_FACTOR if is_late else 1) * SETTLED_TOL
+        tolerance = (LATE_TOL_FACTOR if is_late else 1) * SETTLED_TOL
         value, error = _steady_half_range(history, cycles, free_motion, tolerance)
         ranges = np.ptp(history[:, -cycles:, :2], axis=2) / 2
-        is_known = error < (LATE_FACTOR if is_late else 2) * SETTLED_TOL * ranges[:, -1]
+        is_known = error < (LATE_TOL_FACTOR if is_late else 2) * SETTLED_TOL * ranges[:, -1]
         if law == "yielding":
             length = cases.yield_length[open_cases]
             is_known &= _slips_until_steady(ranges, length, value, error)

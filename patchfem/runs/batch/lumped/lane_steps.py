@@ -11,7 +11,7 @@ from ....dynamics.lanes import run as march
 from ....model.model import Model
 from ....model.similar_models import collect_columns
 from ....structure.drive_sizes import find_max_acceleration
-from .lane_numbers import KINDS, contact_of_point, may_create_energy
+from .lane_numbers import LANE_LAWS, make_point_contact, may_create_energy
 
 STRETCH_STEPS = (128, 256, 512, 1024, 2048)  # steps per cycle under a stretch law
 MAX_STEP_PHASE = 0.5  # largest phase of the fastest rate of a stretch law in a step [rad]
@@ -30,12 +30,14 @@ PATCH_STEPS = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))
 def steps_per_cycle(models: Sequence[Model]) -> np.ndarray:
     """Return the steps per cycle (n,) of models of one law; 0 if there would be too many."""
     ends = POINT_STEPS
-    if march.has_one_stretch(KINDS[models[0].friction.law]):
+    if march.has_one_stretch(LANE_LAWS[models[0].friction.law]):
         ends = [(MAX_STEP_PHASE * steps / (2 * np.pi), steps) for steps in STRETCH_STEPS]
-    return steps_at_rate(collect_columns(models, lambda model: (_relative_rate(model),))[0], ends)
+    return select_steps_for_rates(
+        collect_columns(models, lambda model: (_fastest_relative_rate(model),))[0], ends
+    )
 
 
-def steps_at_rate(rates, ends) -> np.ndarray:
+def select_steps_for_rates(rates, ends) -> np.ndarray:
     """Return the steps per cycle (n,) for ratios (n,) of the fastest rate to that of the drive.
 
     ends: sequence of (largest rate, steps).
@@ -51,11 +53,11 @@ def fastest_rate(model: Model, stiffness):
     return (rate + modes.damping_matrix[0, 0]) / model.rig.drive.signal.omega
 
 
-def _relative_rate(model: Model):
+def _fastest_relative_rate(model: Model):
     """Return the fastest rate of a model over that of its drive; inf if lanes cannot follow it."""
     friction = model.friction
-    stiffness = contact_of_point(model).stiffness
-    if not march.has_one_stretch(KINDS[friction.law]):
+    stiffness = make_point_contact(model).stiffness
+    if not march.has_one_stretch(LANE_LAWS[friction.law]):
         return fastest_rate(model, stiffness)
     modes = model.rig.modes
     omega = model.rig.drive.signal.omega

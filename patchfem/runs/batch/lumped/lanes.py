@@ -32,7 +32,7 @@ from .. import one_by_one
 from ..case_results import CaseResults
 from . import lumped
 from .lane_check import solve_and_check
-from .lane_numbers import KINDS, LaneCases, make_cases
+from .lane_numbers import LANE_LAWS, LaneCases, make_cases
 from .lane_settling import MIN_TOLERANCE
 from .lane_steps import steps_per_cycle
 from .pieces import MAX_CYCLES, MIN_CYCLES
@@ -53,11 +53,11 @@ def refuses(model: Model) -> str:
 def why_no_lanes(model: Model) -> str:
     """Return why a model cannot march in lanes because of its options, or ""."""
     friction = model.friction
-    if why := lumped.not_one_point(model):
+    if why := lumped.why_not_one_point(model):
         return why
     if not MIN_CYCLES <= model.rig.drive.cycles <= MAX_CYCLES or not friction.static > 0:
         return "its cycles are too few or too many, or it has no friction"
-    if friction.law not in KINDS:
+    if friction.law not in LANE_LAWS:
         return "its law cannot be computed for many cases at once"
     if law_has_trait(friction.law, "bonds") and (
         is_bond_list(friction) or friction.slip_growth is not None
@@ -142,5 +142,5 @@ def _solve_exactly(models: Sequence[Model], say, indices: list, is_check: bool) 
         cases = np.flatnonzero(fits)
         n_finer = N_FINER_CELLS if is_check else 0
         results.insert(cases, lumped.solve(select_models(some_models, cases), say, n_finer))
-    one_by_one.solve_rest(results, some_models, ~fits, say)
+    one_by_one.solve_singly(results, some_models, ~fits, say)
     return results

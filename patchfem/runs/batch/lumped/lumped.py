@@ -23,10 +23,10 @@ MAX_CASES_PER_CALL = (
 
 def refuses(model: Model) -> str:
     """Return why the batch of event-driven single points refuses a model, or ""."""
-    return not_one_point(model) or pieces.refuses(model)
+    return why_not_one_point(model) or pieces.refuses(model)
 
 
-def not_one_point(model: Model) -> str:
+def why_not_one_point(model: Model) -> str:
     """Return why a model is not one mode with one constantly loaded point, or ""."""
     rig = model.rig
     if (
@@ -45,10 +45,10 @@ def not_one_point(model: Model) -> str:
         or not model.point.load > 0
     ):
         return "the interface of the case is not one point under a constant load"
-    return not_one_sine(rig)
+    return why_not_one_sine(rig)
 
 
-def not_one_sine(rig) -> str:
+def why_not_one_sine(rig) -> str:
     """Return why a rig is not one mode with one accelerometer under sinusoidal drive, or ""."""
     if rig.modes.gauge is not None:
         return "the gauge and the accelerometer of the case move differently"
@@ -108,7 +108,7 @@ def _solve_cases(models, say, n_merges: int, is_check: bool = False) -> CaseResu
     results, runs_singly, is_resolved = assemble_results(models, runs, numerics)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     needs_cells = ~is_resolved & ~runs.lost & (n_merges > 0)
-    one_by_one.solve_rest(
+    one_by_one.solve_singly(
         results, models, runs_singly & ~needs_cells & ~(runs.lost & is_check), say
     )
     cases = np.flatnonzero(needs_cells).tolist()

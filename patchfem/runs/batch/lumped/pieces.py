@@ -30,9 +30,9 @@ from ...rig.pieces import (
     may_still_change,
 )
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
-from .threads import in_threads
+from .threads import run_in_threads
 
-STICK_CYCLES = (
+N_STICK_CYCLES = (
     3  # number of cycles that contain every stick interval of a periodic motion completely
 )
 MIN_CYCLES = 20  # smallest number of cycles of a run
@@ -111,7 +111,7 @@ def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) ->
         How often neighbouring cells are merged in pairs.
     """
     cases = [make_case(model, n_merges) for model in models]
-    fine = runs_of_cases(cases, cycles, window, say)
+    fine = run_cases(cases, cycles, window, say)
     if not law_has_trait(models[0].friction.law, "cells"):
         return fine
     coarse_runs = []
@@ -120,11 +120,11 @@ def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) ->
         for case in cases:
             groups = tuple(merge_elements(group, *merge) for group in case.groups)
             coarse_cases.append(case._replace(groups=groups))
-        coarse_runs.append(runs_of_cases(coarse_cases, cycles, window, say, steady=False))
-    return with_coarser_errors(fine, coarse_runs, merged_cell_errors)
+        coarse_runs.append(run_cases(coarse_cases, cycles, window, say, steady=False))
+    return add_coarser_errors(fine, coarse_runs, merged_cell_errors)
 
 
-def runs_of_cases(
+def run_cases(
     cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True
 ) -> Runs:
     """Run cases from event to event without histories.
@@ -137,7 +137,7 @@ def runs_of_cases(
     say : callable, optional
         Callback for a line of text.
     least : int
-        Cases of a thread (see `in_threads`).
+        Cases of a thread (see `run_in_threads`).
     steady : bool
         Whether the steady motion and the ringing are computed; a coarse run does not need them.
     """
@@ -157,7 +157,7 @@ def runs_of_cases(
             window,
         )
 
-    in_threads(simulate, len(cases), least)
+    run_in_threads(simulate, len(cases), least)
     return _read_runs(cases, finished, cycles, window, steady)
 
 
@@ -183,7 +183,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     rings = {name: np.full(len(finished), np.nan) for name in ("ring_frequency", "ring_damping")}
     steady_motions = np.full((2, len(finished)), np.nan)
     for k, (case, run) in enumerate(zip(cases, finished)):
-        ring = {} if is_rigid else _find_ring(case, run, steady)
+        ring = {} if is_rigid else _find_ringing(case, run, steady)
         is_lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
@@ -240,7 +240,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     )
 
 
-def _find_ring(case: Case, run, steady: bool) -> dict | None:
+def _find_ringing(case: Case, run, steady: bool) -> dict | None:
     """Find the ringing of a run: {} for none, None if a single run is needed.
 
     The ringing is that of the run itself or, if `steady`, of a few more cycles with samples.
@@ -258,13 +258,13 @@ def _find_ring(case: Case, run, steady: bool) -> dict | None:
         return None
     start, memory = run.end
     more = histories.simulate(
-        modes, drive, case.groups, STICK_CYCLES, STICK_CYCLES, start=start, memory=memory
+        modes, drive, case.groups, N_STICK_CYCLES, N_STICK_CYCLES, start=start, memory=memory
     )
     rings = run_events.measure_ringing_in_sticks(more.window, modes, drive, more.log, repeats=True)
     return {} if rings == ({}, {}) else None
 
 
-def with_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Runs:
+def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Runs:
     """Add the errors that follow from coarse runs to runs.
 
     Parameters
@@ -281,7 +281,7 @@ def with_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Ru
         columns.append(runs.values | others)
     n = len(fine.stuck)
     for case in range(n):
-        values, *coarse = (known_values(measures, case) for measures in columns)
+        values, *coarse = (select_known_values(measures, case) for measures in columns)
         errors = estimate(values, *coarse)
         for name, value in values.items():
             column = fine.errors.setdefault(name, np.zeros(n))
@@ -289,7 +289,7 @@ def with_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Ru
     return fine
 
 
-def known_values(measures: dict, case: int) -> dict:
+def select_known_values(measures: dict, case: int) -> dict:
     """Return the values of one case that are known, from columns by name."""
     values = {name: float(column[case]) for name, column in measures.items()}
     return {name: value for name, value in values.items() if not np.isnan(value)}

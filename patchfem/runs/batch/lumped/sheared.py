@@ -18,7 +18,7 @@ from .. import pressed
 from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
 from .columns import assemble_results
-from .lumped import not_one_sine
+from .lumped import why_not_one_sine
 
 # largest number of cases in one compiled call, whose elements and cycle extremes are in memory together
 MAX_CASES_PER_CALL = 128
@@ -37,7 +37,7 @@ def refuses(model: Model) -> str:
         return "the case is not a patch that slips part by part"
     if model.wear is not None or model.heat is not None or has_unreadable_table(model):
         return "the case has [wear] or [friction.temperature], or its table of measured responses cannot be read"
-    if why := not_one_sine(model.rig):
+    if why := why_not_one_sine(model.rig):
         return why
     if model.friction.law != "elastic-plastic" and not pieces.is_rigid_law(model):
         return "the points of the patch have no slip force"
@@ -82,11 +82,9 @@ def move_cases(
         fine_cases.append(pieces.Case(model, case.fine.groups, case.fine.held, load))
         coarse_cases.append(fine_cases[-1]._replace(groups=case.coarse.groups))
         numerics.append(describe_sizes(case))
-    fine = pieces.runs_of_cases(fine_cases, cycles, window, say, MIN_CASES_PER_THREAD)
-    coarse = pieces.runs_of_cases(
-        coarse_cases, cycles, window, say, MIN_CASES_PER_THREAD, steady=False
-    )
-    runs = pieces.with_coarser_errors(fine, [coarse], coarser_errors)
+    fine = pieces.run_cases(fine_cases, cycles, window, say, MIN_CASES_PER_THREAD)
+    coarse = pieces.run_cases(coarse_cases, cycles, window, say, MIN_CASES_PER_THREAD, steady=False)
+    runs = pieces.add_coarser_errors(fine, [coarse], coarser_errors)
     runs = replace(runs, chosen=tuple(numerics), again=False)
     results, runs_singly, _ = assemble_results(
         models, runs, {"engine": PIECES.name, "window_cycles": window}

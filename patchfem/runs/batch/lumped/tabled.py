@@ -53,7 +53,7 @@ def move_cases(
         lane_steps.fastest_rate(model, elements.stiffness.sum())
         for model, elements in zip(models, fine)
     ]
-    steps = lane_steps.steps_at_rate(rates, lane_steps.PATCH_STEPS)
+    steps = lane_steps.select_steps_for_rates(rates, lane_steps.PATCH_STEPS)
     max_size = load(f"{march.LANES_PACKAGE}.rows_kernels").N_YIELDS - 1
     sizes = [max(a.stiffness.size, b.stiffness.size) for a, b in zip(fine, coarse)]
     fits = (steps > 0) & (np.array(sizes) < max_size)
@@ -65,7 +65,7 @@ def move_cases(
         part, runs_singly = sheared.move_cases(
             some_models, [pressed_cases[case] for case in cases], say
         )
-        one_by_one.solve_rest(part, some_models, runs_singly, say)
+        one_by_one.solve_singly(part, some_models, runs_singly, say)
         return part
 
     if exact_cases := np.flatnonzero(~fits).tolist():

@@ -16,7 +16,7 @@ MIN_CASES_PER_THREAD = (
 )
 
 
-def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
+def run_in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
     """Apply a function to slices of the cases, in parallel threads if there are free cores.
 
     Parameters
@@ -28,13 +28,13 @@ def in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> Non
     least : int
         Smallest number of cases of a thread; 0 for MIN_CASES_PER_THREAD.
     """
-    parts = max(1, min(cores(), count // (least or MIN_CASES_PER_THREAD)))
+    parts = max(1, min(count_cores(), count // (least or MIN_CASES_PER_THREAD)))
     ends = [count * k // parts for k in range(parts + 1)]
     pieces = [slice(*pair) for pair in pairwise(ends)]
-    work(pieces[0]) if parts == 1 else list(_pool().map(work, pieces))
+    work(pieces[0]) if parts == 1 else list(_get_thread_pool().map(work, pieces))
 
 
-def cores() -> int:
+def count_cores() -> int:
     """Return the number of processor cores that this process may use.
 
     The number is 1 in a worker of another process, and at most OMP_NUM_THREADS.
@@ -47,6 +47,6 @@ def cores() -> int:
 
 
 @cache
-def _pool() -> ThreadPoolExecutor:
+def _get_thread_pool() -> ThreadPoolExecutor:
     """Return the pool of threads, made on the first call."""
-    return ThreadPoolExecutor(cores(), "lumped")
+    return ThreadPoolExecutor(count_cores(), "lumped")
