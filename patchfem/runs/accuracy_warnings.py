@@ -82,7 +82,7 @@ class Finding(NamedTuple):
 
 
 def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
-    """Return the warnings on measures whose errors exceed the tolerance.
+    """Return the warnings on all measures of a run whose errors exceed the tolerance.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
 
 
 def _select_interface_measures(finding: Finding, face) -> Finding:
-    """Return the static measures of one interface patch, without interface numbers."""
+    """Select the static measures of one interface, and drop the interface number of their names."""
     measures = {}
     for name in patch_rows.TABLE:
         numbered = rows.add_interface_number(name, face.number)
@@ -141,7 +141,7 @@ def _select_interface_measures(finding: Finding, face) -> Finding:
 
 
 def _named_measures(finding: Finding, excess: dict) -> list[str]:
-    """Return the names of the measures that an accuracy warning mentions.
+    """Select the measures with too large errors that an accuracy warning names.
 
     These are the inaccurate main measures that are not zero within their error, else the measure with
     the largest error over the allowed error.
@@ -204,7 +204,7 @@ def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
 
 
 def _strip_remedy(patch_model, excess: dict) -> str:
-    """Return the advice to use the number of strips that meets the tolerance.
+    """Return the advice to divide the patch into as many strips as the tolerance requires.
 
     The peak of the outermost strip is computed at its centre, so that its error is of first order
     in the width of a strip. The errors of all other measures are of second order, like those of the
@@ -254,7 +254,7 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
 
 
 def _refining_tolerance(finding: Finding, coarse) -> float | None:
-    """Return the tolerance for which a patch gets a finer mesh, or None.
+    """Return the tolerance with which a patch would be solved on a finer mesh, or None.
 
     The result is None if the ladder of meshes has ended. If the coarser meshes are not at hand, it is the
     tolerance for one more halving.
@@ -276,7 +276,7 @@ def _refining_tolerance(finding: Finding, coarse) -> float | None:
 
 
 def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
-    """Return the remedy for the least accurate main measure of a motion.
+    """Return the advice that reduces the error of the least accurate main measure of a motion.
 
     The remedy depends on the largest part of the error. A looser tolerance is no remedy: it chooses
     coarser steps and meshes.
@@ -319,7 +319,7 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
 
 
 def _main_cause(finding: Finding, name: str) -> str:
-    """Return the kind of the largest contribution to the error of a measure."""
+    """Return the kind of discretization (such as the mesh) with the largest error contribution."""
     parts = finding.extra.get("left_open")
     if parts is not None:
         return max(
@@ -371,7 +371,7 @@ def _describe_missing_order(name: str, steps: int) -> str:
 
 
 def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
-    """Return the remedy for a run whose measures do not converge with its steps.
+    """Return the advice for a run whose measures do not converge when its steps are halved.
 
     Steps that the scene does not fix are doubled until the displacement meets the tolerance.
     """
@@ -388,7 +388,7 @@ def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
 
 
 def _end_remedy(cycles: float, steps: int) -> str:
-    """Return the advice to use steps per cycle with which a run ends at a sample.
+    """Return the advice to choose steps per cycle such that a run ends exactly at a sample.
 
     At most twice as many steps are proposed. They are a multiple of four, so that there are runs with
     half and a quarter of them.

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import NamedTuple
 
-# Name of the memory part of code that has to be compiled. A run with such a part also needs address space
+# Label of the memory that compiled code occupies. A run that must compile it also needs address space
 # for the compiler (`memory.free_bytes`).
 CODE_TO_COMPILE = "compiled code"
 
 
 class MemoryPart(NamedTuple):
-    """Part of the memory of a run at its peak, with the key of the scene that sets its size.
+    """Contribution to the peak memory of a run, with the scene key that sets its size.
 
     key: "" if no key sets the size.
 
@@ -64,12 +64,12 @@ class Cost:
 
     @property
     def bytes(self) -> int:
-        """Memory of all parts [bytes]."""
+        """Sum of all contributions to the memory of a run [bytes]."""
         return int(sum(part.bytes for part in self.parts))
 
     def __add__(self, other: Cost) -> Cost:
         def merge(first: dict, second: dict) -> dict:
-            """Add two dicts of numbers by name."""
+            """Add the values of two dicts key by key."""
             return first | {name: first.get(name, 0) + value for name, value in second.items()}
 
         summed = map(

@@ -18,7 +18,7 @@ from .patch.jenkins_elements import elements, strip_elements
 
 
 def remove_joint(model: Model, patch=None) -> Model:
-    """Remove the joint from the modes of a rig that were measured with it.
+    """Remove the joint from the modes of a rig that were measured with the joint in place.
 
     Any other model is returned unchanged.
 

@@ -24,7 +24,7 @@ REMEDIES = {
 
 
 def describe_largest_part(parts: tuple) -> str:
-    """Describe the largest memory part of a run and the key that sets its size.
+    """Describe the largest memory consumer of a run and the scene key that sets its size.
 
     The sentence is "" if this part is small, or if no key sets its size.
     """
@@ -83,7 +83,7 @@ def _process_limits() -> list:
 def free_in_control_group(
     used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
 ) -> float:
-    """Return the memory [bytes] that the control groups of this process leave to it.
+    """Return the memory [bytes] that the control groups of this process still allow.
 
     The result contains the memory that the process already uses.
 
@@ -124,7 +124,7 @@ def free_in_control_group(
 
 
 def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
-    """Return the memory [bytes] that one control group leaves; inf if unlimited.
+    """Return the memory [bytes] that one control group still allows; inf if unlimited.
 
     Inactive cached files count as free.
     """

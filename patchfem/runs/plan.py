@@ -68,7 +68,7 @@ GROUPS = {  # meaning and SI unit of each dimensionless group
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """Model with the engine that will run it, its sizes and its predicted cost.
+    """Model with the engine that will run it, the numbers of unknowns and the predicted cost.
 
     - model, kind: model and kind of its run.
     - effects: names of the effects in the scene.
@@ -100,7 +100,7 @@ class Plan:
 
     @property
     def unknowns(self) -> dict:
-        """Number of unknowns by name."""
+        """Numbers of unknowns of the mesh and the motion, as a dict."""
         return self.cost.sizes
 
     @property
@@ -131,7 +131,7 @@ class Plan:
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def modes(self, chain: dict) -> list:
-        """Return the name and the free and stuck frequencies [Hz] of each mode of a rig."""
+        """Name, free and stuck frequency [Hz] of each mode of a rig."""
         return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
     def as_json(self) -> dict:
@@ -156,7 +156,7 @@ class Plan:
 
 
 def describe_compile_time(seconds: float) -> str:
-    """Return the words on the compile time, or "" if nothing is compiled."""
+    """Return a phrase on the compile time, or "" if nothing is compiled."""
     return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
@@ -178,7 +178,7 @@ def plan(asked) -> Plan:
 
 
 def _make_plan(model: Model) -> Plan:
-    """Plan a Model."""
+    """Choose engine and settings of a Model and predict the cost of its run."""
     if model.measured is not None:
         try:
             # an invalid table of measured responses is reported before anything runs
@@ -249,7 +249,7 @@ def _make_plan(model: Model) -> Plan:
 
 
 def _predict_cost(model: Model) -> Cost:
-    """Return the predicted cost of all steps of a run.
+    """Return the predicted cost of a run, including all coarse runs.
 
     The memory parts are ordered from the largest to the smallest.
     """
@@ -277,7 +277,7 @@ def _predict_cost(model: Model) -> Cost:
 
 
 def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
-    """Return a text that identifies the compiled code of a run.
+    """Return a text that identifies the compiled code that a run needs.
 
     Two runs of one kind run the same code.
 
@@ -313,7 +313,7 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
 
 
 def _write_verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
-    """Return the verdict of a plan as sentences.
+    """Write the sentences of a plan on what the run will do and what it lacks.
 
     said: sentences on the motion, the patch and the friction law.
     """
@@ -359,7 +359,7 @@ def refuse_large_run(what: Plan) -> None:
 
 
 def _interface_links(model: Model) -> dict:
-    """Return the links of the stiffness chain at the interface: grooves and bonds."""
+    """Return the stiffnesses in series at the interface: grooves and bonds."""
     load = model.nominal_load
     if not load > 0:
         return {}
@@ -383,7 +383,7 @@ def _law_link(law, load: float):
 
 
 def _law_groups(model: Model) -> dict:
-    """Return the dimensionless groups of the friction law."""
+    """Return the dimensionless groups of the friction law as a dict."""
     if model.spread is None:
         return {}
 

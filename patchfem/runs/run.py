@@ -35,7 +35,7 @@ NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed pa
 
 
 class StateFile(NamedTuple):
-    """File with the state of a long run, from which the run can continue.
+    """File with the state of a long run, from which a later run can continue.
 
     - path: the file.
     - version: version of the program that the state must have.
@@ -48,7 +48,7 @@ class StateFile(NamedTuple):
 
 
 class PatchMeshes(NamedTuple):
-    """Pressed patch of [contact] on several meshes.
+    """Patch of [contact], solved on several meshes.
 
     - patch: on the finest mesh; None without [contact].
     - coarse: on coarser meshes, fine to coarse; None for a missing one.
@@ -165,7 +165,7 @@ def _run(
 
 
 def _press_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
-    """Press the patch of [contact] on the meshes that the run and its errors need."""
+    """Solve the patch of [contact] on the meshes that the run and its error estimate need."""
     tolerance = model.accuracy.tolerance
     patch, *coarse = patch_result.solve_all(model.patch, tolerance, estimate, fresh)
     static = ()
@@ -175,12 +175,12 @@ def _press_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
 
 
 def _is_open(patch) -> bool:
-    """Return whether the pieces of a pressed patch do not touch."""
+    """Return whether the two pieces of a solved patch do not touch."""
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
 def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
-    """Return the warnings on large strains of a patch, and on a mesh that shows no error."""
+    """Return the warnings on large strains and on an unknown mesh error of a patch."""
     patch = meshes.patch
     warnings = list(patch_result.warn_of_strains(model.patch, patch))
     if estimate and meshes.coarse[0] is None:
@@ -195,7 +195,7 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
 
 
 def _run_kind(inputs: RunInputs) -> Result:
-    """Run a plan with the function for its kind of scene."""
+    """Run a plan with the function for its kind of scene (patch, bench or rig)."""
     if inputs.plan.kind == "patch":
         return patch_result.static(inputs)
     if inputs.plan.kind == "bench":
@@ -213,7 +213,7 @@ def _run_kind(inputs: RunInputs) -> Result:
 
 
 def _result_without_load(inputs: RunInputs) -> Result:
-    """Return the Result of interfaces that carry no load."""
+    """Return the Result of a rig whose interfaces carry no load."""
     return Result(
         plan=inputs.plan,
         outcome=Outcome.NO_CONTACT,
@@ -229,7 +229,7 @@ def _result_without_load(inputs: RunInputs) -> Result:
 
 
 def _wear_patch(inputs: RunInputs, kept: StateFile | None):
-    """Compute the wear of a patch, continuing from a saved state if there is one."""
+    """Compute the wear of a patch; continue from a saved state if there is one."""
     model = inputs.plan.model
     patch = inputs.patch
     key = kept and state_key(model, patch, kept.version)
@@ -237,7 +237,7 @@ def _wear_patch(inputs: RunInputs, kept: StateFile | None):
 
 
 def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
-    """Return the inputs of the run of a worn patch."""
+    """Return the inputs of a run with worn surfaces."""
     plan_of_run = inputs.plan
     if evolved.state is not None:
         worn = evolve.worn_model(plan_of_run.model, evolved.patch, evolved.state.depth)
@@ -248,7 +248,7 @@ def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
 
 
 def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> Result:
-    """Add the measures of pressed patches to the result of a motion."""
+    """Add the static measures of the patches to the result of a motion."""
     if meshes.patch is not None:
         motion = {name: m for name, m in result.measures.items() if name != "normal_load"}
         patch, *coarse = meshes.static or (meshes.patch, *meshes.coarse)
@@ -267,7 +267,7 @@ def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> R
 
 
 def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMeshes) -> Result:
-    """Add total time, notes, accuracy warnings and meanings to a result.
+    """Add CPU time, notes, accuracy warnings and meanings of measures to a result.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
 
 
 def _yielding_faces(result: Result) -> dict:
-    """Return the notes on surfaces that yield even at the peak pressure minus its error."""
+    """Return the notes on surfaces that yield at the peak pressure less its error."""
     peak = result.measures.get("pressure_peak")
     patch_model = result.plan.model.patch
     if patch_model is None or result.patch is None or peak is None or peak.value is None:
@@ -312,7 +312,7 @@ def _yielding_faces(result: Result) -> dict:
 
 
 def _saving_context(kept: StateFile | None, what: Plan, patch):
-    """Return a context in which marches save their states, or an empty context.
+    """Return a context in which marches save their states, or a context that does nothing.
 
     Raises
     ------
@@ -324,7 +324,7 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
         return nullcontext()
 
     def path_of_march(number: int) -> Path:
-        """Return the file for the state of a march."""
+        """Return the file in which the state of one march is saved."""
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path_of_march(1).is_file():
@@ -337,7 +337,7 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
 
 
 def state_key(model, patch, version: str) -> str:
-    """Return the key that identifies the run to which a saved state belongs.
+    """Return the hash of a run, which a saved state must match to be continued.
 
     The key depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
     version of the program.
@@ -362,7 +362,7 @@ def state_key(model, patch, version: str) -> str:
 
 
 def is_march(what: Plan) -> bool:
-    """Return whether a run is a march in time, which saves its state."""
+    """Return whether a run is a time march, whose state can be saved."""
     if what.model.rig is None:
         return False
 

@@ -44,7 +44,7 @@ MAX_CYCLES = 1e5  # largest number of drive cycles that a cure proposes
 
 
 class Cause(NamedTuple):
-    """Cause for which a run will miss its tolerance, with the remedy.
+    """Reason why a run will miss its tolerance, with the keys that remove it.
 
     - words: the cause as the end of a sentence.
     - cure: {key: value to set, or None to leave the key out}.
@@ -55,20 +55,20 @@ class Cause(NamedTuple):
 
 
 class Forecast(NamedTuple):
-    """Requested tolerance of a run, and the causes for which it will be missed."""
+    """Tolerance that a run is asked for, and the reasons why it will be missed."""
 
     asked: float
     causes: tuple
 
     def sentence(self) -> str:
-        """Return a sentence on why the tolerance will be missed and on the remedy, or ""."""
+        """Return a sentence on why the tolerance will be missed and what to set, or ""."""
         if not self.causes:
             return ""
         words = " and ".join(cause.words for cause in self.causes)
         return f"the tolerance {self.asked:g} will not be met {words}; {_cure_words(self.cure())}"
 
     def cure(self) -> dict:
-        """Return the keys to set or leave out (None) to remove all causes."""
+        """Return the scene keys to set, or to leave out (None), so that the tolerance is met."""
         cure = {}
         for cause in self.causes:
             cure |= cause.cure
@@ -88,7 +88,7 @@ EMPTY_FORECAST = Forecast(0.0, ())
 
 
 def _cure_words(cure: dict) -> str:
-    """Return a text on the keys to set and to leave out."""
+    """Describe the scene keys to set and those to leave out."""
     dropped = [key for key, value in cure.items() if value is None]
     given = [f"{key} = {value:.15g}" for key, value in cure.items() if value is not None]
     parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [
@@ -98,7 +98,7 @@ def _cure_words(cure: dict) -> str:
 
 
 def forecast_tolerance(model: Model) -> Forecast:
-    """Predict whether a model will miss its tolerance, before anything is computed."""
+    """Predict from the settings of a model whether it will miss its tolerance."""
     tolerance = model.accuracy.tolerance
     if cause := _mesh_cause(model, tolerance):
         return Forecast(tolerance, (cause,))
@@ -116,7 +116,7 @@ def _replace_accuracy(model: Model, **keys) -> Model:
 
 
 def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the Cause if no mesh of the pieces meets the tolerance in acceptable time."""
+    """Return the reason if no affordable mesh of the pieces meets the tolerance, else None."""
     if model.kind == "patch" and model.patch.mesh.file is None and tolerance < MIN_PATCH_ERROR / 2:
         finest = MIN_PATCH_ERROR
     elif (
@@ -140,7 +140,7 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _uniform_mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the Cause if elements of a fixed size are too long for the contact."""
+    """Return the reason if elements of prescribed size are too long for the contact, else None."""
     patch = model.patch
     if patch is None or patch.mesh.is_automatic:
         return None
@@ -157,7 +157,7 @@ def _uniform_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _rig_steps_cause(model: Model) -> Cause | None:
-    """Return the Cause if a rig has too few time steps."""
+    """Return the reason if a rig has too few time steps for its tolerance, else None."""
     engine = engines.choose_engine(model)
     if (
         not engine.coarser_in_time(model, numerics.choose_numerics(model))
@@ -175,7 +175,7 @@ def _rig_steps_cause(model: Model) -> Cause | None:
 
 
 def _steps_cure(model: Model) -> dict:
-    """Return the keys to set so that the time steps of a rig meet the tolerance.
+    """Return the scene keys that give a rig enough time steps for its tolerance.
 
     The keys select an engine without steps if there is one, else more steps; {} if there are enough.
     """
@@ -192,7 +192,7 @@ def _steps_cure(model: Model) -> dict:
 
 
 def _round_steps(steps: float) -> int:
-    """Return steps per cycle rounded up to two digits and to a multiple of four.
+    """Round steps per cycle up to two significant digits and a multiple of four.
 
     Half and a quarter of the steps are then whole numbers.
     """
@@ -201,7 +201,7 @@ def _round_steps(steps: float) -> int:
 
 
 def _cycles_cure(model: Model) -> dict:
-    """Return the number of cycles after which the transient is below the tolerance, by key.
+    """Return the cycles, as a scene key, after which the transient is below the tolerance.
 
     The slowest mode counts; {} if the scene has enough cycles.
     """
@@ -217,7 +217,7 @@ def _cycles_cure(model: Model) -> dict:
 
 
 def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the Cause if keys of the scene neglect too much of the sum over bonds."""
+    """Return the reason if the scene truncates the sum over bonds too early, else None."""
     keys = [key for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
     pinned = [f"accuracy.{key}" for key in keys]
     if (
@@ -233,7 +233,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
 
 
 def _bench_steps_cause(model: Model) -> Cause | None:
-    """Return the Cause if a bench has too few time steps."""
+    """Return the reason if a bench has too few time steps for its tolerance, else None."""
     if model.accuracy.steps_per_cycle is None or (
         law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
     ):

@@ -59,18 +59,18 @@ class Batch:
         return _why_run_singly(self.kind) or self._module.refuses(model)
 
     def group(self, model: Model) -> Hashable:
-        """Return a key that is equal for models that can share work."""
+        """Return a hashable key that is equal for models that are computed together."""
         return self._module.group(model)
 
     def solve(self, models: Sequence[Model], say: Callable | None) -> CaseResults:
-        """Compute the results of a group of models.
+        """Compute the case results of a group of models that are computed together.
 
         They equal those of single runs to 1e-12, errors included, whatever else is in the group.
         """
         return self._module.solve(models, say)
 
     def parts(self, models: Sequence) -> dict:
-        """Return the indices, by group, of the models whose numbers the batch reads as columns."""
+        """Group the indices of models whose numbers the batch reads as columns of arrays."""
         candidates = [models.first] if isinstance(models, SimilarModels) else models
         if not self.reads_columns or _why_run_singly(self.kind):
             return {}
@@ -81,7 +81,7 @@ class Batch:
 
 @cache
 def _why_run_singly(kind: str) -> str:
-    """Return why no batch computes cases of a kind of scene, or "".
+    """Return the reason why no batch computes cases of a kind of scene, or "".
 
     A measure that only single runs compute excludes all batches.
     """
@@ -107,14 +107,14 @@ BATCHES: tuple[Batch, ...] = (
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
-    """Return the CPU time [s] of compiling for a model, or 0 if code of its kind exists."""
+    """Return the CPU time [s] to compile the batch for a model; 0 if its code is in the cache."""
     if batch.compile and not compiled.has_run(_compiled_kind(batch, model)):
         return batch.compile
     return 0.0
 
 
 def _compiled_kind(batch: Batch, model: Model) -> str:
-    """Return a text that identifies the compiled code of a batch."""
+    """Return a text that identifies the compiled code that a batch needs for a model."""
     rig = model.rig
     if rig is None:
         return batch.name
@@ -123,7 +123,7 @@ def _compiled_kind(batch: Batch, model: Model) -> str:
 
 
 def choose_batch(model: Model, study: int = 1) -> Batch | None:
-    """Return the batch for a model of a study, or None if the model is run by itself."""
+    """Return the first batch that can compute a model, or None if the model needs a single run."""
     for batch in BATCHES:
         if study >= batch.least and not batch.refuses(model):
             return batch
@@ -149,7 +149,7 @@ def solve_models(
     estimate: bool = True,
     study: int = 0,
 ) -> CaseResults:
-    """Compute the case results of many models, in their order.
+    """Compute the case results of many models, in the order of the models.
 
     If a batch fails, its cases are run one by one. A note of each of them names the batch and the
     error, unless the error is that of a case (`one_by_one.CASE_ERRORS`).
@@ -193,7 +193,7 @@ def solve_models(
 
 
 def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
-    """Remove the joint from the modes of a model, or return the error of this step."""
+    """Remove the joint from the measured modes of a model; return an error if that fails."""
     if (
         isinstance(model, PatchfemError)
         or model.rig is None
@@ -207,7 +207,7 @@ def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
 
 
 def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
-    """Assign similar models to the batches that read their numbers as columns.
+    """Assign models that differ in plain numbers to batches that read these numbers as columns.
 
     Returns the indices of the models that are not assigned, and a dict with those of all others by
     Assignment.
@@ -251,14 +251,14 @@ def _describe_failure(batch: Batch | None, error: Exception) -> str:
 
 
 def _report_case(keep: Callable, cases: list, index: int, result) -> None:
-    """Pass a case and its Result to the callback of the caller."""
+    """Pass the index of a case and its Result to the callback of the caller."""
     keep(cases[index], result)
 
 
 def _solve_group(
     assignment: Assignment, models: Sequence[Model], run_singly: Callable, say: Callable | None
 ) -> CaseResults:
-    """Compute the results of a group by its batch, or one by one if the batch fails."""
+    """Compute the results of a group in its batch, or by single runs if the batch fails."""
     batch, _, failure = assignment
     if batch is not None:
         try:

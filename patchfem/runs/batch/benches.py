@@ -14,7 +14,7 @@ MAX_CASES_PER_CALL = 256  # largest number of patches that are pressed in one ca
 
 
 def refuses(model: Model) -> str:
-    """Return why the patch of a bench is not pressed together with others, or ""."""
+    """Return the reason why the patch of a bench cannot be solved in a batch with others, or ""."""
     if (
         model.patch is None
         or model.load_varies
@@ -26,7 +26,7 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> Hashable:
-    """Return a key that is equal for models whose patches are pressed together."""
+    """Return a hashable key that is equal for models whose patches can be solved in one batch."""
     return patches.group(model)
 
 

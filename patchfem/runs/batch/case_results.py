@@ -25,7 +25,7 @@ FAILED_OUTCOME = "failed"  # outcome of a case that was refused or did not finis
 
 
 class ArrayOnDisk:
-    """Array of floats in a file, which needs memory only while it is used.
+    """Array of floats in a temporary file, which occupies memory only while it is accessed.
 
     An access maps the file into memory, and releases the map with the result.
     """
@@ -58,13 +58,13 @@ class ArrayOnDisk:
         np.asarray(self)[at] = values
 
     def reshape(self, shape: tuple) -> ArrayOnDisk:
-        """Return an array with the same file in another shape."""
+        """Return an array that shares the file and has another shape."""
         return ArrayOnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
 class CaseResults:
-    """Results of n cases as columns, in SI units.
+    """Measures, errors, outcomes and messages of n cases, stored as columns in SI units.
 
     - outcome (n,): names of `Outcome`, or FAILED_OUTCOME.
     - values, errors, floors: columns (n,) by measure. NaN means that a case does not have the
@@ -101,14 +101,14 @@ class CaseResults:
 
     @classmethod
     def blank(cls, count: int, room: Path | None = None) -> CaseResults:
-        """Return results of `count` cases without outcomes and measures.
+        """Return the results of `count` cases that have no outcomes or measures yet.
 
         room: folder on whose disk the columns of many cases are kept instead of in memory.
         """
         return cls(np.full(count, "", object), room=room if count > MIN_CASES_ON_DISK else None)
 
     def measure(self, name: str, unit: str) -> None:
-        """Add columns of NaN for a measure, if there are none yet."""
+        """Add columns of NaN (value, error, floor) for a measure that has no columns yet."""
         if name not in self.values:
             self.units[name] = unit
             for columns in self._columns:
@@ -116,7 +116,7 @@ class CaseResults:
                 columns[name][:] = np.nan
 
     def _column(self) -> np.ndarray | ArrayOnDisk:
-        """Return an empty column (n,), in memory or on disk."""
+        """Return an uninitialized column (n,), in memory or on disk."""
         if self.room is None:
             return np.empty(len(self))
         return ArrayOnDisk(TemporaryFile(dir=self.room), (len(self),))
@@ -127,7 +127,7 @@ class CaseResults:
         self.messages[case] = message
 
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
-        """Set outcome, measures and CPU time of one case.
+        """Store the outcome, the measures and the CPU time of one case.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class CaseResults:
         self.fill(case, measures)
 
     def fill(self, case: int, measures: dict) -> None:
-        """Set measures of a case, replacing existing ones.
+        """Store measures of one case, overwriting earlier values.
 
         measures: core.Measure by name.
         """
@@ -157,16 +157,16 @@ class CaseResults:
 
     @property
     def _columns(self) -> tuple[dict, ...]:
-        """Dicts of values, errors and floors by measure."""
+        """Dicts of values, of errors and of floors, with the name of the measure as key."""
         return self.values, self.errors, self.floors
 
     @property
     def _texts(self) -> tuple[dict, ...]:
-        """Dicts of messages, warnings, notes and settings by case."""
+        """Dicts of messages, warnings, notes and settings, with the index of the case as key."""
         return self.messages, self.warnings, self.notes, self.numerics
 
     def insert(self, cases: Sequence[int], part: CaseResults) -> None:
-        """Insert the results of some cases from other case results."""
+        """Insert the results of some cases, taken from another record of case results."""
         indices = np.asarray(cases, int)
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
@@ -181,7 +181,7 @@ class CaseResults:
             texts.update(_renumber(part_texts, numbers))
 
     def remove(self, cases: Sequence[int]) -> None:
-        """Remove the results of some cases, and measures that no other case has."""
+        """Remove the results of some cases, and the measures that no remaining case has."""
         for columns in self._columns:
             for column in columns.values():
                 column[cases] = np.nan
@@ -194,7 +194,7 @@ class CaseResults:
                     columns.pop(name)
 
     def select(self, cases: np.ndarray) -> CaseResults:
-        """Return measures, outcomes and messages of some cases, as `insert` takes them."""
+        """Select measures, outcomes and messages of some cases, in the form that `insert` takes."""
         results = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
         for columns, all_columns in zip(results._columns, self._columns):
             columns.update({name: column[cases] for name, column in all_columns.items()})
@@ -205,7 +205,7 @@ class CaseResults:
         return results
 
     def known_measures(self, case: int) -> dict:
-        """Return the measures of a case whose errors are known."""
+        """Return the measures of one case whose errors are known."""
         measures = {}
         for name, errors in self.errors.items():
             if not np.isnan(errors[case]):
@@ -215,19 +215,19 @@ class CaseResults:
         return measures
 
     def has(self, name: str, case: int) -> bool:
-        """Return whether a case has a value of a measure, or a reason for its absence."""
+        """Return whether a case has a value of a measure, or a reason why the value is missing."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
 def _renumber(texts: dict, numbers: dict) -> dict:
-    """Renumber the cases of a dict, and drop cases without a new number."""
+    """Replace the case indices that are the keys of a dict; drop cases without a new index."""
     return {numbers[case]: text for case, text in texts.items() if case in numbers}
 
 
 def join_case_results(
     count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]
 ) -> CaseResults:
-    """Join case results of parts of a study, given the case indices of each part."""
+    """Join the case results of parts of a study, given the case indices of each part."""
     results = CaseResults.blank(count)
     for cases, part in parts:
         results.insert(cases, part)
@@ -235,7 +235,7 @@ def join_case_results(
 
 
 def has_unreadable_table(model: Model) -> bool:
-    """Return whether a model names a table of measured responses that cannot be read.
+    """Return whether the table of measured responses that a model names cannot be read.
 
     Its single run reports the error; a readable table does not change the results.
     """

@@ -55,7 +55,7 @@ ERROR_KINDS = ("steps", "mesh", "modes", "own")
 
 
 def refuses(model: Model) -> str:
-    """Return why the batch of elastic patches with bonds refuses a model, or "".
+    """Return the reason why this batch (elastic patches with bonds) refuses a model, or "".
 
     The batch takes elastic patches with bonds under a constant load that are integrated in time.
     """
@@ -78,7 +78,7 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> Hashable:
-    """Return a key that is equal for models that march side by side; None for single runs."""
+    """Return a hashable key that is equal for models that can be integrated in one batch."""
     if why_no_lanes(model):
         return None
     modes = model.rig.modes
@@ -90,7 +90,7 @@ def group(model: Model) -> Hashable:
 
 
 def why_no_lanes(model: Model) -> str:
-    """Return why a model cannot march side by side with others, or ""."""
+    """Return the reason why a model cannot be integrated in one batch with others, or ""."""
     rig = model.rig
     law = model.bonds
     if (
@@ -173,7 +173,7 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
 
 
 def _move_cases(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray]:
-    """Compute the results of pressed cases, and which (n,) must be run by themselves."""
+    """Compute the motions of solved patches, and the mask (n,) of cases that need a single run."""
     results = CaseResults.blank(len(models))
     runs_singly = np.zeros(len(models), bool)
     all_steps = np.array([case.numerics.steps for case in cases])
@@ -187,7 +187,7 @@ def _move_cases(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray
 
 
 def _march_side_by_side(models: list, cases: list, steps: int) -> tuple[CaseResults, np.ndarray]:
-    """Compute the results of pressed cases by marches side by side.
+    """Compute the results of cases with solved patches by time integration in one batch.
 
     The cases march with `steps` per cycle, or with twice as many if the displacement needs them and the
     scene does not fix them. Cases with similar slides are neighbours. Returns also which cases (n,) must
@@ -214,7 +214,7 @@ def _march_side_by_side(models: list, cases: list, steps: int) -> tuple[CaseResu
 
 
 class _MarchedCases(NamedTuple):
-    """Results of n cases that marched side by side with the same steps.
+    """Results of n cases that were integrated in one batch with the same time steps.
 
     - results: CaseResults.
     - runs_singly: which cases (n,) must be run by themselves.
@@ -227,14 +227,14 @@ class _MarchedCases(NamedTuple):
 
 
 def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
-    """March pressed cases side by side, with coarse runs for their errors."""
+    """Integrate cases with solved patches in one batch, with coarse runs for their errors."""
     rig = models[0].rig
     numerics = cases[0].numerics
     window = numerics.window
     cycles = int(rig.drive.cycles)
 
     def march(divisor: int, points: list, searched=None) -> _Evaluated:
-        """March and evaluate the cases with a fraction of the steps.
+        """Integrate and evaluate the cases with a given fraction of the time steps.
 
         searched: which cases (n,) are searched for ringing; None: all.
         """
@@ -287,7 +287,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
 
 
 class _Evaluated(NamedTuple):
-    """Evaluation of a march of n cases side by side.
+    """Measures, energies and stated errors of n cases that were integrated in one batch.
 
     - values: measures (n,) by name.
     - energies: (n,) by name [J].
@@ -304,14 +304,14 @@ class _Evaluated(NamedTuple):
 
     @property
     def reach(self) -> np.ndarray:
-        """Largest slide (n,) [m] of each case."""
+        """Largest relative displacement (n,) [m] of each case."""
         return self.marched.reach
 
 
 def _evaluate(
     models: list, cases: list, marched: lanes.MarchedCases, steps: int, searched=None
 ) -> _Evaluated:
-    """Compute measures, energies and ringing of cases from a march side by side.
+    """Compute measures, energies and ringing of the cases of a batch from their last cycles.
 
     Parameters
     ----------
@@ -363,14 +363,14 @@ def _evaluate(
 
 
 def _has_other_modes(model: Model, marched: lanes.MarchedCases) -> np.ndarray:
-    """Return whether modes other than the first contribute to the slide of a case, (n,)."""
+    """Return a mask (n,) of the cases whose slide contains modes other than the first."""
     fraction = model.rig.first_mode.fraction_of_other_modes
     motions = np.moveaxis(marched.z, 2, 0)
     return np.array([fraction(motion) > MAX_OTHER_MODES_FRACTION for motion in motions])
 
 
 def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -> tuple[Runs, list]:
-    """Combine marches to Runs with errors, and the errors of each case by kind.
+    """Estimate the errors of the cases from coarse runs, in total and by kind of coarse run.
 
     Parameters
     ----------
@@ -426,7 +426,7 @@ def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -
 
 
 def _reduction_errors(values: dict, points: _GatheredPoints, model: Model, work: float) -> dict:
-    """Estimate the errors due to the small numbers of shear modes and points.
+    """Estimate the errors due to few shear modes and few contact points.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from ..patch import meshes as patch_meshes
 
 
 class SharedMeshes:
-    """Shared meshes of a sweep, by geometry of the patch and tolerance.
+    """Meshes that the cases of a sweep share, by geometry of the patch and tolerance.
 
     They depend on all models that choose them, but not on their order. Therefore a sweep makes them
     once from its cases, before these are divided into chunks. `all_`: there are no other cases.
@@ -36,7 +36,7 @@ class SharedMeshes:
                 continue
 
     def with_shared_meshes(self, model: Model | PatchfemError) -> Model | PatchfemError:
-        """Return a model with its shared meshes, or the same model if it has none."""
+        """Return a model with the shared meshes of its geometry, if there are any."""
         meshes = (
             self.meshes.get(_mesh_key(model)) if self.meshes and _may_share_meshes(model) else None
         )
@@ -46,7 +46,7 @@ class SharedMeshes:
 
 
 def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
-    """Return models with shared meshes for patches of the same geometry.
+    """Choose common meshes for models with patches of the same geometry.
 
     A single patch of a geometry keeps the mesh that its own run chooses.
     """
@@ -55,10 +55,10 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
 
 
 def _may_share_meshes(model: Model | PatchfemError) -> bool:
-    """Return whether a model may share its meshes with other models."""
+    """Return whether a model may use a mesh that is chosen for several models."""
     return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
 
 
 def _mesh_key(model: Model) -> tuple:
-    """Return the key of a model for its patch geometry and tolerance."""
+    """Return a hashable key of the patch geometry and the tolerance of a model."""
     return patch_meshes.geometry_key(model.patch), model.accuracy.tolerance

@@ -68,7 +68,7 @@ def solve(
 def solve_singly(
     results: CaseResults, models: Sequence[Model], cases: np.ndarray, say: Callable | None = None
 ) -> None:
-    """Replace the results of some cases by those of single runs.
+    """Replace the results of some cases of a batch by those of single runs.
 
     Parameters
     ----------

@@ -35,13 +35,13 @@ MIN_ALLOWED_ERROR = (
 
 
 class _Nodes(NamedTuple):
-    """Positions of interface nodes [m], which stand in for a Patch in a warning."""
+    """Positions of interface nodes [m], which replace a Patch in the text of a warning."""
 
     x: np.ndarray
 
 
 def refuses(model: Model) -> str:
-    """Return why a static patch is not pressed together with others, or ""."""
+    """Return the reason why a static patch cannot be solved in a batch with others, or ""."""
     return (
         static.reason_not_batched(model.patch)
         if model.kind == "patch"
@@ -50,12 +50,12 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> Hashable:
-    """Return a key that is equal for models whose patches are pressed together."""
+    """Return a hashable key that is equal for models whose patches can be solved in one batch."""
     return geometry_key(model.patch), static.batch_key(model.patch), model.accuracy.tolerance
 
 
 def parts(models: Sequence[Model]) -> dict:
-    """Return the indices, by group, of models that differ in plain numbers only."""
+    """Group the indices of models whose patches differ in plain numbers only."""
     alike = (
         isinstance(models, SimilarModels)
         and models.first.kind == "patch"
@@ -65,7 +65,7 @@ def parts(models: Sequence[Model]) -> dict:
 
 
 def press_together(models: Sequence[Model]) -> list[Model]:
-    """Return the models with the solutions of patches that are pressed together.
+    """Return the models with the solutions of their patches, which are solved in batches.
 
     Of patches that are equal, e.g. for several drive levels or friction laws, one is pressed for
     all, so that they share its shear modes.
@@ -86,7 +86,7 @@ def press_together(models: Sequence[Model]) -> list[Model]:
 
 
 def press_and_solve(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
-    """Press the patches of models together, then compute the results of the models.
+    """Solve the patches of models in one batch, then compute the motions of the models.
 
     Parameters
     ----------

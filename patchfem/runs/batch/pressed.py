@@ -26,7 +26,7 @@ from .case_results import CaseResults
 
 
 class PressedCase(NamedTuple):
-    """Case whose patch is pressed and whose motion is not computed yet.
+    """Case of a batch whose patch is solved and whose motion is not computed yet.
 
     - fine, coarse: contact model of the batch on the mesh of the patch and on the coarser one.
     - measures, warnings, notes: of its patch.
@@ -44,7 +44,7 @@ class PressedCase(NamedTuple):
 
 
 class PatchBatch(NamedTuple):
-    """Functions of a batch that computes the motion of pressed patches.
+    """Functions of a batch that computes the motions of cases with solved patches.
 
     - engine: name of the engine of a single run.
     - make_contact: function (model, numerics, patch) -> contact model of the batch, or None if the
@@ -61,7 +61,7 @@ class PatchBatch(NamedTuple):
 
 
 def solve(models: Sequence[Model], batch: PatchBatch, say: Callable | None = None) -> CaseResults:
-    """Press the patches of a group of models, and compute their motions together.
+    """Solve the patches of a group of models, and compute their motions in one batch.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def solve(models: Sequence[Model], batch: PatchBatch, say: Callable | None = Non
 
 
 def _solve_cases(models: list, batch: PatchBatch, say: Callable | None) -> CaseResults:
-    """Compute the case results of models whose patches are pressed."""
+    """Compute the case results of models whose patches are solved."""
     begin = perf_counter()
     results = CaseResults.blank(len(models))
     pressed_cases = {}
@@ -97,7 +97,7 @@ def _solve_cases(models: list, batch: PatchBatch, say: Callable | None) -> CaseR
 
 
 def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
-    """Press the patch of a case and make its contact models; None for a single run."""
+    """Solve the patch of a case and make its contact models; None if a single run is needed."""
     try:
         with locate_errors(model.source):
             patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance)
@@ -134,7 +134,7 @@ def add_patch_results(
     slide: float,
     extra: dict | None = None,
 ) -> None:
-    """Add the results of the pressed patch to a case, as in a single run.
+    """Add the static measures and the notes of the solved patch to a case, as a single run does.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ from ...response.spectrum import GAUSS_POINTS, GAUSS_WEIGHTS, distortion_ratio
 
 
 class Samples:
-    """Samples of the last cycles of n marches under sinusoidal drive.
+    """Samples of the last cycles of n runs under sinusoidal drive.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Samples:
         self.span = window * self.period
 
     def acceleration(self) -> np.ndarray:
-        """Compute the absolute acceleration of the output (s, n) [m s-2]."""
+        """Compute the absolute acceleration at the sensor (s, n) [m s-2] from the modal motion."""
         modes = self.modes
         found = self.found
         out = np.multiply.outer(
@@ -68,7 +68,7 @@ class Samples:
         return out - modes.output @ modes.slide / modes.mass * found.force
 
     def values(self, book: dict, stiffness, load) -> dict:
-        """Compute the measures (n,) of all runs from their samples.
+        """Compute the measures of n runs from their samples, as a dict of columns (n,).
 
         Parameters
         ----------
@@ -110,7 +110,7 @@ class Samples:
         return out | self.slips() | self.loops(first, stiffness)
 
     def harmonic(self, number: int) -> np.ndarray:
-        """Compute the Fourier coefficients (m, n) [m] of the modes at a harmonic of the drive.
+        """Compute the Fourier coefficients (m, n) [m] of the modal motions at a drive harmonic.
 
         They are those of cubics, as in `spectrum.motion_harmonic`.
         """
@@ -138,11 +138,11 @@ class Samples:
         )
 
     def ends(self) -> tuple:
-        """Return the changes of modal displacement and rate (m, n) over the window."""
+        """Return the net changes of modal displacement and velocity (m, n) over the window."""
         return self.found.z[-1] - self.found.z[0], self.found.rate[-1] - self.found.rate[0]
 
     def gain(self, row, first, number: int) -> np.ndarray:
-        """Return the Fourier coefficient (n,) of the acceleration of a sum of modes, by parts.
+        """Compute the Fourier coefficient (n,) of an acceleration from that of the modal motions.
 
         Parameters
         ----------
@@ -157,7 +157,7 @@ class Samples:
         return row @ (2 / self.span * (faster + 1j * omega * moved) - omega**2 * first)
 
     def loops(self, first, stiffness) -> dict:
-        """Compute the measures of the friction loop (n,).
+        """Compute the measures of the friction loops of n runs.
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class Samples:
         ) | {"secant_stiffness": secant}
 
     def turns(self) -> list:
-        """Find the reversals of the slide of each run, as `loops.find_reversals` does."""
+        """Find the extreme slides of each run and the friction forces there."""
         steps = self.steps
         size = self.slide.shape[1]
         rows = np.arange(size)
@@ -235,7 +235,7 @@ class Samples:
         return (means[1] - means[0]) / max(self.window - 1, 1)
 
     def slips(self) -> dict:
-        """Compute the measures of the slip of runs that slide."""
+        """Compute slip amplitude, stick fraction and start of slip of runs that slip."""
         slip = self.found.slip
         steps = np.abs(np.diff(self.slide, axis=0))
         still = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
@@ -262,7 +262,7 @@ class Samples:
         }
 
     def response(self, run: int, acceleration) -> Response:
-        """Return the samples of one run as a Response, for the search for ringing.
+        """Return the samples of one run as a Response, in which ringing is searched.
 
         acceleration: (s,) [m s-2].
         """
@@ -283,7 +283,7 @@ class Samples:
         )
 
     def longest_stick(self, share: float) -> np.ndarray:
-        """Return the longest time (n,) [s] in which the slip is slow.
+        """Return the longest time (n,) [s] during which the slip speed is low.
 
         Slow means below the fraction `share` of the largest slip rate in the same cycle.
         """
@@ -297,7 +297,7 @@ class Samples:
 
 
 def _project_motion(row, motion) -> np.ndarray:
-    """Return the projection (s, n) of modal motions (s, m, n) on a row of participations."""
+    """Return the weighted sum (s, n) of modal motions (s, m, n) with participations (m,)."""
     out = row[0] * motion[:, 0]
     for k in range(1, len(row)):
         out += row[k] * motion[:, k]
@@ -305,7 +305,7 @@ def _project_motion(row, motion) -> np.ndarray:
 
 
 def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
-    """Return the largest slide [m] of a cycle and the force there [N], (2, n).
+    """Return the largest slide [m] of a cycle and the friction force there [N], (2, n).
 
     The method is that of `loops.find_reversals` with "slide"; the force is NaN if the slide is largest
     at an end of the cycle.
@@ -341,7 +341,7 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
 
 
 def find_peaks(size) -> tuple:
-    """Return the peaks (n,) of samples (s, n), and by how much they may be too small.
+    """Return the largest |value| (n,) of samples (s, n), and bounds on the missed peaks.
 
     The method is that of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
     """

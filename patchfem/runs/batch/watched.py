@@ -53,7 +53,7 @@ class ObservedMotion(NamedTuple):
 
 
 class MotionObserver:
-    """Model of a rig that is evaluated at one drive after the other.
+    """Rig model that is evaluated for a sequence of drives.
 
     A call with a drive (core.SineDrive), and with the `near` of another result, returns ObservedMotion;
     None if no bounded motion is found. Without a start, the result is that of `runs.run.run` to
@@ -90,7 +90,7 @@ class MotionObserver:
         self.before = before.made if before is not None else {}
 
     def __call__(self, drive, near=None) -> ObservedMotion | None:
-        """Compute the motion under a drive, starting from `near` or from rest."""
+        """Compute the motion under a drive, starting from a nearby motion or from rest."""
         try:
             return self._with_gauge_displacement(
                 {
@@ -118,13 +118,13 @@ class MotionObserver:
         )
 
     def _get_or_make(self, name: str, make):
-        """Return the object of a given name, made on the first call."""
+        """Return the helper object of a given name, which is created on the first call."""
         if name not in self.made:
             self.made[name] = make()
         return self.made[name]
 
     def _line(self, drive, near) -> ObservedMotion | None:
-        """Compute the linear motion of a structure without friction in closed form."""
+        """Compute the motion of a linear structure without friction in closed form."""
         modes = self.model.rig.modes
         omega = drive.omega
         found = harmonic.make_linear_part(modes, omega, 1)
@@ -171,7 +171,7 @@ class MotionObserver:
         )
 
     def _orbits(self):
-        """Return the finder of periodic motions of elastic-plastic elements."""
+        """Return the search for periodic motions of elastic-plastic elements, made on first use."""
         modes = self.model.rig.modes
         groups = pieces.YieldingElements(self.model, self.numerics, self.patch).groups
         finder = self.before.pop("yields", None)
@@ -221,12 +221,12 @@ class MotionObserver:
 
 
 def _observe_solution(raw) -> ObservedMotion | None:
-    """Convert a Solution to an ObservedMotion; None for an unbounded motion."""
+    """Convert the last cycles of a Solution to an ObservedMotion; None if it is unbounded."""
     return None if raw.outcome in UNBOUNDED_OUTCOMES else _observe(raw.window, raw.values)
 
 
 def _observe(window: Response, values: dict) -> ObservedMotion:
-    """Return the motion in a window with its peak acceleration and its amplitude."""
+    """Return the motion in a window with its peak acceleration and displacement amplitude."""
     return ObservedMotion(
         window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]
     )

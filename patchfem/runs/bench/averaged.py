@@ -33,7 +33,7 @@ def make_averaged_law(model, patch):
 
 
 def rigid_limit_ratio(model, patch) -> float:
-    """Return the limit friction force of a rigid block over static friction x load [1].
+    """Return the ratio of the friction limit of a rigid block to static coefficient x load [1].
 
     Raises
     ------
@@ -61,7 +61,7 @@ def rigid_limit_ratio(model, patch) -> float:
 
 
 def limit_tractions(model, patch, force) -> np.ndarray:
-    """Distribute resultant friction forces of a rigid block as tractions over its nodes.
+    """Distribute the friction force of a fully slipping rigid block over its nodes as tractions.
 
     The tractions are proportional to the averaged pressure in the direction of the force.
 

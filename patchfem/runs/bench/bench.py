@@ -31,7 +31,7 @@ from .stepped import slide_in_plane, slide_step_by_step
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BenchRun:
-    """Histories, fields and measures of an interface along a prescribed path, at k samples.
+    """Histories, fields and measures of an interface along a prescribed path of k samples.
 
     - time, slide, rate, force, load, slip (k,): [s], [m], [m/s], [N], [N], [m].
     - ledger (4, k): work, stored, dissipated and created energy [J]; all but the stored energy are
@@ -113,7 +113,7 @@ def run(
 
 
 def _solve(task: Slide) -> tuple[SlideHistories, dict]:
-    """Return the histories along the path, and those of the lateral direction by name."""
+    """Compute the friction histories along a bench path, and a dict of lateral histories."""
     if task.model.slide.across is not None:
         return slide_in_plane(task)
     if task.model.partial_slip:
@@ -126,7 +126,7 @@ def _solve(task: Slide) -> tuple[SlideHistories, dict]:
 
 
 def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
-    """Return the measures of a bench by name, except those of its loop."""
+    """Return the measures of a bench run as a dict, except those of its friction loop."""
     force = histories.force
     load = histories.load
     # The ratio refers to the applied load: friction is lost where the piece slides off the
@@ -152,7 +152,7 @@ def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
 
 
 def _measure_loop(model, time, slide, histories: SlideHistories, first: int, omega: float) -> dict:
-    """Return the measures of the loop of the last cycle by name.
+    """Return the measures of the friction loop of the last cycle as a dict.
 
     The last cycle starts at sample `first`.
     """

@@ -105,13 +105,13 @@ def _slide_over_grooves_in_closed_form(task: Slide) -> SlideHistories:
 
 
 def _last_moving_steps(increments) -> np.ndarray:
-    """Return the index (k - 1,) of the last step with motion up to each step; -1 without one."""
+    """Return for each step the index of the last moving step so far (k - 1,); -1 without one."""
     steps = np.where(increments != 0, np.arange(increments.size), -1)
     return np.maximum.accumulate(steps)
 
 
 def integrate_steps(slide, integrand) -> np.ndarray:
-    """Integrate a function of the displacement over every step by Gauss quadrature.
+    """Integrate a function of the displacement over every time step by Gauss quadrature.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def integrate_steps(slide, integrand) -> np.ndarray:
 
 
 def _along_flank(grooves, law, slide, speed) -> tuple:
-    """Return slope t and friction ratio f/R [1] along a groove flank, for a law of the speed.
+    """Return the slope t of a groove flank and the friction ratio f/R [1] along it.
 
     They are given at displacements [m] with speeds [m/s].
     """

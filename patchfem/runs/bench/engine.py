@@ -29,7 +29,7 @@ LIST_PASS_RATIO = 1 / 3
 
 
 class Method(Enum):
-    """Method that computes the friction of a bench.
+    """Method by which the friction force along a bench path is computed.
 
     The value is its name in summaries and plans.
     """
@@ -80,7 +80,7 @@ class BenchEngine:
 def bench_engine(
     model, slide, points: int = 1, choice: "bond_engines.EngineChoice | None" = None
 ) -> BenchEngine:
-    """Choose the method with which a bench computes the friction along its path.
+    """Choose the method by which the friction force along a bench path is computed.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def has_changing_pressure(model) -> bool:
 
 
 def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
-    """Choose the engine that sums over the bonds of a rigidly sliding interface.
+    """Choose the method that sums the forces of the bonds of a rigidly sliding interface.
 
     It is chosen as in a rig, except that its error is relative to the reached force, which is small
     if the stroke is short compared with the bond length. slide: samples (k,) [m].
@@ -178,7 +178,7 @@ def requested_engine(model) -> str:
 
 
 def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
-    """Choose a bond-sum engine without merging, whose force varies smoothly with parameters.
+    """Choose a bond summation without merging, whose force varies smoothly with parameters.
 
     It is None for laws without bonds, or if the scene prescribes the engine or the merging. With
     merging, the force would jump by the error of the sum when a value of the scene changes, which
@@ -197,7 +197,7 @@ def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
 
 
 def mean_stroke(slide) -> tuple:
-    """Return mean path [m] and mean number of moving steps between two reversals of a path."""
+    """Return the mean path [m] and the mean number of moving steps between two reversals."""
     moves = np.diff(slide)
     directions = np.sign(moves[moves != 0])
     count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
@@ -207,7 +207,7 @@ def mean_stroke(slide) -> tuple:
 def _choose_sum_engine(
     model, slide, points: int, choice: "bond_engines.EngineChoice", lists: int = 1
 ) -> BenchEngine:
-    """Return the bench engine for a law that sums over bonds, with its predicted CPU time.
+    """Return the bench engine for a law that sums over bonds, and its predicted CPU time [s].
 
     lists: number of lists, one per point with shear modes, else 1.
     """
@@ -261,7 +261,7 @@ def uses_parallel_elements(model) -> bool:
 
 
 def cost(model, points: int) -> Cost:
-    """Predict the cost of a bench along its path.
+    """Predict the CPU time and the memory of a bench run.
 
     Parameters
     ----------
@@ -295,14 +295,14 @@ def cost(model, points: int) -> Cost:
 
 
 def _samples_key(model) -> str:
-    """Return the scene key that sets the number of samples of a bench."""
+    """Return the scene key that sets the number of samples along the bench path."""
     if model.slide.kind == "file":
         return "slide.file"
     return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
 
 
 def groups(model) -> dict:
-    """Return the ratio of displacement amplitude to bond length by name.
+    """Return the dimensionless ratio of displacement amplitude to bond length as a dict.
 
     The dict is empty without a bond length.
     """

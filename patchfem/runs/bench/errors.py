@@ -38,7 +38,7 @@ FINER_MERGE_FACTOR = 0.5
 
 
 class Pass(NamedTuple):
-    """Settings of a coarser computation along the bench path, for an error estimate.
+    """Settings of a coarser computation along a bench path, which serves an error estimate.
 
     - steps: steps per cycle.
     - level: index of the coarser mesh; 0 is that of the run.
@@ -67,7 +67,7 @@ class PassErrors(NamedTuple):
 
 
 def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -> PassErrors:
-    """Estimate the errors of a bench from coarser computations along its path.
+    """Estimate the errors of a bench run from coarser computations along its path.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -
 
 
 def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
-    """List the coarser computations of a bench from which its errors are estimated.
+    """List the coarser computations from which the errors of a bench run are estimated.
 
     They have half and a quarter of the steps. At a quarter of the steps they also have the coarser
     mesh, another number of shear modes, merged cells of a slider density, or narrower strips of a
@@ -149,7 +149,7 @@ def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
 
 
 def bond_sum_error(model, engine) -> float:
-    """Return the error bound of the sum over bonds relative to the friction limit [1].
+    """Return the error bound of the bond summation relative to the friction limit [1].
 
     It is 0 for a law without such a sum.
     """
@@ -161,7 +161,7 @@ def bond_sum_error(model, engine) -> float:
 
 
 def _bond_sum_errors(model, fine_run) -> dict:
-    """Return the errors of the bench measures due to the sum over bonds, by measure name."""
+    """Return the errors of the bench measures due to the bond summation, as a dict."""
     work = np.abs(np.diff(fine_run.ledger[0]))
     friction = model.friction
     scale = FrictionScale(

@@ -42,7 +42,7 @@ class PathResponse(NamedTuple):
             )
 
     def histories(self, load: float, tau, local) -> SlideHistories:
-        """Return the histories as those of a bench under a constant load [N].
+        """Return the histories in the form of a bench run under constant load [N].
 
         Parameters
         ----------
@@ -119,6 +119,6 @@ def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathRespo
 
 
 def _pace_changes(time) -> np.ndarray:
-    """Return the indices of the samples at which the length of the time step changes."""
+    """Return the indices of the samples at which the time step changes its length."""
     step = np.diff(time)
     return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))

@@ -53,7 +53,7 @@ def make_ledger(work, stored, losses) -> np.ndarray:
 
 
 def created_and_dissipated(losses) -> tuple:
-    """Return the created and the dissipated energy, summed over m points.
+    """Sum the created and the dissipated energy over m points.
 
     losses (..., m): dissipated energy of each point; a negative one is created energy.
     """
@@ -107,7 +107,7 @@ def _bond_length(model) -> float:
 
 @dataclass(frozen=True, slots=True)
 class PassOptions:
-    """Options and callbacks for a computation along the bench path.
+    """Options and callbacks of one computation along a bench path.
 
     - choice: method of the sum over bonds; None: chosen by the pass.
     - say: callback for a line of text when something compiles.
@@ -152,7 +152,7 @@ class Slide(NamedTuple):
 
     @property
     def frame_numbers(self) -> np.ndarray:
-        """Indices of the samples of the frames, without the first sample (the pressed state)."""
+        """Indices of the samples with stored fields, without the first sample (the pressed state)."""
         if not self.frames:
             return np.zeros(0, int)
         numbers = np.linspace(0, self.slide.size - 1, self.frames + 1).round().astype(int)[1:]

@@ -44,7 +44,7 @@ MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points times samples) of
 
 
 def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
-    """Run the plan of a bench and return its Result.
+    """Run a plan with prescribed displacement and return its Result.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def _law_warnings(model) -> list:
 
 
 def _warn_of_created_energy(model, fine) -> list:
-    """Return a warning, as a list, on energy that the law in the report's form created."""
+    """Return a warning, as a list, on energy that the law as printed in the 1985 report creates."""
     created = fine.values["energy_created"]
     exchanged = np.abs(np.diff(fine.ledger[0])).sum()
     if model.friction.reading != "report" or created <= 1e-6 * exchanged:
@@ -170,7 +170,7 @@ def _loop_closing_error(fine) -> float:
 
 
 def _warn_if_open(model, patch, fine, steps: int) -> list:
-    """Return a warning, as a list, if the last loop is neither closed nor steady.
+    """Return a warning, as a list, if the last friction loop is neither closed nor steady.
 
     It names the number of cycles after which the loop is steady, if MAX_EXTRA_CYCLES cycles with at most
     MAX_EVALUATIONS evaluations show it.

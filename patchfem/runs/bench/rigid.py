@@ -26,7 +26,7 @@ from .ledger import Slide, SlideHistories, elastic_slip, local_slip
 
 
 def slide_rigidly(task: Slide) -> SlideHistories:
-    """Compute the histories of rigid sliding along the bench path by a compiled engine."""
+    """Compute the histories of rigid sliding along a bench path by a compiled kernel."""
     model = task.model
     law = model.friction.law
     sigma, weight = nodal_pressure(model, task.patch)
@@ -105,7 +105,7 @@ def _make_point_model(task: Slide, load: float) -> ContactModel:
 
 
 def list_merged_cell_runs(reference_pass) -> CoarserRuns:
-    """Return the coarser runs in which groups of four cells of a slider density are merged.
+    """List coarser runs in which every four cells of a slider density are merged to one.
 
     reference_pass: the Pass with which they are compared.
     """

@@ -27,7 +27,7 @@ OPEN_PRESSURE_FRACTION = 1e-3
 
 
 def slide_in_shear(task: Slide) -> SlideHistories:
-    """Compute the histories under a prescribed displacement of pieces that deform in shear.
+    """Compute the bench histories of pieces that deform in shear.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def slide_in_shear(task: Slide) -> SlideHistories:
 
 
 def _slide_elements(task: Slide) -> SlideHistories:
-    """Compute the histories of Coulomb or elastic-plastic points as parallel elements."""
+    """Compute the histories of elastic pieces whose friction is a set of parallel elements."""
     patch = task.patch
     friction = task.model.friction
     length = make_law(friction).element(1.0).length
@@ -69,7 +69,7 @@ def _slide_over_grooves(task: Slide) -> SlideHistories:
 
 
 def groove_fields(patch, contact, states) -> tuple:
-    """Return traction (f, m) [Pa] with climbing and slip (f, m) [m] of points over grooves.
+    """Return the traction (f, m) [Pa] and the slip (f, m) [m] of points that climb grooves.
 
     The points have shear modes.
 
@@ -96,7 +96,7 @@ def groove_fields(patch, contact, states) -> tuple:
 
 
 def _slide_bond_points(task: Slide) -> SlideHistories:
-    """Compute the histories of bond points or bond lists with shear modes."""
+    """Compute the bench histories of bonds at the points of elastic pieces, by shear modes."""
     model = task.model
     patch = task.patch
     law = model.bonds
@@ -116,7 +116,7 @@ def _slide_bond_points(task: Slide) -> SlideHistories:
 
 
 def shear_modes_of_points(model, patch, count: int | None = None):
-    """Return the shear modes of the points at which a bench sums over bonds.
+    """Return the shear modes of the contact points at which a bench sums over bonds.
 
     If the pressure belongs to the lower piece, the points are all nodes; a node without pressure at
     first counts as if under OPEN_PRESSURE_FRACTION times the mean pressure of the others.
@@ -209,7 +209,7 @@ def make_sheared_lists(patch, law, shear, choice, force=None):
 
 
 def list_coarser_element_runs(count: int, reference_pass) -> CoarserRuns:
-    """Return the coarser runs of a bench with parallel elements, on coarser meshes.
+    """List runs of a bench with parallel elements on coarser meshes.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def list_coarser_element_runs(count: int, reference_pass) -> CoarserRuns:
 
 
 def mesh_errors(*values: dict) -> dict:
-    """Return the error of each measure from its values on nested meshes, fine to coarse.
+    """Estimate the mesh error of each measure from its values on nested meshes.
 
     The residual of a balance is an error itself, so that its change is used.
     """

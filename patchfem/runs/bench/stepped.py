@@ -105,7 +105,7 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
 
 
 class _Points(NamedTuple):
-    """Areas of the interface points and their pressure along the path.
+    """Areas of the interface points and their pressure along the bench path.
 
     - weight (m,): areas [m2].
     - pressure: function from the index of a sample to the pressure (m,) [Pa].
@@ -116,7 +116,7 @@ class _Points(NamedTuple):
 
 
 class _LawHistories(NamedTuple):
-    """Force, load, energy and traction histories of a friction law in d directions.
+    """Force, load, energy and traction histories of a friction law in d directions of slip.
 
     - force (k, d), load (k,): [N].
     - ledger (4, k): energies of `make_ledger` [J].
@@ -193,7 +193,7 @@ def _evaluate_law(
 
 
 def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
-    """Raise Missing if the direct sum over bonds exceeds MAX_STRIP_POINT_PRODUCTS.
+    """Raise Missing if a direct sum over bonds exceeds the limit of operations.
 
     Bonds older than 25 bond lengths count as cut off.
 
@@ -220,7 +220,7 @@ def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
 
 
 def _pressed_points(task: Slide) -> _Points:
-    """Return the interface points with their pressure along the path."""
+    """Return the interface points with their pressure along the bench path."""
     model = task.model
     if model.load_varies:
         loads = model.point.evaluate(task.time)
@@ -266,7 +266,7 @@ class _PressureSums(NamedTuple):
 
 
 def _pressure_sums(model, patch) -> _PressureSums:
-    """Return the load and the first moments of the pressure; y is 0 without strips."""
+    """Return the load [N] and the first moments [N m] of a pressure; 0 about x without strips."""
     if patch is None:
         return _PressureSums(model.point.load)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight

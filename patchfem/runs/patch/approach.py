@@ -57,7 +57,7 @@ def press_to_approach_with_rotation(
     min_load = _min_stable_load(patch_model, np.ptp(pieces.interface.x))
 
     def excess(log_load: float) -> float:
-        """Return the approach under a trial load minus the prescribed approach [m].
+        """Return the difference [m] between the approach under a trial load and the prescribed one.
 
         log_load is the logarithm of the load [N] in excess of the least stable load.
         """
@@ -130,7 +130,7 @@ def refuse_opening_gap(patch_model, pieces: Compliance) -> None:
     flat = np.zeros(pieces.interface.x.size)
 
     def closing(offset: float) -> float:
-        """Return the approach [m] of flat pieces under a load of 1 N at position `offset` [m]."""
+        """Return the approach [m] of flat pieces under 1 N at a given position along the interface."""
         return press(
             pieces, flat, 1.0, float(offset), spring=patch_model.loading.rotational_stiffness
         ).approach

@@ -53,7 +53,7 @@ class Pair:
 
     @property
     def coupling(self) -> float:
-        """Return the largest normal closing per largest tangential displacement under a shear force.
+        """Return the largest ratio of normal to tangential displacement under a shear force.
 
         The ratio [1] is 0 for mirrored pieces.
         """
@@ -84,7 +84,7 @@ def finite_elements(body, layers: Layers):
 
 
 def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
-    """Return the interface compliance of a piece, from the cache on disk if it is there.
+    """Return the interface compliance of a piece, read from the disk cache if possible.
 
     It has the normal, tangential and coupling parts nn, tt and nt.
 
@@ -162,14 +162,14 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
 
 
 def shared_pairs(patch_model) -> tuple:
-    """Return the condensed pieces (Pair) of a `PatchModel` on every level of its shared meshes."""
+    """Return the condensed pieces (Pair) of a model on every level of its shared meshes."""
     return tuple(
         shared_pair(patch_model, level) for level in range(len(patch_model.mesh.shared.levels))
     )
 
 
 def shared_pair(patch_model, level: int) -> Pair:
-    """Return the condensed pieces of a `PatchModel` on a given level of its shared meshes."""
+    """Return the condensed pieces (Pair) of a model on one level of its shared meshes."""
     bodies = patch_model.mesh.shared.levels[level]
     return store.reuse(
         _pair_key(patch_model, patch_model.mesh.shared.name, level),
@@ -178,7 +178,7 @@ def shared_pair(patch_model, level: int) -> Pair:
 
 
 def keep_pairs(patch_model, meshes, pairs) -> None:
-    """Store the condensed pieces of new shared meshes, level by level, for `shared_pair`.
+    """Store the condensed pieces of new shared meshes in the cache, level by level.
 
     patch_model: one of the patches that share the meshes.
     """
@@ -187,7 +187,7 @@ def keep_pairs(patch_model, meshes, pairs) -> None:
 
 
 def _pair_key(patch_model, name: str, level: int) -> tuple:
-    """Return the key under which the condensed pieces of a named shared mesh are stored."""
+    """Return the cache key of the condensed pieces on one level of a shared mesh."""
     return (
         "pair",
         name,
@@ -200,7 +200,7 @@ def _pair_key(patch_model, name: str, level: int) -> tuple:
 
 
 def delete_factors(pair: Pair) -> Pair:
-    """Delete the factorised matrices of pieces on tensor grids, and return the Pair.
+    """Delete the factorized matrices of the pieces in a Pair to free memory; return the Pair.
 
     The factors need far more memory than the compliance, and are recomputed for fields.
     """
@@ -232,5 +232,5 @@ def _end_gap(body, x) -> np.ndarray:
 
 
 def _nodes_match(x, other) -> bool:
-    """Return whether the interface nodes of the lower and the upper piece coincide."""
+    """Return whether the interface nodes of the two pieces coincide."""
     return other.size == x.size and np.abs(other - x).max() <= 1e-9 * np.ptp(x)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class EdgeValues(NamedTuple):
-    """Contact length and contact stiffnesses that depend on where the contact ends.
+    """Contact length and contact stiffnesses, which depend on the contact edges.
 
     Each is a number, or (q,) for q patches.
 

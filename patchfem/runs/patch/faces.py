@@ -23,7 +23,7 @@ from .values import values
 
 
 class Face(NamedTuple):
-    """Contact patch of a single interface of a rig, with its solutions on several meshes.
+    """Solved patch of one interface of a rig, on several meshes.
 
     - number: index of the interface.
     - name: nodes of the interface as the scene writes them, "1-0".
@@ -40,17 +40,17 @@ class Face(NamedTuple):
 
     @property
     def patch(self) -> Patch:
-        """Solved Patch of the interface on the finest mesh."""
+        """Patch of the interface, solved on the finest mesh."""
         return self.patches[0]
 
     @property
     def surface(self):
-        """`press.Surface` at whose points the fields of the interface are given."""
+        """Points at which the fields of the interface are given (`press.Surface`)."""
         return patch_surface(self.patch, self.fields or {})
 
     @property
     def folder(self) -> str:
-        """Folder name of the interface in the files of a run."""
+        """Name of the subfolder of the interface in the output of a run."""
         return self.name.replace(" (", "_").removesuffix(")")
 
     @property
@@ -65,7 +65,7 @@ class Face(NamedTuple):
 
 
 def press_faces(model) -> Iterator[Face]:
-    """Iterate over the interfaces of a model that have a patch, with the contact solved."""
+    """Solve the contact of every interface that has a patch, one after another (iterator)."""
     rig = model.rig
     for number, interface in enumerate(rig.friction.interfaces if rig is not None else ()):
         if interface.patch is not None:
@@ -79,7 +79,7 @@ def press_faces(model) -> Iterator[Face]:
 
 
 def press_on_meshes(interface, tolerance: float) -> tuple:
-    """Solve the contact of the patch of an InterfaceLaw on its mesh and on coarser ones.
+    """Solve the contact of an interface on its mesh and on coarser meshes.
 
     The solution is computed once for all runs of a process with the same patch. A patch with files,
     which may change, is solved once per model.
@@ -100,7 +100,7 @@ def press_on_meshes(interface, tolerance: float) -> tuple:
 
 
 def condense_again(model) -> None:
-    """Condense the pieces of every interface of a model again, ignoring cached operators."""
+    """Condense the pieces of every interface again, without the cached stiffness."""
     store.clear()
     for interface in model.rig.friction.interfaces if model.rig is not None else ():
         if interface.patch is not None:
@@ -138,7 +138,7 @@ def make_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
 
 
 def interfaces_with_coarse_mesh(model) -> list:
-    """Return the indices of interfaces that have a coarser mesh, as a tuple per distinct patch."""
+    """Return the indices of interfaces with a coarser mesh, grouped by distinct patch."""
     out = {}
     for face in press_faces(model):
         if face.partial_slip and face.patches[1] is not None:
@@ -188,7 +188,7 @@ def has_error_meshes(model) -> bool:
 
 
 def static_measures_without_errors(model) -> dict:
-    """Return the static measures of all patches of a model by name, without error estimates."""
+    """Return the static measures of all patches of a model as a dict, without errors."""
     if model.patch is not None:
         return result.static_measures_without_errors(model)
     with locate_errors(model.source):
@@ -200,7 +200,7 @@ def static_measures_without_errors(model) -> dict:
 
 
 def static_measures(model) -> dict:
-    """Return the static measures of all patches of a model by name, with error estimates.
+    """Return the static measures of all patches of a model as a dict, with error estimates.
 
     From the second interface on, the number of the interface follows the name.
     """
@@ -236,7 +236,7 @@ def collect_notes(model) -> list:
 
 
 def merge_sentences(model, list_sentences: Callable) -> list:
-    """Return the sentences on all patches of a model, each with the names of its interfaces.
+    """Join equal sentences on several patches, each with the names of its interfaces.
 
     Keys are written as they occur in the scene.
 
@@ -257,7 +257,7 @@ def merge_sentences(model, list_sentences: Callable) -> list:
 
 
 def in_scene(model, text: str) -> str:
-    """Replace the [contact] keys in a sentence on a patch by the keys that the scene uses.
+    """Replace the [contact] keys in a sentence by the keys of the interface in the scene.
 
     If the model has no patch of its own, these keys belong to [structure.interface.contact].
     """

@@ -58,7 +58,7 @@ MAX_OVERLAP_RATIO = 1e-6
 
 
 class PointLevel(NamedTuple):
-    """Solution of a contact problem on the equally spaced points of a refinement level.
+    """Contact solution on the equally spaced points of one refinement level.
 
     - force (n,): nodal forces [N].
     - surface: pressure and gap on the points.
@@ -92,7 +92,7 @@ class FreeEnds(NamedTuple):
 
 
 class PointForces(NamedTuple):
-    """Nodal contact forces at the points of a level, with approach and rotation of the holder.
+    """Contact forces at equally spaced points, with approach and rotation of the holder.
 
     - force (n,): nodal forces [N].
     - approach, rotation: [m] and [rad]; the rotation adds to that of the gap.
@@ -166,19 +166,19 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 
 
 def _first_level_points(patch_model) -> int:
-    """Return the number of points of the coarsest level of a `PatchModel`."""
+    """Return the number of points of the coarsest refinement level of a patch."""
     n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
 def _is_expensive(level: PointLevel) -> bool:
-    """Return whether doubling the points of a level exceeds the limit of points or work."""
+    """Return whether a finer level would exceed the limit of points or of work."""
     count = level.force.size
     return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
 def _add_series(coarse: list, levels: list) -> dict:
-    """Return the estimates of measures by name from two successive refinement series.
+    """Combine two refinement series to one estimate of each measure.
 
     The first series refines the cells at the ends; the second increases the number of points with
     the finest of these cells. The extrapolation and the error of the first are added to the second.
@@ -274,7 +274,7 @@ def _row_depths(piece, layout: Layout) -> tuple:
 
 
 def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
-    """Solve the contact of a `PatchModel` on a given number of equally spaced points.
+    """Solve the contact of a patch on a given number of equally spaced points.
 
     start: forces (n,) [N] of the level with half as many points, or None.
     """

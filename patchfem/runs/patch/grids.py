@@ -50,7 +50,7 @@ N_CELLS_PER_SMALL_CONTACT = (
 N_CELLS_PER_WAVE = (
     16  # Number of cells per wavelength of the gap, in the search and in the third grid.
 )
-# Smallest pressure maximum over the largest pressure towards which cells are graded.
+# Smallest local pressure maximum, relative to the largest pressure, around which the mesh is refined.
 MIN_PEAK_RATIO = 0.3
 N_CELLS_PER_PEAK = 4  # Number of cells of the coarsest grid per half-width of a pressure maximum.
 # Number of coarsest cells in a slip zone; the third grid has 16, which give the work to about 1 %.
@@ -75,7 +75,7 @@ UNSTRUCTURED_COST_FACTOR = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactExtent:
-    """Extent of a contact region with its edges, corners, pressure maxima and slip zones.
+    """Region of contact with its edges, corners, pressure maxima and slip zones.
 
     - span: (start, end) [m] of the loaded part of the interface.
     - places: positions [m] at which the pressure ends inside the interface, or the nodes of a
@@ -100,7 +100,7 @@ class ContactExtent:
 
 
 def condense_on_search_grid(patch_model) -> Pair:
-    """Return the condensed pieces on the equal columns with which the contact search starts.
+    """Return the pieces condensed on equal columns, on which the contact search starts.
 
     Patches of the same geometry share them.
     """
@@ -143,7 +143,7 @@ def make_base_grids(patch_model) -> BaseGrids:
 
 
 def _search_grids(patch_model) -> BaseGrids:
-    """Find the contact of a `PatchModel` on columns that are graded from search to search.
+    """Find the contact region on grids that are graded anew in every iteration.
 
     If a varying load moves the edges of the contact, the columns are fine wherever the edges lie
     between LOAD_RANGE_FACTORS times the load; if wear moves them, no column is longer than MAX_WEAR_CELL_RATIO of the
@@ -183,7 +183,7 @@ def _search_grids(patch_model) -> BaseGrids:
 
 
 def _is_settled(layout: Layout, last: Layout) -> bool:
-    """Return whether the bands of two successive layouts agree within BAND_CHANGE_TOL."""
+    """Return whether the graded bands of two successive column layouts agree."""
     if len(layout.bands) != len(last.bands):
         return False
     bands = np.reshape(layout.bands, (-1, 3))
@@ -225,7 +225,7 @@ def _max_wave_cell(patch_model) -> float:
 
 
 def make_search_layout(patch_model) -> Layout:
-    """Return the layout of equal columns for the first search for the contact."""
+    """Return the layout of equal columns on which the search for the contact starts."""
     half = patch_model.pieces.length / 2
     cell = min(patch_model.pieces.length / N_SEARCH_COLUMNS, _max_wave_cell(patch_model))
     return Layout(-half, half, (), (-half, half), cell, cell, 0.0)
@@ -299,7 +299,7 @@ def make_layout(patch_model, extents: list) -> Layout:
 
 
 def _edge_bands(edge_positions: list, min_cell: float) -> tuple:
-    """Return the mesh bands around contact edges, each with cells of at most `min_cell` [m].
+    """Return the bands of fine columns around the contact edges.
 
     If the number of edges is the same in all contacts, a band covers the range that its edge
     sweeps.

@@ -26,7 +26,7 @@ MAX_DECADES = 6
 
 
 def solve_split(patch_model, level: int, estimate: bool) -> tuple:
-    """Solve the contact on the mesh of a file with every edge halved `level` times.
+    """Solve the contact on a mesh file whose edges are halved a given number of times.
 
     The coarser patches are those of `solve_all`.
     """
@@ -80,7 +80,7 @@ def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool 
 
 
 def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float) -> bool:
-    """Return whether the error of a patch with a profile exceeds the tolerance on shared meshes."""
+    """Return whether a patch with a profile misses its tolerance on shared meshes."""
     has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
     if not has_trace or patches[1] is None:
         return False
@@ -88,20 +88,20 @@ def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
-    """Solve the contact of a patch on given condensed pieces, ordered from fine to coarse."""
+    """Solve the contact of a patch on given condensed pieces, from the finest to the coarsest."""
     return _pad_to_three(
         press_patch(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
     )
 
 
 def _pad_to_three(patches) -> tuple:
-    """Append None to solved patches until there are at least three entries."""
+    """Append None to a list of solved patches until it has at least three entries."""
     out = tuple(patches)
     return out + (None,) * (3 - len(out))
 
 
 def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, fresh: bool) -> tuple:
-    """Solve the contact of a patch on given meshes and on coarser ones (see `solve_all`)."""
+    """Solve the contact of a patch on given meshes and on coarser ones."""
     levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
     return _pad_to_three(solve(patch_model, *level, fresh) for level in levels)
 
@@ -116,7 +116,7 @@ def make_file_meshes(patch_model) -> list:
 
 
 def make_comparison_meshes(low, high) -> list:
-    """Return comparison meshes (lower, upper or None) that show the error of given meshes.
+    """Return the coarser meshes with which the error of given meshes is estimated.
 
     They are coarser grids, or the unstructured mesh with every edge halved. The list is empty for
     meshes with few columns.
@@ -196,14 +196,14 @@ def solve_on_ladder(
 
 
 def _attach_point_solution(patch, points):
-    """Attach the solution on profile points to a solved patch, if there is such a solution."""
+    """Add the solution on the points of a profile to a solved patch, if there is one."""
     if points is None:
         return patch
     return replace(patch, points=points, averaging=points.spacing)
 
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
-    """Return whether solved patches, with the solution on profile points, meet the tolerance."""
+    """Return whether the estimated errors of a solved patch meet the tolerance."""
     patch_measures = measures(
         _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
     )
@@ -211,7 +211,7 @@ def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
 
 
 def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
-    """Return the largest predicted CPU time [s] that is allowed for the finest mesh of a patch.
+    """Return the CPU time [s] that condensing the finest mesh of a patch may take.
 
     The motion of a prescribed slip is cheap, so that a tight tolerance allows a finer mesh, up to
     the limit of a static patch. With tolerance None it is the limit at any tolerance.
@@ -229,7 +229,7 @@ def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float
 def solve_static_ladder(
     patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
 ) -> tuple:
-    """Solve the patch of a law bench with partial slip on the meshes of a static run.
+    """Solve the patch of a bench with partial slip on the meshes of a static run.
 
     The patches are ordered from fine to coarse.
 

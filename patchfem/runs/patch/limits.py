@@ -26,7 +26,7 @@ UNSTEADY_FACTOR = 2.0  # Error over the largest change, for a series without a s
 
 
 class Limit(NamedTuple):
-    """Limit of a series of values on nested meshes, with its error.
+    """Extrapolated value of a series on nested meshes, with its error.
 
     - value: value on the finest mesh.
     - error: half-width of an interval around `value` that contains the limit.
@@ -41,7 +41,7 @@ class Limit(NamedTuple):
 
 
 def extrapolate(values, nested: bool = True) -> Limit:
-    """Extrapolate two or more values on meshes of successively halved cells to their limits.
+    """Extrapolate values on meshes of successively halved cells to the limit of vanishing cells.
 
     Three values give a ratio of successive changes. If it is steady, the remainder of the geometric
     series is the error of the finest value. With two values the error is twice their change. For

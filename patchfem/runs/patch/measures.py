@@ -60,11 +60,11 @@ class Estimate(NamedTuple):
     is_extrapolated: bool = False
 
     def select(self, case: int) -> "Estimate":
-        """Return the estimate of a single patch out of q patches."""
+        """Return the estimate of one of the q patches."""
         return Estimate(self.value[case], self.error[case], self.is_extrapolated[case])
 
     def to_measure(self, name: str, floor: float | None = None) -> Measure:
-        """Return the Measure of a single patch for the measure table.
+        """Convert the estimate of a single patch to a Measure.
 
         With floor None, the floor of the table applies.
         """
@@ -82,7 +82,7 @@ class Estimate(NamedTuple):
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
-    """Return the static measures of a patch by name, each with its estimated error.
+    """Return the static measures of a patch as a dict, each with its estimated error.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
 
 
 def _select_equal_part_counts(fine: Patch, coarse: list) -> list:
-    """Return the coarser patches with as many contact regions as the finest patch.
+    """Select the coarser solutions with as many contact intervals as the finest one.
 
     A contact region of a few cells next to a step may be missing on a coarse mesh. The change to
     such a mesh shows this region and no order of convergence, so that neither this mesh nor coarser
@@ -154,7 +154,7 @@ def _select_equal_part_counts(fine: Patch, coarse: list) -> list:
 
 
 def _count_parts(active) -> int:
-    """Return the number of contact intervals of a contact set (m,) of bool."""
+    """Count the contact intervals of a contact set (m,)."""
     return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
 
@@ -186,7 +186,7 @@ def converge(
     min_relative_error: float = MIN_ERROR,
     factor: float = 1.0,
 ) -> dict:
-    """Estimate the limits and the errors of static measures on successively refined meshes.
+    """Extrapolate static measures over successively refined meshes, with errors.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def converge(
 
 
 def include_peak_error(fraction, error, relative_peak_error):
-    """Widen the errors of loaded fractions by the relative error of the pressure peak.
+    """Add the relative error of the pressure peak to the errors of loaded fractions.
 
     The peak is the divisor of the fraction.
 
@@ -253,7 +253,7 @@ def include_peak_error(fraction, error, relative_peak_error):
 
 
 def max_error_ratio(measures_by_name: dict, tolerance: float) -> float:
-    """Return the largest error of the decisive measures relative to the allowed error [1].
+    """Return the largest ratio of error to allowed error of the measures that choose the mesh.
 
     Above 1, a measure misses the tolerance. A missing value or error counts as 0.
     """
@@ -451,7 +451,7 @@ def estimate_common_errors(resolution: Resolution, finest: dict) -> dict:
 
 
 def _edge_offset(pair, cell):
-    """Return the position error, in cell lengths, of a contact edge between two nodes of a Pair.
+    """Return the error of the position of a contact edge between two nodes, in cell lengths.
 
     A soft coating thinner than the cells acts as a bed of springs, whose edge is where the pressure
     of a node vanishes. cell: longest cell in which the contact ends [m].
@@ -487,7 +487,7 @@ def _missed_corner_pressure(pair, sigma, cells):
 
 
 def _wedge_pressure(patch: Patch) -> float:
-    """Return the largest pressure [Pa] that the gap next to a contact of few nodes allows.
+    """Return the largest pressure [Pa] that the gap beside a contact of few nodes permits.
 
     It is E* times the slope of the gap there.
     """
@@ -501,7 +501,7 @@ def _wedge_pressure(patch: Patch) -> float:
 
 
 def plane_state_sentences(patch_model, patch: Patch) -> list:
-    """Return the sentence on the model error due to the assumed plane state, as a list.
+    """Return a sentence, as a list, on the model error due to plane stress or plane strain.
 
     The list is empty for a piece that is far wider than tall in plane strain, or far taller than
     wide in plane stress. Otherwise no mesh reduces this error.
@@ -521,7 +521,7 @@ def plane_state_sentences(patch_model, patch: Patch) -> list:
 
 
 def with_opposite_plane_state(patch_model):
-    """Return the model in the opposite plane state, or None if its state is clearly right."""
+    """Return the model with plane stress and strain exchanged; None if the state is certain."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     if pieces.plane == "strain":
@@ -534,12 +534,12 @@ def with_opposite_plane_state(patch_model):
 
 
 def _opposite_plane_name(pieces) -> str:
-    """Return the name of the plane state that is opposite to that of the pieces."""
+    """Return "plane stress" for pieces in plane strain, and vice versa."""
     return "stress" if pieces.plane == "strain" else "strain"
 
 
 def _plane_state_clause(patch_model) -> str:
-    """Return the text on the plane state that is assumed for the pieces."""
+    """Describe whether plane stress or plane strain is assumed for the pieces."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     return (
@@ -549,7 +549,7 @@ def _plane_state_clause(patch_model) -> str:
 
 
 def format_plane_changes(patch_model, own_values: dict, other_values: dict) -> list:
-    """Return the sentence on the change of the measures in the opposite plane state, as a list.
+    """Return a sentence, as a list, on the changes of measures in the opposite plane state.
 
     Parameters
     ----------
@@ -580,7 +580,7 @@ def format_plane_changes(patch_model, own_values: dict, other_values: dict) -> l
 
 
 def add_strip_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
-    """Widen the errors of measures by the effect of the number of strips.
+    """Add the errors due to the finite number of strips to measures.
 
     It is the change to another number of strips on the mesh of `patch`, at second order. Measures
     without a value are not changed.
@@ -611,7 +611,7 @@ def add_strip_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
 
 
 def with_other_strip_count(patch_model) -> tuple:
-    """Return the `PatchModel` with another number of strips, and the ratio of the strip widths.
+    """Return the model with another number of strips, and the ratio of the strip widths.
 
     It has half as many strips, or twice as many if half as many would not reach to the load line.
     Without strips to halve it is the model itself.

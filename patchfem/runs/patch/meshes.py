@@ -40,7 +40,7 @@ MAX_CELL_RATIO = 2.0
 
 
 def geometry_key(patch_model) -> tuple:
-    """Return a key of everything that the meshes and the stiffness of the pieces depend on.
+    """Return a hashable key of all that determines the meshes and the stiffness of two pieces.
 
     It does not contain load and surface shapes, and is equal for patches that may share meshes.
     """
@@ -63,7 +63,7 @@ def geometry_key(patch_model) -> tuple:
 
 
 def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> SharedMeshes | None:
-    """Return meshes that all `PatchModel`s of a geometry share, independent of their order.
+    """Choose meshes for all patches of equal geometry, independent of the order of the patches.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
 
 
 def name_by_digest(levels) -> SharedMeshes:
-    """Return shared meshes of the given levels, named by the hash of their content."""
+    """Return shared meshes whose name is the hash of their contents."""
     digest = sha256()
     for body in chain.from_iterable(levels):
         if body is None:
@@ -147,7 +147,7 @@ def name_by_digest(levels) -> SharedMeshes:
 
 
 def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
-    """Select the patches that differ most in loads and shapes.
+    """Select the patches that differ most from each other in load and surface shape.
 
     The second result tells whether these are all patches.
 
@@ -176,7 +176,7 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
 
 
 def _contact_numbers(patch_model) -> tuple:
-    """Return the loads, shapes and other numbers that distinguish contacts of equal geometry."""
+    """Return the loads and shape parameters in which patches of equal geometry differ."""
     shapes = [
         float(value)
         for _, part in patch_model.gap.shapes
@@ -202,7 +202,7 @@ def _contact_numbers(patch_model) -> tuple:
 
 
 def _count_halvings(cases: list, tolerance: float) -> dict:
-    """Return how often the mesh of each case is halved beyond the minimum, by solving it alone.
+    """Solve each patch alone, and return how often its mesh is halved beyond the minimum.
 
     The keys are `_contact_numbers`. N_LADDER_CASES cases are tried.
     """
@@ -221,7 +221,7 @@ def _count_halvings(cases: list, tolerance: float) -> dict:
 def _common_layout(
     cases: list, has_intermediate_cases: bool, halvings_by_case: dict
 ) -> Layout | None:
-    """Return the layout of the coarsest grids for all cases; None if no case can be solved.
+    """Return a column layout of the coarsest grids that suits all patches; None on failure.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def _common_layout(
 
 
 def _contact_of_case(patch_model, pair, patch):
-    """Return the contact region of a case from a given or a new solution; None if that fails.
+    """Return the contact region of a patch, if needed from a new solution; None if that fails.
 
     The single run of the case then reports the error.
     """
@@ -269,7 +269,7 @@ def _contact_of_case(patch_model, pair, patch):
 
 
 def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
-    """Return the layout with the shortest cell that any of the layouts has at each position."""
+    """Merge column layouts, with the shortest cell of all layouts at each position."""
     bands = {
         band
         for layout in layouts
@@ -300,7 +300,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
 
 
 def _interpolate_bands(layouts: list) -> list:
-    """Return mesh bands between the contact edges of neighbouring cases, with graded cells."""
+    """Return bands of fine columns between the contact edges of neighbouring cases."""
     out = []
     half = max(layout.stop for layout in layouts)
     for side in (-1, 1):
@@ -328,7 +328,7 @@ def _interpolate_bands(layouts: list) -> list:
 def _refine_until_met(
     cases: list, bodies, tolerance: float, is_level_count_fixed: bool, min_levels: int
 ) -> tuple:
-    """Refine nested meshes until every case meets its tolerance or the cost limit is reached.
+    """Refine nested meshes until every patch meets its tolerance or the mesh is too expensive.
 
     Parameters
     ----------
@@ -373,7 +373,7 @@ def _refine_until_met(
 
 
 def _error_ratio(patch_model, pairs: list, tolerance: float) -> float:
-    """Return the largest error of a case over the tolerance; 0 if the case cannot be solved."""
+    """Return the ratio of the largest error of a patch to the tolerance; 0 if it is not solved."""
     try:
         return max_error_ratio(
             measures(*ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance), tolerance

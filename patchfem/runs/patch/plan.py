@@ -40,7 +40,7 @@ MAX_FULL_CONTACT_TILT = 0.7
 
 
 class Sizes(NamedTuple):
-    """Predicted sizes and cost of the nested grids of a patch.
+    """Predicted numbers of nodes and CPU time of the nested grids of a patch.
 
     - points: nodes of the interface.
     - finest: (columns, rows) of nodes of the finest grid of each piece, a single entry if they are
@@ -64,7 +64,7 @@ class Sizes(NamedTuple):
 
 
 def expected_grids(patch_model, tolerance: float) -> Sizes:
-    """Predict the grids on which a `PatchModel` will be solved at a given tolerance.
+    """Predict the grids on which a patch will be solved at a given tolerance.
 
     The coarsest grid is that of the run. A mesh file is not read and counts as an automatic grid.
     """
@@ -83,7 +83,7 @@ def expected_grids(patch_model, tolerance: float) -> Sizes:
 
 
 def _expected_levels(patch_model, tolerance: float) -> list:
-    """Return the bodies of each expected mesh level, fine to coarse."""
+    """Return the meshes of the pieces on each expected level, from fine to coarse."""
     if patch_model.mesh.shared is not None:
         return list(patch_model.mesh.shared.levels)
     if not patch_model.mesh.is_automatic:
@@ -105,7 +105,7 @@ def _expected_levels(patch_model, tolerance: float) -> list:
 
 
 def cost(model: Model) -> Cost:
-    """Predict the cost of the contact solutions of all patches of a model.
+    """Predict the cost of solving the contact of all patches of a model.
 
     Equal patches of interfaces are pressed once.
     """
@@ -145,7 +145,7 @@ def cost(model: Model) -> Cost:
 
 
 def pressing_cost(patch_model, tolerance: float) -> Cost:
-    """Predict the cost of the contact solution of a `PatchModel`, including its fields.
+    """Predict the cost of solving the contact of a patch and computing its fields.
 
     The work of condensing follows from the sizes of its grids; the time per unit of work, and that
     of the fields and files of the finest grid, was measured over random patches.
@@ -172,7 +172,7 @@ def pressing_cost(patch_model, tolerance: float) -> Cost:
 
 
 def chain(patch_model) -> dict:
-    """Return the stiffness [N/m] by name of the elements in series in a `PatchModel`.
+    """Return the stiffnesses [N/m] of the elements of a patch that act in series, as a dict.
 
     An element that the scene does not give is "rigid".
     """
@@ -197,7 +197,7 @@ def chain(patch_model) -> dict:
 
 
 def groups(model: Model) -> dict:
-    """Return dimensionless groups of a patch by name, and with friction its slip length [m].
+    """Return dimensionless groups of a patch as a dict, and with friction its slip length [m].
 
     tilt_over_first_opening is the tilt over the tilt at which the edge of flat pieces opens, with
     the pieces as bars.
@@ -251,7 +251,7 @@ def assembly_sentence(patch_model) -> str:
 
 
 def verdict(dimensionless_groups: dict, patch_model) -> list:
-    """Return the sentences of a plan on tilt, asperity layer and assembly of a `PatchModel`.
+    """Return the sentences of a plan on tilt, asperity layer and assembly of a patch.
 
     The tilt group determines the extent of the contact of flat pieces only.
     """
@@ -272,7 +272,7 @@ def verdict(dimensionless_groups: dict, patch_model) -> list:
 
 
 def _tilt_sentence(dimensionless_groups: dict, patch_model) -> list:
-    """Return the sentence on the tilt over the tilt of first opening, as a list."""
+    """Compare the tilt of a patch with the tilt at which the contact opens, as a list."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
     if tilt is None:

@@ -26,7 +26,7 @@ MIN_RIPPLE = 1e-2
 
 
 class Surface(NamedTuple):
-    """Pressure and gap of an interface at the points of its solution.
+    """Pressure and gap at the points of an interface.
 
     - x (n,): positions [m].
     - weight (n,): areas [m2].
@@ -77,7 +77,7 @@ class SolvedContact(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
 class Patch:
-    """Solved contact patch.
+    """Contact patch with the solution of its static contact problem.
 
     Forces, areas and stiffnesses are those of all pairs together.
 
@@ -119,7 +119,7 @@ class Patch:
 
     @property
     def normal_stress(self) -> np.ndarray:
-        """Normal stress at the nodes (m,) [Pa], compression positive; the mean over strips."""
+        """Pressure at the nodes (m,) [Pa], averaged over the strips."""
         return self.pressure.sigma_n
 
     @property
@@ -144,7 +144,7 @@ class Patch:
         return self._last_frame("slip")
 
     def _last_frame(self, name: str) -> np.ndarray | None:
-        """Return the last frame (m,) of a nodal field; 0 in a static run, None if it is unknown."""
+        """Return the last stored values (m,) of a nodal field; 0 in a static run, None if unknown."""
         if name in self.frames:
             return self.frames[name][-1]
         return np.zeros(self.x.size) if self.model.mesh.is_static else None
@@ -157,7 +157,7 @@ class Patch:
 
     @property
     def finest_surface(self) -> Surface:
-        """Pressure and gap of the finest solution, at profile points or else at mesh nodes."""
+        """Pressure and gap of the finest solution, on profile points or else on the mesh."""
         return self.surface if self.points is None else self.points.surface
 
     @property
@@ -167,7 +167,7 @@ class Patch:
 
     @property
     def skin_fraction(self) -> np.ndarray | None:
-        """Fraction (m,) [1] of the asperity layer in the compliance of each node; None without it."""
+        """Fraction (m,) [1] of the nodal compliance due to the asperity layer; None without layer."""
         if not self.has_skin:
             return None
         bare = np.diag(self.pair.compliance.normal)
@@ -206,7 +206,7 @@ def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
 
 
 def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
-    """Solve the contact of a condensed Pair under the shapes and the load of a `PatchModel`.
+    """Solve the contact of condensed pieces (Pair) under the shapes and the load of a model.
 
     The same Pair serves any number of models.
 
@@ -261,7 +261,7 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
 
 
 def _gap_changes_at_step(node: int, gap, half_steps, worn) -> tuple:
-    """Return the gap changes (m,) [m] that put the node at a step on either side of the step.
+    """Return the gap changes (m,) [m] that move a node on a step to either side of it.
 
     The worn depth of the node belongs to a gap at half the height of the step. If the node carries
     pressure, it has worn like its neighbour on the higher side of the step, else like the one on
@@ -345,7 +345,7 @@ def areas(patch_model, interface) -> np.ndarray:
 
 
 def make_force_function(patch_model, pair: Pair):
-    """Return a function that computes the contact forces of a `PatchModel` with worn surfaces.
+    """Return a function that computes the contact forces between worn surfaces.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
     to the diagonal of the compliance, to forces (m,) [N]; all are (s, m) for strips. Everything
@@ -371,7 +371,7 @@ def make_force_function(patch_model, pair: Pair):
 
 @dataclass(eq=False, slots=True)
 class PressedStrips:
-    """Contact solver of worn strips that starts from the previous contact set.
+    """Contact solver of worn strips, which starts each time from the previous contact set.
 
     `begin` sets the contact set of the start, so that a run that continues after an interruption
     gives the same bits.
@@ -388,7 +388,7 @@ class PressedStrips:
     warm_start: WarmStart = field(default_factory=WarmStart)
 
     def begin(self, force) -> None:
-        """Set the contact set of the next solution to the loaded nodes of forces (s, m) [N]."""
+        """Set the contact set from which the next solution starts to the loaded nodes."""
         self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
@@ -401,7 +401,7 @@ class PressedStrips:
 def solve_contact(
     patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> SolvedContact:
-    """Solve the contact of two pieces with asperity layer, load and holder of a `PatchModel`.
+    """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     Parameters
     ----------
@@ -441,7 +441,7 @@ def solve_contact(
 
 
 def with_linear_skin(skin, pieces: Compliance) -> Compliance:
-    """Return the compliance of the pieces in series with a linear asperity layer.
+    """Add the compliance of a linear asperity layer to that of the pieces.
 
     Without a layer, or with another law, these are the pieces themselves. A layer without a
     tangential ratio is rigid in shear.

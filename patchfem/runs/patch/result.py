@@ -111,7 +111,7 @@ def static_measures(model, patch, coarse) -> dict:
 
 
 def floors(patch_model, tolerance: float, values: dict) -> dict:
-    """Return the floor of each static measure by name, as numbers or (q,) for q patches.
+    """Return the error floor of each static measure as a dict, for one or for q patches.
 
     The floor of a measure that is a difference of larger terms is the tolerance times these: for
     the approach the rotation times half the length, for the centre of pressure half the length,
@@ -140,7 +140,7 @@ def floors(patch_model, tolerance: float, values: dict) -> dict:
 
 
 def static(inputs: RunInputs) -> Result:
-    """Return the Result of a static patch, or of a patch without contact."""
+    """Return the Result of a static patch, which may be without contact."""
     patch = inputs.patch
     pressure = patch.pressure
     extra = {"residuals": dict(pressure.residuals), "iterations": pressure.iterations}
@@ -229,7 +229,7 @@ def exceeds_small_strains(patch_model, largest_pressure, approach):
 
 
 def _strains(patch_model, largest_pressure, approach) -> tuple:
-    """Return peak pressure/lowest Young's modulus and approach/height as measures of strain."""
+    """Return two estimates of the strain: peak pressure/modulus and approach/height."""
     young = min(material.young for material in _materials(patch_model))
     height = patch_model.pieces.lower.height + patch_model.pieces.upper.height
     return largest_pressure / young, approach / height
@@ -306,7 +306,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
 
 
 def _mesh_clause(model, patch) -> str:
-    """Return the text on results that are evaluated on the mesh, not on points of a profile."""
+    """Return a clause on results that come from the mesh instead of the points of a profile."""
     largest = format_quantity(float(patch.pressure.sigma_n.max()), "Pa", 3)
     where = f"the mesh of {patch.x.size} interface points, whose largest pressure is {largest}"
     if model.kind == "patch":
@@ -318,7 +318,7 @@ def _mesh_clause(model, patch) -> str:
 
 
 def note_on_perfect_stick(patch_model, patch) -> list:
-    """Return a note on Dundurs' beta of unlike pieces and the effect of perfect stick.
+    """Return a note, as a list, on the normal-shear coupling of dissimilar pieces.
 
     Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
     stresses, which stiffen the contact.

@@ -20,7 +20,7 @@ from ...surface.roughness import peaks
 
 
 def skin_law(patch_model):
-    """Return the law of pressure over separation of the asperity layer of a patch."""
+    """Return the pressure-separation law of the asperity layer of a patch."""
     skin = patch_model.interface.skin
     if skin.law == "linear":
         return asperity_laws.LinearAsperities(skin.normal_stiffness)
@@ -51,7 +51,7 @@ def mean_layer_stiffness(patch_model, pressure: float) -> float:
 
 
 def note_on_peak_stiffness(patch_model, pressure: float) -> list:
-    """Return a sentence, as a list, on the reliability of an asperity stiffness from a profile.
+    """Return a note, as a list, on the reliability of an asperity stiffness from a profile.
 
     It also covers peaks from root mean squares, and is [] for any other layer. pressure: mean
     pressure [Pa].
@@ -85,7 +85,7 @@ def note_on_peak_stiffness(patch_model, pressure: float) -> list:
 
 
 def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
-    """Return the asperity stiffness from every second sample of the profile, as text."""
+    """Return as text the asperity stiffness that every second sample of a profile gives."""
     try:
         surface_peaks = peaks.gaussian_peaks(coarse) if coarse else None
     except PatchfemError:
@@ -104,7 +104,7 @@ def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
 
 
 def cut_off_pressure(pressure) -> np.ndarray:
-    """Set the pressures (..., m) [Pa] of a smooth layer below MIN_RELATIVE_PRESSURE to 0.
+    """Set pressures (..., m) [Pa] of a smooth layer to 0 where they are negligible.
 
     The law never reaches 0, but the pressure that is cut off is below the residual of the load
     balance, and underflows farther out. The limit is relative to the largest pressure.

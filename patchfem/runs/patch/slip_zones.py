@@ -14,7 +14,7 @@ from .jenkins_elements import elements
 
 
 def slip_zones(patch, slip, ends: list) -> tuple:
-    """Return the zones (start, end) [m] that slip at the amplitude of a prescribed displacement.
+    """Return the zones (start, end) [m] that slip at a given displacement amplitude.
 
     The displacement at which points yield is interpolated linearly between nodes. At an end of the
     contact
@@ -89,7 +89,7 @@ def peak_force(jenkins_set: JenkinsSet, amplitude: float) -> float:
 
 
 def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
-    """Return the largest error of friction work and force relative to the allowed error [1].
+    """Return the largest ratio of error to allowed error of friction work and friction force.
 
     Parameters
     ----------

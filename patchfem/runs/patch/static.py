@@ -76,7 +76,7 @@ class PatchLoads(NamedTuple):
 
 
 class Level(NamedTuple):
-    """Contact solutions of q patches on a single mesh.
+    """Contact solutions of q patches on one mesh.
 
     - values: static measures by name, (q,) each.
     - pressure: ContactState whose fields have a row or a number for each patch.
@@ -93,7 +93,7 @@ class Level(NamedTuple):
 
     @property
     def is_solved(self) -> np.ndarray:
-        """Whether the contact (q,) of each patch was found and is a single interval."""
+        """Mask (q,) of the patches that are solved and in contact along a single interval."""
         return self.contacts.residual <= RESIDUAL_TOL
 
 
@@ -123,7 +123,7 @@ class BatchSolution(NamedTuple):
         return self.levels[0].pressure.sigma_n.max(axis=1)
 
     def plane_sentences(self, patch_model, case: int) -> list:
-        """Return the sentence on the plane state of a single patch of the batch, as a list."""
+        """Return a sentence, as a list, on plane stress or plane strain of one patch of the batch."""
         if not self.plane_values:
             return []
         own_values, other_values = (
@@ -133,7 +133,7 @@ class BatchSolution(NamedTuple):
         return format_plane_changes(patch_model, own_values, other_values)
 
     def measures(self, case: int, floors: Mapping | None = None) -> dict:
-        """Return the measures of a single patch of the batch by name.
+        """Return the measures of one patch of the batch as a dict.
 
         floors: floors (q,) by name that replace those of the table.
         """
@@ -146,7 +146,7 @@ class BatchSolution(NamedTuple):
 
 
 def reason_not_batched(patch_model) -> str:
-    """Return the reason why a `PatchModel` cannot be solved in a batch with others.
+    """Return the reason why a patch cannot be solved in a batch with others, or "".
 
     It is "" if it can.
     """
@@ -167,7 +167,7 @@ def reason_not_batched(patch_model) -> str:
 
 
 def _reason_for_several_intervals(patch_model) -> str:
-    """Return the reason why the contact of a `PatchModel` may not be a single interval.
+    """Return the reason why a patch may touch along more than one interval, or "".
 
     It is "" if it is one.
     """
@@ -181,19 +181,19 @@ def _reason_for_several_intervals(patch_model) -> str:
 
 
 def batch_key(patch_model) -> tuple:
-    """Return the mesh name and properties that patches of a batch have in common."""
+    """Return a hashable key that is equal for patches that can be solved in one batch."""
     return patch_model.mesh.shared.name, *_layer_and_rotation(patch_model)
 
 
 def _layer_and_rotation(patch_model) -> tuple:
-    """Return the numbers of the linear asperity layer, and whether the rotation is fixed."""
+    """Return the parameters of the linear asperity layer, and whether the rotation is fixed."""
     skin = patch_model.interface.skin
     numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
     return numbers, patch_model.loading.moment is None
 
 
 def collect_loads(patches: Sequence) -> PatchLoads:
-    """Collect the loads and shapes of several `PatchModel`s in a record of arrays."""
+    """Collect the loads and shapes of several patches in a record of arrays."""
     loadings = [patch.loading for patch in patches]
     moment = None
     if loadings[0].moment is not None:
@@ -209,7 +209,7 @@ def collect_loads(patches: Sequence) -> PatchLoads:
 
 
 def loads_from_columns(patch_model, count: int) -> PatchLoads:
-    """Return the loads of `count` patches given by a single PatchModel with columns of numbers."""
+    """Return the loads of q patches from one PatchModel whose numbers are columns."""
 
     def column(number) -> np.ndarray:
         """Return a number as a column (q,)."""
@@ -227,7 +227,7 @@ def loads_from_columns(patch_model, count: int) -> PatchLoads:
 
 
 def solve_patches_on_pair(patch_models, pair: Pair) -> list:
-    """Solve the contacts of several `PatchModel`s of the same geometry on a Pair.
+    """Solve the contacts of several patches of equal geometry on the same condensed pieces.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def _has_plain_grids(pair: Pair) -> bool:
 
 
 def _group_alike(patch_models) -> list:
-    """Group the indices of `PatchModel`s of the same geometry that can be solved in one batch."""
+    """Group the indices of patches of equal geometry that can be solved in one batch."""
     groups = {}
     for case, patch_model in enumerate(patch_models):
         if not _reason_for_several_intervals(patch_model):
@@ -268,7 +268,7 @@ def _group_alike(patch_models) -> list:
 
 
 def solved_patches(patch_models, tolerance: float) -> list:
-    """Solve similar `PatchModel`s in one batch; None for each that this cannot solve.
+    """Solve similar patches in one batch; None for each patch that the batch cannot solve.
 
     They share their pieces and `batch_key`. tolerance: see `solve_together`.
     """
@@ -289,7 +289,7 @@ def solved_patches(patch_models, tolerance: float) -> list:
 
 
 def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
-    """Return the largest error over the tolerance for each `PatchModel`; None if not solved.
+    """Return the ratio of the largest error to the tolerance for each patch; None if not solved.
 
     Parameters
     ----------
@@ -369,7 +369,7 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
 
 
 def _make_patch(patch_model, pair: Pair, level: Level, case: int):
-    """Return a single patch of a batch as a Patch, as `press.press_patch` returns it."""
+    """Convert the solution of one patch of a batch to a Patch."""
     gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
     pressure = ContactState(
@@ -389,7 +389,7 @@ def _make_patch(patch_model, pair: Pair, level: Level, case: int):
 
 
 def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
-    """Solve the contacts of q patches in one batch on a single Pair.
+    """Solve the contacts of q patches in one batch on one pair of condensed pieces.
 
     Parameters
     ----------
@@ -453,7 +453,7 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) ->
 
 
 def _contact_node_range(x, coarse: Level) -> tuple:
-    """Return the node range at x (m,) [m] in which contacts known from coarser cells lie.
+    """Return the range of nodes that can be in contact, from the contact on a coarser mesh.
 
     The range is the first node (q,) and the node (q,) after the last one.
     """

@@ -16,14 +16,14 @@ _RESULTS: dict = {}  # The dict is ordered from the least to the most recently u
 
 
 def reuse(key: tuple, make: Callable):
-    """Return the cached result of a key, computing and storing it on the first call."""
+    """Return the cached value of a key; compute and store it on the first call."""
     result = _RESULTS[key] if key in _RESULTS else make()
     keep(key, result)
     return result
 
 
 def reuse_in_sweep(patch_model, key: tuple, make: Callable):
-    """Return the result of a key, cached only if other cases of a sweep may need it.
+    """Return the value of a key, which is cached only if other cases of a sweep may need it.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def reuse_in_sweep(patch_model, key: tuple, make: Callable):
 
 
 def keep(key: tuple, result) -> None:
-    """Store a result under a key as the most recently used entry of the cache.
+    """Store a value under a key as the most recently used entry of the cache.
 
     Beyond MAX_ENTRIES, the least recently used result is discarded.
     """
@@ -48,12 +48,12 @@ def keep(key: tuple, result) -> None:
 
 
 def clear() -> None:
-    """Discard all cached results."""
+    """Discard all cached values of this process."""
     _RESULTS.clear()
 
 
 def content_key(patch_model) -> tuple:
-    """Return a cache key that is equal for all `PatchModel`s with the same content."""
+    """Return a cache key that is equal for patch models with equal contents."""
     gap = patch_model.gap
     mesh = patch_model.mesh
     interface = patch_model.interface
@@ -73,7 +73,7 @@ def content_key(patch_model) -> tuple:
 
 
 def may_be_shared(patch_model) -> bool:
-    """Return whether results of a `PatchModel` may be reused by other cases of a sweep.
+    """Return whether other cases of a sweep may reuse the results of a patch model.
 
     This requires shared meshes, and neither a mesh nor a profile from a file.
     """

@@ -59,7 +59,7 @@ def min_stress_ratio(poisson: float, plane: str) -> float:
 
 
 def yielding_faces(patch_model, peak: float) -> dict:
-    """Return notes on the surface materials that yield under a given pressure, by Strength.
+    """Return notes on the surface materials that yield under a given pressure.
 
     Parameters
     ----------

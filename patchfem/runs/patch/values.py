@@ -106,7 +106,7 @@ def _extrapolate_to_ends(x, sigma) -> np.ndarray:
 
 
 def static_values(length: float, area: float, state, peak, edge_values: EdgeValues) -> dict:
-    """Return the static contact measures by name, as numbers or (q,) for q patches.
+    """Return the static contact measures as a dict of numbers, or of columns (q,) for q patches.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def static_values(length: float, area: float, state, peak, edge_values: EdgeValu
 
 
 def values(patch: Patch) -> dict:
-    """Return the value of every static measure of a solved patch by name, in SI units.
+    """Return the values of all static measures of a solved patch as a dict, in SI units.
 
     A node at the edge of a step represents half a cell on either side: the value is the weighted
     mean of the patches with and without contact of this node. `patch_rows` has the definitions.
@@ -160,7 +160,7 @@ def values(patch: Patch) -> dict:
 
 
 def _values(patch: Patch) -> dict:
-    """Return the static measures of a patch that has no node at a step of the gap."""
+    """Return the static measures of a patch without a node at a step of the gap."""
     state = patch.strips
     sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -259,7 +259,7 @@ def _shear_stiffness(patch: Patch, ends: list) -> float:
 
 
 def edge_cells(x, active) -> np.ndarray:
-    """Return the lengths (e,) [m] of the cells in which the contact ends; empty in full contact."""
+    """Return the lengths (e,) [m] of the cells in which contact edges lie; none in full contact."""
     return np.diff(x)[active[1:] != active[:-1]]
 
 
@@ -296,7 +296,7 @@ def unresolved_rounding(patch: Patch) -> float:
 
 
 def open_ends(patch: Patch) -> float:
-    """Return the total length [m] of rounded surface at which the contact may end.
+    """Return the length [m] of rounded surface on which a contact edge may lie.
 
     It counts an end whose last node is in contact.
     """

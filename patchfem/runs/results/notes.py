@@ -27,7 +27,7 @@ MAX_PROPOSED_HARMONICS = (
 
 
 def note_on_groove_slope(model, patch) -> list:
-    """Return the note on the slope of grooves under pieces that are compliant in shear.
+    """Return the note on steep grooves under pieces that are compliant in shear.
 
     The note says how far a point may be from the position at which the slope is taken.
     """
@@ -110,7 +110,7 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
 
 
 def warn_of_unbounded_bonds(law) -> list:
-    """Return a warning if initial bonds of negative order have an infinite traction.
+    """Return a warning if initial bonds of negative order exert an infinite traction.
 
     Their traction is infinite at the first instant. Bonds that form later are bounded: theirs is at
     most the fraction P(p + 1, R/eps_0) of mu_s N, grown or not.
@@ -154,7 +154,7 @@ def note_on_growth(law, peak: float | None) -> list:
 
 
 def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
-    """Return a warning if the friction work from samples and from energies differs.
+    """Return a warning if the friction works from samples and from the energy balance differ.
 
     The trapezoidal rule for the samples is of second order; a difference that is smaller than its error
     may be small by chance.
@@ -199,7 +199,7 @@ def propose_harmonics(n_harmonics: int, sharp: float = 0.0) -> str:
 
 
 def describe_heating(model, patch, work: float, duration: float) -> list:
-    """Return the note on the rise of the surface temperature by friction.
+    """Return the note on the rise of the surface temperature due to frictional heating.
 
     The list is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one
     half-space of the substrate through the loaded area: two alike pieces share it, and warm by half

@@ -193,7 +193,7 @@ def minimum_value(name: str) -> float:
 
 
 def find_unknown_measures(measures: dict) -> list:
-    """Return the positive measures that choose the mesh and are not known, by their errors."""
+    """Return the positive measures that choose the mesh and whose error exceeds their value."""
     names = []
     for name in POSITIVE_MESH_MEASURES:
         measure = measures.get(name)

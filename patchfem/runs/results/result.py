@@ -82,12 +82,12 @@ class Result:
 
 
 def _count_words(count: int, word: str) -> str:
-    """Return a number with its noun, e.g. "no warnings" or "2 warnings"."""
+    """Return a number with its noun, such as "no warnings" or "2 warnings"."""
     return f"{count or 'no'} {word}{'s' * (count != 1)}"
 
 
 def add_meanings(measures: dict, apart: str) -> dict:
-    """Return measures with their meanings as texts.
+    """Return measures to which the text of their meaning is added.
 
     apart: what a number after a name counts, "interface" or "strip".
     """
@@ -108,7 +108,7 @@ def describe_measure(name: str, apart: str = "interface") -> str:
 
 
 def collect_rest_frame(patch) -> dict:
-    """Return the fields of a pressed patch without motion, (1, n) each.
+    """Return the fields of a solved patch without motion as a single frame (1, n).
 
     The fields are normal_stress [Pa], gap [m] and status of the finest solution, on the points of its
     profile if there is one.
@@ -117,7 +117,7 @@ def collect_rest_frame(patch) -> dict:
 
 
 def _pressed_frame(surface) -> dict:
-    """Return pressure, gap and status (1, n) on the surface of a pressed patch."""
+    """Return pressure, gap and contact status (1, n) on the surface of a solved patch."""
     return {
         "time": np.zeros(1),
         "normal_stress": surface.sigma_n[None],
@@ -127,7 +127,7 @@ def _pressed_frame(surface) -> dict:
 
 
 def patch_surface(patch, fields: dict):
-    """Return the surface on whose points the fields of a pressed patch are given.
+    """Return the surface at whose points the fields of a patch are given.
 
     After a motion the points are the nodes of the mesh, otherwise those of `collect_rest_frame`. The result is None
     without a patch.
@@ -138,7 +138,7 @@ def patch_surface(patch, fields: dict):
 
 
 def make_interface_frames(patch, time, tau, local, slide) -> dict:
-    """Return the fields of the interface, frame by frame, from tractions and slips.
+    """Return the fields of an interface in each frame, from tractions and slips.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def make_interface_frames(patch, time, tau, local, slide) -> dict:
 
 
 def has_known_mesh_error(model, patch, coarse) -> bool:
-    """Return whether the error of a motion due to the mesh of its patch can be estimated.
+    """Return whether the mesh error of a motion can be estimated.
 
     This requires the patch on a coarser mesh, unless the motion does not depend on the mesh.
 
@@ -204,7 +204,7 @@ def remove_unknown_errors(found: dict, estimate: bool) -> dict:
 
 
 def collect_used_settings(result) -> dict:
-    """Return the numerical settings that a run used.
+    """Return the numerical settings with which a run was computed.
 
     Settings that the run did not use are left out. The others are engine, steps per cycle or those that a
     tolerance chose, cycles and window, shear modes or elements of the pieces, the method of the sum
@@ -262,7 +262,7 @@ def shorten_file_names(texts, path: Path) -> list:
 
 
 def file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
-    """Return a function that shortens the file names in remarks on scenes at one path."""
+    """Return a function that shortens the file names in remarks on the scenes of one folder."""
     folders = (path.parent, path.parent.absolute())
     prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
 

@@ -15,7 +15,7 @@ MAX_SLIDE_FRACTION = (
 
 
 def find_largest_slide(slide) -> float:
-    """Return the largest |slide| [m] of samples (k,) [m]; inf if the motion overflowed."""
+    """Return the largest |slide| [m] of samples (k,); inf if the motion overflowed."""
     largest = float(np.abs(slide).max(initial=0.0))
     return largest if np.isfinite(largest) else np.inf
 
@@ -31,7 +31,7 @@ def contact_length(patch) -> float:
 
 
 def warn_of_large_slide(patch, slide) -> list:
-    """Return a warning if the slide (k,) [m] exceeds a fraction of the contact length."""
+    """Return a warning if the slide (k,) [m] is large compared with the contact length."""
     largest = find_largest_slide(slide)
     contact = contact_length(patch)
     if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:
@@ -46,7 +46,7 @@ def warn_of_large_slide(patch, slide) -> list:
 
 
 def judge_outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
-    """Return the outcome of a run, or LEAVES_CONTACT if the slide exceeded the piece.
+    """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other.
 
     See `response.outcome.check_piece_length`.
 

@@ -83,7 +83,7 @@ REVERSALS_PER_CYCLE = (
 
 
 class HistoryBytes(NamedTuple):
-    """Memory per sample, cycle and reversal of the histories that an engine keeps.
+    """Memory [bytes] per sample, cycle and reversal of the histories that an engine stores.
 
     Attributes
     ----------
@@ -109,7 +109,7 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def required_steps_per_cycle(model: Model) -> int:
-    """Return the steps per cycle with which a march meets the tolerance, without upper bound."""
+    """Return the time steps per cycle that meet the tolerance, without an upper bound."""
     accuracy = model.accuracy
     rig = model.rig
     quickest = max(
@@ -123,7 +123,7 @@ def required_steps_per_cycle(model: Model) -> int:
 
 
 def steps_per_cycle(model: Model) -> int:
-    """Return the steps per cycle of a march, as set in the scene or as the tolerance requires.
+    """Return the time steps per cycle of a march, from the scene or else from the tolerance.
 
     The tolerance chooses between 100 and MAX_MARCH_STEPS steps.
     """
@@ -133,7 +133,7 @@ def steps_per_cycle(model: Model) -> int:
 
 
 def count_merges(model: Model) -> int:
-    """Return how often a first run merges neighbouring cells of a slider density in pairs.
+    """Return how often neighbouring slider cells are merged in pairs for the first run.
 
     The error of cells falls with the square of their width. If the error of the run is too large,
     the run is repeated with more cells (`Numerics.finer`).
@@ -150,13 +150,13 @@ def count_merges(model: Model) -> int:
 
 
 def interface_load(model: Model, interface) -> float:
-    """Return the normal load [N] on an interface; by default the load of the model."""
+    """Return the normal load [N] on an interface, by default that of the whole model."""
     return model.nominal_load if interface.load is None else interface.load
 
 
 @lru_cache(8)
 def expected_elements(model: Model) -> tuple:
-    """Return the expected number of friction elements and the largest interface stiffness [N/m].
+    """Return the expected number of friction elements and the largest stick stiffness [N/m].
 
     A rigid element has no spring, and counts as stiffness 0.
     """
@@ -183,12 +183,12 @@ def expected_elements(model: Model) -> tuple:
 
 
 def intervals_per_cycle(model: Model) -> float:
-    """Return the largest number of time intervals of the exact solution per drive cycle."""
+    """Return the largest number of time intervals per drive cycle of the event-driven solution."""
     return sum(count_intervals_by_cause(model))
 
 
 def count_intervals_by_cause(model: Model) -> tuple:
-    """Return the intervals of the exact solution per cycle due to ringing and due to events.
+    """Return the intervals per cycle of the event-driven solution, from ringing and from events.
 
     The intervals due to events include the rows of a recorded drive.
     """
@@ -211,7 +211,7 @@ def count_intervals_by_cause(model: Model) -> tuple:
 
 
 def max_exact_seconds(model: Model) -> float:
-    """Estimate the maximum CPU time [s] of an event-driven run.
+    """Return an upper estimate of the CPU time [s] of an event-driven run.
 
     The elements are assumed to stick all the time. The choice of an engine is based on this time.
     """
@@ -223,7 +223,7 @@ def max_exact_seconds(model: Model) -> float:
 
 
 def _extra_interval_seconds(model: Model) -> float:
-    """Return the CPU time [s] per interval that further modes and interfaces add."""
+    """Return the CPU time [s] per time interval for modes and interfaces beyond the first."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
         modes.omega.size - 1
@@ -266,7 +266,7 @@ def expected_march_seconds(model: Model) -> float:
 
 
 def reason_to_march_events(model: Model) -> str:
-    """Return why a model is marched in time instead of solved from event to event.
+    """Return the reason why a model is integrated in time steps instead of event by event.
 
     The events cost more than time steps, and more than an exact solution is worth. The reason is ""
     if the model is better solved from event to event.
@@ -281,7 +281,7 @@ def reason_to_march_events(model: Model) -> str:
 
 
 def reason_to_march_elements(model: Model) -> str:
-    """Return why a model with elements that stick or slip is marched in time, or "".
+    """Return the reason why a model with friction elements needs time steps, or "".
 
     The scene prescribes the steps, or the reason is that of `reason_to_march_events`.
     """
@@ -344,7 +344,7 @@ def _interpreted_seconds(model: Model) -> float:
 
 
 def _is_event_loop_cached(model: Model) -> bool:
-    """Return whether machine code of the event loop is cached for the modes of a rig."""
+    """Return whether the compiled event loop for the number of modes of a rig is cached."""
     from ...dynamics.events.histories import (
         is_loop_cached,  # imported here because a plan does not need the engine otherwise
     )
@@ -353,13 +353,13 @@ def _is_event_loop_cached(model: Model) -> bool:
 
 
 def count_kept_samples(numerics) -> float:
-    """Return the number of samples of the last cycles that a run keeps."""
+    """Return the number of samples of the last cycles that a run stores."""
     each = SAMPLES_PER_CYCLE if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
 def history_memory_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Return the memory of the histories that a run keeps.
+    """Return the memory of the histories that a run stores, by contribution.
 
     Parameters
     ----------
@@ -383,7 +383,7 @@ def history_memory_parts(model: Model, numerics, history: HistoryBytes) -> tuple
 
 
 def describe_element_engine(model: Model, engine: str) -> list:
-    """Return the sentence of a plan on an engine for friction elements and its CPU time."""
+    """Return the sentence of a plan on the engine of friction elements and its CPU time."""
     count = expected_elements(model)[0]
     exact = expected_exact_seconds(model)
     march = expected_march_seconds(model)
@@ -394,7 +394,7 @@ def describe_element_engine(model: Model, engine: str) -> list:
 
 
 def reason_to_march_smooth_law(model: Model) -> str:
-    """Return why a rig is marched instead of integrated at high order, or ""."""
+    """Return the reason why a smooth law needs the march instead of the smooth engine, or ""."""
     rig = model.rig
     accuracy = model.accuracy
     for key in MARCH_SETTINGS:
@@ -461,7 +461,7 @@ def smooth_steps_per_cycle(model: Model, element: "Element") -> float:
 
 
 def stiff_time_fraction(model: Model, element: "Element") -> float:
-    """Return the fraction [1] of the time in which a speed-dependent law is stiff.
+    """Return the fraction [1] of time in which a speed-dependent law makes the equations stiff.
 
     With a single mode it is 1 up to a ratio 1 of the drive force to the friction limit, and less
     above it; with several modes it is 1.
@@ -482,7 +482,7 @@ def stiff_time_fraction(model: Model, element: "Element") -> float:
 
 
 def predict_smooth_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the predicted cost of a run of the smooth engine and of its coarse run.
+    """Predict the cost of a run of the smooth engine, including its coarse run.
 
     Parameters
     ----------

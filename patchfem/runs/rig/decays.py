@@ -60,7 +60,7 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 
 
 def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
-    """Add the differences between coarse runs to the errors of a decay curve."""
+    """Widen the errors of a decay curve by its differences from coarse runs."""
     for run, beside in raw.coarser:
         coarse = _measure_decay_curve(run).interpolate(curve.amplitude)
         reference = (
@@ -71,7 +71,7 @@ def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
 
 
 def _measure_decay_curve(run: Solution) -> DecayCurve:
-    """Measure the decay curve of a run from its half cycles, as long as they decrease.
+    """Measure frequency and damping ratio of a decay from its half cycles while they decrease.
 
     After the last slip, the curve is that of the strongest ringing mode, at each of its half
     cycles: other modes ring at the same time, so that the reversals of their sum belong to none of
@@ -140,12 +140,12 @@ def make_laws_on_coarse_meshes(model, coarse) -> list:
 
 
 def with_automatic_method(model):
-    """Return the model with accuracy.method = "auto"."""
+    """Return a copy of a model with accuracy.method = "auto"."""
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
 def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
-    """Compute amplitude, frequency, damping ratio and loss of a mode under static loading.
+    """Compute amplitude, frequency, damping ratio and loss of a mode from static load cycles.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> 
 
 
 def tabulate_static_motions(modes, motions: list) -> np.ndarray:
-    """Return output amplitude, frequency, damping ratio and loss (4, k) of static motions."""
+    """Tabulate amplitude, frequency, damping ratio and loss (4, k) of quasi-static motions."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
     damping = [motion.zeta for motion in motions]
@@ -184,7 +184,7 @@ def tabulate_static_motions(modes, motions: list) -> np.ndarray:
 
 
 def estimate_mesh_error(fine, rough, read) -> np.ndarray:
-    """Estimate the error of values computed from friction laws due to the mesh of patches.
+    """Estimate the mesh error of values that are computed from friction laws of patches.
 
     It follows from the change on a coarser mesh at second order. It is not less than the change if
     the elements are spread over the yield slides between the nodes (`slip.mesh_correction`): at a
@@ -289,7 +289,7 @@ def estimate_stuck_mode_mesh_errors(amplitude, frequency: float, model, patch, c
 
 
 def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
-    """Return the sentences on results whose error due to the mesh is unknown.
+    """Return sentences on the results whose mesh error is unknown.
 
     Parameters
     ----------
@@ -312,7 +312,7 @@ def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
 
 
 def _find_mode(modes, laws, frequency: float) -> int:
-    """Return the index of the stuck mode that is nearest to a frequency and moves the output."""
+    """Find the mode with stuck interfaces that is nearest to a frequency and moves the output."""
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):
         omega, shape = modes.compute_stuck_mode(laws.rows, laws.stiffness(), k)

@@ -52,7 +52,7 @@ BALANCE_ROUND_OFF = 1e-8
 
 
 class Engine(NamedTuple):
-    """Engine of a rig: its name, its coarse runs and the limits of its errors.
+    """Method that computes the motion of a rig, with its coarse runs and error limits.
 
     `scene.rules.methods.ENGINE_SUPPORT` says what it can compute.
 
@@ -83,7 +83,7 @@ class Engine(NamedTuple):
     finds_periodic_motion: bool = False
 
     def richer_in_modes(self, model: Model, numerics) -> list:
-        """Return the comparison run with more modes of a reduced structure.
+        """Return the settings of a comparison run with more modes of a reduced structure.
 
         The list is empty if no mode is left out.
 
@@ -100,7 +100,7 @@ class Engine(NamedTuple):
         return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
 
     def lacks(self, model: Model, *, steady: bool = False) -> str:
-        """Describe the first property of a model that this engine cannot compute, or return "".
+        """Describe a property of a model that this engine cannot compute; "" if there is none.
 
         steady: whether the drive is a sine of a curve of steady motions instead of its own waveform.
         """
@@ -110,7 +110,7 @@ class Engine(NamedTuple):
 
 
 def reason_not_exact(model: Model, *, steady: bool = False) -> str:
-    """Return why no engine of accuracy.method = "exact" can compute a model, or "".
+    """Return the reason why no event-driven engine can compute a model, or "".
 
     steady: see `Engine.lacks`.
     """
@@ -120,7 +120,7 @@ def reason_not_exact(model: Model, *, steady: bool = False) -> str:
 
 
 def find_motion_properties(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
-    """Return the properties of a model that decide which engines can compute it."""
+    """Collect the properties of a model that decide which engines can compute its motion."""
     rig = model.rig
     spring = ""
     if rig.springs.cubic is not None:
@@ -142,7 +142,7 @@ def find_motion_properties(model: Model, *, steady: bool = False) -> methods.Mot
 
 
 class Finder(NamedTuple):
-    """Method that finds a steady motion, with its text for a plan.
+    """Method that finds steady motions, with the text that a plan prints about it.
 
     - words: text of a plan.
     - engine: name of the engine whose code it runs and whose numerical settings apply.
@@ -186,7 +186,7 @@ def choose_steady_method(model: Model) -> Finder:
 
 
 def _list_no_runs(*_) -> list:
-    """Return an empty list of coarse runs."""
+    """Return an empty list, for engines without coarse runs of a kind."""
     return []
 
 
@@ -206,7 +206,7 @@ MOTION_SAMPLING_ERROR = 1e-9  # relative error of all other measures, which are 
 
 
 def sampling_errors(values: dict) -> dict:
-    """Estimate the errors of measures computed from 400 samples per cycle, by name."""
+    """Estimate the errors of measures due to sampling with 400 samples per cycle."""
     errors = {}
     for name, value in values.items():
         if name in LOOP_MEASURES:
@@ -219,7 +219,7 @@ def sampling_errors(values: dict) -> dict:
 
 
 def _list_exact_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the comparison runs on coarser meshes for the event-driven Coulomb engine.
+    """List comparison runs on coarser meshes for the event-driven engine of Coulomb friction.
 
     The mesh matters if the loads of strips or the limit of an averaged law depend on it.
     The measures of strips that slide independently also have the error of the trapezoidal rule with
@@ -234,7 +234,7 @@ def _list_exact_space_runs(model: Model, numerics, patch, coarse, solution) -> l
 
 
 def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the comparison runs of elastic-plastic elements on coarser meshes and cells."""
+    """List comparison runs with coarser meshes and slider cells of elastic-plastic elements."""
     meshes = _list_coarse_mesh_numerics(model, numerics)
     if coarse is not None and model.partial_slip:
         meshes = [replace(numerics, coarse_patch=True), *meshes]
@@ -247,7 +247,7 @@ def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) ->
 
 
 def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
-    """Return settings in each of which one interface patch has a coarser mesh."""
+    """List numerical settings that differ by a coarser mesh of one interface patch each."""
     if not model.rig.friction.has_partial_slip:
         return []
     meshes = faces.interfaces_with_coarse_mesh(model)
@@ -255,18 +255,18 @@ def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
 
 
 def _divide_steps(numerics, share: int):
-    """Return numerical settings with the steps per cycle divided by an integer."""
+    """Return numerical settings with a fraction of the steps per cycle."""
     return replace(numerics, steps=max(1, numerics.steps // share))
 
 
 def _list_march_time_runs(model: Model, numerics) -> list:
-    """Return the comparison runs of a march with half and a quarter of its steps."""
+    """List comparison runs of a march with half and with a quarter of its time steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), of="steps")]
 
 
 def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the comparison runs of a march with a coarser discretization in space.
+    """List comparison runs of a march with a coarser discretization in space.
 
     These have a coarser mesh, another number of shear modes or another sum over bonds, and a quarter
     of the steps.
@@ -298,7 +298,7 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
 
 
 def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
-    """Return the comparison runs for the error of the sum over a list of bonds.
+    """List comparison runs from which the error of a bond list is estimated.
 
     The first entry is the bound of the sum on forces and energies. If the sum merges bonds or neglects
     a large tail, the second is the change of the motion with narrower strips and a smaller tail; its
@@ -325,7 +325,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
 
 
 def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
-    """Estimate the errors of the measures due to the relative error of a sum over bonds."""
+    """Estimate the errors of measures due to the truncation of a sum over bonds."""
     friction = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
@@ -342,7 +342,7 @@ def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict
 
 
 def _list_stated_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the errors that a run itself states, as `CoarserRuns` without runs.
+    """Return the errors that an engine states itself, in the form of coarser runs.
 
     For harmonic balance these are the residual and the change with twice the harmonics, for the
     smooth engine the errors of the samples.
@@ -351,7 +351,7 @@ def _list_stated_errors(model: Model, numerics, patch, coarse, solution) -> list
 
 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the comparison runs of a steady motion on coarser meshes and its stated errors."""
+    """List comparison runs of a steady motion on coarser meshes, and its stated errors."""
     coarser_runs = _list_stated_errors(model, numerics, patch, coarse, solution)
     if choose_steady_method(model).engine == PIECES.name:
         coarser_runs += _list_element_space_runs(model, numerics, patch, coarse, solution)
@@ -363,7 +363,7 @@ estimate_smooth_errors = partial(coarser_errors, ratio=STEP_TOLERANCE_FACTOR)
 
 
 def _list_smooth_time_runs(model: Model, numerics) -> list:
-    """Return the comparison run of the smooth engine with a larger tolerance of its steps.
+    """List the comparison run of the smooth engine with a larger step tolerance.
 
     A step may have STEP_TOLERANCE_FACTOR times the error; the error of a run is proportional to that of its steps.
     """
@@ -421,7 +421,7 @@ AUTOMATIC_ENGINES = (
 
 
 def describe_balance_error(engine: Engine, measures: dict) -> str:
-    """Describe an energy balance whose error is too large for its engine, or return "".
+    """Describe an energy balance that is too inaccurate for the engine of a run, or return "".
 
     measures: measures of the run by name, with their errors.
     """
@@ -441,7 +441,7 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 
 @lru_cache(8)
 def choose_engine(model: Model) -> Engine:
-    """Choose the engine that computes a model.
+    """Choose the engine that computes the motion of a model.
 
     A method named in the scene selects its engine (of several, the first that can compute the model).
     Otherwise the engine is the first of AUTOMATIC_ENGINES that can compute the model and is not more expensive

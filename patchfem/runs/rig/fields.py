@@ -16,7 +16,7 @@ from ..results.result import N_FRAMES, collect_rest_frame, make_interface_frames
 
 
 def collect_frames(model, numerics, patch, raw) -> dict:
-    """Return the fields of the interface in the last cycle, frame by frame.
+    """Collect the fields of an interface in the frames of the last cycle.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
 
 
 def _collect_varying_load_frames(patch, raw) -> dict:
-    """Return the interface fields of a run with a varying normal load, frame by frame.
+    """Collect the interface fields of a run with varying normal load in the frames of a cycle.
 
     The first frame is the pressed state. The status is 0 for open, 1 for stick and 2 for slip.
     """

@@ -42,7 +42,7 @@ RIGID_LAW_REASON = "with rigid friction limit cycles cannot be computed if the r
 
 
 def find_limit_cycles(run) -> tuple:
-    """Compute the largest unstable limit cycle of a self-excited rig.
+    """Compute the amplitude of the largest unstable limit cycle of a self-excited rig.
 
     Returns the measure by name, i.e. the amplitude of this limit cycle with its error or the reason why
     it is not known, and notes.
@@ -88,7 +88,7 @@ def find_limit_cycles(run) -> tuple:
 
 
 class LimitCycles(NamedTuple):
-    """Limit cycles of a self-excited rig, with the reason if none is unstable.
+    """Limit cycles of a self-excited rig, or the reason why none is unstable.
 
     - cycles: limit cycles by increasing amplitude.
     - reason: reason why none of them is unstable.

@@ -31,7 +31,7 @@ REDUCTION_TOL_FRACTION = 1e-3
 
 
 def make_contact(model: Model, numerics: Numerics, patch):
-    """Return the contact model of all interfaces and nonlinear springs for a march.
+    """Return the contact model of a march, with all interfaces and nonlinear springs.
 
     The result is a ContactModel, a JointsModel for several interfaces or nonlinear springs, or a model
     of grooves.
@@ -106,7 +106,7 @@ def make_interface_elements(model: Model, meshed: tuple) -> list:
 
 
 def _make_groove_contact(model: Model, patch, count: int | None = None):
-    """Return the contact model of a load that climbs grooves."""
+    """Return the contact model of an interface whose load climbs grooves."""
     f = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
@@ -118,7 +118,7 @@ def _make_groove_contact(model: Model, patch, count: int | None = None):
 
 
 def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
-    """Return the friction law of an interface under a load as an Element.
+    """Convert the friction law of an interface under a load to an Element of the engines.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
 
 
 def make_single_contact(model: Model, numerics: Numerics, patch):
-    """Return the contact model of a rig with a single interface.
+    """Return the contact model of a rig with one interface.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
 
 
 def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
-    """Return the contact model of a law of bonds.
+    """Return the contact model of a nonlocal law, whose friction comes from bonds.
 
     The bonds are summed in a list, or at the points of shear modes, of a field or of a single point.
     """
@@ -209,7 +209,7 @@ def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
 
 
 def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
-    """Return the shear modes of a pressed patch and, for few points, their friction forces.
+    """Return the shear modes of a solved patch, and the friction forces if there are few points.
 
     The forces (k,) [N] are None if the modes have all points of the patch. Both are computed once for
     all marches of a pressed patch.
@@ -231,7 +231,7 @@ def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
 
 
 def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
-    """Reduce a patch to a few contact points with the fewest shear modes.
+    """Approximate a patch by a few contact points and as few shear modes as possible.
 
     Parameters
     ----------

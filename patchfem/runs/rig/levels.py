@@ -35,7 +35,7 @@ def list_level_ends(rig) -> tuple:
 
 
 def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
-    """Add the differences from coarse runs to the errors of every drive level.
+    """Widen the errors at every drive level by the differences from coarse runs.
 
     The error of a measure that a coarse run does not have is its absolute value.
 
@@ -65,12 +65,12 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
 
 
 def _values_at_level(solution, number: int) -> dict:
-    """Return the measures of a run at one drive level, or {} if the run ended before it."""
+    """Return the measures at one drive level; {} if the run ended before this level."""
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 
 def find_onset(levels, probe, tolerance: float, past=None) -> tuple | None:
-    """Find the onset [m s-2] between two drive levels by bisection, with half its bracket.
+    """Find the drive level [m s-2] at which slip starts by bisection, with its uncertainty.
 
     The bracket is the last level below the onset and the first level above it. The bisection ends when
     the bracket is `tolerance` times the level; if all levels down to 0 are above the onset, times the
@@ -112,7 +112,7 @@ def find_onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 
 def replace_level(drive, number: int, level: float):
-    """Return a drive in levels that ends with another amplitude at one level.
+    """Return a drive that ends after one of its levels, with another amplitude there.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def replace_level(drive, number: int, level: float):
 def compute_level_measures(
     rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()
 ) -> dict:
-    """Compute onset, jump and hysteresis over all levels of a drive.
+    """Compute onset, largest jump and hysteresis over all levels of a drive.
 
     These are onset_level, jump_level and level_hysteresis, with a reason if there is no value.
 
@@ -196,17 +196,17 @@ def convert_to_scene_units(rig, levels) -> tuple:
 
 
 def _level_unit(rig) -> str:
-    """Return the unit of the drive levels in the scene."""
+    """Return the unit in which the scene gives the drive levels."""
     return "N" if rig.drive.kind == "force" else "m s-2"
 
 
 def _level_factor(rig) -> float:
-    """Return the factor from a drive level [m s-2] to its unit in the scene."""
+    """Return the factor that converts a drive level [m s-2] to the unit of the scene."""
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
 def run_levels(reader, integrate, state, end, progress=None) -> tuple:
-    """Run all levels of a drive, each from the final state of the previous level.
+    """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
     level_results = []
 
     def probe(number: int, level: float) -> Level:
-        """Run another level from the end of an earlier one; number -1 starts at rest."""
+        """Run a level from the end of an earlier one; number -1 means a start from rest."""
         sine = SineDrive(level, omega, moving)
         run = integrate(sine, states[number + 1], None, False)
         return reader.level(level, run, sine, EXACT_RELATIVE_ERROR)
@@ -255,12 +255,12 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
 
 
 def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
-    """Report the completed fraction of all drive levels."""
+    """Report the completed fraction of all levels to the progress callback."""
     progress((level + fraction) / n_levels)
 
 
 def remove_incomplete_cycle(done):
-    """Remove the extremes and the phasor of an incomplete last cycle from a run."""
+    """Remove the extremes and the Fourier coefficient of an incomplete last cycle from a run."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):
         return done
@@ -268,7 +268,7 @@ def remove_incomplete_cycle(done):
 
 
 def join_runs(runs: list, duration: float):
-    """Join successive runs of equal duration [s] to a single run.
+    """Join the runs of successive drive levels to a single run.
 
     Window and loop are those of the last run.
     """
@@ -290,13 +290,13 @@ def join_runs(runs: list, duration: float):
 
 
 def _join_histories(histories: list, shifts: list):
-    """Concatenate the histories of successive runs, shifted by their start times [s]."""
+    """Join the histories of successive runs, each shifted by its start time [s]."""
     last = histories[-1]
     # the last sample of a run is the first one of the next
     samples = [slice(None, -1)] * (len(histories) - 1) + [slice(None)]
 
     def join(arrays) -> np.ndarray:
-        """Concatenate one history of all runs without duplicate samples."""
+        """Join one history of all runs without repeating the sample at each border."""
         return np.concatenate([array[part] for array, part in zip(arrays, samples)])
 
     columns = {}

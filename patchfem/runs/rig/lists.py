@@ -54,7 +54,7 @@ MAX_BOND_PHASE = 2.0  # largest phase [rad] in a step of the vibration of the bl
 
 @lru_cache(maxsize=8)
 def choose_bond_sum(model: Model, numerics: Numerics):
-    """Choose how the forces of the bonds of a nonlocal law are summed.
+    """Choose the method that sums the forces of the bonds of a nonlocal law in a rig.
 
     The stroke is taken as four times the amplitude that follows from speed over frequency of the
     drive, or from the stiffness of the bonds if they stop the block. The stroke of a motion that
@@ -68,7 +68,7 @@ def choose_bond_sum(model: Model, numerics: Numerics):
 
 
 def has_list(model: Model, numerics: Numerics) -> bool:
-    """Return whether the bonds of a model are summed in a list."""
+    """Return whether the forces of bonds are summed over a list of bonds."""
     f = model.friction
     return (
         f is not None
@@ -78,7 +78,7 @@ def has_list(model: Model, numerics: Numerics) -> bool:
 
 
 def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
-    """Choose the sum over bonds for a requested engine, or "auto".
+    """Choose the bond summation for the requested engine, which may be "auto".
 
     stretch: bond lengths by which a block moves on its bonds.
     """
@@ -98,7 +98,7 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
 
 
 def _relative_stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
-    """Return the displacement of a stuck, driven block over the bond length.
+    """Return the displacement of a stuck, driven block relative to the bond length.
 
     The stiffness is mu_s N/eps_0. The result is inf if the bonds do not stop the block, i.e. if their
     limit is below `least` times the required force, or if the printed law gives them no stiffness.
@@ -113,7 +113,7 @@ def _relative_stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
 
 
 def count_step_halvings(model: Model) -> int:
-    """Return how often the automatic time step is halved for a block stuck on its bonds.
+    """Return how often the automatic time step is halved for a block that sticks on its bonds.
 
     A stuck block vibrates on its bonds faster than its modes and its drive. The steps are halved until
     a period of this vibration has as many steps as one of the modes or the drive, MAX_HALVINGS times at most. If the
@@ -136,7 +136,7 @@ def count_step_halvings(model: Model) -> int:
 
 
 def _bond_omega(model: Model) -> float:
-    """Return the angular frequency [rad/s] of the block on its bonds, sqrt(k_t/m)."""
+    """Return the angular frequency [rad/s] of a block on the stiffness of its bonds."""
     f = model.friction
     modes = model.rig.modes
     return sqrt(
@@ -145,7 +145,7 @@ def _bond_omega(model: Model) -> float:
 
 
 def stuck_force_ratio(model: Model, push: float | None = None) -> float:
-    """Return the ratio of friction limit to holding force for bonds without stiffness.
+    """Return the ratio of limit to holding force at which bonds without stiffness stick.
 
     It is 0 for other bonds. The printed law reaches its limit at any stroke, so that its stiffness
     mu_s N/stroke is unbounded; bonds of order 0 have the same force at any stretch. A released
@@ -174,7 +174,7 @@ def stuck_force_ratio(model: Model, push: float | None = None) -> float:
 
 
 def min_growing_force_ratio(model: Model) -> float:
-    """Return the ratio of limit to holding force from which a list of bonds grows every step.
+    """Return the ratio of limit to holding force above which a bond list grows in every step.
 
     It is 1 for a driven block if each step leaves a strip that no path erases, i.e. for bonds that
     grow or that have no stiffness by their order; else MIN_STUCK_RATIO.
@@ -207,7 +207,7 @@ def is_stuck_without_stiffness(model: Model) -> bool:
 
 
 def is_list_growing(model: Model) -> bool:
-    """Return whether the list of bonds gains an entry in almost every step of the run.
+    """Return whether the bond list gains an entry in almost every time step.
 
     It does if, at some time of the run, the friction of a law without stiffness at rest (see `stuck_force_ratio`) holds the
     sliding block. Pieces with shear compliance have a
@@ -220,7 +220,7 @@ def is_list_growing(model: Model) -> bool:
 
 
 def find_min_drive(rig) -> float:
-    """Return the acceleration [m s-2] of the lowest level of a drive.
+    """Return the amplitude [m s-2] of the lowest level of a drive.
 
     For a drive in levels it is the smaller of the lowest level and half the first one, where the
     bisection of the onset starts. Without levels it is the largest acceleration of the drive.
@@ -246,7 +246,7 @@ def compute_holding_force(rig, push: float | None = None) -> float:
 
 
 def _force_for_prescribed_slides(rig, omega: float, push, slides) -> float:
-    """Return the force amplitude [N] on the first interface for prescribed displacements.
+    """Return the force amplitude [N] on the first interface if all slides are prescribed.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def _force_for_prescribed_slides(rig, omega: float, push, slides) -> float:
 
 
 def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
-    """Return whether the list of bonds is too long to halve the time step again.
+    """Return whether the bond list is too long to halve the time step once more.
 
     It is too long if it grows by a strip in every few steps. Bonds that grow leave a strip in each
     step of any stroke; for these the block has to be held.
@@ -296,7 +296,7 @@ def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
 
 
 def has_doubling_failed(book: dict, errors: list) -> bool:
-    """Return whether two doublings of the steps have not reduced the error of a bond list.
+    """Return whether doubling the steps twice has not reduced the error of a bond list.
 
     The list of a released block that reverses in almost every step is different for any step
     (errors of 71, 509, 139, 39 and 97 times the tolerance were observed), and the next doublings
@@ -313,14 +313,14 @@ def has_doubling_failed(book: dict, errors: list) -> bool:
 
 
 class ListCost(NamedTuple):
-    """Expected number of strips of a list of bonds, and CPU time [s] of a run with it."""
+    """Predicted length of a bond list and CPU time [s] of a run with it."""
 
     strips: float
     seconds: float
 
 
 def estimate_list_cost(model: Model, numerics: Numerics) -> ListCost:
-    """Estimate the strips of a list of bonds and the CPU time [s] of a run with it.
+    """Predict the length of a bond list and the CPU time [s] of a run with it.
 
     A list that grows with every step is expected to contain all strips; its seconds are known
     within a factor of about 12, because the increments that a step tries depend on the motion.
@@ -342,7 +342,7 @@ def estimate_list_cost(model: Model, numerics: Numerics) -> ListCost:
 
 
 class ListGuard:
-    """Progress callback that stops a march whose list of bonds takes too long.
+    """Progress callback that stops a march whose bond list takes too much CPU time.
 
     A list grows or keeps its length. Therefore all steps together take at least the time of the
     completed steps divided by their fraction.
@@ -354,7 +354,7 @@ class ListGuard:
         self.start = None
 
     def __call__(self, fraction: float) -> None:
-        """Report the completed fraction of the steps, and stop a march that takes too long.
+        """Report the completed fraction of steps, and stop a march that takes too long.
 
         Raises
         ------
@@ -373,7 +373,7 @@ class ListGuard:
 
 
 def _long_list_message(seconds: float, entries: float | None = None) -> str:
-    """Return the message that refuses a run whose list of bonds takes too long."""
+    """Return the error message on a run whose bond list takes too much CPU time."""
     length = "" if entries is None else f" (about {entries:.0f} entries)"
     return (
         f"the sum over the list of bonds{length} would need a computing time of about {seconds:.0f} s, more than "
@@ -404,7 +404,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
 
 
 def refuse_long_list(model: Model, numerics: Numerics) -> None:
-    """Raise Missing if the sum over a list of bonds would take too long.
+    """Raise Missing if the sum over a bond list would take too much CPU time.
 
     The CPU time of a growing list is uncertain: its run is stopped only when it turns out too long.
     """

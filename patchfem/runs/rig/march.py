@@ -112,7 +112,7 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
 
 
 class MarchReader(Reader):
-    """Evaluator of a march in time."""
+    """Evaluation of the runs of the march."""
 
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
@@ -124,7 +124,7 @@ class MarchReader(Reader):
         super().__init__(model, numerics, patch, contact, held)
 
     def solution_fields(self, run, drive) -> dict:
-        """Return the drive levels, the sum over bonds and the errors due to the end of the run."""
+        """Return the drive levels, the bond summation and the errors due to the end of the run."""
         fields = {"summed": self.choose_bond_sum(), "extra": {"late": self.late(run.window)}}
         if self.model.rig.drive.levels.amplitudes:
             fields["levels"], fields["probe"] = self._levels(run)
@@ -143,18 +143,18 @@ class MarchReader(Reader):
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
     def peak_excesses(self, window) -> dict:
-        """Estimate how far the peaks of a motion exceed its samples, by measure."""
+        """Estimate how far the peaks of a motion exceed its largest samples, as a dict."""
         return peak_sampling_errors(window, self.model.grooves is not None)
 
     def late(self, window) -> dict:
-        """Estimate the errors due to a run that ends at a sample beside the requested end."""
+        """Estimate the errors due to a last sample that is not exactly at the requested end."""
         steps = self.numerics.cycles * self.numerics.steps
         period = self.model.rig.drive.signal.period
         changes = estimate_window_error(window, period, steps - round(steps))
         return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
 
     def choose_bond_sum(self):
-        """Choose how the forces of bonds are summed; None for a law without bonds."""
+        """Choose the bond summation of the run; None for a law without bonds."""
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return None
@@ -195,7 +195,7 @@ class MarchReader(Reader):
         }
 
     def inside_steps(self, window, number: int):
-        """Add samples within the time steps to the window of a law that overshoots.
+        """Add samples inside the time steps to the window, for laws whose force overshoots.
 
         Samples are added for laws whose force exceeds its limit within a step.
 
@@ -219,7 +219,7 @@ class MarchReader(Reader):
         return motion_inside_steps(window, make_law(interface.numbers, load), load)
 
     def _loop(self, part, drive) -> CycleLoop | None:
-        """Compute the first harmonics of the friction loop and the friction work per cycle.
+        """Compute the first harmonics of displacement and friction force, and the work per cycle.
 
         If no other forces act besides drive and friction, the harmonics of the force come from the
         motion (`friction_harmonic`).
@@ -251,12 +251,12 @@ class MarchReader(Reader):
         return compute_sampled_loop(window, drive, work, force)
 
     def _levels(self, done) -> tuple:
-        """Return the drive levels of a run, and the function that runs another level."""
+        """Return the drive levels of a run, and a function that runs a further level."""
         rig = self.model.rig
         numerics = self.numerics
 
         def probe(number, level):
-            """Run another level from the end of an earlier one; number -1 starts at rest."""
+            """Run a level from the end of an earlier one; number -1 means a start from rest."""
             other = rig_levels.replace_level(rig.drive.signal, number + 1, level)
             if number >= 0:
                 run = done.marks[number].after.fork(other)

@@ -38,7 +38,7 @@ ONE_POINT_WARNING = (
 
 
 def collect_warnings(run) -> list:
-    """Return the warnings of a coupled run on its law, load and engine."""
+    """Return the warnings of a rig run on its friction law, load and engine."""
     model = run.model
     patch = run.patch
     solution = run.solution
@@ -101,7 +101,7 @@ def _warn_of_face(face, response) -> list:
 
 
 def warn_of_peak_at_sweep_end(run, modes) -> list:
-    """Return the warning on a sweep whose largest response is at one of its ends.
+    """Return a warning, as a list, on a sweep whose largest response is at one of its ends.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def warn_of_peak_at_sweep_end(run, modes) -> list:
 
 
 def find_sweep_end(frequency: float, *ends: float) -> float | None:
-    """Return the end [Hz] of a sweep that equals a frequency [Hz], or None."""
+    """Return the end [Hz] of a sweep at which a frequency [Hz] lies, or None."""
     return next((end for end in ends if abs(frequency - end) <= EQUAL_FREQUENCY_TOL * end), None)
 
 
@@ -170,7 +170,7 @@ def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
 
 
 def collect_notes(run) -> list:
-    """Return the notes of a coupled run on its law, engine, fields and the end of its motion."""
+    """Return the notes of a rig run on its law, engine, fields and the end of its motion."""
     model = run.model
     solution = run.solution
     rig = run.model.rig
@@ -204,7 +204,7 @@ def collect_notes(run) -> list:
 
 
 def _note_on_release(run) -> list:
-    """Return the note on the time span of the measures of a decaying release."""
+    """Return the note on the time span from which the measures of a release are computed."""
     rig = run.model.rig
     window = run.solution.window
     main = run.measures["relative_displacement_amplitude"]
@@ -281,7 +281,7 @@ def _note_on_bond_growth(model, patch, solution) -> list:
 
 
 def _note_on_elements(run) -> list:
-    """Return the note on how the motion of elements that stick or slip is computed."""
+    """Return the note on the method that computes the motion of the friction elements."""
     if PIECES.lacks(run.model):
         return []
     if run.numerics.engine == "march":
@@ -292,7 +292,7 @@ def _note_on_elements(run) -> list:
 
 
 def _note_marched_elements(run) -> list:
-    """Return the note on elements that are marched because they yield too often."""
+    """Return the note on friction elements that yield too often for the event-driven engine."""
     model = run.model
     if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
         return []
@@ -345,7 +345,7 @@ def law_warnings(model, outcome, measures, peak: float) -> list:
 
 
 def warn_of_created_energy(model, book: dict, cycles: float) -> list:
-    """Return the warning on energy that the printed law created.
+    """Return the warning on energy that the law as printed in the 1985 report creates.
 
     The law creates energy in steps in which it returns more than it had stored.
 
@@ -371,7 +371,7 @@ def warn_of_created_energy(model, book: dict, cycles: float) -> list:
 
 
 def note_on_shear_modes(model, kept: int, nodes: int) -> list:
-    """Return the note on the shear modes of a patch whose normal force changes.
+    """Return the note on the shear modes of a patch with varying normal force.
 
     Parameters
     ----------

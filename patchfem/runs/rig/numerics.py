@@ -23,7 +23,7 @@ MIN_SAMPLES = 100  # smallest number of samples of a run whose drive is not sinu
 
 @dataclass(frozen=True, slots=True)
 class Numerics:
-    """Numerical settings of a coupled run.
+    """Numerical settings of a run of a rig.
 
     - engine: name of the engine.
     - steps: time steps per cycle.
@@ -59,7 +59,7 @@ class Numerics:
     coarse_patch: bool = False
 
     def finer(self):
-        """Return finer settings for the next run.
+        """Return refined settings for the next run.
 
         The next run has four times as many cells if cells are merged; else a hundredth of the error
         of a step of the smooth engine, or twice as many steps.
@@ -72,7 +72,7 @@ class Numerics:
 
 
 def choose_numerics(model: Model) -> Numerics:
-    """Choose the engine and the numerical settings of a coupled run.
+    """Choose the engine and the numerical settings of a run of a rig.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def choose_numerics(model: Model) -> Numerics:
 
 
 def step_tolerance(tolerance: float) -> float:
-    """Return the relative error that a step of the smooth engine may have.
+    """Return the relative error that one step of the smooth engine may have.
 
     The energy balance requires 1e-9 if the tolerance does not require less.
     """
@@ -130,7 +130,7 @@ def step_tolerance(tolerance: float) -> float:
 
 
 def round_steps_to_run_end(steps: int, cycles: float) -> int:
-    """Return steps per cycle >= `steps` with which a run ends nearest to the requested time.
+    """Round steps per cycle up so that a sample lies nearest to the requested end of a run.
 
     The steps are a multiple of 4, because runs with a half and a quarter of them show the order. A run
     ends at a sample, and the last of its `cycles` may be incomplete. An end that is wrong by half a
@@ -146,7 +146,7 @@ def round_steps_to_run_end(steps: int, cycles: float) -> int:
 
 
 def min_unique_steps(model: Model) -> int:
-    """Return the smallest even number of steps per cycle for which each step has one solution.
+    """Return the smallest even number of steps per cycle with a unique solution in each step.
 
     It is 0 except for bonds that weaken, which need dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s
     N/eps_0 and the mass M that the interface moves.

@@ -26,7 +26,7 @@ from .solution import Solution
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CoupledRun:
-    """Coupled run between two of the passes that complete its result.
+    """Run of a rig, whose result successive passes complete.
 
     - inputs: plan and pressed patch.
     - numerics, solution: settings and Solution of the engine.
@@ -51,17 +51,17 @@ class CoupledRun:
 
     @property
     def patch(self):
-        """Pressed patch of [contact], or None."""
+        """Solved patch of [contact], or None."""
         return self.inputs.patch
 
     @property
     def drive(self):
-        """Drive of the motion in the result."""
+        """Drive at which the measures of the result are evaluated."""
         return self.solution.extra.get("at", self.model.rig.drive.signal)
 
     @property
     def has_friction(self) -> bool:
-        """Whether friction acts in the run."""
+        """Whether friction acts on the rig."""
         return self.model.friction is not None
 
     @property
@@ -77,7 +77,7 @@ class CoupledRun:
 
 
 def add_level_measures(run: CoupledRun) -> CoupledRun:
-    """Add the measures over all drive levels to a run."""
+    """Add to a run the measures over all drive levels."""
     solution = run.solution
     model = run.model
     measures = levels.compute_level_measures(
@@ -141,7 +141,7 @@ def add_reasons(run: CoupledRun) -> CoupledRun:
 
 
 def add_decay(run: CoupledRun) -> CoupledRun:
-    """Add the decay curve of a release to its run, with the errors due to the mesh.
+    """Add to a released run its decay curve, with errors due to the mesh.
 
     The ringing has the mesh error at its amplitude in the last stick interval. Notes name the results
     whose errors exclude that of the mesh.
@@ -198,13 +198,13 @@ def _ringing_amplitude(run: CoupledRun) -> float:
 
 
 def add_limit_cycles(run: CoupledRun) -> CoupledRun:
-    """Add the unstable limit cycle of a self-excited mode to a run."""
+    """Add to a run the unstable limit cycle of a self-excited mode."""
     measures, notes = flutter.find_limit_cycles(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
 
 
 def collect_warnings(run: CoupledRun) -> list:
-    """Return the warnings of a coupled run."""
+    """Return the warnings of a completed run of a rig."""
     plan = run.inputs.plan
     return [
         *motion_warnings.collect_warnings(run),

@@ -50,7 +50,7 @@ MIN_DECAY = (
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with Coulomb friction, or without friction, from event to event.
+    """Compute the motion of a rig with Coulomb friction, or none, from event to event.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 
 
 def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with elastic-plastic elements from yield to yield.
+    """Compute the motion of a rig with elastic-plastic elements from yield to yield.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
 
 
 def _run_drive(reader, frames: int, say, progress) -> Solution:
-    """Run the drive of a rig from event to event, one level after the other."""
+    """Compute the motion of a rig from event to event, level after level of the drive."""
     rig = reader.model.rig
     numerics = reader.numerics
     begin = perf_counter()
@@ -140,7 +140,7 @@ def _run_drive(reader, frames: int, say, progress) -> Solution:
 
 
 class PieceReader(Reader):
-    """Evaluator of an event-driven run.
+    """Evaluation of the runs of the event-driven engines.
 
     found: RigidElements or YieldingElements of the run.
     """
@@ -167,7 +167,7 @@ class PieceReader(Reader):
         )
 
     def sticks(self, run) -> bool:
-        """Return whether the interface sticks, or all its strips if they slide independently."""
+        """Return whether the interface sticks; independent strips must all stick."""
         if self.apart and self.has_friction:
             return run_events.is_all_stuck(run.window, self.held)
         return super().sticks(run)
@@ -183,7 +183,7 @@ class PieceReader(Reader):
         )
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the measures that the engine computes between events, for the evaluation.
+        """Return the measures that the event-driven engine computes between its events.
 
         Rigid elements dissipate all work of friction, so that their ledger is known.
 
@@ -235,7 +235,7 @@ class PieceReader(Reader):
         )
 
     def compute_stuck_vibration(self, run, motion, drive) -> list:
-        """Return the modes that ring while every interface is held by a single spring.
+        """Return the free vibration of the modes while every interface sticks on a single spring.
 
         The list is empty unless only a constant force acts in this part of the run, and every
         interface is a single spring that sticks until the end.
@@ -261,7 +261,7 @@ class PieceReader(Reader):
         return compute_stuck_vibration(self.model.rig.modes, np.concatenate(springs), motion)
 
     def tail(self, run, drive) -> dict:
-        """Return the mode that rings after the last slip of a release, or {}."""
+        """Return the mode that vibrates after the last slip of a release, as a dict."""
         if (
             self.model.rig.drive.kind != "free"
             or run.response is None
@@ -274,7 +274,7 @@ class PieceReader(Reader):
         return {"tail": select_strongest(held, "displacement")} if held else {}
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors due to sampling and the error of the drift of rigid elements.
+        """Return the errors due to sampling, and the error of the drift of rigid elements.
 
         The drift of rigid elements has the round-off of the difference of two means; below 1.5
         cycles there are no means, only the ends of the window. The means of independent strips are
@@ -299,7 +299,7 @@ class PieceReader(Reader):
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def solution_fields(self, run, drive) -> dict:
-        """Return the ringing of a release and, for a changing motion, the steady amplitude."""
+        """Return the ringing of a release, and the steady amplitude of a motion that still changes."""
         fields = {}
         if tail := self.tail(run, drive):
             fields["extra"] = tail
@@ -343,7 +343,7 @@ def _compute_strips_loop(run, drive) -> InterfaceLoop:
 
 
 def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may still change by more than a fraction of the tolerance.
+    """Return whether a motion may change by more than a fraction of the tolerance in future.
 
     It may if the run is too short, or if the extremes of its cycles have moved too much in the last
     N_CHANGE_WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.
@@ -368,7 +368,7 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
 
 
 def find_steady_motion(modes, drive, groups, done) -> tuple | None:
-    """Compute the steady amplitude [m], with its error, to which a run converges.
+    """Compute the steady amplitude [m] and its error to which a run converges.
 
     It is found by the map of the yields over a period.
 
@@ -405,7 +405,7 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
 
 
 def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tuple:
-    """Return the amplitude [m] and error of a periodic motion, or NaN if it is unstable.
+    """Return the amplitude [m] and error of a periodic motion; NaN if it is unstable.
 
     Parameters
     ----------

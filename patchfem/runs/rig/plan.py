@@ -68,7 +68,7 @@ MIN_STIFF_LINK_RATIO = (
 
 
 def chain(rig) -> dict:
-    """Return the stiffness [N/m] of the structural links of the stiffness chain of a rig."""
+    """Return the stiffnesses [N/m] of a structure that act in series with the contact."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
     )
@@ -127,7 +127,7 @@ def remove_expected_joint(rig, links: dict):
 
 
 def mode_frequencies(rig, chain: dict) -> list:
-    """Return the name and the free and stuck frequencies [Hz] of each mode.
+    """Return name, free frequency and stuck frequency [Hz] of each mode.
 
     The stuck frequency is that with the contact held by the links of a chain; None if no link is
     compliant, and without friction.
@@ -153,7 +153,7 @@ def mode_frequencies(rig, chain: dict) -> list:
 
 
 def predict_cost(model: Model, points: int) -> Cost:
-    """Return the predicted cost of a coupled run.
+    """Predict the cost of a run of a rig.
 
     Parameters
     ----------
@@ -178,14 +178,14 @@ def predict_cost(model: Model, points: int) -> Cost:
 
 
 def _motion_sentences(model: Model, numerics) -> list:
-    """Return the sentences of a plan on how the motion of a rig is computed."""
+    """Return the sentences of a plan on the method that computes the motion."""
     if ENGINES[numerics.engine].finds_periodic_motion:
         return [f"the steady motion is found by {choose_steady_method(model).words}"]
     return bond_sum_sentences(model, numerics)
 
 
 def predict_march_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the predicted cost of a march with its coarse runs.
+    """Predict the cost of a march, including its coarse runs.
 
     Parameters
     ----------
@@ -235,12 +235,12 @@ def predict_march_cost(model: Model, numerics, points: int) -> Cost:
 
 
 def choose_march_code(model: Model) -> EngineCode:
-    """Return the cost of the compiled code of a march."""
+    """Return the compiled code of a march, with its memory and compile time."""
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
 def _step_seconds_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
-    """Return the CPU time [s] of a march step without shear modes and list of bonds."""
+    """Return the CPU time [s] of a march step without shear modes or a bond list."""
     rig = model.rig
     step = _point_step_seconds(model.rig, model.friction)
     if model.grooves is not None:
@@ -278,7 +278,7 @@ def _point_step_seconds(rig, friction) -> float:
 
 
 def compute_groups(model: Model) -> dict:
-    """Return the dimensionless groups of a motion that have a meaning, by name.
+    """Return the dimensionless groups that apply to the motion of a model, as a dict.
 
     - D: static friction limit over largest force of the drive, D of (2.3) at resonance.
     - D_kinetic: the same with the kinetic limit, if it differs.
@@ -310,7 +310,7 @@ def compute_groups(model: Model) -> dict:
 
 
 def drive_and_knee(model: Model) -> dict:
-    """Return the drive and the drive above which friction does not bound the resonance.
+    """Return the drive, and the drive above which friction cannot bound the resonance.
 
     Both are accelerations of the base [m s-2], "drive" and "knee", of a single mode that a sine
     excites at resonance; {} for another rig.
@@ -332,7 +332,7 @@ def drive_and_knee(model: Model) -> dict:
 
 
 def _participation_ratio(rig) -> float:
-    """Return the ratio of slide to base participation of the first mode that is not rigid.
+    """Return the ratio of slide to base participation of the first mode with relative motion.
 
     This is the effect of friction over that of the drive. It is 1 if the scene lists no modes, or if
     the drive does not excite the mode.
@@ -344,7 +344,7 @@ def _participation_ratio(rig) -> float:
 
 
 def describe_stick(rig, sizes: dict, chain: dict) -> list:
-    """Return the sentence of a plan on whether friction stops a driven block.
+    """Describe in a plan whether friction stops a driven block.
 
     The sentence on D of a single mode says whether the block sticks, and whether friction bounds its
     motion; there is none for other rigs.
@@ -396,7 +396,7 @@ def _describe_sliding(d: float) -> str:
 
 
 def bond_sum_sentences(model: Model, numerics) -> list:
-    """Return the sentences of a plan on the sum over bonds or the engine of elements."""
+    """Return the sentences of a plan on the bond summation or the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else describe_element_engine(model, numerics.engine)
     choice = lists.choose_bond_sum(model, numerics)
@@ -420,7 +420,7 @@ def bond_sum_sentences(model: Model, numerics) -> list:
 
 
 def _describe_stuck_block(model: Model) -> str:
-    """Describe how bonds stop a block whose list of bonds grows."""
+    """Describe how bonds stop a block while its bond list grows."""
     if lists.is_stuck_without_stiffness(model):
         held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
     elif lists.is_stuck_after_release(model):
@@ -436,7 +436,7 @@ def _describe_stuck_block(model: Model) -> str:
 
 
 def predict_steady_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the predicted cost of a curve of steady motions with its coarse runs.
+    """Predict the cost of a curve of steady motions, including its coarse runs.
 
     Parameters
     ----------
@@ -499,7 +499,7 @@ def _steady_point_seconds(model: Model, by: str) -> float:
 
 
 def _smooth_law_seconds(rig) -> float:
-    """Estimate the CPU time [s] per point of a curve that smooth laws add to harmonic balance.
+    """Estimate the extra CPU time [s] that a smooth law needs per point of a curve.
 
     Their slope changes during the whole cycle, whereas that of elements that stick and slip is
     constant for most of it.

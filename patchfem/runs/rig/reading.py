@@ -24,7 +24,7 @@ from .solution import Solution, find_release_amplitude, mode_stiffness, normal_l
 
 
 class Reader:
-    """Evaluator of the runs of a model by one engine.
+    """Evaluation of the runs of a model by one engine.
 
     The methods `integrated` and `more` return the measures that an engine computes itself.
 
@@ -55,11 +55,11 @@ class Reader:
         self.held = 0.0 if self.creeps else held
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the measures that the engine integrated over the last cycles of a run."""
+        """Return the measures that the engine itself integrates over the last cycles."""
         return IntegratedMeasures()
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return data that the engine knows better than its samples, as fields of `LastCycles`.
+        """Return data that the engine knows more accurately than samples, as fields of `LastCycles`.
 
         Parameters
         ----------
@@ -73,7 +73,7 @@ class Reader:
         return {}
 
     def values(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
-        """Compute the measures of the last cycles of a run.
+        """Compute the measures of a run from its last cycles.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Reader:
         return values
 
     def sticks(self, run) -> bool:
-        """Return whether no interface slips in the last cycles of a run."""
+        """Return whether all interfaces stick during the last cycles of a run."""
         loops = self.integrated_measures(run, self.model.rig.drive.signal).loops
         if not self.has_friction or self.creeps:
             return False
@@ -132,7 +132,7 @@ class Reader:
         )
 
     def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors of the measures that the run itself states, except ringing.
+        """Return the errors of measures that the run states itself, except those of ringing.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class Reader:
         return {}
 
     def with_half_the_samples(self, run):
-        """Return the run without every second of its samples."""
+        """Return a run with every second sample removed."""
         return replace(run, window=thin_samples(run.window))
 
     def sampling_errors(self, run, drive, values: dict) -> dict:
@@ -177,7 +177,7 @@ class Reader:
         return errors
 
     def whole_run(self, run, drive):
-        """Return the complete histories of a run, or None if they are not equally sampled.
+        """Return the histories of all cycles, or None if they are not equally sampled.
 
         None if they are not kept at equal steps.
         """
@@ -190,7 +190,7 @@ class Reader:
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 
     def between_samples(self, run, drive, values: dict) -> dict:
-        """Estimate the sampling errors of the measures that need the whole run.
+        """Estimate the sampling errors of measures that depend on all cycles of a run.
 
         The changes without the even and without the odd samples are added, because each reversal
         has neighbours of one kind.
@@ -217,11 +217,11 @@ class Reader:
         return errors
 
     def solution_fields(self, run, drive) -> dict:
-        """Return the fields of a Solution that only this engine has."""
+        """Return fields of a Solution that only this engine provides."""
         return {}
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """Evaluate a run of an engine as a Solution.
+        """Evaluate a run and return it as a Solution.
 
         Parameters
         ----------
@@ -265,7 +265,7 @@ class Reader:
         )
 
     def level(self, size: float, run, drive=None, relative_error: float = 0.0) -> Level:
-        """Evaluate a run as a level of the drive.
+        """Evaluate a run as one level of the drive.
 
         Parameters
         ----------
@@ -287,7 +287,7 @@ class Reader:
 
 
 def _thin_between_reversals(histories, parity: int):
-    """Remove every second sample of histories, except the ends and all reversals.
+    """Remove every second sample of histories, except the ends and the reversals.
 
     parity: 0 or 1, remainder of the index of the samples that are kept on division by 2.
     """
@@ -299,7 +299,7 @@ def _thin_between_reversals(histories, parity: int):
 
 
 def thin_samples(window):
-    """Remove every second of the equally spaced samples of a window.
+    """Remove every second sample of an equally sampled window.
 
     The last sample, and those of events between the others, are kept.
     """
@@ -311,7 +311,7 @@ def thin_samples(window):
 
 
 class FrictionWorks(NamedTuple):
-    """Friction work of a run from its samples and from its energy balance.
+    """Friction work of a run, computed from samples and from the energy balance.
 
     - sampled: from samples by the trapezoidal rule [J].
     - booked: from the energy balance [J].
@@ -324,7 +324,7 @@ class FrictionWorks(NamedTuple):
 
 
 def compute_friction_works(response, work: float) -> FrictionWorks:
-    """Return the friction work of a run from samples and from its energy balance.
+    """Compute the friction work of a run from samples and from the energy balance.
 
     Parameters
     ----------

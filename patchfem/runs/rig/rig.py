@@ -37,7 +37,7 @@ MIN_STEP_ERROR = 1e-12  # relative error of a step, below which round-off domina
 
 
 class RefinedRun(NamedTuple):
-    """Run at the first numerical settings whose displacement error meets the tolerance.
+    """Run with the first numerical settings whose displacement error meets the tolerance.
 
     - numerics, solution: the settings and the Solution of the engine.
     - measures: measures by name, with errors from coarser runs if they are estimated.
@@ -49,7 +49,7 @@ class RefinedRun(NamedTuple):
 
 
 def run_coupled(inputs: RunInputs) -> Result:
-    """Run the plan of a driven structure with or without friction.
+    """Run a plan for a structure with modes, drive and perhaps friction.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def run_coupled(inputs: RunInputs) -> Result:
 
 
 def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
-    """Run a rig with finer and finer settings until its displacement meets the tolerance.
+    """Repeat a run with finer settings until the error of the displacement meets the tolerance.
 
     Settings that the scene does not fix are refined from run to run. All coarser runs are kept in
     `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run that is
@@ -165,7 +165,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
 
 
 def _count_slip_period_cycles(model, numerics, solution) -> int:
-    """Return the number of cycles that contain a whole stick-slip period on a belt.
+    """Return the number of cycles that contain a complete stick-slip period on a belt.
 
     No periodic drive sets the period of such a run. It is 0 if there is no period, or if the run is
     shorter than two windows.
@@ -184,7 +184,7 @@ def are_errors_met(measures: dict, tolerance: float) -> bool:
 
 
 def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -> bool:
-    """Return whether the displacement is accurate enough, or no finer run is possible.
+    """Return whether the displacement is accurate enough or no finer run is possible.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -
 
 
 def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -> Solution:
-    """Add errors from coarser runs to the drive levels of a run, and the runs themselves.
+    """Add errors from coarser runs to the drive levels of a Solution.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
 def _split_errors_by_cause(
     solution: Solution, coarser_runs: list, errors: list, solutions: dict
 ) -> dict:
-    """Return the contributions to the errors by cause, and the observed orders of convergence.
+    """Split the errors of measures by cause, and return the observed orders of convergence.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ OTHER_PEAK_RATIO = 0.1
 
 
 class Runner:
-    """Solver of one rig at several numerical settings, which keeps all coarser runs.
+    """Solver of a rig at several numerical settings, which stores all coarser solutions.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Runner:
         self.progress = RunProgress(inputs.progress, _expected_steps(inputs, numerics))
 
     def solve(self, numerics: Numerics, coarser_model=None) -> Solution:
-        """Solve the rig at given settings.
+        """Solve the rig with given settings.
 
         Parameters
         ----------
@@ -73,7 +73,7 @@ class Runner:
         return solution
 
     def estimate(self, coarser_runs: list, solution: Solution) -> list:
-        """Estimate the errors of a run from coarser runs, one dict per kind of coarser run."""
+        """Estimate the errors of a run, with one dict of errors per kind of coarser run."""
         errors, seconds = estimate_errors(
             lambda numerics: self._solve_coarser(numerics, solution),
             solution.values,
@@ -84,7 +84,7 @@ class Runner:
         return errors
 
     def _solve_coarser(self, numerics: Numerics, fine: Solution) -> Solution:
-        """Solve the rig at coarser settings."""
+        """Solve the rig with coarser settings."""
         model = self.model
         if numerics.richer:
             model = replace(model, rig=model.rig.structure.richer_rig)
@@ -94,7 +94,7 @@ class Runner:
         return self._solve_around_peak(model, numerics, fine) or self.solve(numerics, model)
 
     def _solve_around_peak(self, model, numerics: Numerics, fine: Solution) -> Solution | None:
-        """Solve the coarser run of a curve only around its largest amplitude.
+        """Solve a curve with coarser settings, only around its largest amplitude.
 
         The result is None if there is no curve, or if its largest amplitude is elsewhere.
         """
@@ -123,7 +123,7 @@ class Runner:
 
 
 class RunProgress:
-    """Completed fraction of all runs of a rig, each weighted by its steps.
+    """Completed fraction of the work of a run and its coarser runs, weighted by their steps.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class RunProgress:
         self.shown = 0.0
 
     def make_callback(self, steps: float):
-        """Return the progress callback of a run with a given number of steps per cycle.
+        """Return the progress callback of one run with a given number of steps per cycle.
 
         It is None if the caller gave no callback. The reported fraction never decreases.
         """
@@ -153,7 +153,7 @@ class RunProgress:
             return None
 
         def report(fraction: float) -> None:
-            """Report the completed fraction of one run as that of all runs."""
+            """Convert the completed fraction of one run to that of all runs, and report it."""
             expected = max(self.expected_steps, self.done + steps)
             self.shown = max(self.shown, (self.done + fraction * steps) / expected)
             self.callback(self.shown)
@@ -162,7 +162,7 @@ class RunProgress:
 
 
 def _expected_steps(inputs: RunInputs, numerics: Numerics) -> float:
-    """Return the expected steps per cycle of a run and its coarser runs together.
+    """Return the expected steps per cycle of a run plus those of its coarser runs.
 
     A run on a coarser mesh has the smallest number of steps.
     """

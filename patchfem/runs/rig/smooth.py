@@ -23,7 +23,7 @@ CROSSING_FRACTION_ERROR = 1e-7
 
 
 def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with a smooth friction law by steps of high order, with error control.
+    """Compute the motion of a rig with a smooth friction law by high-order integration.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 class SmoothReader(Reader):
-    """Evaluator of a run of the smooth engine, whose own integrals replace those of samples."""
+    """Evaluation of the runs of the smooth engine, whose measures are integrals over its steps."""
 
     def __init__(self, model, numerics, patch, contact):
         super().__init__(
@@ -73,7 +73,7 @@ class SmoothReader(Reader):
         )
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the measures integrated over the polynomials of the steps."""
+        """Return the measures integrated over the polynomials of the time steps."""
         book = run.ledger
         integrated = run.integrated
         if not _has_clear_slip(run):
@@ -83,7 +83,7 @@ class SmoothReader(Reader):
         return replace(integrated, friction_works=works)
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the samples with and without the reversals, for the evaluation.
+        """Return the last cycles with samples added at the reversals, for the evaluation.
 
         Parameters
         ----------
@@ -93,12 +93,12 @@ class SmoothReader(Reader):
         return {"window": run.with_reversals, "even": run.window, "by": "rate"}
 
     def with_half_the_samples(self, run):
-        """Return the run without every second of its samples."""
+        """Return a run with every second sample removed."""
         thinned = super().with_half_the_samples(run)
         return replace(thinned, with_reversals=thin_samples(run.with_reversals))
 
     def integration_errors(self, run, values: dict) -> dict:
-        """Estimate the errors of the measures of a smooth run, by name.
+        """Estimate the errors of measures due to sampling and skipped cycles of a smooth run.
 
         The errors are due to sampling, to peaks between samples, and to skipped cycles of a periodic
         motion. values: measures by name.

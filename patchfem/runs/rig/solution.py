@@ -22,7 +22,7 @@ PEAK_SHIFT_FACTOR = (
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
-    """Output of one run of an engine before its errors are known.
+    """Output of an engine for one run, without error estimates from coarser runs.
 
     - values: measures by name.
     - response, window: histories that are kept, and those of the last cycles.
@@ -88,7 +88,7 @@ class CycleLoop(NamedTuple):
 
 
 def replace_output_by_gauge(model, raw: Solution) -> Solution:
-    """Return a Solution with the motion of a gauge instead of the accelerometer.
+    """Return a Solution whose output is the motion of a gauge, not of the accelerometer.
 
     Displacement and histories are those of the gauge. How the motion settles is judged at the
     accelerometer; the steady amplitude at the gauge is not known.
@@ -115,7 +115,7 @@ def replace_output_by_gauge(model, raw: Solution) -> Solution:
 
 
 def _histories_at_gauge(histories: Response, gauge) -> Response:
-    """Return histories with the motion of a gauge as their output.
+    """Return histories whose output is the motion of a gauge.
 
     gauge: participations (n,) of the modes in the motion of the gauge.
     """
@@ -129,7 +129,7 @@ def _histories_at_gauge(histories: Response, gauge) -> Response:
 
 
 def find_release_amplitude(window, period: float, window_amplitude: float) -> float:
-    """Return the amplitude [m] of a release in its last whole cycle.
+    """Return the amplitude [m] of a released motion in its last complete cycle.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def normal_load(model, patch) -> float | None:
 
 
 def mode_stiffness(model, window) -> float:
-    """Return the stiffness [N/m] of the first mode as seen by the contact.
+    """Return the stiffness [N/m] of the first mode, referred to the motion at the contact.
 
     It is 0 if other modes carry more than MAX_OTHER_MODES_FRACTION of the slide.
     """
@@ -192,7 +192,7 @@ def compute_sampled_loop(
 
 
 def compute_curve_measures(extra: dict, coarser=()) -> dict:
-    """Return the frequency [Hz] of the largest amplitude of a curve, with its error.
+    """Return the frequency [Hz] of the largest amplitude of a curve, as a dict with its error.
 
     It has no value if the amplitude is 0.
 

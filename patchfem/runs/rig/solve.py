@@ -10,7 +10,7 @@ from .steady import steady
 
 
 def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with the engine of its settings, as measured by its gauge.
+    """Solve a rig with the engine of its settings; the output is the motion at its gauge.
 
     Parameters
     ----------

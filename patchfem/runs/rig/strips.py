@@ -10,12 +10,12 @@ import numpy as np
 
 
 def strip_loads(patch) -> np.ndarray:
-    """Return the normal load (s,) [N] on every strip of a pressed patch."""
+    """Return the normal load (s,) [N] on each strip of a solved patch."""
     return patch.strips.force.sum(axis=1)
 
 
 def average_march(done, patch):
-    """Average a march of independent strips over the patch."""
+    """Average a march of independently sliding strips over the patch."""
     loads = strip_loads(patch)
     offsets = patch.strips.offsets
     window = average_strips(done.window, loads, offsets)
@@ -29,13 +29,13 @@ def average_march(done, patch):
 
 
 def average_mark(mark, patch):
-    """Average one stored cycle of independent strips over the patch."""
+    """Average one stored cycle of independently sliding strips over the patch."""
     window = average_strips(mark.window, strip_loads(patch), patch.strips.offsets)
     return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
 def average_strips(response, loads, offsets):
-    """Average the histories of independent strips over the patch.
+    """Average the histories of independently sliding strips over the patch.
 
     Slide, speed and slip are means weighted by the loads, the force is the resultant. `extra` keeps
     the strips, and has the yaw moment (k,) [N m], the sum of y f of the friction about +z on the
@@ -64,7 +64,7 @@ def average_strips(response, loads, offsets):
 
 
 def estimate_lateral_motion(patch, window, period: float) -> tuple:
-    """Return the lateral amplitude and the lengthened slide path of a patch that yaws.
+    """Estimate the lateral amplitude and the longer slide path of a patch that yaws.
 
     The yaw rotates the patch about its middle: a point slides by s_j along x, and by the rotation
     times x across it.

@@ -12,7 +12,7 @@ from .numerics import Numerics
 
 
 def make_varying_load_law(model: Model, numerics: Numerics):
-    """Return the friction law of a model for a contact with varying normal load."""
+    """Convert the friction law of a model to one for varying normal load."""
     f = model.friction
     if f.law == "coulomb":
         return march.make_coulomb_law(f.static, f.kinetic)

@@ -27,7 +27,7 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 
 
 def failed_findings(result: Result) -> list:
-    """Return all findings of a Result whose difference exceeds the threshold."""
+    """Return the self-checks of a Result whose difference exceeds the threshold."""
     run = Evidence(result)
     return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
 

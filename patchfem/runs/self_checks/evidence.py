@@ -26,7 +26,7 @@ class Evidence:
         self.scene = tomllib.loads(self.model.source.resolved)
 
     def number(self, *keys) -> float | None:
-        """Return the value of a scene key in SI units; None if the scene does not have it."""
+        """Return the number of a scene key in SI units; None if the scene does not give it."""
         value = self.scene
         for key in keys:
             if not isinstance(value, dict) or key not in value:
@@ -35,18 +35,18 @@ class Evidence:
         return parse_scene_number(value)
 
     def value(self, name: str) -> float | None:
-        """Return the value of a measure; None if the run does not have it."""
+        """Return the value of a measure; None if the run has no such measure."""
         measure = self.result.measures.get(name)
         return None if measure is None else measure.value
 
     def error(self, name: str) -> float:
-        """Return the stated error of a measure plus its floor; 0 if the run does not have it."""
+        """Return the error of a measure plus its floor; 0 if the run has no such measure."""
         measure = self.result.measures.get(name)
         return 0.0 if measure is None else (measure.error or 0.0) + measure.floor
 
     @property
     def area(self) -> float:
-        """Area [m2] of the interface of all pairs."""
+        """Area [m2] of the interfaces of all contact pairs."""
         contact = self.scene["contact"]
         return (
             self.number("contact", "width")
@@ -83,7 +83,7 @@ class Evidence:
 
     @cached_property
     def modes(self) -> "SceneModes | None":
-        """Modes of [[structure.mode]]; None if the engine uses other modes.
+        """Modes that the scene lists in [[structure.mode]]; None if the engine uses other modes.
 
         Reduction, or a bonded spring, replaces the modes of the scene.
         """
@@ -113,7 +113,7 @@ class Evidence:
 
     @cached_property
     def window(self):
-        """Last cycles of a run under sinusoidal drive, as a Response or LastCycle; else None.
+        """Last cycles of a run under sinusoidal drive; None under other drives.
 
         It is also None for too few samples.
         """
@@ -143,7 +143,7 @@ class Evidence:
 
     @cached_property
     def balance(self) -> "ForceBalance | None":
-        """Friction force from the equation of motion and from its samples, as first harmonics.
+        """First harmonics of the friction force from the equation of motion and from samples.
 
         It is None if other forces act as well.
         """
@@ -228,7 +228,7 @@ def parse_scene_number(value) -> float | None:
 
 
 def cubic_harmonic(time, value, rate, omega: float) -> complex:
-    """Compute the Fourier coefficient 2/T int y exp(-i omega t) dt of sampled y.
+    """Compute a Fourier coefficient of samples by integrating piecewise cubics.
 
     The samples (k,) are joined by cubics and integrated by Simpson's rule.
 
@@ -249,7 +249,7 @@ def cubic_harmonic(time, value, rate, omega: float) -> complex:
 
 
 def energy_balance(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
-    """Compute the first harmonic of the friction force from the motion and from its samples.
+    """Compute the first harmonic of the friction force from the motion and from samples.
 
     The equation of motion times exp(-i omega t) is integrated by parts over the window: the
     harmonic of z'' is [v e + i omega z e] 2/T - omega^2 z1, that of v is [z e] 2/T + i omega z1.

@@ -19,7 +19,7 @@ ROUTE_OF_LOWER_BOUND = "from the values of the scene at least"
 
 
 class Finding(NamedTuple):
-    """Comparison of a number of the run with a second computation of the same quantity.
+    """Comparison of a measure of a run with an independent computation of the same quantity.
 
     - quantity: name of the number.
     - found, expected: number of the run, and the second one.
@@ -40,7 +40,7 @@ class Finding(NamedTuple):
 
     @property
     def difference(self) -> float:
-        """Difference between the run and the second computation."""
+        """Difference between the measure and its independent computation."""
         return max(abs(self.found - self.expected), self.phase_difference)
 
     @property
@@ -55,7 +55,7 @@ class Finding(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Sentence that states both numbers and their difference."""
+        """Sentence that states both values and their difference."""
         unit = f" {self.unit}" if self.unit else ""
         return (
             f"a self-check of the run failed: {self.quantity} is {self.found:.6g}{unit}, but "

@@ -165,7 +165,7 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
 
 
 def check_motion_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare displacement amplitude and acceleration with those from modal coordinates.
+    """Compare displacement amplitude and acceleration with sums over modal coordinates.
 
     Half the range of sum output_i z_i over the samples is at most the amplitude, and at most a few
     percent less; the same holds for the largest absolute acceleration. The acceleration of a sample

@@ -33,7 +33,7 @@ def check_interface_area(run: Evidence) -> Iterator[Finding]:
 
 
 def check_normal_load(run: Evidence) -> Iterator[Finding]:
-    """Compare the integral of the pressure and the measure `normal_load` with the load.
+    """Compare the prescribed load with the integral of the pressure and with `normal_load`.
 
     This is the equilibrium of the upper piece, which the contact solver satisfies to its residual.
     """
@@ -139,7 +139,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
 
 
 def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare the pressure measures with the nodal pressures and the mean pressure.
+    """Compare the pressure measures with the pressures at the nodes.
 
     By definition loaded_fraction × pressure_peak is the mean, load/(length × width); the moment is
     the sum of force × x; each edge of the contact lies within one cell of its last node. Measures

@@ -46,7 +46,7 @@ MIN_ROW_DISTANCE = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Moment:
-    """State of the worn interface after a number of cycles.
+    """Contact, slip path and measures of a worn patch after a number of cycles.
 
     - cycle: number of cycles.
     - depth: worn depth (m,), of strips (s, m) [m].
@@ -68,7 +68,7 @@ class Moment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evolved:
-    """Worn patch on its mesh and on coarser ones, with the history of its wear.
+    """Worn patch with the history of its wear, also on coarser meshes.
 
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
     - state: at the end; None if nothing was worn.
@@ -93,11 +93,11 @@ class Evolved:
 
 
 class _Unbounded(Exception):
-    """Exception for a motion without a periodic cycle."""
+    """Exception that is raised if the motion of a worn model has no periodic cycle."""
 
 
 class _Motion:
-    """Function that computes the slip path per cycle of a model on its worn patch.
+    """Function that computes the slip path per cycle on a worn patch.
 
     A motion that does not depend on wear is computed once, on the unworn patch, so that a run that
     continues from a saved state gives the same bits.
@@ -130,7 +130,7 @@ class _Motion:
 
 
 def mean_depth(patch, depth) -> float:
-    """Return the mean worn depth [m] of a patch: worn volume over area.
+    """Return the mean worn depth [m] of a patch, which is worn volume divided by area.
 
     depth: (m,), of strips (s, m) [m].
     """
@@ -257,7 +257,7 @@ def evolve(
 
 
 class WornCoating(NamedTuple):
-    """Coating of a piece with its worn fraction.
+    """Coating of a piece, with the fraction of its thickness that is worn off.
 
     - fraction: worn fraction at the deepest point.
     - piece: "upper" or "lower".
@@ -279,7 +279,7 @@ def find_worn_through_coating(model, depth) -> WornCoating | None:
 
 
 def _most_worn_coating(model, depth) -> WornCoating:
-    """Return the coating of which the largest fraction is worn.
+    """Return the coating with the largest worn fraction of its thickness.
 
     Its fraction is 0 without coatings.
     """
@@ -298,17 +298,17 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
 
 def _jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the wear state after the next jump, or when a coating is worn through.
+    """Compute the wear after the next jump over cycles, or when a coating is worn through.
 
     The latter is found by the Illinois variant of regula falsi.
     """
 
     def excess(state: WearState) -> float:
-        """Return the largest worn fraction of a coating minus 1."""
+        """Return the largest worn fraction of a coating thickness minus 1."""
         return _most_worn_coating(model, state.depth).fraction - 1
 
     def jump_to(cycle: float) -> WearState:
-        """Compute the wear state after a jump that ends at a given cycle or earlier."""
+        """Compute the wear after a jump over cycles that ends at a given cycle or earlier."""
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
     if model.patch.interface.strips is not None:
@@ -341,7 +341,7 @@ def _jump(model, problem: WearProblem, state: WearState) -> WearState:
 
 
 def next_row_cycle(wear, problem: WearProblem, state: WearState) -> float:
-    """Return the largest end cycle of a jump that passes no row of the friction table.
+    """Return the last cycle to which a jump can go before the next row of the friction table.
 
     At this cycle the current wear rate reaches the next row of the table, or the row after it if
     the next one is nearer than a tenth of their distance. A jump past a row would miss its values.
@@ -374,7 +374,7 @@ def next_row_cycle(wear, problem: WearProblem, state: WearState) -> float:
 
 
 def _with_earlier_wear(model, patch):
-    """Return the patch with the depth that earlier runs have worn off.
+    """Return the patch with the worn depth of earlier runs included in its gap.
 
     It is unchanged if there is no earlier wear.
 
@@ -433,7 +433,7 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
 
 
 def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
-    """Compute the wear of a patch on another mesh with the jumps and slip paths of a given run.
+    """Repeat on another mesh the wear of a run, with its jumps and slip paths.
 
     The other patch may also have another number of strips. Return its worn patch and its worn depth
     [m].
@@ -450,7 +450,7 @@ def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
     area = areas(patch_model, other_patch.pieces.interface)
 
     def interpolate(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes and strips of the other patch."""
+        """Interpolate a slip path to the nodes and strips of another patch."""
         if patch_model.interface.strips is None:
             return np.interp(other_patch.x, patch.x, path)
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in path])
@@ -473,7 +473,7 @@ def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
 
 
 def evolve_and_save(storage, key: str, model, patch, coarse, progress=None) -> Evolved:
-    """Compute the wear of a patch and save its state after every jump.
+    """Compute the wear of a patch, saving its state after every jump over cycles.
 
     Parameters
     ----------
@@ -491,7 +491,7 @@ def evolve_and_save(storage, key: str, model, patch, coarse, progress=None) -> E
 
 
 def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
-    """Save a wear state and its history; an earlier file is replaced atomically.
+    """Write a wear state with its history to a file, which is replaced atomically.
 
     Parameters
     ----------
@@ -512,7 +512,7 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
 
 
 def no_saved_state_error(path: Path) -> PatchfemError:
-    """Return the error that a run folder has no saved wear state.
+    """Return the exception for a run folder without a saved wear state.
 
     path: file of the state.
     """
@@ -523,7 +523,7 @@ def no_saved_state_error(path: Path) -> PatchfemError:
 
 
 def load_state(path: Path, key: str) -> tuple:
-    """Load a wear state and its history from a saved file.
+    """Read a wear state with its history from a file.
 
     Raises
     ------

@@ -30,7 +30,7 @@ HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
 
 
 def add_wear_measures(result, evolved, estimate: bool = True):
-    """Return the Result of a run on the worn patch, extended by the measures of wear.
+    """Add the measures of wear to the Result of a run on a worn patch.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
 
 
 def _make_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
-    """Return a measure of wear with its unit from the table of measures.
+    """Return a measure of wear, with its unit from the table of measures.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _make_measure(name: str, value: float, error: float | None, engine: str = ""
 
 
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
-    """Return the cycle at which a coating is worn through as a measure, if there is any.
+    """Return a measure, if any, of the cycle in which a coating is worn through.
 
     error: of the largest depth [m].
     """
@@ -102,7 +102,7 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
 
 
 def _note_on_start(model) -> list:
-    """Return a note on the earlier run whose worn state is the initial state."""
+    """Return a note on the earlier run from whose worn state the wear continues."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
@@ -124,7 +124,7 @@ def _note_on_coating(model, evolved) -> list:
 
 
 def _widen_by_jumps(result, evolved):
-    """Return the Result with errors that include those due to the jumps over cycles.
+    """Widen the errors of a Result by those of jumping over cycles.
 
     They follow at first order from the change if the same jumps are computed without subdivision,
     and from the change to another number of strips: an edge of contact that moves during a jump
@@ -163,7 +163,7 @@ def find_period(model, result) -> float:
 
 
 def _warn_of_depth(model, evolved) -> list:
-    """Return warnings of a worn depth that invalidates the stiffness of the unworn pieces."""
+    """Return warnings on a worn depth that is large compared with a piece or its coating."""
     depth = float(evolved.state.depth.max(initial=0.0))
     pieces = model.patch.pieces
     warnings = []
@@ -194,7 +194,7 @@ def _slip_error(measures: dict) -> float:
 
 
 def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) -> dict:
-    """Return worn_volume and worn_depth_max with errors that include earlier runs.
+    """Return the measures worn_volume and worn_depth_max, including the errors of earlier runs.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
 
 
 def _measure_worn_friction(model, evolved, motion: dict, error: float | None) -> dict:
-    """Return the friction parameters after wear, and measures with errors due to the worn depth.
+    """Return the friction parameters after wear, and widen errors by that of the worn depth.
 
     The error of the mean depth changes the measures of the motion, at the rate of the last two
     jumps.
@@ -299,7 +299,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
 
 
 def _warn_of_table(model, evolved) -> list:
-    """Return warnings of wear beyond the table of friction, and of jumps past its rows."""
+    """Return warnings on wear beyond the friction table, and on jumps over its rows."""
     table = model.wear.friction
     if table is None:
         return []
@@ -324,7 +324,7 @@ def _warn_of_table(model, evolved) -> list:
 
 
 def _measure_depths(patch_model, patch, depth) -> dict:
-    """Return worn volume [m3] and largest worn depth [m] of a patch by name."""
+    """Return the worn volume [m3] and the largest worn depth [m] of a patch as a dict."""
     return {
         "worn_volume": float(np.vdot(depth, areas(patch_model, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
@@ -332,7 +332,7 @@ def _measure_depths(patch_model, patch, depth) -> dict:
 
 
 def _slip_difference(evolved, motion: dict) -> float:
-    """Return the relative difference of the slip in the last wear cycle from the final run.
+    """Return the relative difference in slip between the last wear cycle and the final run.
 
     The run on the worn patch may have used smaller steps for its tolerance.
     """
@@ -344,7 +344,7 @@ def _slip_difference(evolved, motion: dict) -> float:
 
 
 def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
-    """Return the worn volume of a single point under [normal] by name.
+    """Return the worn volume of a single contact point under [normal] as a dict.
 
     It is coefficient times load times slip path, over all cycles of wear.
 
@@ -365,7 +365,7 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
 
 
 def _add_wear_frames(result, evolved):
-    """Return the Result with the fields of the wear history before those of the last cycle.
+    """Put the fields of the wear history before the fields of the last cycle in a Result.
 
     The states after some of the jumps come first, then the motion. The time of a state is its cycle
     times the period, and the last cycle follows. The worn depth of strips is (frame, strip, x).
@@ -403,7 +403,7 @@ def _add_wear_frames(result, evolved):
 
 
 def _list_wear_history(evolved) -> dict:
-    """Return the measures over the cycles (j,) by name that all moments have.
+    """Return the recorded wear measures over the cycles (j,) as a dict.
 
     The entries `cycle` and `EDGE_PEAK` are included.
     """
@@ -417,7 +417,7 @@ def _list_wear_history(evolved) -> dict:
 
 
 def edge_pressure_excess(pressure) -> float:
-    """Return the excess pressure [Pa] at a contact edge over the pressure inside.
+    """Return by how much [Pa] the pressure at a contact edge exceeds that inside.
 
     It is 0 if the largest pressure is inside, or if the contact ends with the piece. A contact edge
     between two nodes moves as the pieces wear, and the element at the edge carries part of the load

@@ -30,7 +30,7 @@ THINNING_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
-    """Slip path of the interface nodes in a single cycle of a motion.
+    """Slip path of the interface nodes in one cycle of a motion.
 
     - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
       work per area over pressure, and over grooves it is along their flanks.
@@ -47,7 +47,7 @@ class CycleSlip(NamedTuple):
 
 
 def count_frames(tolerance: float) -> int:
-    """Return the frames per cycle for which the slip path has an error of tolerance/100.
+    """Return the frames per cycle with which a slip path is accurate to tolerance/100.
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
@@ -69,7 +69,7 @@ def strips_slide_independently(model) -> bool:
 
 
 def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
-    """Return the slip path of the interface nodes in a converged cycle of a model.
+    """Compute the slip path of the interface nodes in one periodic cycle of a model.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
 
 
 class _Cycle(NamedTuple):
-    """Displacement, slip and forces of a cycle at k samples.
+    """Displacement, slip, forces and load of one cycle at k samples.
 
     - slide, slip: [m].
     - force, load: [N].
@@ -179,7 +179,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
 
 
 def _beat_error(values: dict, cycle: _Cycle) -> float:
-    """Return the relative difference of the slip amplitudes of the last cycle and the window.
+    """Return the relative difference of the slip amplitudes in the last cycle and in the window.
 
     A mode that still beats causes this difference.
     """
@@ -191,7 +191,7 @@ def _beat_error(values: dict, cycle: _Cycle) -> float:
 
 
 def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
-    """Return the slip path [m] of a point in a cycle under [normal], and its relative error.
+    """Return the slip path [m] per cycle of a single point under [normal], and its error.
 
     It is weighted with the load if that changes. The error comes from differences between the
     cycles.
@@ -232,13 +232,13 @@ def _last_rig_cycle(model, window, load: float) -> _Cycle:
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
-    """Return a mask of the samples of a window that lie in its last cycle."""
+    """Return a mask of the samples in the last cycle of a window."""
     period = model.rig.drive.signal.period
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
 def _compute_strip_slip(model, patch, window) -> CycleSlip:
-    """Return the slip path along x of every strip of a rig with yaw.
+    """Return the slip path in the drive direction of each strip of a rig with yaw.
 
     An open strip has the slip of the nearest strip in contact.
     """
@@ -262,7 +262,7 @@ def _compute_strip_slip(model, patch, window) -> CycleSlip:
 
 
 def _thinned_error(compute_path, count: int, fine_path, weight, is_closed: bool = False) -> float:
-    """Estimate the relative error of a slip path due to reversals between samples.
+    """Estimate the relative error of a slip path whose reversals lie between samples.
 
     A reversal between two samples hides f(d) of the path, d <= 1/2 of their distance. Every third
     sample hides f(d), f(1 - d) or f(1 + d), for the first, second or third choice: 3/2 of the mean
@@ -291,7 +291,7 @@ def _thinned_error(compute_path, count: int, fine_path, weight, is_closed: bool 
 
 
 def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
-    """Return the slip path of a cycle in which all points slip equally under a load [N]."""
+    """Return the slip path of a cycle in which all points slip by the same distance."""
     slip = cycle.slip
     # Friction opposes the slip, also in a step with a reversal.
     weight = np.abs(cycle.force) if model.wear.uses_friction_work else cycle.load
@@ -306,12 +306,12 @@ def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
 
 
 def _integrate(slip, weight) -> float:
-    """Integrate a weight over |slip| by the trapezoidal rule."""
+    """Integrate a weight over the slip path |ds| by the trapezoidal rule."""
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
 
 def wearing_force_on_flanks(model, slide, force, load) -> np.ndarray:
-    """Return the wearing force per displacement (k,) [N] on the flanks of grooves.
+    """Return the force (k,) [N] that wears the flanks of grooves per unit of displacement.
 
     It is R ds/dq = V + F t of the normal force R, or with form 'energy' |f| ds/dq = |F - V t| of
     the friction force f along the flank, with the slope t.
@@ -331,7 +331,7 @@ def wearing_force_on_flanks(model, slide, force, load) -> np.ndarray:
 
 
 def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
-    """Return slip along the flank [m] and wearing stress [Pa] (f, m) of points over grooves.
+    """Return the slip along groove flanks [m] and the stress that wears them [Pa], (f, m) each.
 
     The slip is s - e, with the path s along the flank and its elastic part e. A point of pressure
     sigma carries V sigma/N, so that its normal stress on the flank is R = (V sigma/N + tau
@@ -365,7 +365,7 @@ def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
 
 
 def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
-    """Return the slip path of every node from frames of slip and shear stress."""
+    """Return the slip path of each node from frames of slip and shear stress."""
     count = len(frames.slip)
 
     def path(indices) -> np.ndarray:

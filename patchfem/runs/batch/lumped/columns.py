@@ -55,7 +55,7 @@ PHASE_MEASURE = "slip_start_phase"
 
 
 class CaseScales(NamedTuple):
-    """Scales of n models for their errors and outcomes, (n,) each.
+    """Tolerances and reference motions (displacement, period, decay rate) of n models.
 
     - tolerance: relative tolerance [1].
     - displacement: expected displacement [m].
@@ -72,7 +72,7 @@ class CaseScales(NamedTuple):
 
 
 def collect_scales(models) -> CaseScales:
-    """Return the scales of models as columns."""
+    """Collect the tolerances and reference motions of models as columns (n,)."""
     return CaseScales(
         *collect_columns(
             models,
@@ -134,7 +134,7 @@ class Runs:
 
 
 class AssembledRuns(NamedTuple):
-    """Case results of n runs, with the cases that need another run.
+    """Case results of n runs, with a mask of the cases that must be computed again.
 
     - results: CaseResults.
     - runs_singly: which cases (n,) must be run by themselves.
@@ -150,7 +150,7 @@ class AssembledRuns(NamedTuple):
 def assemble_results(
     models, runs: Runs, numerics: dict, is_repeated: Callable | None = None
 ) -> AssembledRuns:
-    """Evaluate the runs of models as case results.
+    """Convert the runs of models to case results with errors, outcomes and warnings.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def assemble_results(
 
 
 def _values_and_errors(runs: Runs) -> tuple[dict, dict]:
-    """Return the measures of runs and their errors, (n,) by name."""
+    """Return the measures of n runs and their errors, as dicts of columns (n,)."""
     values = dict(runs.values)
     values.setdefault(MAIN_MEASURE, runs.amplitudes)
     values["energy_balance"] = energy_balance(runs.book)
@@ -262,7 +262,7 @@ def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Ca
 def _insert_warnings(
     models, results: CaseResults, outcomes: list, is_wide: np.ndarray, rings: dict
 ) -> None:
-    """Insert the warnings of all cases in case results, as single runs give them.
+    """Insert the same warnings in case results as single runs would give.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def _insert_warnings(
 
 
 def _model_warnings(model, engine: str) -> list:
-    """Return the warnings on a model that do not depend on its run."""
+    """Return the warnings that follow from the model of a case without its motion."""
     return [
         *model.source.remarks,
         *describe_unused_settings(model, engine),
@@ -353,7 +353,7 @@ def _judge_outcomes(sizes: CaseScales, runs: Runs, drifts) -> _SteadyOutcomes:
 
 
 def _warn_of_ringing(sizes: CaseScales, runs: Runs, outcomes: list, amplitude) -> dict:
-    """Return the warnings on cases that stick but still vibrate."""
+    """Return the warnings on cases whose interface sticks while the structure still vibrates."""
     n = len(amplitude)
     floor = np.broadcast_to(error_floor(MAIN_MEASURE, sizes.displacement), n)
     decay = np.broadcast_to(sizes.decay * sizes.period, n)
@@ -392,7 +392,7 @@ def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
 
 
 def _insert_reasons(models, sizes: CaseScales, runs: Runs, results: CaseResults) -> None:
-    """Insert the reasons why measures of cases lack a value in case results."""
+    """Insert in case results the reason for each measure that has no value."""
     names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:
         results.measure(name, TABLE[name].unit)
@@ -415,7 +415,7 @@ def _insert_reasons(models, sizes: CaseScales, runs: Runs, results: CaseResults)
 
 
 def _may_need_law_warnings(models: SimilarModels, results: CaseResults) -> np.ndarray:
-    """Return which cases (n,) may need a warning on their friction law.
+    """Return a mask (n,) of the cases that may need a warning on their friction law.
 
     These cases have bonds that grow, have an infinite traction or creep.
     """

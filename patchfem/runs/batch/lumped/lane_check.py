@@ -33,7 +33,7 @@ IWAN_ERROR_FACTOR = 2.0
 
 
 class CheckedCases(NamedTuple):
-    """Results of n cases by lanes, some of which were checked with the exact engine.
+    """Results of n cases from a vectorized march, some of them compared with the exact engine.
 
     - results: CaseResults.
     - is_exact: which cases (n,) were not computed by lanes.
@@ -48,7 +48,7 @@ class CheckedCases(NamedTuple):
 def solve_and_check(
     models: Sequence[Model], cases: LaneCases, steps, solve_exactly: Callable
 ) -> CheckedCases:
-    """Compute cases by lanes, and check some of them with the exact engine.
+    """Compute cases by a vectorized march, and compare some of them with the exact engine.
 
     If checked cases differ, those of a stretch law are marched with twice the steps, and more cases are
     checked; if more than a few still differ, all cases are computed exactly.
@@ -113,7 +113,7 @@ def solve_and_check(
 
 
 def select_checked_cases(numbers, is_free, min_count: int = MIN_CHECKED) -> list:
-    """Select the cases that are checked with the exact engine, by a hash of their numbers.
+    """Select by a hash of their numbers the cases that are compared with the exact engine.
 
     The hash makes the choice of a case independent of other cases.
 
@@ -135,7 +135,7 @@ def select_checked_cases(numbers, is_free, min_count: int = MIN_CHECKED) -> list
 def _find_differences(
     results: CaseResults, exact_results: CaseResults | None, checked: list, is_exact, factor: float
 ) -> dict[int, str]:
-    """Return, by case, the first measure that differs from its exact result.
+    """Return for each differing case the first measure that deviates from the exact engine.
 
     A measure differs if the difference exceeds the sum of both errors and the floor.
 

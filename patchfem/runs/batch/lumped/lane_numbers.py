@@ -30,7 +30,7 @@ HELD_FRACTION = 1e-3  # slip over the stretch at the friction limit, below which
 
 
 class Scales(NamedTuple):
-    """Quantities of n cases in SI units, (n,) each.
+    """Scale factors and reference quantities that convert n dimensionless cases to SI units.
 
     - omega: of the drive [rad/s].
     - energy: unit of the energies, over the squared unit of the slide [J m-2].
@@ -51,7 +51,7 @@ class Scales(NamedTuple):
 
 
 class LaneCases(NamedTuple):
-    """Cases of one friction law that march in lanes, i.e. side by side.
+    """Cases with the same friction law, which are integrated in parallel lanes of a kernel.
 
     - cases, scales: of the cases.
     - coarse: (cases, scales) on a coarser mesh; None without a mesh.
@@ -63,7 +63,7 @@ class LaneCases(NamedTuple):
 
 
 def select_rows(values, indices):
-    """Select the rows of some cases from arrays in a dict or a tuple."""
+    """Select the entries of some cases from the arrays of a dict or a tuple."""
     if isinstance(values, dict):
         return {name: select_rows(value, indices) for name, value in values.items()}
     if isinstance(values, tuple):
@@ -73,12 +73,12 @@ def select_rows(values, indices):
 
 
 def count_evaluated_cycles(cycles: int) -> int:
-    """Return the number of last cycles of a run that are evaluated."""
+    """Return the number of last cycles of a run from which measures are computed."""
     return min(10, cycles // 10)
 
 
 def find_lane_law(model: Model) -> str:
-    """Return the friction law of a model in `dynamics.lanes`."""
+    """Return the name by which `dynamics.lanes` knows the friction law of a model."""
     return LANE_LAWS[model.friction.law] if model.patch is None else "table"
 
 
@@ -119,7 +119,7 @@ def collect_law_numbers(model: Model) -> StretchLaw:
 
 
 class ContactNumbers(NamedTuple):
-    """Contact of a single point: stick stiffness, stretch and further parameters.
+    """Parameters of a contact with a single point: stick stiffness, stretch and law constants.
 
     - stiffness: in stick [N/m].
     - length: stretch at the friction limit [m].
@@ -166,7 +166,7 @@ def may_create_energy(model: Model):
 
 
 def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Scales]:
-    """Return the cases of models in units of their drives, and their scales in SI units.
+    """Return models as dimensionless cases, and the scales that convert them to SI units.
 
     contacts: numbers (m, n) of the contacts as from `_collect_contact_numbers`; None: those of single points.
     """
@@ -236,7 +236,7 @@ class _RigNumbers(NamedTuple):
 
 
 def _collect_rig_numbers(model: Model) -> _RigNumbers:
-    """Return the parameters of the rig of a model."""
+    """Return the parameters of the single mode and the drive of a model."""
     modes = model.rig.modes
     drive = model.rig.drive.signal
     start = model.rig.start
@@ -258,7 +258,7 @@ def _collect_rig_numbers(model: Model) -> _RigNumbers:
 
 
 def _collect_contact_numbers(model: Model) -> list:
-    """Return the friction limits, load and contact parameters of a model for `make_cases`.
+    """Return the friction limits, the load and the contact parameters of a model.
 
     They are static and kinetic friction [N], load [N], and those of its ContactNumbers.
     """

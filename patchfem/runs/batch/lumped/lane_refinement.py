@@ -30,7 +30,7 @@ MAX_MESH_CHANGES = ((MAIN_MEASURE, 0.1), ("friction_force_peak", 0.1), ("loop_ar
 
 
 class RefinedCases(NamedTuple):
-    """Results of n cases by lanes, with their steps and those that need the exact engine.
+    """Results of n cases from a vectorized march, with the number of steps that each needed.
 
     - results: CaseResults.
     - is_exact: which cases (n,) must be computed by the exact engine.
@@ -45,7 +45,7 @@ class RefinedCases(NamedTuple):
 
 
 def march_side_by_side(models: Sequence[Model], cases: LaneCases, steps) -> RefinedCases:
-    """March models side by side, and refine the steps until the errors meet the tolerance.
+    """Integrate models in one batch, and refine their steps until the errors meet the tolerance.
 
     All cases with the same steps march together, including those whose errors need these steps. If
     the difference from half the steps is too large with a stretch law, a quarter of them shows how
@@ -64,7 +64,7 @@ def march_side_by_side(models: Sequence[Model], cases: LaneCases, steps) -> Refi
 
 
 class _Refinement:
-    """Cases with the measures of all their marches at several numbers of steps."""
+    """Cases of a batch, with the measures from marches with increasing numbers of steps."""
 
     def __init__(self, models: Sequence[Model], cases: LaneCases, steps):
         n = len(models)
@@ -82,7 +82,7 @@ class _Refinement:
         self.values = {}  # measures (n,) by steps per cycle and name
 
     def refine(self) -> RefinedCases:
-        """March with more and more steps until no case needs more."""
+        """Repeat the march with more steps until the errors of all cases are small enough."""
         steps = int(self.min_steps.min())
         while (self.steps >= steps).any():
             self._march(steps)
@@ -90,7 +90,7 @@ class _Refinement:
         return RefinedCases(self.results, self.is_exact, self.steps, self.reach)
 
     def _march(self, steps: int) -> None:
-        """March the cases that need this number of steps per cycle."""
+        """March those cases that need a given number of steps per cycle."""
         marching = np.flatnonzero((self.min_steps <= steps) & (self.steps >= steps))
         if not marching.size:
             return
@@ -110,7 +110,7 @@ class _Refinement:
             self._judge(final, final_measured)
 
     def _measure(self, indices, steps: int) -> MeasuredMarch:
-        """March some cases, and store their measures."""
+        """March some cases with a given number of steps, and store their measures."""
         cases = select_rows(self.cases[:2], indices)
         measured = march_and_measure(self.law, *cases, self.cycles, steps)
         columns = self.values.setdefault(steps, {})
@@ -119,7 +119,7 @@ class _Refinement:
         return measured
 
     def _needs_mesh_errors(self, indices, values: dict) -> np.ndarray:
-        """Return which cases need the errors due to the mesh with more steps.
+        """Return a mask of the cases whose mesh error must be computed again with more steps.
 
         values: their measures, (n,) by name.
         """
@@ -132,7 +132,7 @@ class _Refinement:
         return is_needed
 
     def _compute_mesh_errors(self, indices, values: dict, steps: int) -> None:
-        """Store the errors of some cases due to the mesh, from a march on a coarser mesh.
+        """Compute the mesh errors of some cases by a march on a coarser mesh.
 
         The error of a measure that the coarser mesh does not have is its absolute value.
         """
@@ -145,7 +145,7 @@ class _Refinement:
             column[indices] = np.where(np.isnan(error), np.abs(values[name]), error)
 
     def _judge(self, indices, measured: MeasuredMarch) -> None:
-        """Store the results of some cases, and choose the cases that need more steps."""
+        """Store the results of some cases, and select the cases that need more steps."""
         steps = measured.steps
         is_wide = self._evaluate(indices, measured, [steps // 2])
         if self.has_one_stretch and is_wide.any():
@@ -163,7 +163,7 @@ class _Refinement:
         self.is_exact[indices[is_wide]] = ~is_refined[is_wide]
 
     def _evaluate(self, indices, measured: MeasuredMarch, coarser_steps: list) -> np.ndarray:
-        """Store the results of some cases, and return which have too large errors.
+        """Store the results of some cases, and return a mask of those with too large errors.
 
         coarser_steps: steps per cycle of the marches that show the errors.
         """
@@ -176,7 +176,7 @@ class _Refinement:
         )
 
         def is_wide(results: CaseResults) -> np.ndarray:
-            """Return which cases have an error above the tolerance."""
+            """Return a mask of the cases with an error of a given measure above the tolerance."""
             return has_large_error(models, results, mesh_errors)
 
         numerics = {"engine": "exact", "window_cycles": measured.window}
@@ -197,7 +197,7 @@ class _Refinement:
 def has_large_error(
     models: Sequence[Model], results: CaseResults, mesh_errors: dict | None = None
 ) -> np.ndarray:
-    """Return which cases (n,) have an error above their tolerance.
+    """Return a mask (n,) of the cases with an error above the tolerance of the case.
 
     The tolerance applies to a measure or to the larger terms of which it is the difference. The
     errors due to the mesh are not counted, because no other engine reduces them.

@@ -34,7 +34,7 @@ FORCED_DISTANCE = 1e-2
 
 
 class LaneRinging(NamedTuple):
-    """Ringing of n cases during stick, and which cases need another run.
+    """Free vibration of n cases during stick, and a mask of cases that need another run.
 
     - values, errors: ring_frequency [Hz] and ring_damping [1] by name, (n,) each.
     - needs_single_run: which cases (n,) may ring, but lanes cannot tell.
@@ -48,7 +48,7 @@ class LaneRinging(NamedTuple):
 
 
 def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRinging:
-    """Find the ringing of cases during stick, and which cases need another run.
+    """Fit the free vibration of cases during stick, and find cases that need another run.
 
     Parameters
     ----------
@@ -88,13 +88,13 @@ def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRin
 
 
 def has_long_stick(cases, marched) -> np.ndarray:
-    """Return which cases (n,) have a stick interval that is long enough for ringing."""
+    """Return a mask (n,) of the cases that stick long enough for a free vibration to be fitted."""
     omega = np.sqrt(np.maximum(cases.stiffness + cases.spring - cases.damping**2 / 4, 0.0))
     return marched.reading("LONGEST_STICK") * omega >= MIN_STICK_PHASE
 
 
 def may_contain_transient(cases, marched) -> np.ndarray:
-    """Return which runs (n,) may still contain a transient or ringing at their end.
+    """Return a mask (n,) of runs whose last cycles may still contain a transient or ringing.
 
     The remaining transient is at most the change between the last two cycles over the fraction that the
     damper removes in one cycle.
@@ -135,7 +135,7 @@ def _fit_ringing(law: str, cases, scales: Scales, measured, fitted, ringing: Lan
 
 
 def _ring_on_springs(cases, scales: Scales, marched, is_held, ringing: LaneRinging) -> None:
-    """Compute in closed form the ringing of cases that a spring holds in stick.
+    """Compute in closed form the free vibration of cases that stick on a linear spring.
 
     The spring holds the cases `is_held` (n,) in all evaluated cycles. The results are accepted by the
     criteria of `response.ringing`, and stored in `ringing`.

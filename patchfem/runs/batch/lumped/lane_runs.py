@@ -32,7 +32,7 @@ DROPPED_LOOP_RATIO = 1e-2
 
 
 class MeasuredMarch(NamedTuple):
-    """March of n cases in lanes with the same steps, and its measures.
+    """Vectorized march of n cases with equal time steps, and its measures.
 
     - steps, cycles, window: steps per cycle, cycles, and those at the end that are evaluated.
     - values: measures (n,) by name.
@@ -53,7 +53,7 @@ class MeasuredMarch(NamedTuple):
 
 
 class LaneRuns(NamedTuple):
-    """Runs of n cases by lanes, and which cases need another run.
+    """Runs of n cases from a vectorized march, with a mask of cases that need another run.
 
     - runs: Runs with their errors.
     - is_exact: which cases (n,) must be computed by the exact engine.
@@ -66,7 +66,7 @@ class LaneRuns(NamedTuple):
 
 
 def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) -> MeasuredMarch:
-    """March cases in lanes, and evaluate the last cycles.
+    """March cases in parallel lanes of a kernel, and evaluate their last cycles.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def collect_runs(
     coarser: list,
     mesh_errors: dict,
 ) -> LaneRuns:
-    """Combine the marches of models of a group to runs with errors.
+    """Combine the marches of a group of models with different steps to runs with errors.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ MIN_EXTRAPOLATION_ERROR = 7e-6
 
 
 class SettledRanges(NamedTuple):
-    """Steady motions of n cases.
+    """Steady amplitudes of n cases with errors, and a mask of the cases that do not settle.
 
     - value, error: half the range of the slide in the steady state and its error, (n,) each [m];
       NaN if they are not needed.

@@ -28,7 +28,7 @@ PATCH_STEPS = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))
 
 
 def steps_per_cycle(models: Sequence[Model]) -> np.ndarray:
-    """Return the steps per cycle (n,) of models of one law; 0 if there would be too many."""
+    """Return the time steps per cycle (n,) of models of one law; 0 for cases that need too many."""
     ends = POINT_STEPS
     if march.has_one_stretch(LANE_LAWS[models[0].friction.law]):
         ends = [(MAX_STEP_PHASE * steps / (2 * np.pi), steps) for steps in STRETCH_STEPS]
@@ -38,7 +38,7 @@ def steps_per_cycle(models: Sequence[Model]) -> np.ndarray:
 
 
 def select_steps_for_rates(rates, ends) -> np.ndarray:
-    """Return the steps per cycle (n,) for ratios (n,) of the fastest rate to that of the drive.
+    """Return the steps per cycle (n,) for ratios (n,) of fastest rate to drive frequency.
 
     ends: sequence of (largest rate, steps).
     """
@@ -47,14 +47,14 @@ def select_steps_for_rates(rates, ends) -> np.ndarray:
 
 
 def fastest_rate(model: Model, stiffness):
-    """Return the fastest rate of a rig in stick over the drive frequency."""
+    """Return the ratio of the fastest rate of a sticking rig to the drive frequency."""
     modes = model.rig.modes
     rate = np.sqrt(modes.omega[0] ** 2 + stiffness * modes.slide[0] ** 2 / modes.mass)
     return (rate + modes.damping_matrix[0, 0]) / model.rig.drive.signal.omega
 
 
 def _fastest_relative_rate(model: Model):
-    """Return the fastest rate of a model over that of its drive; inf if lanes cannot follow it."""
+    """Return the ratio of the fastest rate of a model to its drive; inf if it is unresolvable."""
     friction = model.friction
     stiffness = make_point_contact(model).stiffness
     if not march.has_one_stretch(LANE_LAWS[friction.law]):

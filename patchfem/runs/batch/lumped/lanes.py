@@ -42,7 +42,7 @@ N_FINER_CELLS = 2  # number of doublings of the cells of the Iwan law in the exa
 
 
 def refuses(model: Model) -> str:
-    """Return why a model cannot march in lanes, or ""."""
+    """Return the reason why a model cannot be integrated in a vectorized batch, or ""."""
     if why := why_no_lanes(model):
         return why
     if not steps_per_cycle([model])[0]:
@@ -51,7 +51,7 @@ def refuses(model: Model) -> str:
 
 
 def why_no_lanes(model: Model) -> str:
-    """Return why a model cannot march in lanes because of its options, or ""."""
+    """Return the reason why options of a model exclude a vectorized batch, or ""."""
     friction = model.friction
     if why := lumped.why_not_one_point(model):
         return why
@@ -67,7 +67,7 @@ def why_no_lanes(model: Model) -> str:
 
 
 def needs_other_accuracy(model: Model) -> str:
-    """Return why the requested method or accuracy of a model excludes lanes, or ""."""
+    """Return the reason why the requested method or accuracy excludes a vectorized batch, or ""."""
     if (
         model.accuracy.method != "auto"
         or list_fixed_settings(model.accuracy)
@@ -78,12 +78,12 @@ def needs_other_accuracy(model: Model) -> str:
 
 
 def group(model: Model) -> tuple:
-    """Return a key that is equal for models of one compiled call."""
+    """Return a hashable key that is equal for models that one kernel call can compute."""
     return int(model.rig.drive.cycles), model.friction.law
 
 
 def parts(models: Sequence) -> dict[tuple, list]:
-    """Return the indices of the models that can march in lanes, by group."""
+    """Group the indices of the models that can be integrated in vectorized batches."""
     groups: dict = {}
     if isinstance(models, SimilarModels):
         if not why_no_lanes(models.first):
@@ -101,7 +101,7 @@ def parts(models: Sequence) -> dict[tuple, list]:
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Compute the case results of a group of models by lanes."""
+    """Compute the case results of a group of models by a vectorized march."""
     results = CaseResults.blank(len(models))
     for first in range(0, len(models), MAX_CASES_PER_CALL):
         cases = range(first, min(first + MAX_CASES_PER_CALL, len(models)))
@@ -110,7 +110,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 
 
 def _solve_cases(models: Sequence[Model], say) -> CaseResults:
-    """Compute the case results of the models of one compiled call."""
+    """Compute the case results of models in one call of the vectorized kernel."""
     checked = solve_and_check(
         models,
         LaneCases(*make_cases(models)),
@@ -133,7 +133,7 @@ def _solve_cases(models: Sequence[Model], say) -> CaseResults:
 
 
 def _solve_exactly(models: Sequence[Model], say, indices: list, is_check: bool) -> CaseResults:
-    """Compute the results of some cases by the exact batch, or else by single runs."""
+    """Compute some cases by the event-driven batch, or by single runs if it refuses them."""
     some_models = list(select_models(models, indices))
     is_check = is_check and models[0].friction.law == "iwan"
     results = CaseResults.blank(len(some_models))

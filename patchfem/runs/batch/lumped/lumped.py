@@ -27,7 +27,7 @@ def refuses(model: Model) -> str:
 
 
 def why_not_one_point(model: Model) -> str:
-    """Return why a model is not one mode with one constantly loaded point, or ""."""
+    """Return the reason why a model is not one mode with one point under constant load, or ""."""
     rig = model.rig
     if (
         model.kind != "rig"
@@ -49,7 +49,7 @@ def why_not_one_point(model: Model) -> str:
 
 
 def why_not_one_sine(rig) -> str:
-    """Return why a rig is not one mode with one accelerometer under sinusoidal drive, or ""."""
+    """Return the reason why a rig is not one mode with one sensor under a sine, or ""."""
     if rig.modes.gauge is not None:
         return "the gauge and the accelerometer of the case move differently"
     if rig.structure.richer_rig is not None:
@@ -73,12 +73,12 @@ def why_not_one_sine(rig) -> str:
 
 
 def group(model: Model) -> tuple[int, str, int]:
-    """Return a key that is equal for models of one compiled call."""
+    """Return a hashable key that is equal for models that one kernel call can compute."""
     return int(model.rig.drive.cycles), model.friction.law, pieces.count_first_merges(model)
 
 
 def solve(models: Sequence[Model], say=None, n_finer: int = 0) -> CaseResults:
-    """Compute the case results of a group of event-driven single points.
+    """Compute the case results of a group of single-point models from event to event.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def solve(models: Sequence[Model], say=None, n_finer: int = 0) -> CaseResults:
 
 
 def _solve_cases(models, say, n_merges: int, is_check: bool = False) -> CaseResults:
-    """Compute the case results of the models of one compiled call."""
+    """Compute the case results of models in one call of the event-driven kernel."""
     begin = perf_counter()
     cycles = int(models[0].rig.drive.cycles)
     window = min(10, cycles // 10)

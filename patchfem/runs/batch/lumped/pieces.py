@@ -42,7 +42,7 @@ DRIFT_ROUND_OFF = 1e-14
 
 
 class Case(NamedTuple):
-    """Case of an event-driven run, with its friction elements and load.
+    """One case of an event-driven batch: its model, friction elements and load.
 
     - model: its Model.
     - groups: Elements of its interface.
@@ -57,7 +57,7 @@ class Case(NamedTuple):
 
 
 def refuses(model) -> str:
-    """Return why the law, the cycles or the engine of a model exclude it from the batch, or ""."""
+    """Return the reason why law, cycles or engine of a model exclude this batch, or ""."""
     friction = model.friction
     is_rigid = is_rigid_law(model)
     if (
@@ -76,13 +76,13 @@ def refuses(model) -> str:
 
 
 def is_rigid_law(model) -> bool:
-    """Return whether the law of a model is Coulomb's, i.e. a rigid element."""
+    """Return whether the friction law of a model is Coulomb's, without elastic stick."""
     law = model.friction.law
     return law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
 
 
 def count_first_merges(model) -> int:
-    """Return how often a first run merges neighbouring cells of a density in pairs."""
+    """Return how often neighbouring slider cells are merged in pairs for the first run."""
     return 0 if is_rigid_law(model) else count_merges(model)
 
 
@@ -127,7 +127,7 @@ def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) ->
 def run_cases(
     cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True
 ) -> Runs:
-    """Run cases from event to event without histories.
+    """Run cases from event to event without storing their histories.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def run_cases(
     finished = [None] * len(cases)
 
     def simulate(part: slice) -> None:
-        """Run a slice of the cases, and store their runs."""
+        """Run a slice of the cases, and store the finished runs."""
         rigs = [(case.model.rig, case.groups) for case in cases[part]]
         finished[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
@@ -162,7 +162,7 @@ def run_cases(
 
 
 def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bool) -> Runs:
-    """Evaluate finished event-driven runs as columns.
+    """Evaluate finished event-driven runs, and return their measures as columns.
 
     Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
     nothing rings, and their drift has the round-off of two means.
@@ -265,7 +265,7 @@ def _find_ringing(case: Case, run, steady: bool) -> dict | None:
 
 
 def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Runs:
-    """Add the errors that follow from coarse runs to runs.
+    """Estimate the errors of runs from coarser runs, and add them to the runs.
 
     Parameters
     ----------
@@ -290,6 +290,6 @@ def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Run
 
 
 def select_known_values(measures: dict, case: int) -> dict:
-    """Return the values of one case that are known, from columns by name."""
+    """Select the finite values of one case from a dict of columns."""
     values = {name: float(column[case]) for name, column in measures.items()}
     return {name: value for name, value in values.items() if not np.isnan(value)}

@@ -27,7 +27,7 @@ MIN_CASES_PER_THREAD = 2
 
 
 def refuses(model: Model) -> str:
-    """Return why the batch of patches that slip in part refuses a model, or ""."""
+    """Return the reason why this batch (patches with partial slip) refuses a model, or ""."""
     if (
         model.patch is None
         or not model.partial_slip
@@ -49,12 +49,12 @@ def refuses(model: Model) -> str:
 
 
 def group(model: Model) -> tuple:
-    """Return a key that is equal for models of one compiled call."""
+    """Return a hashable key that is equal for models that one kernel call can compute."""
     return int(model.rig.drive.cycles), model.friction.law
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Compute the case results of a group of patches that slip in part."""
+    """Compute the case results of a group of patches with partial slip."""
     batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
     return pressed.solve(models, batch, say)
 
@@ -62,7 +62,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 def move_cases(
     models: Sequence[Model], pressed_cases: list, say=None
 ) -> tuple[CaseResults, np.ndarray]:
-    """Compute the motions of pressed patches, and which (n,) must be run by themselves.
+    """Compute the motions of solved patches, and the mask (n,) of cases that need a single run.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def move_cases(
 
 
 def describe_sizes(case: pressed.PressedCase) -> dict:
-    """Return the numbers of elements and interface nodes of a case."""
+    """Return the numbers of friction elements and interface nodes of a case, as settings."""
     return {
         "elements": int(case.fine.contact.reduction.stiffness.size),
         "interface_nodes": int(case.patch.x.size),
@@ -107,7 +107,7 @@ def describe_sizes(case: pressed.PressedCase) -> dict:
 def add_patch_results(
     results: CaseResults, case: int, model: Model, pressed_case: pressed.PressedCase, reach: float
 ) -> None:
-    """Add the results of the pressed patch to a case.
+    """Add the static measures and the notes of the solved patch to a case.
 
     Parameters
     ----------

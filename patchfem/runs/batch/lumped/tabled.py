@@ -25,17 +25,17 @@ MAX_CASES_PER_CALL = (
 
 
 def refuses(model: Model) -> str:
-    """Return why a patch that slips in part cannot march in lanes, or ""."""
+    """Return the reason why a patch with partial slip cannot be integrated in lanes, or ""."""
     return sheared.refuses(model) or lanes.needs_other_accuracy(model)
 
 
 def group(model: Model) -> tuple:
-    """Return a key that is equal for models of one compiled call."""
+    """Return a hashable key that is equal for models that one kernel call can compute."""
     return sheared.group(model)
 
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Compute the case results of a group of patches that slip in part, by lanes."""
+    """Compute the case results of a group of patches with partial slip by a vectorized march."""
     batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
     return pressed.solve(models, batch, say)
 
@@ -43,7 +43,7 @@ def solve(models: Sequence[Model], say=None) -> CaseResults:
 def move_cases(
     models: Sequence[Model], pressed_cases: list, say=None
 ) -> tuple[CaseResults, np.ndarray]:
-    """Compute the motions of pressed patches by lanes, and which must be run by themselves.
+    """Compute the motions of solved patches in lanes, and find cases that need a single run.
 
     The parameters are those of `sheared.move_cases`.
     """
@@ -60,7 +60,7 @@ def move_cases(
     results = CaseResults.blank(len(models))
 
     def solve_exactly(cases: list, is_check: bool = False) -> CaseResults:
-        """Compute the results of some cases by the exact batch or by single runs."""
+        """Compute some cases by the event-driven batch or by single runs."""
         some_models = [models[case] for case in cases]
         part, runs_singly = sheared.move_cases(
             some_models, [pressed_cases[case] for case in cases], say
@@ -102,7 +102,7 @@ def move_cases(
 
 
 def _contact_numbers(elements: list, pressed_cases: list) -> np.ndarray:
-    """Return the contact parameters (m, n) of patches, as `lane_numbers.make_cases` takes them."""
+    """Return the contact parameters (m, n) of n patches with tables of their friction elements."""
     rows = [
         (
             group.limit,

@@ -17,7 +17,7 @@ MIN_CASES_PER_THREAD = (
 
 
 def run_in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:
-    """Apply a function to slices of the cases, in parallel threads if there are free cores.
+    """Apply a function to slices of the cases, in parallel threads if processor cores are idle.
 
     Parameters
     ----------
@@ -48,5 +48,5 @@ def count_cores() -> int:
 
 @cache
 def _get_thread_pool() -> ThreadPoolExecutor:
-    """Return the pool of threads, made on the first call."""
+    """Return the thread pool of the batches, which is created on the first call."""
     return ThreadPoolExecutor(count_cores(), "lumped")

@@ -36,7 +36,7 @@ SAMPLES_PER_CYCLE = (
 
 
 class BalanceReader(Reader):
-    """Evaluator of one cycle of a motion found by harmonic balance.
+    """Evaluation of one cycle of a motion from harmonic balance.
 
     turns: reversals of this cycle, see `SteadyMotion.turns`.
     """
@@ -44,7 +44,7 @@ class BalanceReader(Reader):
     turns: tuple = ()
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the friction work from samples and from the balance, and the reversals.
+        """Return the friction work from samples and from the harmonics, and the reversals.
 
         A periodic motion has no drift.
         """
@@ -76,7 +76,7 @@ class BalanceReader(Reader):
 
 
 class CycleMeasures(NamedTuple):
-    """Measures, histories and energies of one cycle of a motion found by harmonic balance.
+    """Measures, histories and energies of one cycle of a motion from harmonic balance.
 
     - values: measures by name.
     - response: Response of the cycle.
@@ -89,7 +89,7 @@ class CycleMeasures(NamedTuple):
 
 
 class StableMotion(NamedTuple):
-    """Steady motion that is shown, its stability, and notes on other motions.
+    """Steady motion that is reported, with its stability and notes on other motions.
 
     - motion, stability: SteadyMotion without and with its multipliers.
     - notes: sentences on other motions at the same drive.
@@ -101,7 +101,7 @@ class StableMotion(NamedTuple):
 
 
 class BalanceFinder:
-    """Finder of steady motions by harmonic balance, for laws with memory or nonlinear springs.
+    """Search for steady motions by harmonic balance, for laws with memory or nonlinear springs.
 
     It starts near the point of a curve that it gets, if there are several motions.
     """
@@ -186,7 +186,7 @@ class BalanceFinder:
         ), motion
 
     def _errors(self, values: dict, motion, drive, read) -> dict:
-        """Estimate the errors of the measures of a steady motion from more harmonics.
+        """Estimate the errors of the measures of a steady motion by adding harmonics.
 
         If no motion with more harmonics converges, the errors are those that the balance states.
 
@@ -211,7 +211,7 @@ class BalanceFinder:
         return errors
 
     def _find_stable(self, drive, motion) -> StableMotion:
-        """Return a steady motion, or the smallest stable one under the same drive.
+        """Return a steady motion if it is stable, else the smallest stable one under the same drive.
 
         If none of the motions is stable, the given motion is returned.
         """
@@ -239,7 +239,7 @@ class BalanceFinder:
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find a point of a curve of steady motions, without errors."""
+        """Find the steady motion at one point of a curve, without errors."""
         motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
@@ -262,7 +262,7 @@ class BalanceFinder:
         )
 
     def _read(self, motion, drive) -> dict:
-        """Return the measures of a point of a curve of steady motions."""
+        """Return the measures of one point of a curve of steady motions."""
         response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
@@ -293,7 +293,7 @@ class BalanceFinder:
         return CycleMeasures(reader.values(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
-        """Trace the curve of steady motions over frequency through its folds [Hz]."""
+        """Trace the steady motions over frequency, continued through folds."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.trace_over_frequency(
             self.modes,
@@ -307,14 +307,14 @@ class BalanceFinder:
         return [self._point_of_branch(point, first) for point in branch.points], branch.folds
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Return the arc length between two points of a curve of steady motions.
+        """Return the arc length between two points of a frequency curve.
 
         The frequency is scaled by the swept range.
         """
         return branches.measure_distance(one.near, other.near, self._range)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Find the point of a curve at a fraction of the arc length between two points.
+        """Find the steady motion at a fraction of the arc length between two curve points.
 
         The balance is solved in the plane normal to the line between these points.
 
@@ -337,7 +337,7 @@ class BalanceFinder:
         return 2 * np.pi * abs(drive.high - drive.low)
 
     def _point_of_branch(self, motion, drive) -> CurvePoint:
-        """Convert a steady motion of a branch to a point of a curve with errors."""
+        """Convert a steady motion on a branch to a curve point with errors."""
         motion = add_stability(motion, self.modes) if motion.stable is None else motion
         point = self._curve_point(motion)._replace(regime="stable" if motion.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)

@@ -40,7 +40,7 @@ INTERPOLATION_TOL = (
 
 
 class CurvePoint(NamedTuple):
-    """Point of a curve of steady motions.
+    """One point of a curve of steady motions over frequency.
 
     - drive: sinusoidal drive of the motion.
     - values, errors: measures and their errors by name; {} if there is no bounded motion.
@@ -62,7 +62,7 @@ class CurvePoint(NamedTuple):
 
     @property
     def level(self) -> Level:
-        """Steady motion of the point as a level of the drive; NaN for an unbounded motion."""
+        """Steady motion of the point, in the form of a drive level; NaN if it is unbounded."""
         values = {COLUMN_MEASURES["amplitude"]: np.nan}
         if self.values:
             values = {name: self.values.get(name) for name in LEVEL_MEASURES}
@@ -78,7 +78,7 @@ class CurvePoint(NamedTuple):
 
 
 def estimate_exact_errors(values: dict, residual: float) -> dict:
-    """Estimate the errors of an event-driven steady motion from its residual over a period."""
+    """Estimate the errors of an event-driven steady motion from its mismatch after a period."""
     errors = {}
     for name, value in values.items():
         if value is not None:
@@ -88,7 +88,7 @@ def estimate_exact_errors(values: dict, residual: float) -> dict:
 
 
 def describe_instability(multipliers) -> str:
-    """Return the sentence on an unstable steady motion.
+    """Return the sentence that a steady motion is unstable.
 
     multipliers: Floquet multipliers (m,).
     """
@@ -100,7 +100,7 @@ def describe_instability(multipliers) -> str:
 
 
 def curve_point(drive, raw, near=None) -> CurvePoint:
-    """Convert the Solution of a steady motion to a point of a curve.
+    """Convert the Solution of a steady motion to a curve point.
 
     Parameters
     ----------
@@ -124,12 +124,12 @@ def curve_point(drive, raw, near=None) -> CurvePoint:
 
 
 def make_missing_point(drive) -> CurvePoint:
-    """Return a curve point for a drive at which no steady motion was found."""
+    """Return a curve point that states that no steady motion was found."""
     return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
 class TracedCurve:
-    """Curve of steady motions over frequency, whose points a subclass computes.
+    """Base class of curves of steady motions over frequency; subclasses compute the points.
 
     leaves: see `top.refine_peak`.
 
@@ -139,11 +139,11 @@ class TracedCurve:
     leaves = 1e-2, 0.1
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Return the distance [rad/s] between two points of the curve."""
+        """Return the distance [rad/s] between two points of a frequency curve."""
         return abs(other.drive.omega - one.drive.omega)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Find the point of the curve at a fraction of the distance between two points.
+        """Find the curve point at a fraction of the distance between two points.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ class TracedCurve:
 
 
 def trace_curve(modes, drive, find) -> list:
-    """Compute the curve of steady motions of a sweep, refined where it bends.
+    """Compute the steady motions over a frequency sweep, with more points where the curve bends.
 
     The curve starts with N_SWEEP_POINTS frequencies and those of the modes, and is refined until linear
     interpolation between its points has an error of at most INTERPOLATION_TOL.
@@ -184,7 +184,7 @@ def trace_curve(modes, drive, find) -> list:
 
 
 def choose_start_frequencies(modes, drive) -> np.ndarray:
-    """Return the frequencies [Hz] with which the curve of a sweep starts.
+    """Return the frequencies [Hz] from which the curve of a sweep is refined.
 
         These are N_SWEEP_POINTS frequencies over the range, and the frequencies of the modes in it, where a peak may
     be narrower than the spacing.
@@ -200,7 +200,7 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
 
 
 def sweep_around_peak(drive, curve: dict, at: float):
-    """Return a sweep over the neighbourhood of the largest peak of a curve.
+    """Return a narrow sweep around the largest peak of a curve.
 
     The neighbourhood ends where the curve has fallen to PEAK_END_RATIO of the largest amplitude, plus a
     quarter of its width on both sides.
@@ -240,7 +240,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
 
 
 def find_largest_point(points) -> int:
-    """Return the index of the curve point with the largest stable amplitude.
+    """Return the index of the stable curve point with the largest amplitude.
 
     If no point is stable, all points count.
     """
@@ -250,7 +250,7 @@ def find_largest_point(points) -> int:
 
 
 def tabulate_curve(points, folds=()) -> dict:
-    """Return the columns of a curve of steady motions by name; NaN for unbounded motions.
+    """Return the columns of a curve of steady motions as a dict; NaN for unbounded motions.
 
     The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with
     its error.
@@ -271,7 +271,7 @@ def tabulate_curve(points, folds=()) -> dict:
 
 
 def solve_levels(finder, drive):
-    """Find the steady motions at all levels of a drive, and return the largest.
+    """Find the steady motions at all levels of a drive; return that of the largest amplitude.
 
     Each level starts from the motion at the previous one, as in a test. The Solution has the curve
     of all levels, the Level of each, and a probe for `levels.find_onset`. A level without a steady
@@ -304,7 +304,7 @@ def solve_levels(finder, drive):
         raise failures[0]  # none of the drive levels has a steady motion
 
     def probe(number: int, level: float) -> Level:
-        """Find the steady motion at another level [m s-2], starting from a known level."""
+        """Find the steady motion at a further level [m s-2], starting from a known one."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
         return finder.curve_point(sine, points[number].near if number >= 0 else None).level
 

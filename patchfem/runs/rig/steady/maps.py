@@ -33,7 +33,7 @@ from .curves import (
 
 
 class PeriodicMotion(NamedTuple):
-    """Periodic motion found by the map of a period, with its stability.
+    """Periodic motion that the map of one period found, with its stability.
 
     - start, memory: state and memory of the elements at phase 0 of the drive.
     - near: initial guess for a motion nearby.
@@ -59,7 +59,7 @@ class PeriodicMotion(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Regime of the motion, marked if the motion is unstable."""
+        """Type of the motion as text, which says whether it is unstable."""
         return self.regime if self.lasting else f"{self.regime}, unstable"
 
     @property
@@ -69,7 +69,7 @@ class PeriodicMotion(NamedTuple):
 
 
 class MapFinder(TracedCurve):
-    """Finder of steady motions by the map of a period.
+    """Search for steady motions by the map of one drive period.
 
     `repeating` finds a motion; it starts from `near` if there are several.
 
@@ -95,7 +95,7 @@ class MapFinder(TracedCurve):
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:
-        """Find the steady motion under sinusoidal drive, and a guess for a motion nearby."""
+        """Find the steady motion under sinusoidal drive, and an initial guess for motions nearby."""
         begin = perf_counter()
         motion = self.repeating(drive, near)
         numerics = replace(self.numerics, cycles=2.0, window=1)
@@ -140,11 +140,11 @@ class MapFinder(TracedCurve):
         ), motion.near
 
     def start_memory(self, memory):
-        """Return the memory of the friction elements at the start of a run."""
+        """Return the initial memory of the friction elements."""
         return memory
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find a point of a curve of steady motions."""
+        """Find the steady motion at one point of a curve."""
         motion = self.repeating(drive, near)
         if not motion.bounded:
             return CurvePoint(drive, {}, {}, motion.words, motion.size, False, Outcome.GROWS)
@@ -177,7 +177,7 @@ class MapFinder(TracedCurve):
         )
 
     def curve(self, drive) -> tuple:
-        """Trace the curve of steady motions over frequency, which has no folds.
+        """Trace the steady motions over frequency along a curve without folds.
 
         Each point starts from the motion at the previous one.
         """
@@ -185,7 +185,7 @@ class MapFinder(TracedCurve):
 
 
 def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
-    """Return the measures of a point of a curve of steady motions."""
+    """Return the measures of one point of a curve of steady motions."""
     values = {
         COLUMN_MEASURES["amplitude"]: amplitude,
         COLUMN_MEASURES["acceleration_peak"]: acceleration,
@@ -195,7 +195,7 @@ def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
 
 
 class YieldFinder(MapFinder):
-    """Finder of steady motions with elastic-plastic elements, by the map from yield to yield."""
+    """Search for steady motions of elastic-plastic elements by the map from yield to yield."""
 
     name = "yields"
     elements = YieldingElements
@@ -205,7 +205,7 @@ class YieldFinder(MapFinder):
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
     def start_memory(self, memory):
-        """Return the memory of the friction elements with work and loss reset to 0."""
+        """Return the initial memory of the elements, with work and loss set to 0."""
         return event_elements.reset_work(memory)
 
     def repeating(self, drive, near) -> PeriodicMotion:
@@ -226,7 +226,7 @@ class YieldFinder(MapFinder):
 
 
 class EventFinder(MapFinder):
-    """Finder of steady motions with Coulomb friction or without friction, by the event map."""
+    """Search for steady motions with Coulomb friction, or none, by the event map."""
 
     name = "events"
     elements = RigidElements
@@ -261,7 +261,7 @@ class EventFinder(MapFinder):
         )
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find a point of a curve; without friction the motion is known in closed form.
+        """Find the steady motion at one point of a curve, in closed form without friction.
 
         An undamped resonance has no closed form.
         """

@@ -39,7 +39,7 @@ MULTIPLIER_TOL = 1e-2
 
 
 def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | None:
-    """Return the Solution of a motion whose lifted mass leaves its grooves, or None.
+    """Return the Solution of a motion that climbs out of its grooves; None if it stays inside.
 
     The mass must leave the grooves within N_CYCLES_IN_GROOVES cycles of a march from rest. The errors are the differences
     from a march with half the steps.
@@ -83,7 +83,7 @@ def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | 
 
 
 class CycleReading(NamedTuple):
-    """Evaluation of one cycle of a periodic motion over grooves.
+    """Measures and histories of one cycle of a periodic motion over grooves.
 
     - values: measures by name.
     - mark: Mark at its end.
@@ -98,7 +98,7 @@ class CycleReading(NamedTuple):
 
 
 class MarchFinder(TracedCurve):
-    """Finder of steady motions over grooves, by a march whose initial state is corrected."""
+    """Search for steady motions over grooves by marching and correcting the initial state."""
 
     # the points of the curve have errors as large as the tolerance, so that a refined peak cannot be better
     tries_another = True
@@ -117,7 +117,7 @@ class MarchFinder(TracedCurve):
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
     def _run(self, drive, near, steps: int):
-        """March until the motion is periodic, and return the run with its residual."""
+        """March until the motion is periodic; return the run and its remaining change per period."""
         run = engine.start_run(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
         )
@@ -137,7 +137,7 @@ class MarchFinder(TracedCurve):
         return run, left
 
     def _read(self, run, steps: int, frames: int = 0) -> CycleReading:
-        """Evaluate one cycle of a periodic motion."""
+        """Evaluate one cycle of a periodic march."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
         reader = MarchReader(self.model, numerics, self.patch, self.contact)
@@ -146,7 +146,7 @@ class MarchFinder(TracedCurve):
         return CycleReading(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def point(self, drive, near=None) -> tuple:
-        """Find the steady motion under sinusoidal drive, and the run that continues it.
+        """Find the steady motion under sinusoidal drive, and the run from which to continue.
 
         If there is no steady motion because the lifted mass leaves its grooves, the Solution of the
         motion that does and None are returned.
@@ -163,7 +163,7 @@ class MarchFinder(TracedCurve):
         return gone, None
 
     def _point(self, drive, near) -> tuple:
-        """Find the steady motion with steps that meet the tolerance.
+        """Find the steady motion with as many time steps as the tolerance needs.
 
         The steps are doubled until the amplitude differs from that with half as many by less than
         the tolerance. The error of a measure contains its difference from half of the steps.
@@ -227,11 +227,11 @@ class MarchFinder(TracedCurve):
         ), run
 
     def _rough(self, value: float, half: float) -> bool:
-        """Return whether the amplitude changes by more than the tolerance at half the steps."""
+        """Return whether half the steps change the amplitude by more than the tolerance."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find a point of a curve, starting from a motion nearby or else from rest."""
+        """Find the steady motion at one curve point, from a nearby motion or else from rest."""
         try:
             return curve_point(drive, *self.point(drive, near))
         except NotConverged:
@@ -240,7 +240,7 @@ class MarchFinder(TracedCurve):
         return curve_point(drive, *self.point(drive))
 
     def curve(self, drive) -> tuple:
-        """Trace the curve of steady motions over frequency, which has no folds.
+        """Trace the steady motions over frequency along a curve without folds.
 
         Each point starts from the motion at the previous one.
         """

@@ -16,7 +16,7 @@ from .top import solve_peak
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Find the steady motion under sinusoidal drive, or the largest one over a sweep or levels.
+    """Find the steady motion under a sine, or the largest one over a sweep or drive levels.
 
     The drive of the largest motion is extra["at"]. If the map of yields does not converge, harmonic
     balance is tried.
@@ -53,7 +53,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 def _solve_drive(finder, model) -> Solution:
-    """Find the steady motion, curve or levels for the drive of a model."""
+    """Find the steady motion, frequency curve or levels that the drive of a model requires."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
         return finder.point(drive)[0]

@@ -34,7 +34,7 @@ ERROR_SHIFT_FACTOR = 10.0
 
 
 class RefinedPeak(NamedTuple):
-    """Curve of steady motions refined around its largest point.
+    """Curve of steady motions with points added around its largest amplitude.
 
     - points: those of the curve and those added.
     - best: index of the largest stable point.
@@ -48,7 +48,7 @@ class RefinedPeak(NamedTuple):
 
 
 def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
-    """Refine a curve of steady motions around its largest amplitude.
+    """Add points to a curve of steady motions around its largest amplitude.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
 
 
 def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
-    """Choose where to add a point beside the largest point of a curve.
+    """Choose the position of a new point next to the largest point of a curve.
 
     The result is None if both neighbours are closer than `share` times the width of the peak, or if the
     largest value is at an end. The point is the vertex of the parabola through the three points, or a tenth
@@ -130,7 +130,7 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
 
 
 def _peak_width(y, away) -> float:
-    """Return the distance from a peak at which the curve falls to a fraction of it.
+    """Return the distance from a peak at which a curve has fallen to a given fraction.
 
     away: distances (k,) of the values y (k,).
     """
@@ -139,12 +139,12 @@ def _peak_width(y, away) -> float:
 
 
 def _point_amplitudes(points) -> np.ndarray:
-    """Return the amplitudes [m] of curve points; NaN for unbounded motions."""
+    """Return the amplitudes [m] of the points of a curve; NaN for unbounded motions."""
     return np.array([point.values.get(AMPLITUDE, np.nan) for point in points])
 
 
 def bound_concave_curve(s, y) -> tuple:
-    """Bound a concave curve in each interval by lines through the neighbouring points.
+    """Return upper bounds of a concave curve between its points, by extrapolated chords.
 
     A line from points below MIN_CONCAVE_FRACTION of the larger end is not used, because a curve may be convex there;
     without any line, the bound is the larger end divided by MIN_CONCAVE_FRACTION.
@@ -186,7 +186,7 @@ def bound_concave_curve(s, y) -> tuple:
 
 
 def solve_peak(points: list, folds, finder) -> Solution:
-    """Find the motion of largest amplitude of a curve, with the errors due to its position.
+    """Find the steady motion of largest amplitude on a curve, with the error of its position.
 
     Its errors include those by the position of the peak.
 
@@ -237,7 +237,7 @@ def solve_peak(points: list, folds, finder) -> Solution:
 
 
 def _compute_neighbour_differences(finder, beside, raw: Solution) -> dict:
-    """Return the differences of all measures between a neighbouring point and a Solution."""
+    """Return the differences of all measures between a curve point and a Solution."""
     try:
         other = finder.point(beside.drive, beside.near)[0]
     except NotConverged:
