@@ -82,7 +82,9 @@ def njit(cache: bool = False, **options):
         Whether the machine code is stored on disk, as by `numba.njit`. Other functions are compiled only within their
         callers; if this version of numba lacks the methods `LIBRARY_METHODS`, `numba.njit` compiles them.
     **options
-        Options of `numba.njit`.
+        Options of `numba.njit`. Numba hands `forceinline=True` on to every function that the decorated one calls, and to
+        those that these call, unless they set `forceinline=False`. Only functions that call little may set it: the bond
+        lists of a march, inlined at all calls, had four million lines of LLVM code.
     """
     if numba.config.DISABLE_JIT:
         return lambda function: function

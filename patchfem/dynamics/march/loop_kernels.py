@@ -192,7 +192,7 @@ def march(first, steps, system, rows):
     return steps, FINISHED
 
 
-@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_contact_step(start, table_row, system):
     """Solve a step of a single contact without other elements.
 
