@@ -1,8 +1,8 @@
 """Members of an `IntEnum` as integers in kernels.
 
 Kernels index arrays with the members of `IntEnum` classes. Numba before 0.68 types a member as an enum, which it
-rejects as an index, and every version refuses to compare a member with a float. Here `Class.MEMBER` in a kernel is an
-integer constant, as in Python.
+rejects as an index, and every version refuses to compare a member with a float. Here a member in a kernel is an integer
+constant, as in Python.
 """
 
 from numba.core import types
@@ -11,7 +11,7 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
 
 class IntegerMember(AttributeTemplate):
-    """Typing of `Class.MEMBER` for a subclass of `IntEnum`."""
+    """Typing of the members of a subclass of `IntEnum`, as attributes of the class."""
 
     key = types.IntEnumClass
 

@@ -25,7 +25,7 @@ N_REFINEMENTS = 2  # steps of iterative refinement; a third one changes nothing
 
 
 class ContactProblem(NamedTuple):
-    """Contact of n nodes under one rigid holder with r free motions.
+    """Contact of n nodes of a body pressed by a rigid holder with r free motions.
 
     - gap (n,): Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
     - motions (n, r): Closing of each node per unit of each free motion. The first one is the approach [m],
@@ -47,12 +47,12 @@ class ContactProblem(NamedTuple):
 
     @property
     def min_nodes(self) -> int:
-        """Smallest number of nodes in contact that determines the motion."""
+        """Smallest number of nodes in contact that determines the motion of the holder."""
         return 1 + len(self.free_rotations)
 
 
 def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> ContactProblem:
-    """Return the contact problem of a patch, which is one strip.
+    """Return the contact problem of a patch that consists of a single strip.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> Contac
 
 
 class SetSolution(NamedTuple):
-    """Solution of the contact equations on a given set, whatever the signs of its forces.
+    """Solution of the contact equations on a given active set, with forces of either sign.
 
     - force, opening (n,): Forces [N] and gap under load [m].
     - scale (n,): Sum of the magnitudes of the terms of each opening [m], to which its rounding error is
@@ -90,7 +90,7 @@ class SetSolution(NamedTuple):
 
 
 class _SetEquations:
-    """Contact equations of one set of active nodes, for motions made orthogonal to each other.
+    """Equations of an active set, with the rigid motions orthogonalized.
 
     The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so each
     motion is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
@@ -139,7 +139,7 @@ class _SetEquations:
         self.target = self.transform.T @ problem.target
 
     def solve(self, n_refinements: int) -> SetSolution:
-        """Return the solution after a number of steps of iterative refinement."""
+        """Solve the equations, with a given number of steps of iterative refinement."""
         problem = self.problem
         nodal_force, motion = self._close_gap(self.gap_force, self.target)
         motion[:1] += self.offset
@@ -167,7 +167,7 @@ class _SetEquations:
         )
 
     def _close_gap(self, gap_force: np.ndarray, loads: np.ndarray) -> tuple:
-        """Return the forces (k,) [N], and the amounts (r,) of the orthogonalised motions, that close a gap.
+        """Return the nodal forces (k,) [N] and orthogonalized motions (r,) that close a gap.
 
         gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of these motions.
         """
@@ -178,7 +178,7 @@ class _SetEquations:
 def solve_on_set(
     compliance, problem: ContactProblem, active: np.ndarray, n_refinements: int = 0
 ) -> SetSolution:
-    """Solve for forces and motion with the nodes `active` in contact, whatever the signs.
+    """Solve for forces and holder motion with given nodes in contact, whatever the signs.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def solve_on_set(
 
 
 def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:
-    """Refine a solution iteratively on its contact set, if that lowers its violation.
+    """Improve a solution by iterative refinement on its active set if its violation falls.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def relative_violation(solution: SetSolution) -> float:
 
 
 def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
-    """Return the set, completed so that it can carry the load.
+    """Add nodes to an active set until it can carry the load.
 
     Where it does not reach to both sides of the load line of a free rotation, the node of the smallest gap on each side
     is added.
@@ -357,7 +357,7 @@ def solve_primal(
 
 
 def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> float:
-    """Return the rotation theta [rad] of a rigid piece in equilibrium under a load and a moment.
+    """Return the rotation [rad] at which a rigid piece is in equilibrium under load and moment.
 
     The piece rests on the edge of the lower convex hull of the gap below the load line; against a spring it may rest
     on one corner.
@@ -393,7 +393,7 @@ def find_rest_rotation(x, gap, load: float, moment: float, spring: float) -> flo
 
 
 def find_rest_motion(problem: ContactProblem) -> np.ndarray:
-    """Return the motion q (r,) of a rigid piece in equilibrium under a load and moments.
+    """Return the motion q (r,) at which a rigid piece is in equilibrium under load and moments.
 
     The rotations are found about one axis after the other.
     """
@@ -417,7 +417,7 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 
 
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes (n,) that the load brings into contact, from the gap of rigid pieces in equilibrium.
+    """Guess the nodes in contact from the gap of rigid pieces in equilibrium.
 
     The load closes the gap by the geometric mean of what a point load and a uniform load would. Under a prescribed
     approach these are the nodes that overlap.

@@ -31,7 +31,7 @@ class LinearAsperities:
 
 
 class SmoothAsperities:
-    """Base of the smooth laws, with P > 0 at every separation; P and -dP/ds follow from log P.
+    """Base class of pressure laws that are positive and smooth at every separation.
 
     Each law has `log_pressure` and `separation`.
     """
@@ -63,7 +63,7 @@ class ExponentialAsperities(SmoothAsperities):
     reference: float | None = None
 
     def log_pressure(self, s: np.ndarray) -> tuple:
-        """Return log P (m,), P in Pa, and its decay rate 1/u0 (m,) [1/m] at s (m,) [m]."""
+        """Return log P (m,) and its decay rate (m,) [1/m] at separations s (m,) [m]."""
         return np.log(self.reference) - s / self.u0, np.full(np.shape(s), 1 / self.u0)
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
@@ -117,7 +117,7 @@ class HertzAsperities(SmoothAsperities):
 
 
 def peak_integral(h: np.ndarray) -> tuple:
-    """Return log F(h) and its decay rate -d(log F)/dh, each of the shape of h.
+    """Return the logarithm of the integral over asperity heights, and its decay rate.
 
     F(h) = int_h^inf (z - h)^3/2 phi(z) dz with the unit normal density phi. It is computed as F = phi(h) 2 int_0^inf
     v^4 exp(-h v^2 - v^4/2) dv by the trapezoidal rule, and the moment series of (z - h)^3/2 below h = -8, which is

@@ -51,7 +51,7 @@ class AsperityProblem(NamedTuple):
 
     @property
     def mean_pressure(self) -> float:
-        """Load over the area [Pa]."""
+        """Load divided by area [Pa]."""
         return self.contact.target[0] / self.area.sum()
 
     def separation(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
@@ -59,13 +59,13 @@ class AsperityProblem(NamedTuple):
         return self.contact.gap - self.contact.motions @ motion + self.compliance.product(force)
 
     def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Return the load and moments (r,) that forces and motion leave unbalanced."""
+        """Return the load and the moments (r,) that are not balanced by given forces and motion."""
         contact = self.contact
         return contact.target - contact.motions.T @ force - contact.springs * motion
 
 
 class AsperitySolution(NamedTuple):
-    """Forces (n,) [N], separations (n,) [m], motion (r,) and number of iterations."""
+    """Forces, separations and motion of a contact through asperities, with the iterations."""
 
     force: np.ndarray
     separation: np.ndarray
@@ -74,7 +74,7 @@ class AsperitySolution(NamedTuple):
 
 
 class _StripResponse(NamedTuple):
-    """Response of the nodes of one strip: (I + D^1/2 C D^1/2)^-1 D^1/2 (R, values).
+    """Linearized response of the nodes of one strip with its asperity layer.
 
     - nodes (k,): Indices among all nodes.
     - root (k,): D^1/2.
@@ -88,7 +88,7 @@ class _StripResponse(NamedTuple):
 
 
 def solve_tangent(compliance, motions, slope, values) -> tuple:
-    """Factorise the tangent equations of every strip with its asperity layer.
+    """Factorize the linearized equations of every strip with its asperity layer.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def solve_tangent(compliance, motions, slope, values) -> tuple:
 
 
 def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> tuple:
-    """Return the Newton step (forces, motion, separations) of f = A P(s).
+    """Return the Newton step of the contact equations: forces, motion and separations.
 
     slope: (n,) stiffness of the asperity layer [N/m]; mismatch: (n,) separation of the geometry less that of the law
     [m]; imbalance: (r,) missing load and moments.
@@ -188,7 +188,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
 
 
 def _guess_separation(problem: AsperityProblem) -> np.ndarray | None:
-    """Guess the separations of one strip under its approach; None without any contact.
+    """Guess the separations of a strip under its approach; None if it does not touch.
 
     No node can carry more force than the one that flattens its overlap.
     """
@@ -308,7 +308,7 @@ def _minimise_dual(problem: AsperityProblem, approach: float, length: float) -> 
 def _search_dual(
     problem: AsperityProblem, start: AsperitySolution, direction, min_imbalance
 ) -> tuple:
-    """Search for the best solution along a direction of the motion by bisection.
+    """Search for the best solution along a direction of the holder motion by bisection.
 
     Returns the solution and the number of iterations.
 
@@ -341,7 +341,7 @@ def _search_dual(
 
 
 def _linearised_start(problem: AsperityProblem) -> tuple:
-    """Return initial separations and motion, from the law linearised at the mean pressure."""
+    """Return initial separations and motion from a law linearized at the mean pressure."""
     contact = problem.contact
     mean_pressure = problem.mean_pressure
     mean_separation = problem.asperities.separation(np.array([mean_pressure]))

@@ -33,7 +33,7 @@ class _QuadraticProgram(NamedTuple):
 
 
 def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram:
-    """Return the contact problem as a quadratic program.
+    """Formulate the contact problem as a quadratic program.
 
     A spring becomes two more forces >= 0 that turn the piece either way, each with the compliance of a node.
     """
@@ -65,7 +65,7 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
 def project_forces(
     force: np.ndarray, rigid: np.ndarray, target: np.ndarray, max_iterations: int = 100
 ) -> np.ndarray:
-    """Return the nonnegative forces nearest to `force` whose resultants are `target`.
+    """Project forces onto nonnegative forces with prescribed resultants.
 
     They are max(0, force + rigid q), where q maximises a concave, piecewise quadratic function. Newton's method with an
     exact line search finds it after finitely many pieces.
@@ -100,7 +100,7 @@ def project_forces(
 
 
 def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
-    """Return t > 0 for which change . max(0, start + t change) has the given value.
+    """Find the step t > 0 at which change . max(0, start + t change) has a given value.
 
     The left-hand side is piecewise linear in t.
     """
@@ -127,7 +127,7 @@ def solve_by_gradients(
     max_iterations: int = 1000,
     start: np.ndarray | None = None,
 ) -> tuple:
-    """Solve approximately by constrained conjugate gradients.
+    """Solve the contact problem approximately by constrained conjugate gradients.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def solve_by_gradients(
 
 
 def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
-    """Return the first forces, before their resultants are corrected.
+    """Return initial nodal forces, whose resultants are not corrected yet.
 
     start: (n_nodes,) forces [N] of the nodes, or None. The springs of the holder begin without force.
     """
@@ -207,14 +207,14 @@ def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bo
 
 
 def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.ndarray:
-    """Return the gradient of the energy (n,) [m] without its least-squares rigid motion."""
+    """Return the energy gradient (n,) [m] with its least-squares rigid motion removed."""
     slope = program.gap + displacement
     motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
     return slope - program.rigid @ motion
 
 
 def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return forces >= 0 with the prescribed resultants, near to given forces >= 0.
+    """Correct forces so that they have the prescribed resultants and stay nonnegative.
 
     Nodes without force stay unloaded, unless the loaded nodes alone cannot carry the resultants.
     """
@@ -228,7 +228,7 @@ def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray
 
 
 def _fit_motion(rigid: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the rigid motion (r,) that fits nodal values (k,) by least squares."""
+    """Fit a rigid motion (r,) to nodal values (k,) by least squares."""
     if not rigid.shape[1]:
         return np.zeros(0)
     return np.linalg.lstsq(rigid, values, rcond=1e-13)[0]

@@ -24,7 +24,7 @@ MAX_SLOTS = 100_000  # largest number of stored contact sets; more are not neede
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactSet:
-    """One contact set, with its forces and gaps as affine functions of the rigid displacement.
+    """Contact set, with forces and gaps as linear functions of the rigid displacement.
 
     - in_contact (m,): whether a node is in contact.
     - unknowns (3, m): force [N] of nodes in contact and gap [m] of the others, coefficients of 1, d, t.
@@ -37,7 +37,7 @@ class ContactSet:
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """Return forces [N] of nodes in contact, gaps [m] of others (m,) at a rigid displacement.
+        """Return nodal forces [N] in contact and gaps [m] elsewhere at a rigid displacement.
 
         d [m], t [rad]: motion of the holder.
         """
@@ -52,7 +52,7 @@ class ContactSet:
 
 
 class ContactSets:
-    """Pressed reference state, around which `press_kernels` searches for contact sets.
+    """Preloaded contact from which a compiled search for contact sets starts.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class ContactSets:
         self.reference = self._make_set(reference.in_contact)
 
     def _make_set(self, in_contact) -> ContactSet:
-        """Solve for the forces and gaps on a set (m,) of touching nodes."""
+        """Compute the linear functions of forces and gaps for the nodes (m,) in contact."""
         index = np.flatnonzero(in_contact)
         right = np.stack([self.opening, -np.ones(self.x.size), self.x], axis=1)
         force = np.zeros_like(right)

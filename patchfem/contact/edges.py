@@ -19,7 +19,7 @@ MAX_ASPECT = 4.0
 
 
 class ContactEdge(NamedTuple):
-    """An end of a contact set inside the interface.
+    """End of the contact region between two nodes of the interface.
 
     - node: Last node in contact.
     - side: 1 where the contact ends towards +x, else -1.
@@ -35,7 +35,7 @@ class ContactEdge(NamedTuple):
 
 
 def edge_offset_fraction(aspect):
-    """Return the offset of an edge over the length of the last cell in contact.
+    """Return the distance of an edge from its node as a fraction of the last cell in contact.
 
     The edge lies inside the position that `ContactEdge.fraction` gives. The offset decreases with
     the aspect, first with its square and then in proportion. The three numbers fit Hertz contact on
@@ -51,7 +51,7 @@ def edge_offset_fraction(aspect):
 
 
 def edge_offset(inner, outer, fraction, row_height: float | None = None):
-    """Return how far [m] edges lie inside the positions that `ContactEdge.fraction` gives.
+    """Return how far [m] an edge lies inside the position that its cell fraction gives.
 
     The cell length is interpolated between both cells by the fraction, so an edge does not jump where cells of two
     lengths meet.
@@ -70,7 +70,7 @@ def edge_offset(inner, outer, fraction, row_height: float | None = None):
 
 
 def _find_ends(active: np.ndarray) -> list:
-    """Return (node, side) of every end of the contact set inside the interface, by increasing x."""
+    """Find the nodes at which the contact set ends inside the interface, with their sides."""
     return [
         (int(change), 1) if active[change] else (int(change) + 1, -1)
         for change in np.flatnonzero(active[1:] != active[:-1])
@@ -138,7 +138,7 @@ def find_edges(normal, x, force, gap, softness=None, row_height: float | None = 
 
 
 def snap_to_steps(edges: list, x, gap, jumps) -> list:
-    """Move the edges within a cell of a step that opens the gap to the position of the step.
+    """Move contact edges within a cell of an opening step of the gap onto this step.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def snap_to_steps(edges: list, x, gap, jumps) -> list:
 
 
 def find_pressure_edges(x, pressure, fraction: float, largest: float | None = None) -> list:
-    """Find the edges of the nodes whose pressure exceeds a fraction of the largest pressure.
+    """Find the edges of the region in which the pressure exceeds a fraction of its maximum.
 
     This serves the pressures of a smooth asperity law, which have no sharp edge. Between two nodes the logarithm of the
     pressure is taken as linear.
@@ -217,7 +217,7 @@ def contact_intervals(x, force, edges: list) -> np.ndarray:
 
 
 def set_stiffness(compliance, active, motion, edges: list) -> float:
-    """Return the stiffness of a contact set whose edges lie between the nodes.
+    """Return the stiffness of a contact whose edges lie between nodes.
 
     The stiffness motion . C_AA^-1 motion of the nodes A in contact is that of edges half a cell beyond the last nodes.
     Every edge that lies elsewhere adds the change along the parabola through the sets with one node less and one more.
@@ -262,7 +262,7 @@ def set_stiffness(compliance, active, motion, edges: list) -> float:
 
 
 def parabola_change(shift: float, gain: float, loss: float) -> float:
-    """Interpolate a change at `shift` by a parabola through three given changes.
+    """Interpolate a change at a shift of a contact edge by a parabola.
 
     These are `gain` at 1, -`loss` at -1 and 0 at 0.
 

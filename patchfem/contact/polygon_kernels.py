@@ -20,7 +20,7 @@ BOX_HALF_WIDTH = 100.0
 
 
 class HalfPlane(NamedTuple):
-    """Rigid displacements (d, t) with constant + by_d d + by_t t >= 0."""
+    """Half plane of rigid displacements (d, t) that is bounded by a contact condition."""
 
     constant: float
     by_d: float
@@ -29,7 +29,7 @@ class HalfPlane(NamedTuple):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def polygon_units(sets):
-    """Return the units of d [m] and of t [rad] in which polygons are computed.
+    """Return the units of displacement [m] and rotation [rad] in which polygons are computed.
 
     They are the size of the openings of the reference state, and this size over the largest |x|.
     """
@@ -40,7 +40,7 @@ def polygon_units(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_limits(sets, slot):
-    """Write the force and gap below which a node violates its contact condition in the polygon."""
+    """Compute the force and the gap below which a node violates its contact condition."""
     unit_d, unit_t = polygon_units(sets)
     constant = sets.stored.unknowns[slot, 0]
     by_d = sets.stored.unknowns[slot, 1]
@@ -57,7 +57,7 @@ def write_limits(sets, slot):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def half_plane_value(half_plane, d, t):
-    """Return constant + by_d d + by_t t, which is negative outside the half plane.
+    """Evaluate the linear function that is negative outside a half plane.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def clip_polygon(old, new, n_corners, half_plane, node):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_polygon(sets, slot):
-    """Compute the polygon of rigid displacements at which the contact set in a slot holds.
+    """Compute the polygon of rigid displacements for which a stored contact set is valid.
 
     It is a box of motions, clipped by one line for each node: that of the motions at which the node
     would enter or leave the contact. Nodes at the ends of the contact come first, because they cut off
@@ -168,7 +168,7 @@ def write_polygon(sets, slot):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_in_box(sets, d, t):
-    """Return whether a rigid displacement lies in the box in which polygons are computed.
+    """Return whether a rigid displacement lies in the region in which polygons are computed.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def is_in_box(sets, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def side_margin(sets, slot, side, d, t):
-    """Return the force [N] or gap [m] of the node of a side, less its limit.
+    """Return by how much the force [N] or gap [m] of a polygon side exceeds its limit.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def side_margin(sets, slot, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def is_inside(sets, slot, d, t):
-    """Return whether a displacement lies in the polygon of a set; False without a polygon.
+    """Return whether a rigid displacement lies in the polygon of a contact set.
 
     This takes a few multiplications per side, instead of one pass over the nodes.
 
@@ -238,7 +238,7 @@ def is_inside(sets, slot, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_exit(sets, slot, d, t, dd, dt):
-    """Find where an increment of the rigid displacement leaves the polygon of a set.
+    """Find the point at which an increment of the rigid displacement leaves a polygon.
 
     Parameters
     ----------

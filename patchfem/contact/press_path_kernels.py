@@ -25,7 +25,7 @@ class HolderMotion(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
 def find_first_failure(sets, slot, motion, change, bounds):
-    """Return the fraction of an increment at which a node first violates contact conditions.
+    """Return the fraction of an increment after which a node first violates its condition.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def find_first_failure(sets, slot, motion, change, bounds):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def cross_side(sets, slot, side, d, t):
-    """Find the set beyond a side of the polygon of a set.
+    """Find the neighbouring contact set beyond a side of a polygon.
 
     The set is stored with the side, so the next crossing needs no search.
 
@@ -91,7 +91,7 @@ def cross_side(sets, slot, side, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_border(sets, slot, start, motion, change):
-    """Find where a contact set ceases to hold on an increment, beyond its fraction `start`.
+    """Find the fraction of an increment at which a contact set ceases to be valid.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def find_border(sets, slot, start, motion, change):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
-    """Average the derivatives of the energy of the preloaded contact along an increment.
+    """Average the derivatives of the contact energy along an increment of displacement.
 
     The mean times the increment is the difference of the energies (a discrete gradient), and the mean
     is itself the gradient of a convex function.

@@ -40,7 +40,7 @@ class Tableau(NamedTuple):
 
 
 class StoredSets(NamedTuple):
-    """Contact sets in k slots, found by their 64-bit names.
+    """Contact sets in k slots, which are found by 64-bit hashes.
 
     The name of a set is the exclusive or of the names of its nodes.
 
@@ -61,7 +61,7 @@ class StoredSets(NamedTuple):
 
 
 class Polygons(NamedTuple):
-    """Polygons of the rigid displacements at which the sets in k slots hold.
+    """Polygons of rigid displacements for which the stored contact sets are valid.
 
     - n_sides (k,): number of sides; 0 without a polygon, and then all nodes have to be checked.
     - nodes (k, MAX_POLYGON_SIDES): node of each side.
@@ -78,7 +78,7 @@ class Polygons(NamedTuple):
 
 
 class SetArrays(NamedTuple):
-    """Arrays of an interface of m nodes, of its stored contact sets, and of the search for them.
+    """Arrays of a preloaded interface, of its stored contact sets and of the search for them.
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
@@ -98,7 +98,7 @@ class SetArrays(NamedTuple):
 
 
 def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int) -> SetArrays:
-    """Return the arrays of a search for contact sets, in which no set is stored yet.
+    """Return the arrays of a search for contact sets, with no set stored yet.
 
     Parameters
     ----------
@@ -147,5 +147,5 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
 
 
 def name_set(sets: SetArrays, in_contact) -> int:
-    """Return the 64-bit name of the contact set with the nodes `in_contact` (m,)."""
+    """Return the 64-bit hash of the contact set with given nodes (m,)."""
     return int(np.bitwise_xor.reduce(sets.stored.node_names[in_contact], initial=0))

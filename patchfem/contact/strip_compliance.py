@@ -16,7 +16,7 @@ MAX_CACHE_BYTES = 1e8
 
 
 def factorise(matrix: np.ndarray) -> np.ndarray:
-    """Return the lower Cholesky factor of a symmetric C-ordered matrix, which is overwritten.
+    """Compute the lower Cholesky factor of a symmetric matrix, which is overwritten.
 
     LinAlgError unless the matrix is positive definite.
     """
@@ -28,7 +28,7 @@ def factorise(matrix: np.ndarray) -> np.ndarray:
 
 @dataclass(eq=False, slots=True)
 class WarmStart:
-    """Contact set and Cholesky factors that are reused when strips are pressed again.
+    """Contact set and Cholesky factors of a previous solution, which the next solution reuses.
 
     - contact_set (s, m): Nodes in contact, from which the next pressing starts.
     - factors: Cholesky factors by the active nodes of a strip and by the diagonal added to it, oldest first.
@@ -38,7 +38,7 @@ class WarmStart:
     factors: dict = field(default_factory=dict)
 
     def factor(self, key: tuple, make_matrix: Callable) -> np.ndarray:
-        """Return the Cholesky factor of the matrix of `make_matrix`; it is cached under `key`."""
+        """Return the Cholesky factor of a matrix, from the cache if it is stored there."""
         lower_factor = self.factors.pop(key, None)
         if lower_factor is None:
             lower_factor = factorise(make_matrix())
@@ -88,7 +88,7 @@ class StripCompliance:
         return displacement.ravel()
 
     def block(self, strip: int, nodes: np.ndarray) -> np.ndarray:
-        """Return a copy of the compliance (k, k) [m/N] between the sorted `nodes` (k,) of one strip."""
+        """Return a copy of the compliance (k, k) [m/N] between given nodes of one strip."""
         if nodes[-1] - nodes[0] == nodes.size - 1:
             span = slice(nodes[0], nodes[-1] + 1)
             block = self.common[span, span].copy()
@@ -99,7 +99,7 @@ class StripCompliance:
         return block
 
     def solver(self, active: np.ndarray) -> Callable:
-        """Factorise the blocks of the active nodes and return a function that solves with them.
+        """Factorize the compliance of the active nodes; return a function that solves with it.
 
         Parameters
         ----------
@@ -126,14 +126,14 @@ class StripCompliance:
             start += nodes.size
 
         def solve(right_sides: np.ndarray) -> np.ndarray:
-            """Solve with the block of every strip."""
+            """Solve with the factors of every strip."""
             parts = [dpotrs(factor, right_sides[rows], lower=1)[0] for rows, factor in blocks]
             return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
         return solve
 
     def _factor(self, strip: int, is_active: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """Return the Cholesky factor of the active nodes of a strip, if possible from the cache."""
+        """Return the Cholesky factor of the active nodes of a strip, cached if possible."""
         if self.warm_start is None:
             return factorise(self.block(strip, nodes))
         diagonal = b"" if self.added is None else self.added[strip].tobytes()
@@ -141,5 +141,5 @@ class StripCompliance:
         return self.warm_start.factor(key, lambda: self.block(strip, nodes))
 
     def add_to_diagonal(self, diagonal: np.ndarray) -> "StripCompliance":
-        """Return a compliance with `diagonal` (m,) [m/N] added in every strip; no warm start."""
+        """Return a compliance with given diagonal terms (m,) [m/N] added in every strip."""
         return StripCompliance(self.common + np.diag(diagonal), self.added)

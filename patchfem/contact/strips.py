@@ -55,7 +55,7 @@ LOOSE_ROLL_MESSAGE = (
 
 
 class StripLayout(NamedTuple):
-    """Nodes of equal strips.
+    """Positions and areas of the nodes of equal strips.
 
     - x (m,): Positions [m] along each strip.
     - weight (m,): Nodal areas [m2] of one strip.
@@ -68,7 +68,7 @@ class StripLayout(NamedTuple):
 
 
 class HolderLoads(NamedTuple):
-    """Load and moments of the holder; a motion without load or moment is prescribed.
+    """Load and moments on the holder; None for a motion that is prescribed instead.
 
     - load: Normal load [N] of all strips, or None under an approach.
     - moment: Moment sum f x [N m] of a free rotation about y, or None.
@@ -91,7 +91,7 @@ class HolderPosition(NamedTuple):
 
 
 class StripModel(NamedTuple):
-    """Equal strips that one holder presses.
+    """Equal strips that are pressed by one rigid holder.
 
     - compliance: Compliance [m/N] of each strip; rigid pieces (0) need asperities.
     - layout: Nodes of the strips.
@@ -105,7 +105,7 @@ class StripModel(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StripsState:
-    """State of s strips of m nodes pressed by one holder; forces are of all pairs together.
+    """Contact state of s strips of m nodes that are pressed by one rigid holder.
 
     - force (s, m): Nodal forces [N] >= 0.
     - gap (s, m): Gap under load [m]; with asperities the separation of the mean planes, negative where
@@ -134,7 +134,7 @@ class StripsState:
 
     @property
     def offsets(self) -> np.ndarray:
-        """Distances y (s,) [m] of the strips from the middle."""
+        """Transverse positions y (s,) [m] of the strips."""
         return self.layout.offsets
 
     @property
@@ -169,12 +169,12 @@ class StripsState:
 
     @property
     def centre_y(self) -> float:
-        """Position y [m] of the resultant of the pressure; 0 without load."""
+        """Transverse position [m] of the resultant of the pressure; 0 without load."""
         return self.roll_moment / self.load if self.load else 0.0
 
     @property
     def fraction(self) -> float:
-        """Fraction [1] of the area whose nodes carry load."""
+        """Fraction [1] of the area that carries load."""
         weight = self.layout.weight
         return float(((self.force > 0) * weight).sum() / (weight.sum() * self.offsets.size))
 
@@ -184,7 +184,7 @@ class StripsState:
         return NEGLECTED_SHEAR_NOTE
 
     def yaw_moment(self, friction: float) -> float:
-        """Return the yaw moment mu sum f y [N m] about +z on an upper piece that slides towards +x.
+        """Return the yaw moment [N m] of friction on an upper piece that slides towards +x.
 
         friction: coefficient of friction mu.
         """
@@ -204,7 +204,7 @@ def strip_offsets(width: float, count: int) -> np.ndarray:
 
 
 class StripProperties(NamedTuple):
-    """Normal and tangential compliance (m, m) [m/N] and nodal areas (m,) [m2] of one strip."""
+    """Compliances (m, m) [m/N] and nodal areas (m,) [m2] of one strip."""
 
     normal: np.ndarray
     tangential: np.ndarray
@@ -212,7 +212,7 @@ class StripProperties(NamedTuple):
 
 
 def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
-    """Return the properties of one of `count` equal strips.
+    """Return compliance and areas of one of several equal strips of a patch.
 
     A strip is `count` times as compliant as the whole width.
     """
@@ -286,7 +286,7 @@ def press_strips(
     rotation: float = 0.0,
     roll: float = 0.0,
 ) -> StripsState:
-    """Press strips with one holder, under a prescribed load or approach.
+    """Solve the contact of strips that one holder presses, under a load or an approach.
 
     If nothing touches, the outcome is no_contact.
 
@@ -347,7 +347,7 @@ def press_strips(
 
 
 def _strip_opening(strips: StripModel, gap, solution, position: HolderPosition) -> np.ndarray:
-    """Return the gap (s, m) [m] of pressed strips; with asperities, of their mean planes.
+    """Return the gap (s, m) [m] under load, with asperities that between the mean planes.
 
     gap: (s, m) [m] before loading, with the rotation about x; position: that beyond the gap.
     """
@@ -362,7 +362,7 @@ def _strip_opening(strips: StripModel, gap, solution, position: HolderPosition) 
 
 
 def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProblem:
-    """Return the contact problem of all strips, with one motion for each given load."""
+    """Formulate the contact problem of all strips, with a free motion for each given load."""
     n_strips = layout.offsets.size
     motions = (
         (loads.load, np.ones(gap.size), 0.0),
@@ -379,14 +379,14 @@ def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProb
 
 
 def _holder_position(motion, loads: HolderLoads) -> HolderPosition:
-    """Return the position of the holder from its approach and free rotations (r,)."""
+    """Convert approach and free rotations (r,) to the position of the holder."""
     theta = -float(motion[1]) if loads.moment is not None else 0.0
     roll = -float(motion[-1]) if loads.roll_moment is not None else 0.0
     return HolderPosition(float(motion[0]), theta, roll)
 
 
 def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> ContactSolution:
-    """Solve bare strips, or strips with a linear asperity layer, which adds to the compliance."""
+    """Solve strips that have no asperity layer, or a linear one."""
     compliance, layout, asperities = strips
     warm_start = compliance.warm_start
     if asperities is not None:
@@ -441,7 +441,7 @@ def _press_with_asperities(strips: StripModel, problem: ContactProblem, approach
 
 
 def _refuse_controls(strips: StripModel, gap, loads: HolderLoads, approach) -> None:
-    """Raise PatchfemError for controls without a solution."""
+    """Raise PatchfemError for prescribed loads and motions without a solution."""
     asperities = strips.asperities
     load = loads.load
     moment = loads.moment
@@ -522,7 +522,7 @@ def _make_state(
     n_iterations: int = 0,
     residuals=(),
 ) -> StripsState:
-    """Return the frozen state of strips; without load its outcome is no_contact."""
+    """Assemble the state of strips from a contact solution."""
     _, layout, asperities = strips
     is_pressed = force.sum() > 0
     stiffness = None
@@ -543,7 +543,7 @@ def _make_state(
 def strips_stiffness(
     c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0
 ) -> float:
-    """Return the stiffness of all strips in translation, asperities and pieces in series.
+    """Return the stiffness of all strips together, asperities and pieces in series.
 
     Parameters
     ----------

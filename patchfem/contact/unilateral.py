@@ -41,7 +41,7 @@ MIN_LOAD = 1e-200  # load [N] or overlap [m] below which the products of the che
 
 
 class ContactSolution(NamedTuple):
-    """Solution of a contact problem.
+    """Solution of a contact problem: nodal forces, holder motion and stiffness.
 
     - force (n,): Nodal forces [N], > 0 on the contact set and 0 elsewhere.
     - motion (r,): Approach [m] and rotations [rad] q; the rotation about y is -theta.
@@ -66,7 +66,7 @@ class ContactSolution(NamedTuple):
 
 
 class PlainSolution(NamedTuple):
-    """Forces (m,) [N], motion () or (delta,) or (delta, -theta), and number of iterations."""
+    """Contact solution of a patch as plain arrays, with the number of iterations."""
 
     force: np.ndarray
     motion: np.ndarray
@@ -74,7 +74,7 @@ class PlainSolution(NamedTuple):
 
 
 def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
-    """Solve by slower methods where the primal-dual method cycles.
+    """Solve a contact problem by slower methods if the primal-dual method cycles.
 
     Returns the SetSolution and the number of iterations. The methods are, in turn: primal-dual from all nodes,
     primal-dual from the result of conjugate gradients, and primal.
@@ -95,7 +95,7 @@ def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int
 
 
 def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float):
-    """Solve a patch of which one node carries the whole load; None if there is no such node.
+    """Solve a patch that is in contact at a single node; None if no node qualifies.
 
     The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is that without
     rotation of the holder if the other nodes are open then, else the mean of the two limits.
@@ -179,7 +179,7 @@ def solve(
 
 
 def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
-    """Solve a contact problem of a patch given as plain arrays.
+    """Solve the contact problem of a patch that is given as plain arrays.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def compute_residuals(c, x, problem: ContactProblem, solution: ContactSolution) 
 
 
 def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) -> None:
-    """Raise PatchfemError, with the key of the scene, for a contact problem without a solution.
+    """Raise PatchfemError for a contact problem that has no solution.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ def press(
     start: np.ndarray | None = None,
     spring: float = 0.0,
 ) -> ContactState:
-    """Press two pieces together under a load and return the static pressure.
+    """Compute the static pressure between two pieces under a load.
 
     Parameters
     ----------
@@ -355,7 +355,7 @@ def press_to_approach(
     rotation: float = 0.0,
     start: np.ndarray | None = None,
 ) -> ContactState:
-    """Press two pieces together by a given approach and return the static pressure.
+    """Compute the static pressure between two pieces under a prescribed approach.
 
     Parameters
     ----------
@@ -438,7 +438,7 @@ def _solve_and_check(
 
 
 def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
-    """Return the message, with a remedy, for a contact set whose equations are singular.
+    """Return the error message for a contact set with singular equations.
 
     A prescribed rotation is determined by any node in contact, so only the compliance itself can be at fault.
 
@@ -465,7 +465,7 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
 
 
 def check_solution(c, x, problem: ContactProblem, solution: ContactSolution) -> tuple:
-    """Return the openings (m,) [m] >= 0 and the relative residuals of a patch.
+    """Return the gaps under load (m,) [m] and the relative residuals of a patch.
 
     Parameters
     ----------
@@ -489,7 +489,7 @@ def check_solution(c, x, problem: ContactProblem, solution: ContactSolution) -> 
 
 
 def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy: str = "") -> None:
-    """Raise NotConverged if a residual exceeds the tolerance, or is not a number.
+    """Raise NotConverged if a residual exceeds its tolerance or is NaN.
 
     Parameters
     ----------

@@ -118,13 +118,13 @@ def write_in_partial_folder(path: Path, text: str) -> None:
 
 
 def forget_placed_paths() -> None:
-    """Clear the lists of completed files and of folders with a checkpoint when a command starts."""
+    """Clear the lists of completed files and checkpoint folders at the start of a command."""
     PLACED_PATHS.clear()
     RESUMABLE_FOLDERS.clear()
 
 
 def list_placed_paths() -> list[str]:
-    """List the files that this process completed and that still exist."""
+    """List the files that this process has completed and that still exist."""
     return [
         format_path(path)
         for path in dict.fromkeys(PLACED_PATHS)
@@ -251,7 +251,7 @@ def format_path(path: Path) -> str:
 
 
 class LossyFile:
-    """File for HDF5 that drops data instead of raising an error when the disk is full.
+    """File that drops data instead of raising an error when the disk is full.
 
     HDF5 writes failed data again when it closes a file and when the process ends, and crashes if this fails again. So
     every write appears to succeed, the file is closed regularly, and the caller checks `error`.

@@ -81,7 +81,7 @@ class FolderLock:
         self.owner = f"{os.getpid()} {read_start_ticks(os.getpid()) or '-'} {HOST_HASH}"
 
     def acquire(self) -> None:
-        """Become the owner; raise Missing if another process is, or if the file cannot be written."""
+        """Acquire the lock; raise Missing if another process holds it."""
         try:
             with _open_exclusively(self.path) as file:
                 owner = os.read(file, 200).decode("utf-8", "replace").split()
@@ -118,7 +118,7 @@ class FolderLock:
                         self.path.unlink()
 
     def _is_active(self, owner: list) -> bool:
-        """Return whether the owner runs; a process of another machine is assumed to run."""
+        """Return whether the process that holds the lock is running."""
         if not owner or not owner[0].isdecimal():
             return False
         if len(owner) > 2 and owner[2] != HOST_HASH:
@@ -147,7 +147,7 @@ def _open_exclusively(path: Path) -> Iterator[int]:
 
 
 def _lock_file(file: int) -> None:
-    """Take the kernel's lock on a file, where the system and the file system have locks."""
+    """Lock a file by the operating system, where it supports this."""
     try:
         import fcntl
     except ImportError:  # Windows

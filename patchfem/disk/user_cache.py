@@ -47,7 +47,7 @@ def prepare_folder(folder: Path) -> str:
 
 
 def _find_distrust_reason(folder: Path) -> str:
-    """Return why other users may have written to a folder, and remove write access of the group."""
+    """Return why other users may have changed a folder, and remove group write access."""
     status = os.stat(folder)
     if status.st_uid != os.geteuid():
         return f"{folder} belongs to another user"

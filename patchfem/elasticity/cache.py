@@ -26,7 +26,7 @@ MESH_SOURCE_FILES = (*COMMON_SOURCE_FILES, "dissect.py", "fronts.py", "substruct
 
 
 def cache_folder() -> Path:
-    """Return the folder of the files, which need not exist.
+    """Return the folder of the disk cache, which need not exist.
 
     It is patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache.
     """
@@ -86,7 +86,7 @@ def _hash_source(digest, source: tuple) -> str:
 
 
 def load_arrays(key: str, shapes: dict) -> dict | None:
-    """Read the arrays that `store_arrays` has stored under a key.
+    """Read the arrays that are stored under a key of the disk cache.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def load_arrays(key: str, shapes: dict) -> dict | None:
 
 
 def store_arrays(key: str, arrays: dict) -> None:
-    """Store named arrays under a key; do nothing if the folder cannot be written."""
+    """Store arrays under a key of the disk cache; do nothing if it is not writable."""
     if user_cache.prepare_folder(cache_folder()):
         return
     content = BytesIO()
@@ -126,7 +126,7 @@ def store_arrays(key: str, arrays: dict) -> None:
 
 
 def _delete_oldest_files() -> None:
-    """Delete the least recently used files until the folder is within `MAX_FOLDER_BYTES`.
+    """Delete the least recently used files until the disk cache is within its limit.
 
     Temporary files that killed processes have left behind are deleted in the same way.
     """

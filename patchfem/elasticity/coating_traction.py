@@ -11,7 +11,7 @@ from .recovery import Cells, make_points
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CoatingTraction:
-    """Forces and tractions of a coating on its substrate along their common line.
+    """Forces and tractions that a coating exerts on its substrate along their interface.
 
     - ``node``: (b,) nodes by increasing x
     - ``length``: (b,) tributary length of each node along the line [m]
@@ -28,7 +28,7 @@ class CoatingTraction:
 
 
 def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
-    """Compute the forces of the coating on its substrate.
+    """Compute the forces that a coating exerts on its substrate.
 
     They are the nodal forces of the stress in the coating, so they balance the load on its face.
 
@@ -90,7 +90,7 @@ def _find_bonded_edges(cells: Cells) -> np.ndarray:
 
 
 def _select_coating(cells: Cells, nodes) -> Cells:
-    """Return the coating cells that touch given nodes.
+    """Select the coating cells that touch given nodes.
 
     No other cell exerts a force of the coating on these nodes.
     """

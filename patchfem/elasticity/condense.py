@@ -55,7 +55,7 @@ class KeptNodeFactor:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CondensedGrid:
-    """A grid condensed to its first row.
+    """Stiffness of a grid, condensed to the nodes of its first row.
 
     - ``stencil``: stiffness of the whole grid (`tensor_stiffness`)
     - ``inner_factor``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
@@ -72,7 +72,7 @@ class CondensedGrid:
     round_off_error: float = 0.0
 
     def compliance(self) -> np.ndarray:
-        """Return the displacements of the interface per force on it.
+        """Return the displacements of the interface nodes per unit force on them.
 
         Returns
         -------
@@ -84,7 +84,7 @@ class CondensedGrid:
         return self._join_halves(*parts) if self.is_mirrored else parts[0]
 
     def _join_halves(self, even, odd) -> np.ndarray:
-        """Return the compliance of the whole interface from those of even and of odd motion.
+        """Combine the compliances of even and odd motion to that of the full interface.
 
         A force on the right half is the sum of an even and an odd pair of forces, each of half its
         size. The displacements on the left are the mirror images of those on the right, with the
@@ -154,7 +154,7 @@ class CondensedGrid:
             return np.concatenate([left[: columns - half], even + odd])
 
     def _solve_part(self, load, has_inner_loads: bool) -> np.ndarray:
-        """Solve one part of the grid; the loads of even motion precede those of odd motion."""
+        """Solve one part of a grid; the loads of even motion precede those of odd motion."""
         nodes = load.reshape(-1, *load.shape[2:])
         nodes = self.inner_factor.forward(nodes) if has_inner_loads else nodes.copy()
         ring = self.inner_factor.ring
@@ -246,7 +246,7 @@ def _factorise(matrix, unknowns, n_interface: int) -> KeptNodeFactor:
 
 
 def irregular_load(size: int) -> np.ndarray:
-    """Return a quasi-random load (size,) in [-1/2, 1/2], with which factors are checked.
+    """Return a quasi-random load (size,) with which the factors are checked.
 
     The fractional parts of k^2 (sqrt(5) - 1)/2 are equidistributed (Weyl, Math. Ann. 77, 1916,
     313). Importing numpy.random would take 20 ms.

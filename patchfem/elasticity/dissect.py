@@ -15,7 +15,7 @@ N_LANDMARKS = 4  # nodes whose distances serve as coordinates; four separate a g
 
 
 def graph_coordinates(graph) -> np.ndarray:
-    """Return coordinates of the nodes of a graph: graph distances to landmarks far apart.
+    """Return coordinates of graph nodes: their graph distances to distant landmarks.
 
     Each landmark is the node farthest from the earlier ones. The components of the graph
     have separate ranges of coordinates.
@@ -156,7 +156,7 @@ def minimum_vertex_cover(pairs, side) -> np.ndarray:
 
 
 def _sort_by_key(points, key) -> tuple[np.ndarray, np.ndarray]:
-    """Sort the nodes by key, and the nodes of one key along their longest extent.
+    """Sort nodes by key, and nodes of equal key along their longest extent.
 
     Returns the sorted nodes (n,), and the position at which each key begins, and n.
     """

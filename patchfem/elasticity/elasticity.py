@@ -19,7 +19,7 @@ from .tensor_stiffness import tensor_stencil
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Layers:
-    """Elastic constants of a coated piece.
+    """Elastic constants of the substrate and the coating of a piece.
 
     - ``coating``, ``substrate``: Young's modulus [Pa] and Poisson ratio of each material
     - ``plane``: "strain" or "stress"
@@ -103,7 +103,7 @@ class Piece:
 
     @property
     def factor(self) -> CondensedGrid:
-        """The piece condensed to its interface, which gives compliance and displacements.
+        """Stiffness of the piece condensed to its interface.
 
         NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
@@ -129,7 +129,7 @@ class Piece:
 
 
 def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: bool) -> str:
-    """Return a sentence about what to change if the stiffness of a piece cannot be factorised.
+    """Return a sentence on what to change if the stiffness of a piece is singular.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: boo
 
 
 def make_piece(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Make a piece on a tensor grid of bilinear quadrilaterals; no stiffness is computed yet.
+    """Create a piece on a tensor grid of bilinear quadrilaterals, without its stiffness.
 
     Parameters
     ----------
@@ -179,7 +179,7 @@ def make_piece(x, depth, coating_rows: int, layers: Layers) -> Piece:
 
 
 def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the cells of a tensor grid, column by column.
+    """Return the corner nodes of the cells of a tensor grid, column by column.
 
     The corners of a cell are (column, row), (column + 1, row), (column + 1, row + 1) and
     (column, row + 1).

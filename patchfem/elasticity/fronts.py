@@ -28,7 +28,7 @@ MIN_MEAN_RUN_LENGTH = 24
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fronts:
-    """Factors L L^T of a matrix (n, n) in f fronts.
+    """Cholesky factors of a matrix (n, n), stored in frontal matrices.
 
     - ``triangles``: triangle of L for the own unknowns of each front, in LAPACK's rectangular format
     - ``lower_blocks``: (later, own) columns of L below each triangle
@@ -47,7 +47,7 @@ class Fronts:
         return sum(part.size for part in (*self.triangles, *self.lower_blocks))
 
     def compliance(self) -> np.ndarray:
-        """Return the last diagonal block (k, k) of the inverse, that of the last front."""
+        """Return the diagonal block (k, k) of the inverse that belongs to the last front."""
         size = self.first_unknowns[-1] - self.first_unknowns[-2]
         low, _ = dtfttr(size, self.triangles[-1], uplo="L")
         return cho_inverse(low)
@@ -69,7 +69,7 @@ class Fronts:
 
 
 class ZeroEnergyMotion(NotConverged):
-    """Raised if the stiffness is singular to round-off: it has a zero-energy (rigid-body) mode."""
+    """Exception for a stiffness matrix with a rigid-body or other zero-energy mode."""
 
 
 class SparseFactor:
@@ -165,7 +165,7 @@ def factorise(
 
 
 def _describe_fault(block, diagonal, min_pivot: float) -> NotConverged:
-    """Return the exception for a front whose diagonal block cannot be factorised.
+    """Return the exception for a frontal matrix that cannot be factorized.
 
     block: (k, k), of which the lower half is read; diagonal: (k,) entries of the matrix there.
     """
@@ -176,7 +176,7 @@ def _describe_fault(block, diagonal, min_pivot: float) -> NotConverged:
 
 
 def _add_update(front, update, nodes, per_node: int) -> None:
-    """Add the lower triangle of an update to a front, by the fastest method for its nodes.
+    """Add the lower triangle of an update matrix to a frontal matrix.
 
     nodes: ascending positions of its nodes in the front. A small update is added by one indexed
     assignment, a large one in rectangles of successive nodes, or by columns if few nodes are
@@ -207,7 +207,7 @@ def _list_unknowns(nodes, per_node: int) -> np.ndarray:
 
 
 def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
-    """Find the later nodes that each front is coupled with (symbolic factorisation).
+    """Find the uneliminated nodes that each front is coupled to (symbolic factorization).
 
     A later node may be coupled with a front only once earlier nodes are eliminated. Each list is in
     ascending order.
@@ -232,7 +232,7 @@ def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
 def _make_front(
     lower: csc_matrix, start: int, stop: int, size: int, position, per_node: int
 ) -> np.ndarray:
-    """Return a front (size, size) that contains the matrix columns of the nodes it eliminates."""
+    """Assemble a frontal matrix from the matrix columns of the nodes that it eliminates."""
     front = np.zeros((size, size), order="F")
     pointer = lower.indptr[per_node * start : per_node * stop + 1]
     entries = slice(pointer[0], pointer[-1])

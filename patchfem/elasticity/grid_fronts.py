@@ -30,7 +30,7 @@ BYTES_PER_NUMBER = 8
 
 
 class RegionHalf(NamedTuple):
-    """One half of a part: its shape, and the column and row of its corner within the part."""
+    """One half of a rectangular part of a grid, with its position in the part."""
 
     shape: "RegionShape"
     column: int
@@ -38,7 +38,7 @@ class RegionHalf(NamedTuple):
 
 
 class RegionShape(NamedTuple):
-    """The shape of a part of the grid.
+    """Shape of a rectangular part of a grid.
 
     - ``columns``, ``rows``: numbers of cells
     - ``left``, ``right``, ``bottom``: whether the nodes on that side are kept, because another part
@@ -73,7 +73,7 @@ class RegionShape(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NodeNumbering:
-    """Nodes in the matrix of a part, in the order of its rows.
+    """Nodes of a part of a grid in the order of the rows of its matrix.
 
     - ``own``: (o, 2) column and row of the nodes that are eliminated with the part
     - ``ring``: (b, 2) column and row of the nodes that are kept
@@ -120,7 +120,7 @@ def number_nodes(shape: RegionShape) -> NodeNumbering:
 
 
 class StiffnessBlocks(NamedTuple):
-    """Stiffness blocks of g parts of one shape: unknowns to eliminate (own), and on the boundary (ring).
+    """Stiffness blocks of g parts of equal shape, for eliminated and for boundary unknowns.
 
     ::
 
@@ -157,7 +157,7 @@ def _zero_blocks(shape: RegionShape, n_parts: int) -> StiffnessBlocks:
 
 
 class LeafCouplings(NamedTuple):
-    """Entries of the stencil that form one block of the matrix of a leaf.
+    """Stencil entries that form one block of the matrix of a leaf of the dissection.
 
     - ``axes``: (6, k) indices into the stencil of a grid whose first node is the corner of the leaf
     - ``entry``: (k,) position of each in the flattened block
@@ -169,7 +169,7 @@ class LeafCouplings(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _leaf_couplings(shape: RegionShape) -> tuple[LeafCouplings, ...]:
-    """Return the couplings of each of the stored blocks of a leaf.
+    """Return the stencil entries of each stored block of a leaf of the dissection.
 
     A coupling joins an unknown of a node n with one of a node m, which is n itself or one of its
     eight neighbours. The stencil has six axes: the column and row of n, the steps along columns and
@@ -338,7 +338,7 @@ def _eliminate_inner_unknowns(blocks: StiffnessBlocks) -> None:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FactorStack:
-    """Factors of g eliminated parts of one shape.
+    """Factors of g eliminated parts of equal shape.
 
     - ``own``, ``ring``: (g, o) and (g, b) eliminated and ring nodes in the grid, column * rows + row
     - ``own_factor``: (g, 2o, 2o) transposed Cholesky factors L^T of the eliminated unknowns
@@ -424,7 +424,7 @@ class GridFactor:
 
 
 class LevelParts(NamedTuple):
-    """All parts of one shape on one level of the dissection.
+    """Parts of equal shape on one level of the dissection of a grid.
 
     - ``corners``: (g, 2) column and row of the first node of every part
     - ``halves``: for each half, its shape and the slice of its stack on the next level; empty for
@@ -607,7 +607,7 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
 
 
 def _count_unknowns(shape: RegionShape) -> tuple[int, int]:
-    """Count the unknowns that are eliminated with a part, and those on its boundary."""
+    """Count the unknowns that are eliminated with a part of a grid, and those on its boundary."""
     kept_sides = shape.left + shape.right
     kept_lines = 1 + (shape.bottom and shape.n_free_rows > 1)
     ring = kept_sides * shape.n_free_rows + (shape.columns + 1 - kept_sides) * kept_lines

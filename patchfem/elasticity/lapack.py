@@ -27,7 +27,7 @@ __all__ = [
 
 
 def _load_compiled(name: str):
-    """Load the compiled module scipy.linalg.`name`, without its package where that is possible."""
+    """Load a compiled module of scipy.linalg, if possible without its package."""
     try:
         scipy_folder = find_spec("scipy").submodule_search_locations[0]
         spec = PathFinder.find_spec(name, [str(Path(scipy_folder) / "linalg")])
@@ -75,12 +75,12 @@ def cho_inverse(low) -> np.ndarray:
 
 @cache
 def _thread_pools():
-    """Return the controller of the BLAS libraries; looking for them takes milliseconds."""
+    """Return the controller of the thread pools of the BLAS libraries, found on first use."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
 
 
 def one_thread():
-    """Return a context in which NumPy and SciPy use one BLAS thread; entering it takes 10 us."""
+    """Return a context in which BLAS uses a single thread."""
     return _thread_pools().limit(limits=1, user_api="blas")

@@ -49,7 +49,7 @@ class PieceInterface(NamedTuple):
 
 
 class Grids(NamedTuple):
-    """Candidate grids of interface nodes [m] on which the pressure is defined.
+    """Candidate grids [m] for the nodes at which the pressure is defined.
 
     - ``lower``, ``upper``: interface nodes of that piece
     - ``both``: nodes taken from both pieces (`common_grid`)
@@ -135,7 +135,7 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
 
 
 def candidate_grids(lower: PieceInterface, upper: PieceInterface) -> Grids:
-    """Return the grids to choose from, on the interface that both pieces cover.
+    """Return candidate grids for the pressure on the interface that both pieces cover.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def common_interval(x_lower, x_upper) -> tuple[float, float]:
 
 
 def clip_nodes(x, begin: float, end: float) -> np.ndarray:
-    """Return the nodes between two ends, and these ends.
+    """Return the nodes between two ends, with the ends added.
 
     Nodes closer to a new end than half a cell are left out, because tiny cells would arise.
 
@@ -256,7 +256,7 @@ def clip_nodes(x, begin: float, end: float) -> np.ndarray:
 
 
 def common_grid(x_lower, x_upper, softness_lower, softness_upper) -> np.ndarray:
-    """Choose the pressure nodes from those of two pieces with the same ends.
+    """Choose the pressure nodes from the nodes of two pieces with the same ends.
 
     From left to right, each step goes to the next node of the piece that has it farther away. If
     one piece is coarser everywhere, these are its nodes. Where one piece is softer than the other
@@ -349,7 +349,7 @@ def interpolate_force_triple_compliance(x, compliance, positions) -> np.ndarray:
 
 
 def estimate_ripples(x, nn, pieces) -> np.ndarray:
-    """Estimate the ripple of the pressure at the inner nodes of a grid, over the peak pressure.
+    """Estimate the ripple of the pressure at inner nodes, relative to the peak pressure.
 
     It holds for a smooth contact whose half width is `N_REFERENCE_CELLS` cells of the coarser side,
     and falls with the square of this width. A piece that is deformed to a parabola reaches the grid

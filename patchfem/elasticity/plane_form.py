@@ -7,7 +7,7 @@ from skfem.quadrature import get_quadrature
 
 @BilinearForm
 def plane_elasticity(u, v, w):
-    """Integrand sigma(u) : eps(v) of the weak form.
+    """Weak form of plane elasticity, sigma(u) : eps(v).
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def plane_elasticity(u, v, w):
 
 
 def evaluate_reference_cells() -> dict[str, np.ndarray]:
-    """Evaluate the elements on their reference cells; `reference_cells` describes the arrays."""
+    """Evaluate shape functions and their derivatives on reference cells."""
     arrays = {"rectangle_terms": rectangle_terms()}
     for name, element in (("triangle", ElementTriP1()), ("quadrilateral", ElementQuad1())):
         gauss_points, weights = get_quadrature(element.refdom, 2)

@@ -22,7 +22,7 @@ MIN_PLANE_DETERMINANT = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """The cells of one piece.
+    """Cells of one piece, in blocks of equal element type.
 
     - ``points``: (N, 2) x and depth [m] of the nodes
     - ``blocks``: arrays (c, 3) or (c, 4) of node numbers; the cells are numbered block after block
@@ -36,12 +36,12 @@ class Cells:
     layers: Layers
 
     def cell_of_corner(self) -> np.ndarray:
-        """Return the cell number of every corner, block after block."""
+        """Return the cell number of every cell corner."""
         sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in self.blocks])
         return np.repeat(np.arange(sizes.size), sizes)
 
     def corners(self) -> np.ndarray:
-        """Return the node number of every corner, block after block."""
+        """Return the node number of every cell corner."""
         return np.concatenate([block.ravel() for block in self.blocks])
 
     def centres(self) -> np.ndarray:
@@ -60,7 +60,7 @@ def get_cells(piece) -> Cells:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CellPoints:
-    """Points in the cells of one block, at which scikit-fem's shape functions are known.
+    """Points in the cells of one block, with the shape functions of scikit-fem.
 
     - ``corners``: (n, c) nodes of the cells
     - ``element``: values of the element at the points of its reference cell
@@ -153,7 +153,7 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recovery:
-    """Linear map from cell centres to recovery points, one for each node and material.
+    """Linear map of cell-centre stresses to nodes, separately for each material.
 
     A node on the border of coating and substrate has two recovery points.
 
@@ -170,7 +170,7 @@ class Recovery:
     fit: Patches
 
     def __call__(self, values) -> np.ndarray:
-        """Recover values (..., s, k) at the recovery points from (..., t, k) at cell centres.
+        """Map values (..., t, k) at cell centres to recovery points (..., s, k).
 
         Linear fields are recovered exactly.
         """
@@ -215,7 +215,7 @@ def fit_recovery(cells: Cells) -> Recovery:
 
 
 def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
-    """Fit a plane to the cell centres of each patch by least squares.
+    """Fit a plane to the values at the cell centres around each node by least squares.
 
     Returns the weights of the cells of each patch, and whether it is too thin for a plane.
 

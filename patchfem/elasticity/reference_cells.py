@@ -28,12 +28,12 @@ CELL_NAMES = {3: "triangle", 4: "quadrilateral"}  # names of cells by their numb
 
 
 def rectangle_terms() -> np.ndarray:
-    """Return `plane_form.rectangle_terms`, from the disk cache if it is there."""
+    """Return the stiffness terms of bilinear rectangles, from the disk cache if possible."""
     return _load_arrays()["rectangle_terms"]
 
 
 def element_values(n_corners: int, kind: str) -> ElementValues:
-    """Return the values of an element at points of its reference cell.
+    """Return the shape functions of an element at points of its reference cell.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def element_values(n_corners: int, kind: str) -> ElementValues:
 
 @cache
 def _load_arrays() -> dict[str, np.ndarray]:
-    """Return the arrays of `plane_form.evaluate_reference_cells`, from the disk cache if possible."""
+    """Return the shape functions on the reference cells, from the disk cache if possible."""
     # Lame constant, term A, B or C, two corners, two directions
     shapes = {"rectangle_terms": (2, 3, 4, 4, 2, 2)}
     for n_corners, name in CELL_NAMES.items():

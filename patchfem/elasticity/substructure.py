@@ -43,7 +43,7 @@ class Substructure:
 
     @property
     def factor(self) -> Fronts:
-        """Factors of the stiffness of the free unknowns, in the order of elimination.
+        """Cholesky factors of the stiffness of the free unknowns.
 
         NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
@@ -66,7 +66,7 @@ class Substructure:
         return out
 
     def _cached_value(self, name: str):
-        """Return a cached result by its name; the first call computes all results."""
+        """Return a cached result by its name; compute all results on the first call."""
         if not self.computed:
             order, firsts = elimination_order(self.mesh)
             stiffness = assemble_stiffness(self.mesh, self.layers, order)

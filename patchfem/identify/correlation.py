@@ -10,7 +10,7 @@ MIN_REPEAT_CORRELATION = 0.5
 
 
 def estimate_effective_rows(residual) -> float:
-    """Estimate the number of independent rows that are equivalent to a correlated residual.
+    """Estimate the number of independent residuals that are equivalent to correlated ones.
 
     The number is n/tau with tau = 1 + 2 sum rho_k over the lags k before the first one without
     correlation (Geyer, Statistical Science 7, 473, 1992). If the correlation returns at a later lag,
@@ -51,7 +51,7 @@ def _compute_autocorrelation(r) -> np.ndarray:
 
 
 def _compute_repetition_factor(rho, first_lag: int) -> float:
-    """Return the factor by which repeated cycles contain less information than independent ones.
+    """Return the factor by which repeated cycles carry less information than independent ones.
 
     `rho` (n,) is the autocorrelation, and `first_lag` is the first lag without correlation of neighbours.
     """

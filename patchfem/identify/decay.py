@@ -28,7 +28,7 @@ START_DECAY_RATES = (0.3, 3.0, 30.0)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Decay:
-    """Sinusoids of a free decay, in rising order of frequency.
+    """Frequencies, damping ratios and amplitudes of the sinusoids of a free decay.
 
     - frequency: undamped natural frequencies (n,) [Hz], w/(2 pi) with w^2 = w_r^2 + s_r^2.
     - damping: damping ratios (n,), s_r/w.
@@ -49,7 +49,7 @@ class Decay:
 
 
 class _RefinedPoles(NamedTuple):
-    """Poles of the sinusoids of a free decay, and the residual of the fit with these poles.
+    """Fitted poles of a free decay, with the residual of the fit.
 
     - poles: damped frequency [rad/s] and decay rate [1/s] of each sinusoid in turn, w_1, s_1, w_2, ... (2n,).
     - residual: model minus data (k,).
@@ -108,7 +108,7 @@ def fit_decay(time, value) -> Decay:
 
 
 def _make_decay(time, value, poles, misfit: float) -> Decay:
-    """Convert fitted poles to natural frequencies and damping ratios with their errors."""
+    """Convert the fitted poles of a decay to natural frequencies and damping ratios with errors."""
     damped_omega = poles[0::2]
     rate = poles[1::2]
     columns = _compute_columns(time, poles)

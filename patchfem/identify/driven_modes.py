@@ -77,7 +77,7 @@ class _ModeColumn(IntEnum):
 
 
 class _Columns(NamedTuple):
-    """Design matrix of the linear least-squares problem for given modes, with its derivatives.
+    """Design matrix of the linear least-squares fit for given modes, with its derivatives.
 
     - design: columns (k, 3 + 3n). The first three do not depend on the modes: a constant, and the residuals
       of modes below and above the band. The columns of each mode follow (`_ModeColumn`).
@@ -90,7 +90,7 @@ class _Columns(NamedTuple):
 
 
 class _ModeFit(NamedTuple):
-    """Modes fitted to a record, and the residual of this fit.
+    """Modes fitted to a record, with the residual of the fit.
 
     - theta: ln w_r of all modes, then ln zeta_r of all modes (2n,).
     - residual: model minus data (k,).
@@ -127,11 +127,11 @@ class _ModeProblem:
         ]
 
     def _inverse_transform(self, spectrum) -> np.ndarray:
-        """Transform a spectrum back to the times of the fitted samples."""
+        """Transform a spectrum to the times of the fitted samples."""
         return irfft(spectrum, self.samples)[self.inner]
 
     def columns(self, theta) -> _Columns:
-        """Compute the design matrix of the linear problem for given modes, with its derivatives."""
+        """Compute the design matrix of the linear fit for given modes, with its derivatives."""
         columns = list(self.fixed)
         by_frequency = []
         by_damping = []
@@ -154,7 +154,7 @@ class _ModeProblem:
         return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
 
     def _differentiate_columns(self, motion: tuple, by_pole, by_omega) -> list:
-        """Compute the derivatives of the three columns of a mode with respect to ln w or ln zeta.
+        """Compute the derivatives of the columns of a mode with respect to its parameters.
 
         `motion` holds its pole, decay rate, cosine and sine. `by_pole` and `by_omega` are the derivatives
         of 1/pole and of the damped frequency.
@@ -167,7 +167,7 @@ class _ModeProblem:
         ]
 
     def solve(self, theta) -> Projection:
-        """Fit the linear coefficients to the response for given modes."""
+        """Fit the linear coefficients of given modes to the response."""
         return project_data(self.columns(theta).design, self.value)
 
     def mode_coefficients(self, linear: Projection) -> np.ndarray:
@@ -175,7 +175,7 @@ class _ModeProblem:
         return linear.coefficients[len(self.fixed) :].reshape(-1, len(_ModeColumn))
 
     def slopes(self, theta) -> np.ndarray:
-        """Compute the derivatives (k, 2n) of the residual with respect to ln w_r and ln zeta_r."""
+        """Compute the derivatives (k, 2n) of the residual with respect to the mode parameters."""
         columns = self.columns(theta)
         linear = project_data(columns.design, self.value)
         coefficients = self.mode_coefficients(linear)

@@ -29,7 +29,7 @@ WINDOW_WIDTH_LINES = 1.5
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FrequencyResponse:
-    """Frequency response of a record, estimated with its coherence.
+    """Frequency response function estimated from a record, with its coherence.
 
     - frequency: frequencies (q,) > 0 [Hz].
     - value: response over input (q,), complex.
@@ -67,7 +67,7 @@ def find_time_step(time) -> float:
 def estimate_response(
     step: float, force, response, segment: int | None = None, window: str | None = None
 ) -> FrequencyResponse:
-    """Estimate the frequency response of a record by the H1 estimator.
+    """Estimate the frequency response function of a record by the H1 estimator.
 
     Segments overlap by half.
 
@@ -125,7 +125,7 @@ def estimate_response(
 
 
 def _is_transient(response) -> bool:
-    """Return whether a response starts and ends at rest, so that no segment truncates it."""
+    """Return whether a response starts and ends at rest, so that one segment can contain it all."""
     n_end_samples = max(response.size // 50, 1)
     max_response = np.abs(response).max(initial=0.0)
     max_end_response = max(

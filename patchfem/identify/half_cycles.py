@@ -100,7 +100,7 @@ def find_half_cycles(time, value) -> HalfCycles:
 
 
 def _raise_for_short_decay(time, middle: float, length: float) -> None:
-    """Raise PatchfemError with the reason why a decay has fewer than three half cycles."""
+    """Raise PatchfemError that explains why a decay has fewer than three half cycles."""
     reasons = [_describe_missing_samples(time, middle + k * length, length) for k in range(3)]
     reasons.append(_describe_gaps(time))
     for reason in reasons:
@@ -115,13 +115,13 @@ def _raise_for_short_decay(time, middle: float, length: float) -> None:
 
 
 def describe_missing_samples_at_end(time, half_cycles: HalfCycles) -> str:
-    """Describe a lack of samples after the last half cycle of a decay; "" if the record ends there."""
+    """Describe the lack of samples at the end of a decay; "" if the record ends there."""
     length = half_cycles.middle[-1] - half_cycles.middle[-2]
     return _describe_missing_samples(time, float(half_cycles.middle[-1] + length), float(length))
 
 
 def _describe_missing_samples(time, middle: float, length: float) -> str:
-    """Describe the samples of a half cycle that are too few; "" if they suffice.
+    """Describe which half cycle of a decay has too few samples; "" if none has.
 
     A half cycle that ends after the record has the description "" as well.
     """
@@ -142,7 +142,7 @@ def _describe_gaps(time) -> str:
 
 
 def _find_first_half_cycle(time, value) -> tuple:
-    """Find the first half cycle of a decay: its middle [s] and its half period [s]."""
+    """Find the first half cycle of a decay: the time [s] of its middle and its half period [s]."""
     frequency = _find_dominant_frequency(time, value)
     best = None
     for f in frequency * FREQUENCY_RATIOS:
@@ -187,7 +187,7 @@ def _find_dominant_frequency(time, value) -> float:
 
 
 def _follow_half_cycles(time, value, middle: float, length: float) -> list:
-    """Fit half cycles one after another from the first, until the noise exceeds one."""
+    """Fit the half cycles of a decay in order, until the noise exceeds a half cycle."""
     half_cycles = []
     while middle + length / 2 <= time[-1]:
         half_cycle = _fit_half_cycle(time, value, middle, length, 0.0)
@@ -233,7 +233,7 @@ def _refine_half_cycles(time, value, half_cycles: list, *, is_viscous: bool) -> 
 
 
 def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _HalfCycle | None:
-    """Fit a sine to a half cycle near its predicted middle.
+    """Fit a sine to the samples around the predicted middle of a half cycle.
 
     Returns None if it has too few samples, or if its middle is too far from the prediction.
     `length` is its half period [s], `rate` its decay rate [1/s].

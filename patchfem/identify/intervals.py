@@ -34,7 +34,7 @@ QUICK_PROFILE_TOL = 1e-2  # PROFILE_TOL of a residual that is expensive to evalu
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FitIntervals:
-    """95 % confidence intervals of the n values of a fit, and what the rows do not determine.
+    """95 % confidence intervals of fitted parameters, and the parameters left undetermined.
 
     - ends: ends (n, 2) of the intervals, NaN for a value that the rows do not determine.
     - methods: "linear", "profile" or "none" for each value.
@@ -56,7 +56,7 @@ class FitIntervals:
 
 
 class _FittedPoint(NamedTuple):
-    """Least-squares fit whose confidence intervals are computed.
+    """Result of a least-squares fit for which confidence intervals are computed.
 
     - model: residual over the unit cube.
     - u: point (n,) of the cube with the least squares.
@@ -73,7 +73,7 @@ class _FittedPoint(NamedTuple):
 
 
 class _IntervalEnd(NamedTuple):
-    """End of the confidence interval of a value.
+    """One end of the confidence interval of a fitted parameter.
 
     - end: coordinate of the unit cube.
     - is_open: whether the end is only the bound of the value.
@@ -84,7 +84,7 @@ class _IntervalEnd(NamedTuple):
 
 
 def make_unknown_intervals(n: int) -> FitIntervals:
-    """Return NaN intervals for a fit of n values whose intervals were not requested."""
+    """Return intervals of NaN for a fit whose confidence intervals were not requested."""
     return FitIntervals(
         ends=frozen_array(np.full((n, 2), np.nan)),
         methods=("none",) * n,
@@ -99,7 +99,7 @@ def make_unknown_intervals(n: int) -> FitIntervals:
 def compute_intervals(
     model: CubeResidual, u, cost: float, descend: Callable, *, is_series: bool = False
 ) -> FitIntervals:
-    """Compute the 95 % confidence intervals of the values of a least-squares fit.
+    """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 
     A value on a bound is constant in the linear intervals of the others, and has a profile of its own.
 
@@ -168,7 +168,7 @@ def compute_intervals(
 
 
 def _convert_ends(model: CubeResidual, u, ends) -> np.ndarray:
-    """Convert the ends (n, 2) of intervals in the unit cube to values.
+    """Convert the ends (n, 2) of intervals in the unit cube to parameter values.
 
     Each end is taken along its coordinate from the point u (n,).
     """
@@ -182,7 +182,7 @@ def _convert_ends(model: CubeResidual, u, ends) -> np.ndarray:
 
 
 def _invert_normal_matrix(jacobian, column_norm) -> tuple:
-    """Invert the normal matrix J^T J over the directions that the rows determine.
+    """Invert the normal matrix J^T J in the directions that the residuals determine.
 
     Returns the inverse (f, f), and the unit directions (d, f) that they do not determine. `column_norm` (f,)
     are the norms of the columns of J.
@@ -197,7 +197,7 @@ def _invert_normal_matrix(jacobian, column_norm) -> tuple:
 
 
 def _compute_correlation(covariance, unknown: set) -> np.ndarray:
-    """Return the correlation matrix (n, n) of fitted values, NaN for undetermined ones."""
+    """Return the correlation matrix (n, n) of fitted parameters; NaN for undetermined ones."""
     matrix = covariance.copy()
     index = list(unknown)
     matrix[index] = np.nan
@@ -210,7 +210,7 @@ def _compute_correlation(covariance, unknown: set) -> np.ndarray:
 def _list_unknown_directions(
     model: CubeResidual, u, free_values: list, null_vectors, column_norm
 ) -> np.ndarray:
-    """Return the directions of fitted values that the rows do not determine, as relative changes.
+    """Return the directions in parameter space that the residuals do not determine.
 
     The largest change of each direction (d, n) is 1. If a value at the point u of the cube is 0, they are
     changes over the range.
@@ -228,7 +228,7 @@ def _list_unknown_directions(
 
 
 def _is_linear(fit: _FittedPoint, i: int, half_width: float, covariance, free_values: list) -> bool:
-    """Return whether the sum of squares grows at both ends of a linear interval as predicted.
+    """Return whether the sum of squares at both ends of an interval agrees with a linear model.
 
     The interval is that of value i. The other values follow their covariance (n, n) with value i.
     """
@@ -251,7 +251,7 @@ def _is_linear(fit: _FittedPoint, i: int, half_width: float, covariance, free_va
 def _follow_profile(
     fit: _FittedPoint, i: int, sign: float, half_width: float, others: list
 ) -> _IntervalEnd:
-    """Find an end of the interval of a fitted value by the profile of the sum of squares.
+    """Find one end of a confidence interval by profiling the sum of squares.
 
     At this end of the interval of value i, on the side `sign`, the sum of squares, minimized over the other
     values, has grown by `fit.growth`. The root of the growth is nearly linear, so that a secant step inside a

@@ -34,7 +34,7 @@ N_TRIALS_PER_VALUE = 8
 
 
 class IntervalKind(StrEnum):
-    """Assumption on the rows from which the intervals of a fit are computed.
+    """Assumption on the errors of the data from which confidence intervals are computed.
 
     - ROWS: the rows are independent.
     - SERIES: the rows are a series in time, in which correlated neighbours count as fewer rows.
@@ -49,18 +49,18 @@ class IntervalKind(StrEnum):
 
 
 class DescentStorage:
-    """Storage of the descents of a search, so that it can be continued; this one stores nothing."""
+    """Storage for finished local searches, from which a search continues; this one is empty."""
 
     def load(self, start: int) -> "Descent | None":
-        """Return the stored descent from a start, or None."""
+        """Return the stored local search that began at a starting point, or None."""
         return None
 
     def save(self, start: int, descent: "Descent") -> None:
-        """Store the descent from a start."""
+        """Store the local search that began at a starting point."""
 
 
 class SearchCounts(NamedTuple):
-    """Evaluations of the residual by a search, and their failures.
+    """Numbers of residual evaluations of a search, and of failed evaluations.
 
     - evaluations: number of evaluations.
     - failures: number of those that failed.
@@ -74,7 +74,7 @@ class SearchCounts(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fit:
-    """Result of a least-squares fit of n values.
+    """Result of a least-squares fit of n parameters.
 
     - values: best values (n,).
     - at_bound: "low", "high" or "" for each value.
@@ -96,7 +96,7 @@ class Fit:
 
 
 class Descent(NamedTuple):
-    """Result of one descent (a local least-squares search).
+    """Result of one local least-squares search (descent).
 
     - u: point (n,) of the unit cube.
     - cost: sum of squares, infinite if the start failed.
@@ -117,7 +117,7 @@ class Descent(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Problem:
-    """Least-squares problem: a residual as a function of n bounded values.
+    """Least-squares problem whose residual is a function of n bounded parameters.
 
     - residual: function of values (n,) that returns the residual (r,), each row divided by its weight. If it
       raises a PatchfemError or is not finite, the evaluation is counted as failed.
@@ -132,7 +132,7 @@ class Problem:
 
     @property
     def space(self) -> SearchSpace:
-        """Unit cube of the bounds of the values; raises ValueError if the bounds are wrong."""
+        """Mapping of the bounded parameters to the unit cube."""
         return make_space(self.low, self.high)
 
     def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
@@ -179,7 +179,7 @@ def run_descents(
     before_descent: Callable | None = None,
     report: Callable | None = None,
 ) -> list:
-    """Minimize the residual locally from several points of the unit cube.
+    """Minimize the residual by local searches from several points of the unit cube.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def assemble_fit(
 def choose_starting_points(
     model: CubeResidual, given_start, max_points: int, n_trials: int = 0
 ) -> list:
-    """Choose points of the unit cube from which descents start.
+    """Choose points of the unit cube from which local searches start.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def choose_starting_points(
 
 
 class _CubeSlice(NamedTuple):
-    """Residual as a function of some coordinates of the unit cube; the others are constant.
+    """Residual as a function of some coordinates of the unit cube, with the others fixed.
 
     - model: residual over the whole cube.
     - u: point (n,) of the cube.
@@ -316,7 +316,7 @@ class _CubeSlice(NamedTuple):
     free: list
 
     def point(self, free_coordinates) -> np.ndarray:
-        """Return the point (n,) of the unit cube with given values (f,) of the free coordinates."""
+        """Return the point (n,) of the unit cube with given free coordinates (f,)."""
         full_point = self.u.copy()
         full_point[self.free] = free_coordinates
         return full_point
@@ -386,7 +386,7 @@ def descend(model: CubeResidual, u, free) -> Descent:
 
 
 def _move_onto_bounds(model: CubeResidual, u, cost: float) -> tuple:
-    """Set values near a bound to the bound, unless this raises the sum of squares.
+    """Move parameters that are close to a bound onto it, unless the sum of squares rises.
 
     Only values are set that would decrease the sum of squares beyond the bound. The other values are
     fitted again. Returns the point u (n,) and the sum of squares.

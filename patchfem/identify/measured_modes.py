@@ -28,7 +28,7 @@ MAX_DECAY_MISFIT = 0.05
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ListedModes:
-    """Measured modes, as the contents of the tables [[structure.mode]] of a scene.
+    """Measured modes in the form of the tables [[structure.mode]] of a scene.
 
     - frequency: natural frequencies (n,) [Hz].
     - damping: damping ratios (n,).
@@ -49,7 +49,7 @@ class ListedModes:
 
 
 class RecordEstimate(NamedTuple):
-    """Frequency response of a record, with the quantities from which it was estimated.
+    """Frequency response estimated from a record, with the quantities used for it.
 
     - estimate: frequency response.
     - step: time step [s].
@@ -63,7 +63,7 @@ class RecordEstimate(NamedTuple):
 
 
 class _ModeRows(NamedTuple):
-    """Mode-shape components and modal mass that follow from the residues of modes.
+    """Mode-shape components and modal mass that follow from residues.
 
     - rows: components (n,) by the key of the table of a mode.
     - mass: modal mass [kg], or None.
@@ -210,7 +210,7 @@ def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
 
 
 def _describe_modes(modes: DrivenModes) -> list:
-    """Describe the damping ratio of each mode and the record from which it follows."""
+    """Describe the damping ratio of each mode and the record that gives it."""
     descriptions = []
     for k, (zeta, error) in enumerate(zip(modes.damping, modes.damping_error)):
         text = f"damping {zeta:.4g} +- {error:.1g} from the whole record"
@@ -223,7 +223,7 @@ def _describe_modes(modes: DrivenModes) -> list:
 
 
 def _write_fit_notes(modes: DrivenModes, estimate: FrequencyResponse, step: float) -> list:
-    """Write notes on peaks that the window widens, and on a large misfit of the modes."""
+    """Write notes on peaks that the window broadens, and on a large misfit of the modes."""
     notes = []
     is_widened = modes.estimate_damping > (1 + MAX_DAMPING_EXCESS) * modes.damping
     # a single segment has no window, so that a larger damping comes from noise
@@ -245,7 +245,7 @@ def _write_fit_notes(modes: DrivenModes, estimate: FrequencyResponse, step: floa
 
 
 def _select_decay(values: dict, begin: float | None) -> tuple:
-    """Select the times [s] and values of the response of a record from the start of its decay.
+    """Select the times [s] and samples of a response from the start of its decay.
 
     The decay starts at the time `begin` [s], by default at the largest deviation from the final value.
     """
@@ -262,7 +262,7 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
 
 
 def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
-    """Compute frequency and damping ratio of a measured free decay against its amplitude.
+    """Compute frequency and damping ratio against amplitude from a measured free decay.
 
     A velocity is divided by the undamped circular frequency of its point, an acceleration by its square.
     Amplitudes whose damping ratio is too uncertain are left out with a note.

@@ -8,13 +8,15 @@ import numpy as np
 from ..core import Missing, PatchfemError
 
 DIFFERENCE_STEP = 1e-5  # fraction of the range of a value; step of difference quotients
-MIN_LOG_RATIO = 10  # upper / lower bound; a value with a wider range is searched in logarithms
+MIN_LOG_RATIO = (
+    10  # ratio of upper to lower bound above which a parameter is searched on a log scale
+)
 PENALTY_FACTOR = 1e3  # residual that stands for a failed evaluation / largest residual so far
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SearchSpace:
-    """Bounds of n values, mapped to the unit cube u in [0, 1]^n.
+    """Mapping of n bounded parameters to the unit cube u in [0, 1]^n.
 
     - low, high: bounds (n,), low < high.
     - log: whether each value is searched in logarithms (n,).
@@ -25,7 +27,7 @@ class SearchSpace:
     log: np.ndarray
 
     def values(self, u) -> np.ndarray:
-        """Return the values (n,) at a point u of the unit cube; on its faces, exactly the bounds."""
+        """Map a point u of the unit cube to parameter values (n,), exactly at the bounds."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
         for i, coordinate in enumerate(u):
@@ -37,7 +39,7 @@ class SearchSpace:
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
     def unit(self, values) -> np.ndarray:
-        """Return the point (n,) of the unit cube that is nearest to given values (n,)."""
+        """Map parameter values (n,) to the nearest point of the unit cube."""
         u = np.empty(len(values))
         for i, value in enumerate(values):
             low = self.low[i]
@@ -49,7 +51,7 @@ class SearchSpace:
         return np.clip(u, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """Return the derivatives (n,) of the values with respect to coordinates u of the cube."""
+        """Return the derivatives (n,) of the parameters with respect to the unit-cube coordinates."""
         slope = self.high - self.low
         ratio = self.high[self.log] / self.low[self.log]
         slope[self.log] = self.values(u)[self.log] * np.log(ratio)
@@ -57,7 +59,7 @@ class SearchSpace:
 
 
 def make_space(low, high) -> SearchSpace:
-    """Map the bounds of values to the unit cube.
+    """Return the mapping of bounded parameters to the unit cube.
 
     A positive value with a wide range is searched in logarithms.
 
@@ -87,7 +89,7 @@ def make_space(low, high) -> SearchSpace:
 
 
 class CubeResidual:
-    """Residual as a function of a point of the unit cube; it counts evaluations and failures.
+    """Residual as a function of a point of the unit cube, which counts its evaluations.
 
     A failure is a PatchfemError, an arithmetic error, or a residual that is not finite; `reason` is the
     first one. An error of type Missing is passed on.
@@ -121,7 +123,7 @@ class CubeResidual:
         return self._last_residual
 
     def _remember(self, u, residual) -> None:
-        """Keep the residual at u (n,), because the next evaluation is often at the same point."""
+        """Store the residual at u (n,), because it is often evaluated there again."""
         self._last_point = np.array(u)
         self._last_residual = residual
 
@@ -175,7 +177,7 @@ class CubeResidual:
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
     def _evaluate_neighbours(self, u, i: int) -> dict:
-        """Evaluate the residual at points near u that differ from u along coordinate i.
+        """Evaluate the residual at points that differ from u along coordinate i.
 
         Returns residuals (r,) by the number of difference steps from u.
         """
@@ -213,7 +215,7 @@ def _difference_quotient(residual_at_u, neighbours: dict) -> np.ndarray:
 
 
 def make_space_filling_points(count: int, n: int) -> np.ndarray:
-    """Return points (count, n) that fill the unit cube evenly, the same in every call.
+    """Return points (count, n) that fill the unit cube evenly, the same points in every call.
 
     They are an additive recurrence with the root of x^(n + 1) = x + 1 (Roberts 2018).
     """

@@ -34,7 +34,7 @@ MIN_IMPROVEMENT = 1e-4  # relative decrease of the sum of squares below which th
 
 
 class _SearchPoint(NamedTuple):
-    """Point that a search with two models has reached.
+    """Point that a search with a cheap and an expensive model has reached.
 
     - sum_of_squares: sum of squares of the residual of the expensive model.
     - u: point (n,) of the unit cube.
@@ -48,7 +48,7 @@ class _SearchPoint(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TwoModels:
-    """Cheap and expensive model of the same data, with the residual of their fit.
+    """Cheap and expensive models of the same data, and the residual to minimize.
 
     - cheap, expensive: functions of values (n,) that return an array; a PatchfemError is a failure.
     - residual: function of such an array that returns the residual (r,).
@@ -61,7 +61,7 @@ class TwoModels:
     space: SearchSpace
 
     def search(self, given_values, n_starts: int) -> tuple:
-        """Minimize the sum of squares of the expensive model with the help of the cheap one.
+        """Minimize the sum of squares of the expensive model, guided by the cheap one.
 
         Parameters
         ----------
@@ -105,7 +105,7 @@ class TwoModels:
         return best.model, self.space.values(best.u)
 
     def correct_cheap_model(self, u, expensive_value, slopes=None) -> Callable:
-        """Correct the cheap model to agree with the expensive one at a point of the unit cube.
+        """Correct the cheap model so that it agrees with the expensive one at a point.
 
         Parameters
         ----------
@@ -132,7 +132,7 @@ class TwoModels:
         return model
 
     def _minimize_with_value_correction(self, u) -> _SearchPoint:
-        """Minimize by the cheap model, corrected to the value of the expensive one at each minimum.
+        """Minimize the cheap model, corrected to the value of the expensive one at each minimum.
 
         Minimization and correction are repeated from u (n,) until the models agree. Returns the best point.
         """
@@ -155,7 +155,7 @@ class TwoModels:
         return best
 
     def _minimize_with_slope_correction(self, point: _SearchPoint) -> _SearchPoint:
-        """Minimize by the cheap model, corrected to value and derivatives of the expensive one.
+        """Minimize the cheap model, corrected to value and gradient of the expensive one.
 
         Returns the best point, without a model if the sum of squares does not converge.
         """
@@ -176,7 +176,7 @@ class TwoModels:
         return _SearchPoint(sum_of_squares, u)
 
     def _make_tangent_model(self, u) -> Callable:
-        """Correct the cheap model to the value and derivatives of the expensive one at u (n,).
+        """Correct the cheap model to the value and gradient of the expensive one at u (n,).
 
         The derivatives are one-sided difference quotients.
         """
@@ -193,17 +193,17 @@ class TwoModels:
         return self.correct_cheap_model(u, expensive_value, np.stack(slopes, axis=-1))
 
     def _descend(self, model: Callable, u) -> np.ndarray:
-        """Return the point (n,) of the unit cube at which a descent with a model from u (n,) ends."""
+        """Return the point (n,) at which a local search with a model from u (n,) ends."""
         cube_residual = CubeResidual(lambda values: self.residual(model(values)), self.space)
         return descend(cube_residual, u, range(u.size)).u
 
     def _sum_of_squares(self, data) -> float:
-        """Return the sum of squares of the residual for data that a model computed."""
+        """Return the sum of squares of the residual between data and a model."""
         return float(np.square(self.residual(data)).sum())
 
 
 def _choose_minima(ends: list) -> list:
-    """Return the end points (n,) of the best descents, at least a minimum distance apart.
+    """Select the end points (n,) of the best local searches that are not close to each other.
 
     The best comes first.
     """

@@ -9,7 +9,7 @@ MAX_CONDITION = 1e12
 
 
 class Projection(NamedTuple):
-    """Solution of a linear least-squares problem for given nonlinear parameters.
+    """Solution of the linear part of a separable least-squares problem.
 
     - residual: model minus data (k,).
     - coefficients: coefficients (n,) of the columns.
@@ -21,7 +21,7 @@ class Projection(NamedTuple):
     basis: np.ndarray
 
     def jacobian(self, derivatives) -> np.ndarray:
-        """Return the Jacobian (k, p) of the residual in the nonlinear parameters (Kaufman 1975).
+        """Return the Jacobian (k, p) of the residual with respect to the nonlinear parameters.
 
         It is the part of `derivatives` that is orthogonal to the columns. `derivatives` (k, p) are those of
         the model with respect to the nonlinear parameters, with constant coefficients.

@@ -10,7 +10,7 @@ MIN_SENSITIVITY = 1e-9
 
 
 def describe_fit(fit: Fit, names) -> list:
-    """Describe the values that a fit does not determine, and the failures of its search.
+    """Describe the parameters that a fit does not determine, and failures of its search.
 
     The sentences name values that are at a bound, without effect, determined only in a combination, or whose
     interval reaches a bound; failed evaluations; and a search that did not converge.
@@ -62,7 +62,7 @@ def describe_fit(fit: Fit, names) -> list:
 
 
 def _describe_combination(row, names) -> str:
-    """Describe a combined change of fitted values that leaves the residual unchanged.
+    """Describe a direction in parameter space along which the residual stays unchanged.
 
     `row` (n,) is the relative change of each value [%].
     """

@@ -23,7 +23,7 @@ _NUMBER_WORDS = ("no", "one", "two", "three", "four", "five", "six", "seven", "e
 
 
 class TableFormat(NamedTuple):
-    """Columns of a table, and the words for it in error messages.
+    """Columns that a table may have, and the words for them in error messages.
 
     units: column of numbers -> unit -> factor to SI; the unit "" stands for a column without a unit.
     required: columns that must be there; "displacement slide" accepts either name.

@@ -36,7 +36,7 @@ _COLUMN_PATTERN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
 def read_records(path, requests: list, exported_names: Mapping = EXPORTED_NAMES) -> Records:
-    """Read records over time.
+    """Read measured records over time from a laboratory file.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class Loop:
     labels: dict
 
     def select_rows(self, condition: str) -> np.ndarray:
-        """Return which rows (k,) fulfil a condition ``column=value,value`` on a column of labels.
+        """Return a mask of the rows (k,) whose label fulfils a condition "column=value,value".
 
         Numbers are compared as numbers. Raises PatchfemError if there is no such column, or no row with
         one of the values.

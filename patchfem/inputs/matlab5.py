@@ -40,7 +40,7 @@ VARIABLE_DAMAGE = "a variable of the MATLAB file is damaged"
 
 
 class DataType(IntEnum):
-    """Data types of elements; numeric types have the names of NumPy."""
+    """Data types of the elements of a MATLAB file of version 5."""
 
     INT8 = 1
     UINT8 = 2
@@ -59,7 +59,7 @@ class DataType(IntEnum):
 
 
 class ArrayClass(IntEnum):
-    """Classes of variables; those from DOUBLE to UINT64 are full arrays of numbers."""
+    """Classes of the variables of a MATLAB file of version 5."""
 
     CELL = 1
     STRUCT = 2
@@ -99,7 +99,7 @@ class Array(NamedTuple):
 
 
 class _Element(NamedTuple):
-    """Data element of the file; end: offset of the next element."""
+    """Data element of a MATLAB file, with the offset of the next element."""
 
     kind: int
     data: bytes
@@ -107,7 +107,7 @@ class _Element(NamedTuple):
 
 
 class _Variable(NamedTuple):
-    """A variable whose values have not been read.
+    """Variable of a MATLAB file whose values are not read yet.
 
     body: its bytes in the file; is_packed: whether they are compressed; kind: its class, with COMPLEX_FLAG
     if its numbers are complex; start: position of the values; size: bytes of the unpacked variable.
@@ -146,7 +146,7 @@ def read_variables(path, data: bytes) -> dict:
 
 
 class _MatFile(NamedTuple):
-    """A file of version 5: its path, for error messages, and the byte order of its numbers."""
+    """MATLAB file of version 5, with the byte order of its numbers."""
 
     path: str
     order: str

@@ -39,7 +39,7 @@ ROUNDING_DEVIATION = 12**-0.5  # standard deviation of the error of rounding to 
 
 
 class Matrix(NamedTuple):
-    """A sparse matrix of a file.
+    """Sparse matrix that was read from a file.
 
     values: sparse array (n, n); places: node and direction 1 to 6 of each row (n, 2), or None if the
     file does not state them; has_size: whether the file states its size; else it ends with the last row
@@ -64,7 +64,7 @@ def read_matrix(path, matrix_name: str) -> Matrix:
 
 
 class MatrixRounding(NamedTuple):
-    """Rounding of a matrix: digits in words, and standard deviation of the errors (k,)."""
+    """Rounding of the numbers of a matrix file, with the standard deviations of its errors."""
 
     digits: str
     deviation: np.ndarray
@@ -128,7 +128,7 @@ def compute_form_deviation(values, deviation, shape) -> float:
 
 
 def align_rows(*matrices: Matrix) -> list[Matrix]:
-    """Bring matrices to the same rows: all degrees of freedom, or else their common size.
+    """Extend matrices so that all have the same rows and degrees of freedom.
 
     Raises PatchfemError if the sizes differ, or if only some of the matrices state places.
     """

@@ -211,7 +211,7 @@ class DmigColumn(NamedTuple):
 
 
 class DmigMatrix:
-    """DMIG matrix; each entry is three wide fields of text: node, component and number."""
+    """DMIG matrix of a Nastran file, with entries of node, component and number."""
 
     def __init__(self, path, form: int):
         self.path = path
@@ -220,7 +220,7 @@ class DmigMatrix:
         self.entries = []
 
     def add(self, node: str, component: str, number: str) -> None:
-        """Add an entry to the last column.
+        """Add an entry to the last column of the matrix.
 
         Parameters
         ----------
@@ -349,7 +349,7 @@ def parse_real(text: str) -> float:
 
 
 def _split_card(line: str, *, is_wide: bool) -> list[str]:
-    """Return the stripped fields after the first one of a card: four wide or eight narrow ones."""
+    """Split a Nastran card into its fields, without the first one."""
     count = 4 if is_wide else 8
     width = 64 // count
     fields = line.split(",")[1:]

@@ -22,7 +22,7 @@ EDGE_TAGS = ("upper_interface", "lower_interface", "upper_far", "lower_far")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TaggedMesh:
-    """A tagged mesh as its file contains it.
+    """Mesh with named groups of cells and edges, as its file contains it.
 
     - ``points``: (N, 2) or (N, 3) [m]
     - ``triangles``: (t, 3), ``quads``: (q, 4) node numbers
@@ -41,7 +41,7 @@ class TaggedMesh:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PieceMesh:
-    """A piece as a mesh of triangles and quads.
+    """Mesh of triangles and quadrilaterals of one piece.
 
     - ``points``: (N, 2) x and depth >= 0 [m]
     - ``triangles``: (t, 3), ``quads``: (q, 4) nodes, counterclockwise in (x, depth)
@@ -106,7 +106,7 @@ class PieceMesh:
 
     @property
     def base_grid(self):
-        """The TensorGrid from which the piece is made; None for an unstructured mesh."""
+        """Tensor grid from which the mesh is made; None for an unstructured mesh."""
         return None
 
     def areas(self) -> np.ndarray:
@@ -293,7 +293,7 @@ def _check_numbers(mesh: TaggedMesh, source) -> None:
 
 
 def _select_piece(mesh: TaggedMesh, side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return which cells (t + q,) of a tagged mesh belong to a piece, and their nodes."""
+    """Select the cells of a tagged mesh that belong to a piece, and their nodes."""
     is_cell = np.isin(mesh.names, (f"{side}_substrate", f"{side}_coating"))
     n_triangles = len(mesh.triangles)
     triangles = mesh.triangles[is_cell[:n_triangles]]
@@ -346,7 +346,7 @@ def _signed_areas(corners) -> np.ndarray:
 
 
 def _turn_counterclockwise(points, cells, source) -> np.ndarray:
-    """Return the cells counterclockwise; PatchfemError if one is not convex or has no area."""
+    """Orient cells counterclockwise; raise PatchfemError if one is degenerate."""
     is_clockwise = _signed_areas(points[cells]) < 0
     cells = np.where(is_clockwise[:, None], cells[:, ::-1], cells)
     side = np.roll(points[cells], -1, axis=1) - points[cells]

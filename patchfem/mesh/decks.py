@@ -26,7 +26,7 @@ MAX_SET_SIZE_RATIO = 4
 
 
 class DeckBlock(NamedTuple):
-    """A keyword with its parameters, in capitals, and the words of its data lines."""
+    """Keyword of a deck with its parameters and data lines."""
 
     keyword: str
     parameters: dict
@@ -34,7 +34,7 @@ class DeckBlock(NamedTuple):
 
 
 class Deck:
-    """Nodes, elements and sets of a deck, by number or name."""
+    """Nodes, elements and sets of an Abaqus or CalculiX deck."""
 
     def __init__(self):
         self.nodes: dict[int, list[float]] = {}
@@ -43,7 +43,7 @@ class Deck:
         self.element_sets: dict[str, list[int]] = {}
 
     def add(self, block: DeckBlock) -> None:
-        """Add the content of a block; PatchfemError or ValueError if it cannot be read."""
+        """Add the contents of a keyword block to the deck."""
         keyword, parameters, lines = block
         if keyword in UNSUPPORTED_KEYWORDS:
             raise PatchfemError(
@@ -72,7 +72,7 @@ class Deck:
             _extend_set(self.element_sets, parameters.get(keyword), members)
 
     def _read_set(self, block: DeckBlock, sets: dict, max_range: int) -> list[int]:
-        """Return the numbers in a set, which may name other sets or ranges of numbers."""
+        """Return the node or element numbers of a set, which may contain other sets."""
         members = []
         if "GENERATE" in block.parameters:
             for line in block.lines:
@@ -96,7 +96,7 @@ class Deck:
         return members
 
     def tagged_mesh(self) -> TaggedMesh:
-        """Return the mesh of the deck; PatchfemError if it names nodes that it does not define."""
+        """Convert the deck to a mesh with named groups."""
         position = {number: k for k, number in enumerate(self.nodes)}
 
         def find_nodes(owner: str, numbers) -> list[int]:
@@ -169,7 +169,7 @@ def read_deck(text: str) -> TaggedMesh:
 
 
 def _split_blocks(text: str):
-    """Yield the blocks of a deck; comments and empty lines are skipped."""
+    """Yield the keyword blocks of a deck, without comments and empty lines."""
     block = DeckBlock("", {}, [])
     for line in text.splitlines():
         if not line.strip() or line.startswith("**"):

@@ -13,7 +13,7 @@ MAX_CIRCLE_SLOPE = sqrt(3)
 
 @dataclass(frozen=True, slots=True)
 class End:
-    """The shape of both ends of a piece.
+    """Shape of both ends of the face of a piece.
 
     - ``kind``: "sharp", "chamfer" (45 degrees) or "radius" (a quarter circle, tangent to the face)
     - ``size``: extent [m] along the face and in depth, 0 for "sharp"
@@ -36,7 +36,7 @@ class End:
         return half_flat_length + self.size * MAX_INTERFACE_SLOPE / hypot(1, MAX_INTERFACE_SLOPE)
 
     def face_depth(self, x, length: float) -> np.ndarray:
-        """Return the depth of the end face below the level of the flat face.
+        """Return how far [m] the end face lies below the flat face.
 
         At the distance s beyond the flat part the circle lies R - sqrt(R^2 - s^2) deep. It is
         followed to 60 degrees, then its tangent: the cells below a vertical face would have an

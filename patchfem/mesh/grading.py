@@ -61,7 +61,7 @@ def _distance_from_interval(x, low: float, high: float) -> np.ndarray:
 
 
 def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
-    """Divide a layout into cells.
+    """Divide an interval into cells of given target lengths.
 
     The levels lie at equal steps of the integral of 1/length, so the lengths of neighbouring cells
     differ by a factor of about 1 + slope at most.

@@ -14,7 +14,7 @@ MAX_ORDERED_CELLS = 8
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patches:
-    """The cells around every point, with weights.
+    """Cells around each point, with the weights of their average.
 
     - ``starts``: (s + 1,) index into `cells` at which each point begins
     - ``cells``, ``weights``: (k,) point by point
@@ -67,7 +67,7 @@ class PatchGroup(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GroupedPatches:
-    """Weighted sums over patches, for values that have the cells on the last axis.
+    """Weighted averages over the cells around points, for many values at once.
 
     All points with the same number of cells are summed at once. This takes a fifth of the time of
     `Patches`.
@@ -104,7 +104,7 @@ class GroupedPatches:
 
 
 def collect_patches(point, cell, weight=None) -> Patches:
-    """Collect pairs of a point and a cell into patches.
+    """Group pairs of a point and a cell by point.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ class TensorGrid:
         return self._with_rows(split_levels(self.x), split_levels)
 
     def _with_rows(self, x, change) -> "TensorGrid":
-        """Return the grid with columns `x`; `change` maps the row depths of each layer to new ones."""
+        """Return the grid with given columns, and rows changed by a function for each layer."""
         coated = change(self.depth[: self.coating_rows + 1])
         under = change(self.depth[self.coating_rows :])
         depth = np.concatenate([coated, under[1:]])
@@ -224,7 +224,7 @@ def graded_grid(
 
 
 def merge_levels(levels) -> np.ndarray:
-    """Return every second level, first and last included; interpolated if their number is even."""
+    """Return every second grid line, always with the first and the last."""
     if levels.size % 2:
         return levels[::2]
     position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
@@ -232,7 +232,7 @@ def merge_levels(levels) -> np.ndarray:
 
 
 def split_levels(levels) -> np.ndarray:
-    """Insert a level into each cell, so that geometrically growing cells stay geometric."""
+    """Insert a grid line into each cell so that geometric growth of the cells is preserved."""
     if levels.size < 2:
         return levels
     cells = np.diff(levels)

@@ -93,7 +93,7 @@ class EarlierWear:
             )
 
     def measure_error(self, name: str, value: float) -> float | None:
-        """Estimate the error of a measure of wear at the end of that run, None if the run has none.
+        """Return the error of a wear measure at the end of the earlier run; None if it is unknown.
 
         `value` is the measure on the mesh of this run; its difference from that of the earlier run is
         added to the error of the latter.
@@ -192,7 +192,7 @@ def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
 
 
 def _describe_pieces(scene: dict) -> dict:
-    """Return key -> value of the keys of a scene that determine which pieces wear."""
+    """Return the scene keys, with their values, that determine which pieces wear."""
     pieces = {
         f"contact.{key}": value
         for key, value in scene["contact"].items()

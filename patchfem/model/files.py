@@ -40,7 +40,7 @@ MESH_STARTS = {
 def find_file_faults(
     tables, folder: Path, is_valid: bool = True, notes: list | None = None
 ) -> list:
-    """Return the faults of the files that the tables of a scene name.
+    """Check the files that a scene names, and return their faults.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def find_file_faults(
 
 
 class _FileKey(NamedTuple):
-    """Key of a file and the tables with which the file is checked.
+    """Scene key of a file, with the tables that are needed to check the file.
 
     - prefix: prefix of the keys of an interface, "" for any other file.
     - key: key of the file; for the patch of an interface, its key in [contact].
@@ -101,7 +101,7 @@ def _select_interface(key: str, tables) -> _FileKey:
 
 
 def _check_reduction(tables, folder: Path) -> list:
-    """Return the faults of the matrices of [structure.reduced] together; nothing is reduced."""
+    """Check the matrices of [structure.reduced] together without reducing them."""
     table = tables.structure and tables.structure.reduced
     matrices = [file for key, file in list_named_files(tables) if "reduced" in key]
     if not table or not all(file_exists(folder / file) for file in matrices):

@@ -35,7 +35,7 @@ class ProfileLengths(NamedTuple):
 
 
 class ShapedGap(NamedTuple):
-    """Gap of the unloaded pieces.
+    """Gap between the unloaded pieces at given positions.
 
     - heights: gap [m] at each node.
     - notes: sentences for the user.
@@ -92,7 +92,7 @@ class Gap:
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list:
-        """Return (table, value of a property) for each shape that has this property of `gaps.ShapeProperties`."""
+        """Return a property of every shape that has it, with the table of the shape."""
         pairs = []
         for name, keys in self.shapes:
             evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)

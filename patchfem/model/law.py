@@ -68,7 +68,7 @@ class InterfaceLaw:
 def make_effective_law(
     law: Friction, width: float | None, locate_key: Callable, load: float | None = None
 ) -> Friction:
-    """Return the keys of a law after the effects that change only its numbers.
+    """Return the keys of a friction law after effects that change its parameters.
 
     `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
     multiplied by the factor of the pad; `bond_length` follows from a stiffness.

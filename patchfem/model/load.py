@@ -19,7 +19,7 @@ MIN_SAMPLE_SPACING = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class PointLoad:
-    """Normal load on a point: N(t) = max(0, load + amplitude cos(2 pi frequency t + phase)).
+    """Normal load on a point, which may oscillate: N(t) = max(0, load + amplitude cos(...)).
 
     - load: mean load [N].
     - amplitude: amplitude [N] of the oscillation, 0 for a constant load.

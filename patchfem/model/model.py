@@ -151,7 +151,7 @@ def build_without_sweep(scene: Scene) -> Model:
 
 
 def build(scene: Scene) -> Model:
-    """Build the model of a valid scene; read the files that it names.
+    """Build the model of a valid scene, including the files that it names.
 
     Only effects that the scene names are imported.
 
@@ -267,5 +267,5 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
 
 @lru_cache(64)
 def _find_absent(effects: tuple) -> tuple:
-    """Return the known effects that are not among the given effects of a scene."""
+    """Return the known effects that a scene neglects."""
     return tuple(list_absent_effects(effects))

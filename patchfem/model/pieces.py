@@ -14,7 +14,7 @@ MESH_SIZE_TOL = 1e-6
 
 
 class RoundedEdges(NamedTuple):
-    """Positions at the ends of a patch of rounded pieces.
+    """Positions at which the flat face and the contact of rounded pieces end.
 
     - positions: ends [m] of the contact and of the flat part, in rising order; () without rounded
       ends.

@@ -52,23 +52,23 @@ class SimilarModels(Sequence):
         return replace_numbers(self.first, self.plain_numbers, self.values[index].tolist(), sets)
 
     def select(self, indices: np.ndarray) -> SimilarModels:
-        """Return the models at some indices."""
+        """Select the models with given indices."""
         return replace(self, values=self.values[indices], cases=self.cases[indices])
 
     def columns(self) -> Model:
-        """Merge all models into one, in which each number that differs is an array (n,)."""
+        """Merge the models into one whose differing numbers are arrays (n,)."""
         return replace_numbers(self.first, self.plain_numbers, list(self.values.T))
 
 
 def select_models(models: Sequence[Model], indices: Sequence[int]) -> Sequence[Model]:
-    """Return the models at some indices."""
+    """Select the models with given indices from a sequence or a SimilarModels."""
     if isinstance(models, SimilarModels):
         return models.select(np.asarray(indices, int))
     return [models[index] for index in indices]
 
 
 def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> np.ndarray:
-    """Return numbers of all models as columns (k, n).
+    """Evaluate a function of the model for all models, as columns (k, n).
 
     `row` is a function of a model that returns k numbers; its formulas take arrays as well.
     """
@@ -83,7 +83,7 @@ def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> n
 def replace_numbers(
     model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple = ()
 ) -> Model:
-    """Return the model that `build` returns for a scene with other values of the plain keys.
+    """Return a model with other values of keys that are plain numbers.
 
     The numbers are written into the tables of the scene, and the functions of `build` read these tables again. So every
     other key of a table keeps its effect. Parts that the numbers do not change are shared with `model`.

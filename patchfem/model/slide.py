@@ -44,7 +44,7 @@ class SlideSamples(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SlidePath:
-    """Prescribed slide of a bench.
+    """Relative displacement that a bench prescribes over time.
 
     - kind: "sine" and "triangle" repeat; "constant", "dwell" and "file" run once through corners.
     - amplitude: half the range [m] of a slide that returns, the length [m] of one that does not.
@@ -167,7 +167,7 @@ class SlidePath:
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
     def _legs(self) -> tuple:
-        """Return time [s] and relative displacement [m] at the corners of a slide of straight legs."""
+        """Return time [s] and displacement [m] at the corners of a path of straight segments."""
         if self.corners is not None:
             return self.corners
         return np.array([0.0, self.amplitude / self.speed]), np.array([0.0, self.amplitude])

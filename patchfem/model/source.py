@@ -11,7 +11,7 @@ from ..scene.lines import locate_key, number_items_from_one
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Source:
-    """Origin of a model.
+    """Scene file or text from which a model was built.
 
     - path: scene file.
     - text: text of the scene as it was read.
@@ -32,7 +32,7 @@ class Source:
     notes: tuple = ()
 
     def describes(self, model) -> bool:
-        """Return whether no part of a model was replaced since it was built from the scene."""
+        """Return whether a model is still as built from the scene, with no part replaced."""
         built = self.write.args[-1]
         names = [part.name for part in fields(built) if part.name != "source"]
         return all(getattr(model, name) is getattr(built, name) for name in names)
@@ -43,7 +43,7 @@ class Source:
         return self.write()
 
     def where(self, key: str) -> str:
-        """Return ``FILE:LINE: key`` for a message about a key."""
+        """Return file, line and key as text for a message."""
         return locate_key(self.path, self.text, key)
 
 

@@ -63,7 +63,7 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
 
 
 def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
-    """Build the modes of a rig without the bonded spring.
+    """Build the modes of a rig without the linear spring of the bonded joint.
 
     The joint is subtracted from modes that were measured while it stuck.
 
@@ -193,12 +193,12 @@ def read_file_notes(scene) -> list:
 
 
 def _find_driven_mass(scene) -> int:
-    """Return the number, from 1, of the mass that a force drives or that is released."""
+    """Return the number of the mass on which a force acts or which is released."""
     return scene.drive.mass or scene.structure.output_mass or 1
 
 
 def build_start(scene, modes: ModalBasis) -> InitialState | None:
-    """Build the initial state of a rig, None if it starts at rest.
+    """Build the initial state of a rig; None if it starts at rest.
 
     Raises
     ------

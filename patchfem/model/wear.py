@@ -13,7 +13,7 @@ from . import earlier_wear
 
 @dataclass(frozen=True, slots=True)
 class WornFriction:
-    """Factors on the friction law as functions of the mean wear depth.
+    """Factors by which friction parameters change with the mean wear depth.
 
     They are linear between their rows and constant beyond the last row.
 
@@ -28,7 +28,7 @@ class WornFriction:
     bond_length: tuple | None
 
     def compute_worn_law(self, law: Friction, depth: float) -> Friction:
-        """Return a friction law with its values at a mean worn depth [m]."""
+        """Return a friction law with the parameters for a mean worn depth [m]."""
         # with a given stiffness, the bond length follows the coefficient
         bond_length = self.bond_length if law.stiffness is None else self.coefficient
         factors = {

@@ -15,7 +15,7 @@ from .errors import coarser_errors, observed_orders
 
 
 class CoarserRuns(NamedTuple):
-    """Coarser runs of one kind, and the rule that turns their measures into errors.
+    """Coarser runs of one kind, with the rule that estimates errors from their measures.
 
     - runs: variants (hashable arguments of `solve`), from fine to coarse.
     - rule: function (values of the reference run, *values of the coarse runs) -> error by measure
@@ -32,7 +32,7 @@ class CoarserRuns(NamedTuple):
 
 
 def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | None = None) -> tuple:
-    """Solve coarser runs; return errors by measure name for every kind, and the CPU time [s].
+    """Solve coarser runs, and estimate from them the errors of the measures by kind of run.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | Non
     solved_runs = {} if solved_runs is None else solved_runs
 
     def solve_values(variant) -> dict:
-        """Return the measures of a variant, solving it on the first call."""
+        """Return the measures with given settings, solving them on the first call."""
         if variant not in solved_runs:
             solved_runs[variant] = solve(variant)
         return solved_runs[variant].values
@@ -66,7 +66,7 @@ def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | Non
 
 
 def find_open_kinds(kinds, errors, runs) -> dict:
-    """Return the errors by kind and measure name, and the observed orders in the time step.
+    """Sum the errors of measures by kind of coarser run, and compute the observed orders.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def find_open_kinds(kinds, errors, runs) -> dict:
 
 
 def make_spatial_coarsening(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
-    """Return a second-order error rule with a single run of wider cells or fewer modes.
+    """Return the rule that estimates second-order errors from a run on a coarser mesh.
 
     Parameters
     ----------

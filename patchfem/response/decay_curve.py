@@ -46,9 +46,9 @@ SAMPLING_HALF_WIDTH = 4
 N_NEWTON_STEPS = 3  # Number of Newton steps with which the time of a reversal is refined.
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
 REST_SPEED_TOL = 1e-12  # Speed over the largest speed below which a sample is itself a reversal.
-MIN_HALF_CYCLE = 1e-9  # Half cycle over the largest half cycle below which it is round-off.
+MIN_HALF_CYCLE = 1e-9  # A half cycle smaller than this fraction of the largest one is round-off.
 STEP_END_TOL = 1e-9  # fraction of a step by which round-off may move a reversal outside the step
-# Reversal over the range in one period; a smaller one is attributed to a faster mode.
+# Largest reversal, relative to the range in one period, that is attributed to a faster mode.
 MAX_RIPPLE = 0.25
 RANGE_TOL = 1e-6  # Relative distance beyond its end points up to which a curve is evaluated.
 
@@ -69,7 +69,7 @@ class HalfCycles(NamedTuple):
 
 
 class DecayCurve(NamedTuple):
-    """Frequency and damping ratio of a decay against amplitude, sorted by falling amplitude.
+    """Frequency and damping ratio of a decay against amplitude, from large to small amplitudes.
 
     - time (k,): [s].
     - amplitude (k,): [m].
@@ -86,7 +86,7 @@ class DecayCurve(NamedTuple):
     damping_error: np.ndarray
 
     def at(self, selection) -> "DecayCurve":
-        """Return the points of the curve selected by indices, a slice or booleans."""
+        """Return the points of the curve at given indices."""
         return DecayCurve(*(part[selection] for part in self))
 
     def interpolate(self, amplitudes) -> "DecayCurve":
@@ -136,7 +136,7 @@ class DecayCurve(NamedTuple):
         """
 
         def wider(name: str) -> np.ndarray:
-            """Return the error of a field, widened by the difference of both curves."""
+            """Return the error of one column, widened by the difference of the two curves."""
             change = np.abs(getattr(first_curve, name) - getattr(second_curve, name))
             return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
 
@@ -225,7 +225,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
 
 
 def find_reversals_by_extrapolation(time, position, speed) -> tuple:
-    """Find reversals as `locate_reversals`, but extrapolate the cubics of adjacent steps.
+    """Find the reversals of a motion from cubics that are extrapolated from adjacent steps.
 
     The times between two samples are the means of the zeros of the speed on the extrapolated cubics
     of the steps before and after. If the force of a law reverses with the speed within less than a
@@ -242,7 +242,7 @@ def find_reversals_by_extrapolation(time, position, speed) -> tuple:
     fraction = speed[k] / (speed[k] - speed[k + 1])
 
     def find_zero(step, guess):
-        """Find the time [s] of zero speed on the extrapolated cubic of a step by Newton's method.
+        """Find by Newton's method the time [s] of zero speed on the extrapolated cubic of a step.
 
         near: initial guess as a fraction of the step, outside 0 to 1.
         """
@@ -331,7 +331,7 @@ def _overlap_spans(span) -> np.ndarray:
 
 
 def _smooth_values(values, indices, span) -> np.ndarray:
-    """Evaluate least-squares parabolas over spans of values at their midpoints."""
+    """Fit parabolas to values over moving spans, and evaluate them at the midpoints."""
     out = np.empty(indices.size)
     for m in np.unique(span):
         has_span = span == m
@@ -352,7 +352,7 @@ class Slopes(NamedTuple):
     span: np.ndarray
 
     def at(self, selection) -> "Slopes":
-        """Return the slopes selected by indices, a slice or booleans."""
+        """Return the slopes at given indices."""
         return Slopes(*(part[selection] for part in self))
 
 
@@ -380,7 +380,7 @@ def fit_slopes(values, noise) -> Slopes:
     slope = np.empty(count)
     spread = np.zeros(count)
     bias = np.full(count, np.nan)
-    # This is the change over the next shorter span, minus its noise.
+    # Change of the slope from the next shorter fit span to the current one, minus its noise.
     shorter_change = np.full(count, np.nan)
     span = np.zeros(count, int)
     grows = np.ones(count, bool)
@@ -424,7 +424,7 @@ def fit_slopes(values, noise) -> Slopes:
 
 
 def _add_sampling_error(curve: DecayCurve) -> DecayCurve:
-    """Widen the errors of a decay curve by the effect of amplitudes overestimated by delta^2/8.
+    """Widen the errors of a decay curve by the effect of damping within a half cycle.
 
     Half of a half cycle is cosh(delta/2) times the amplitude at its middle, where delta is the
     logarithmic decrement over half a cycle. The errors are the changes of the curve over this
@@ -448,7 +448,7 @@ def smooth_slopes(values, noise) -> np.ndarray:
 
 
 def _limit_noise(noise, values) -> np.ndarray:
-    """Limit standard deviations (n,) from below by an estimate from third differences.
+    """Raise standard deviations (n,) to at least an estimate from third differences.
 
     Third differences of a parabola vanish, those of white noise have 20 times its variance. Values
     without noise keep 0.
@@ -484,7 +484,7 @@ def _interpolate_monotone(x, knots, values) -> np.ndarray:
 
 
 def _evaluate_cubic(position, speed, fraction):
-    """Evaluate Hermite cubics of steps at given fractions (k,) of the steps.
+    """Evaluate Hermite cubics at given fractions (k,) of their steps.
 
     position, speed: values at both ends of the steps; the speeds are multiplied by the durations of
     the steps.

@@ -12,7 +12,7 @@ from .run_events import slips_and_displacements
 
 
 def estimate_window_error(window: Response, period: float, offset: float) -> dict:
-    """Return the change of each measure by name for a window shifted by `offset` steps.
+    """Return the changes of the measures if the window is shifted by some time steps, as a dict.
 
     An extreme value changes only if it lies at an end of the window.
 

@@ -45,7 +45,7 @@ def absolute_change(fine: dict, coarse: dict) -> dict:
 
 
 def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
-    """Return the error of a value from its change in a run `ratio` times as coarse.
+    """Return the error of a value from its change in a coarser run.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def convergence_errors(*values: dict) -> dict:
 
 
 def _ladder_error(changes: list) -> float:
-    """Return the error on the finest mesh from the changes of a value, fine to coarse."""
+    """Return the error of a value on the finest mesh from its changes between the meshes."""
     if len(changes) == 1:
         return convergence_error(changes[0])
     error = convergence_error(*changes[-2:])
@@ -194,7 +194,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
 
 
 class FrictionScale(NamedTuple):
-    """Friction scales of a run to which a relative force error is referred.
+    """Reference values of friction (limit, bond length, work) for a relative force error.
 
     - static: coefficient of friction [1].
     - limit: friction limit [N].
@@ -272,7 +272,7 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
 def add_errors(
     values: dict, *errors: dict, min_relative_error: float = 0.0, size: float = np.inf
 ) -> dict:
-    """Combine values and errors into measures, adding a relative error to each.
+    """Combine values and errors to measures, and add a relative error to each.
 
     The summed errors of a measure are its parts plus `min_relative_error` of the value. The error
     of a measure that a coarse run does not have is its absolute value.
@@ -300,7 +300,7 @@ def add_errors(
 
 
 def total_error(name: str, value, parts, min_relative_error: float, size):
-    """Return the total error of a measure of one run, or (n,) of many, as sum of its parts.
+    """Sum the contributions to the error of a measure, of one run or of n runs.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class Events:
 
 
 def sort_events(rows, count: int | None = None, source: str = "") -> Events:
-    """Sort event rows (time [s], interface, kind, displacement [m]) into an Events table.
+    """Sort event rows (time [s], interface, kind, displacement [m]) by time into Events.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def sort_events(rows, count: int | None = None, source: str = "") -> Events:
 def detect_events(
     time, slips, slides, period: float, max_stick_slip: float = 0.0, borders=()
 ) -> Events:
-    """Detect the events in samples: stops, releases, reversals, and borders of drive segments.
+    """Detect stops, releases, reversals and segment borders in the samples of a run.
 
     A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal
     where it changes sign without a stop between two samples.
@@ -103,7 +103,7 @@ def detect_events(
 
 
 def compute_slip_states(time, slip, period: float, max_stick_slip: float = 0.0) -> tuple:
-    """Return relative slip speed (k - 1,) [1] and stick-slip state (k - 1,) between samples.
+    """Return relative slip speed [1] and stick-slip state between samples, (k - 1,) each.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def _detect_interface_events(
 
 
 def find_sticks(events: Events, begin: float, end: float, moves) -> list:
-    """Return the stick intervals [(start, end)] [s] of the first interface, bounded by events.
+    """Return the intervals [(start, end)] [s] between events in which an interface sticks.
 
     If other interfaces stick during some of them only, the intervals with the combination of states
     that lasts longest in total are taken.

@@ -22,7 +22,7 @@ N_SUBSTEPS = 16
 
 
 class Steps(NamedTuple):
-    """Ends of all substeps: times [s], displacements [m] and speeds [m/s], (k, N_SUBSTEPS) each."""
+    """Times [s], displacements [m] and speeds [m/s] at the ends of all substeps."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -30,7 +30,7 @@ class Steps(NamedTuple):
 
 
 def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
-    """Return the window with the ends of all substeps as samples of its interface.
+    """Add the ends of all substeps to the samples of an interface in a window.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def divide_steps(time, slide, speed) -> Steps:
 
 
 def evaluate_recursion(start: float, factor, increment) -> np.ndarray:
-    """Iterate the recursion x -> factor x + increment over the substeps; (k p + 1,) values.
+    """Evaluate the recursion x -> factor x + increment over all substeps.
 
     Parameters
     ----------

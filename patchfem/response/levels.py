@@ -36,7 +36,7 @@ MIN_JUMP_FACTOR = 1.5
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Level:
-    """State of a run at the end of a level of the drive.
+    """State and measures of a run at the end of one level of the drive.
 
     - drive: acceleration [m s-2]; for a force drive the force over the modal mass, or the force [N]
       if `unit` says so.
@@ -55,7 +55,7 @@ class Level:
 
 
 def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level], bool]:
-    """Return a function that decides whether a drive level lies above the onset of slip.
+    """Return a function that decides whether slip has started at a drive level.
 
     A motion that grows without bound lies above every onset.
 
@@ -85,7 +85,7 @@ def make_no_onset_reason(kind: str, length: float | None = None) -> str:
 
 
 def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | None:
-    """Return the indices of the last level below the onset and of the first level above it.
+    """Return the indices of the drive levels just below and just above the onset of slip.
 
     Only the levels before the first decrease count.
 
@@ -110,7 +110,7 @@ def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | No
 
 
 def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
-    """Return the largest relative jump of a measure between neighbouring drive levels.
+    """Return the largest relative jump of a measure between successive drive levels.
 
     The factor of the measure is divided by the factor of the drive.
 

@@ -21,7 +21,7 @@ MIN_REST_END_STEP = 1e-3
 
 
 class Reversal(NamedTuple):
-    """Extreme relative displacement of a cycle [m], and the friction force there [N].
+    """Displacement [m] at an extreme of a cycle, and the friction force [N] there.
 
     force is None if the displacement rests at this value over an end of the window, so that one
     side of a jump is not known.
@@ -32,7 +32,7 @@ class Reversal(NamedTuple):
 
 
 def cycle_spans(time, period: float) -> list:
-    """Return the complete cycles [(start, end)] [s] of times (k,), oldest first.
+    """Return the complete cycles [(start, end)] [s] that sampled times (k,) cover, oldest first.
 
     They are measured from the end, so that a partial cycle at the start is left out.
     """
@@ -43,7 +43,7 @@ def cycle_spans(time, period: float) -> list:
 
 
 def reversal_evaluation(model) -> str:
-    """Return the rule that evaluates the friction force at a reversal, for `find_reversals`."""
+    """Return the name of the rule by which the friction force at a reversal is evaluated."""
     law = model.friction.law
     soft = model.partial_slip or (
         model.rig is not None and model.rig.friction.interfaces[0].partial_slip
@@ -56,7 +56,7 @@ def reversal_evaluation(model) -> str:
 
 
 def find_reversals(time, slide, rate, force, period: float, by: str = "rate") -> list:
-    """Return the (smallest, largest) `Reversal` of the displacement in every complete cycle.
+    """Return the smallest and the largest `Reversal` of the displacement in every cycle.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def find_reversals(time, slide, rate, force, period: float, by: str = "rate") ->
 
 
 def _find_largest(time, y, v, time_tolerance: float) -> tuple:
-    """Find the maximum of the cubics through samples of a quantity and its rate.
+    """Find the maximum of a sampled quantity on the cubics through its values and rates.
 
     Returns the index of the sample before it, its value, and the fraction of the step to the next
     sample.
@@ -118,7 +118,7 @@ def _find_largest(time, y, v, time_tolerance: float) -> tuple:
 
 
 def _find_rate_zero(v, sample: int, *, first: bool) -> tuple:
-    """Find where a sampled rate (k,) decreases through 0 next to a given sample.
+    """Find the zero of a decreasing sampled rate (k,) next to a given sample.
 
     The step before the sample `at` is used if `first`, else the step after it.
 
@@ -136,7 +136,7 @@ def _find_rate_zero(v, sample: int, *, first: bool) -> tuple:
 def _force_at_reversal(
     slide, force, sample: int, fraction: float, value: float, by: str
 ) -> float | None:
-    """Return the friction force [N] at the largest displacement; None if it is not known.
+    """Return the friction force [N] at the largest displacement; None if it is unknown.
 
     The largest slide lies at the fraction `share` of the step after sample `at`; `by` as in
     `find_reversals`.
@@ -155,7 +155,7 @@ def _force_at_reversal(
 
 
 def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
-    """Return the mean of the friction force [N] before and after a rest; None if it is unknown."""
+    """Return the mean friction force [N] before and after an interval of rest; None if unknown."""
     step = np.abs(np.diff(slide))
     moves = step > MIN_REST_END_STEP * step.max(initial=0.0)
     moves &= np.maximum(
@@ -169,7 +169,7 @@ def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
 
 
 def mean_half_range(reversals) -> float:
-    """Return half the displacement range [m] averaged over the cycles; 0 without a cycle."""
+    """Return half the range of the displacement [m], averaged over the cycles."""
     return (
         float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
         if reversals
@@ -190,7 +190,7 @@ def secant_stiffness(reversals) -> float | None:
 
 
 def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffness: float) -> dict:
-    """Return loop area, equivalent stiffness and equivalent damping of an interface by name.
+    """Return loop area, equivalent stiffness and equivalent damping of an interface as a dict.
 
     The stiffness Re(F1/q1) refers to the first harmonic of the slide, as in harmonic balance.
 
@@ -217,7 +217,7 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
 
 
 def interface_loops(amplitude, q, f, work, stiffness) -> dict:
-    """Return the loop measures of one loop, or (n,) of many; NaN where there is no value.
+    """Return the measures of one friction loop, or of n loops as columns (n,).
 
     The parameters are those of `interface_loop`, numbers or (n,).
     """
@@ -233,7 +233,7 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
 
 
 def drift(time, slide, rate, period: float) -> float:
-    """Return the mean motion per cycle [m] over a window.
+    """Return the displacement per cycle [m] by which the mean position moves in a window.
 
     It is the difference between the time means of the last and the first cycle, divided by the
     number of cycles between them; below 1.5 cycles, the motion between the ends of the window per
@@ -258,7 +258,7 @@ def drift(time, slide, rate, period: float) -> float:
 
 
 def time_mean(time, value, rate, begin: float, end: float) -> float:
-    """Return the time mean of a quantity from cubics through its samples and rates.
+    """Return the time average of a quantity from cubics through its values and rates.
 
     Each step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, of fourth order at any spacing.
 

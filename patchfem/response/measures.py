@@ -14,8 +14,8 @@ SLIP_FRACTION = (
     0.5  # irreversible fraction of the displacement change above which an interface slips [1]
 )
 COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
-MIN_ENERGY_GAP = 1e-18  # Smallest gap of an energy balance that counts [J].
-# Friction work over the energy that passes through a run below which it is round-off.
+MIN_ENERGY_GAP = 1e-18  # Smallest significant difference of energies [J].
+# Friction work below this fraction of the energy that passes through a run is round-off.
 WORK_ROUND_OFF = 1e-10
 MIN_SLIDE_RANGE = 1e-15  # Range of the relative displacement [m] below which nothing moves.
 MAX_SMOOTH_RATIO = (
@@ -24,7 +24,7 @@ MAX_SMOOTH_RATIO = (
 
 
 def energy_balance(energies: dict):
-    """Return the relative gap of the energy balance [1] of one run, or (n,) of many.
+    """Return the relative error of the energy balance [1] of one run, or (n,) of n runs.
 
     |work in - stored - dissipated| / (integral |power in| + peak stored). A gap of MIN_ENERGY_GAP is the
     round-off of a system at rest; without energy the result is 0.
@@ -43,7 +43,7 @@ def energy_balance(energies: dict):
 
 
 def relative_gap(sampled, balanced, passed, energy=0.0):
-    """Return the relative difference of the friction work by samples and by energy balance.
+    """Return the relative difference of the friction work from samples and from energies.
 
     Parameters
     ----------
@@ -67,13 +67,13 @@ def relative_gap(sampled, balanced, passed, energy=0.0):
 
 
 def ratio_or_zero(part, total):
-    """Return part/total, or 0 where the total is not positive; numbers or (n,) arrays."""
+    """Return part/total, or 0 where the total is not positive."""
     is_positive = np.asarray(total) > 0
     return (part / np.where(is_positive, total, 1.0) * is_positive)[()]
 
 
 def compute_harmonic(time, weight, values, omega) -> complex:
-    """Return the first Fourier coefficient 2/T int values exp(-i omega t) dt of samples.
+    """Return the first Fourier coefficient of sampled values at the drive frequency.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def compute_harmonic(time, weight, values, omega) -> complex:
 
 
 def compute_step_harmonic(time, means, omega) -> complex:
-    """Return the first Fourier coefficient of a force from its mean value in each step.
+    """Return the first Fourier coefficient of a force from its mean in each time step.
 
     It is exact for a force that is constant in each step, even if it jumps at a sample.
 
@@ -153,7 +153,7 @@ def largest_distance(x, y=None) -> float:
 
 
 def path_increments(x, y=None) -> np.ndarray:
-    """Return the distances (k - 1,) [m] between successive points of a path."""
+    """Return the lengths (k - 1,) [m] of the segments of a path."""
     return np.abs(np.diff(x)) if y is None else np.hypot(np.diff(x), np.diff(y))
 
 
@@ -220,7 +220,7 @@ def slip_round_off(window: Response) -> float:
 
 
 def slip_start_measure(phases) -> dict:
-    """Return slip_start_phase [rad] by name, averaged over phases of slip starts.
+    """Return the mean drive phase [rad] at which slip starts, as a dict.
 
     The dict is empty if the starts have no phase in common.
     """
@@ -231,13 +231,13 @@ def slip_start_measure(phases) -> dict:
 
 
 def compute_ledger_measures(ledger) -> dict:
-    """Return friction work and energies [J] by name at the end of a ledger (4, k) [J]."""
+    """Return the friction work and the energies [J] at the end of a run, as a dict."""
     names = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
     return {name: float(row[-1]) for name, row in zip(names, ledger)}
 
 
 def work_difference(work, pairs, jumps: bool = False) -> float:
-    """Return the relative gap [1] of the friction work between energy balance and samples.
+    """Return the relative difference [1] of the friction work from energies and from samples.
 
     It is |trapezoidal rule of the forces over the slides - work| over the sum of |work| of all
     steps, and falls with the square of the step.
@@ -280,7 +280,7 @@ def compute_acceleration_peak(window: Response) -> float:
 
 
 def _is_smooth(size, top: int) -> bool:
-    """Return whether samples (k,) are smooth at their largest value.
+    """Return whether samples (k,) are smooth around their largest value.
 
     The second difference there is at most MAX_SMOOTH_RATIO times that at the samples on both sides. Next to a
     jump, one of these has the opposite sign.
@@ -290,7 +290,7 @@ def _is_smooth(size, top: int) -> bool:
 
 
 def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
-    """Return a bound on the peaks missed between samples, by measure name.
+    """Return upper bounds on the peaks that the samples miss, as a dict of measures.
 
     - Acceleration: if it jumps at its largest sample, its change over a step on the smooth side.
     - Normal load that changes: an eighth of its second difference at its smallest and largest
@@ -326,7 +326,7 @@ def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
 
 
 def find_reversal_steps(time, position, rate) -> tuple:
-    """Return the steps in which a rate changes sign, and the fraction of the step there.
+    """Return the steps in which a rate changes its sign, and the fractions of these steps.
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ def find_reversal_steps(time, position, rate) -> tuple:
 
 
 def measure_half_range(time, position, rate) -> float:
-    """Return half the peak-to-peak value [m] of cubics through samples and their rates.
+    """Return half the peak-to-peak value [m] of the cubics through samples and rates.
 
     Parameters
     ----------
@@ -388,7 +388,7 @@ def window_amplitudes(extremes, window: int) -> np.ndarray:
 
 
 def window_end_values(extremes, phasors, window: int) -> tuple:
-    """Return amplitude [m] and phasor [m] of the last cycle of each window, oldest first.
+    """Return amplitude [m] and Fourier coefficient [m] of the last cycle of each window.
 
     Parameters
     ----------

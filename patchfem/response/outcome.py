@@ -40,7 +40,7 @@ AMPLITUDE_ROUND_OFF = 1e-12
 def judge_outcome(
     raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0
 ) -> tuple:
-    """Classify the motion of a run, and extend its measures by a steady estimate.
+    """Classify the motion of a run, and add the steady amplitude to its measures.
 
     - Periodic drive, and the last level of a drive in levels: the amplitudes of successive windows
       decide (`classify_periodic`), and the free motion that remains in them (`remaining_free_motion`). A motion that is
@@ -150,7 +150,7 @@ def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
 
 
 def _midpoint_drift(extremes, window: int) -> float:
-    """Return the motion per cycle [m] of the midpoint of the output over the last two windows.
+    """Return the displacement per cycle [m] of the midpoint of the motion in the last windows.
 
     It is inf if they are not known. For a belt, a window contains whole stick-slip cycles, whereas
     a cycle of the drive does not. extremes: (c, 2) [m] per cycle.
@@ -185,7 +185,7 @@ def _reject_drifting(
 
 
 def remove_errors(measures: dict) -> dict:
-    """Return the measures of a growing motion without errors, because later values differ."""
+    """Remove the errors of the measures of a growing motion, whose later values differ anyway."""
     return {name: replace(one, error=None) for name, one in measures.items()}
 
 
@@ -242,7 +242,7 @@ def classify_periodic(
 
 
 def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
-    """Return whether a motion that is steady to the tolerance will still change noticeably.
+    """Return whether a motion will still change noticeably although it meets the tolerance.
 
     The limit is the fraction ESTIMATE_TOL of the tolerance.
 
@@ -258,7 +258,7 @@ def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
 
 
 def steady_estimate_error(steady, error, amplitude, amplitude_error):
-    """Return the error of a steady estimate [m], including the numerical error of the amplitude.
+    """Return the error of a steady amplitude [m], including that of the computed amplitude.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def steady_estimate_error(steady, error, amplitude, amplitude_error):
 
 
 def is_still_loading(window, period: float, tolerance: float) -> bool:
-    """Return whether the friction force of a stuck interface still increases, as on a belt.
+    """Return whether the friction force of a sticking interface still increases, as on a belt.
 
     The mean of the last cycle must exceed that of the first by more than the tolerance times the
     largest force. In a window of one cycle, the force must increase throughout.
@@ -309,7 +309,7 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
 def check_piece_length(
     outcome: Outcome | None, max_displacement: float, length: float
 ) -> Outcome | None:
-    """Return LEAVES_CONTACT if the displacement exceeded the piece length, else the outcome.
+    """Return LEAVES_CONTACT if the displacement exceeds the piece length, else the outcome.
 
     From that instant on nothing overlaps, so this outcome replaces any later one: steady, growing,
     or at the stop of the flexure, which would have ended the run earlier if it were nearer. A
@@ -359,7 +359,7 @@ def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) ->
 
 
 def remaining_ringing(extremes, window: int, decay):
-    """Return the free vibration [m] that the amplitude of stuck motions still contains, (...).
+    """Return the part [m] of the amplitude that is free vibration while the interface sticks.
 
     It is `remaining_free_motion`, but not less than the change of the last window.
 
@@ -380,7 +380,7 @@ def remaining_ringing(extremes, window: int, decay):
 
 
 def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """Return the warning on a given amount of free vibration of a stuck motion, as a list.
+    """Return a warning, as a list, on the free vibration of a sticking interface.
 
     Parameters
     ----------
@@ -410,7 +410,7 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
 
 
 def changing_note(outcome: Outcome, drive) -> list:
-    """Return a note, as a list, on measures under a drive that changes until the end of the run.
+    """Return a note, as a list, on measures under a drive that changes until the end.
 
     The list is empty for other drives.
     """
@@ -427,7 +427,7 @@ def changing_note(outcome: Outcome, drive) -> list:
 
 
 def estimate_steady(drive, amplitudes, phasors) -> tuple:
-    """Return the steady amplitude and its error [m] under a periodic drive, else (None, None).
+    """Return the steady amplitude [m] and its error; (None, None) without a periodic drive.
 
     A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
     that is not sinusoidal the motion may have no first harmonic, so the amplitudes are extrapolated

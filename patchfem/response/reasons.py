@@ -45,7 +45,7 @@ UNCLOSED = (
 def find_missing(
     values, window, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
 ) -> dict:
-    """Return the measures without a value in a coupled run, by name, each with the reason.
+    """Return the measures of a run that have no value, each with the reason, as a dict.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def find_missing(
 
 
 def find_missing_secant(values) -> dict:
-    """Replace the secant stiffness by a reason if the friction force is not unique.
+    """Return the secant stiffness without a value if the friction force is not unique.
 
     The force of rigid friction takes many values if the interface sticks at the largest slide.
     values: Measure by name. The result is a dict by name; {} if the value remains.
@@ -91,7 +91,7 @@ def find_missing_secant(values) -> dict:
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
-    """Replace the steady amplitude by a reason if a transient hides it.
+    """Return the steady amplitude without a value if a transient hides it.
 
     Parameters
     ----------
@@ -112,13 +112,13 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
 
 
 def _make_missing_measure(name: str, reason: str) -> Measure:
-    """Return a measure that has a reason instead of a value."""
+    """Return a measure that has no value but a reason for this."""
     row = TABLE[name]
     return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
 def find_missing_drift(values, drive) -> dict:
-    """Replace the drift by a reason if the drive is not periodic.
+    """Return the drift without a value if the drive is not periodic.
 
     Means over time spans other than a period differ without any drift. values: Measure by name.
     The result is a dict by name; {} if the value remains.
@@ -131,7 +131,7 @@ def find_missing_drift(values, drive) -> dict:
 
 
 def find_missing_unbounded(values) -> dict:
-    """Replace all measures except the load by the reason that no bounded motion exists."""
+    """Return all measures except the load without values if no bounded motion exists."""
     out = {}
     for name, measure in values.items():
         out[name] = replace(measure, error=None)
@@ -141,7 +141,7 @@ def find_missing_unbounded(values) -> dict:
 
 
 def find_missing_loops(values, window, drive) -> dict:
-    """Replace the areas of friction loops that do not close by a reason.
+    """Return the areas of friction loops without values if the loops do not close.
 
     The result is {} if all loops close. The work per cycle is reported as a loss. If nothing forces
     the motion to repeat, as after a release, the interface also returns or stores energy: if this

@@ -41,7 +41,7 @@ MIN_REFINED_FRACTION = 0.9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ringing:
-    """Decaying sinusoid of a free vibration during stick.
+    """Decaying sinusoid of the free vibration while the interface sticks.
 
     - frequency: frequency of the damped motion [Hz].
     - damping: damping ratio [1].
@@ -56,7 +56,7 @@ class Ringing:
 
 
 def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> Ringing | None:
-    """Fit the free vibration in a signal during a stick interval; None if there is none.
+    """Fit the free vibration of a signal in a stick interval; None if there is none.
 
     A line at a harmonic of the drive that does not decay is forced motion and no ringing.
 
@@ -135,7 +135,7 @@ def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> R
 def make_ringing_measures(
     amplitude: float, omega: float, damping: float, largest_acceleration: float
 ) -> dict:
-    """Return ring_frequency [Hz] and ring_damping [1] of a sinusoid known in closed form.
+    """Return the ringing measures (frequency [Hz], damping ratio [1]) of a known sinusoid.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def compute_stuck_vibration(modes, stiffness, motion) -> list:
 
 
 def select_strongest(modes: list, kind: str) -> VibratingMode:
-    """Return the mode with the largest vibration energy over the stick interval.
+    """Select the mode with the largest vibration energy in the stick interval.
 
     Energy is the time integral of the square of its "displacement" or "acceleration", as `kind`
     says.
@@ -236,7 +236,7 @@ def select_strongest(modes: list, kind: str) -> VibratingMode:
 
 
 def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
-    """Return frequency and damping of the ringing in a signal as medians over stick intervals.
+    """Return frequency and damping of the free vibration as medians over stick intervals.
 
     Parameters
     ----------
@@ -295,7 +295,7 @@ def _resample(time, value) -> tuple:
 
 
 def _make_forced_columns(time, omega: float) -> np.ndarray:
-    """Return the fit columns (k, 1 or 3) of a constant and the forced sinusoid."""
+    """Return the columns of a fit for the constant and the forced part of a signal."""
     parts = [np.ones(time.size)]
     if omega > 0:
         parts += [np.cos(omega * time), np.sin(omega * time)]
@@ -336,7 +336,7 @@ def _fit_poles(time, value, forced, poles, *ends) -> tuple:
 
 @lru_cache(maxsize=16)
 def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
-    """Return the cached workspace of a fit with a given number of poles."""
+    """Return the cached arrays for a fit with a given number of poles."""
     return (
         np.empty((3, count, samples)),
         np.empty((count + 2, count)),
@@ -347,7 +347,7 @@ def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
 
 
 def _subtract_sinusoids(time, value, forced, poles) -> tuple:
-    """Return the residual (k,) and the fitted sinusoids (k,) of given poles."""
+    """Return the residual and the fitted sinusoids (k,) for given poles."""
     n, (columns, few, *_) = forced.shape[1], _fit_poles(time, value, forced, poles)[2]
     return columns[2, 0].copy(), [
         few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
@@ -355,7 +355,7 @@ def _subtract_sinusoids(time, value, forced, poles) -> tuple:
 
 
 def _fit_all_sinusoids(time, value, forced, signal) -> _Fit | None:
-    """Fit as many decaying sinusoids as the signal contains.
+    """Add decaying sinusoids to the fit of a signal while each of them halves the residual.
 
     Sinusoids are added one after the other while each of them at least halves the residual.
     """
@@ -392,7 +392,7 @@ def _find_largest_line(time, residual) -> float:
 
 
 def _initial_guesses(time, value, forced, poles, residual) -> list:
-    """Return two initial guesses of the next sinusoid, with different decay rates.
+    """Return two initial guesses of a further sinusoid, with different decay rates.
 
     The frequency is the best one, by projection, around the highest line of the residual.
     """

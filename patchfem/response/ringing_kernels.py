@@ -76,7 +76,7 @@ def subtract_multiple(a, share, b):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def factor_qr(columns, count, basis, corner):
-    """Compute the QR factorization of columns by Gram-Schmidt, repeated for each column.
+    """Compute the QR factorization of fit columns by repeated Gram-Schmidt orthogonalization.
 
     Fills the rows of `basis` and the upper triangle `corner` (count, count) with column j = sum
     corner[i, j] basis[i]. A dependent column has zeros as its basis vector.
@@ -163,7 +163,7 @@ def solve_upper_triangle(count, corner, inside, numbers):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def compute_residual(time, value, poles, columns, few):
-    """Compute the residual of fitting decaying sinusoids with given poles to a signal.
+    """Compute the residual of a signal after the fit of decaying sinusoids with given poles.
 
     Fills the workspace and returns the sum of squares of the residual.
 

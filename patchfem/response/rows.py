@@ -41,7 +41,7 @@ NO_INTEGRATED_MEASURES = IntegratedMeasures()
 
 @dataclass(frozen=True, eq=False)
 class LastCycles:
-    """Last cycles of a run, with values that its engine integrates more accurately than samples.
+    """Last cycles of a run, from which the measures are evaluated.
 
     - window: histories.
     - drive: drive of the run.
@@ -93,7 +93,7 @@ class LastCycles:
 
     @cached_property
     def samples(self) -> Response:
-        """Window with interface samples inside the time steps, if the engine has them."""
+        """Samples of the window, with samples inside the time steps if the engine has them."""
         return self.window if self.inside is None else self.inside(self.window, self.number)
 
     @cached_property
@@ -103,7 +103,7 @@ class LastCycles:
 
     @cached_property
     def slip(self) -> dict:
-        """Slip amplitude [m], stick fraction [1] and phase of the slip start [rad] by name."""
+        """Slip amplitude [m], stick fraction [1] and phase of the slip start [rad] as a dict."""
         if self.load is None:
             return {}
         first = self.integrated.loops[0] if self.integrated.loops else None
@@ -149,7 +149,7 @@ class LastCycles:
 
     @cached_property
     def cycle(self) -> dict:
-        """Measures of the friction loop by name; {} without friction or complete cycle.
+        """Measures of the friction loop as a dict, empty without friction or a complete cycle.
 
         loop_area [J]; under sinusoidal drive also equivalent_stiffness and secant_stiffness [N/m]
         and equivalent_damping [1].
@@ -168,7 +168,7 @@ class LastCycles:
 
     @cached_property
     def waves(self) -> dict:
-        """Harmonics of the acceleration by name; {} if the drive does not end as a sinusoid.
+        """Harmonics of the acceleration as a dict, empty unless the drive ends as a sinusoid.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
@@ -183,12 +183,12 @@ class LastCycles:
 
     @cached_property
     def energies(self) -> dict:
-        """Work and energies [J] by name at the end of the ledger; empty without a ledger."""
+        """Work and energies [J] at the end of the run as a dict, empty if they are not recorded."""
         return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
     def random_response_measures(self) -> dict:
-        """Measures of a stationary random drive by name; {} under other drives."""
+        """Measures of the response to a stationary random drive as a dict."""
         if not hasattr(self.drive, "band"):
             return {}
         found = stationary.random_response_measures(self.window, self.drive)
@@ -200,7 +200,7 @@ class LastCycles:
 
     @property
     def work_check(self) -> float | None:
-        """Relative difference [1] of two computations of the friction work; None without the second."""
+        """Relative difference [1] of the friction work from two computations, if both exist."""
         if self.load is None or self.integrated.friction_works is None:
             return None
         return relative_gap(
@@ -244,11 +244,11 @@ class LastCycles:
         return out
 
     def lateral(self, name: str):
-        """Return a history of the interface perpendicular to its main sliding direction."""
+        """Return a history of the interface in the direction perpendicular to sliding."""
         return lateral_history(self.window, name, self.number)
 
     def evaluate_load(self, value: Callable) -> float | None:
-        """Return a number computed from the load history (k,) [N]; None if the load is constant.
+        """Apply a function to the history of the normal load (k,) [N]; None if it is constant.
 
         value: function of the load history in the window.
         """
@@ -257,7 +257,7 @@ class LastCycles:
 
 
 def lateral_work(window, number: int) -> float:
-    """Return the friction work [J] of an interface perpendicular to the drive in a window.
+    """Return the friction work [J] in a window due to motion perpendicular to the drive.
 
     The trapezoidal rule is used; the work is 0 if the interface slides along a line.
     """
@@ -266,12 +266,12 @@ def lateral_work(window, number: int) -> float:
 
 
 def resultant_peak(force, across) -> float:
-    """Return the largest magnitude [N] of a force (k,) or of its resultant with a lateral force."""
+    """Return the largest magnitude [N] of a force or of its resultant with a lateral force."""
     return float((np.abs(force) if across is None else np.hypot(force, across)).max())
 
 
 def compute_drift(s: LastCycles) -> float:
-    """Return the drift of the relative displacement of an interface per cycle [m].
+    """Return the drift of the relative displacement per cycle [m] of an interface.
 
     If the interface slides in a plane, it is the magnitude of the drift vector.
     """
@@ -314,7 +314,7 @@ def _drift_scale(values: dict):
 
 
 def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
-    """Return the definitions of a measure under random drive and of its scatter."""
+    """Return the definitions of a measure under random drive and of its statistical scatter."""
     scatter = f"{name}_scatter"
     return (
         MeasureDefinition(
@@ -688,7 +688,7 @@ MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
 def compute_measures(last_cycles: LastCycles) -> dict:
-    """Compute the measures of a run from its last cycles, by name, in SI units.
+    """Compute the measures of a run from its last cycles as a dict, in SI units.
 
     Measures without a value are left out. The INTERFACE_MEASURES are repeated for every further
     interface, with its number after the name. A value of the engine replaces the one computed from
@@ -711,7 +711,7 @@ def _compute_value(row: MeasureDefinition, last_cycles: LastCycles) -> float | N
 
 
 def stick_fraction(stuck, span):
-    """Return the fraction of a time span [s] that a stick time [s] covers; numbers or (n,).
+    """Return the ratio of the stick time to a time span.
 
     A fraction that differs from 1 only by the round-off of the sum of its parts is set to 1.
     """
@@ -719,13 +719,13 @@ def stick_fraction(stuck, span):
 
 
 def remove_interface_number(name: str) -> str:
-    """Return the name of a measure without interface number: slip_amplitude_2 -> slip_amplitude."""
+    """Remove the interface number from a measure name, such as "_2" of slip_amplitude_2."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
 
 
 def add_interface_number(name: str, number: int) -> str:
-    """Append the interface number to the name of a measure; the first interface has no suffix."""
+    """Append an interface number to the name of a measure, except for the first interface."""
     return f"{name}_{number + 1}" if number else name
 
 
@@ -749,7 +749,7 @@ def error_floor(name: str, size=np.inf):
 
 
 def larger_term(name: str, values: dict):
-    """Return the size of the larger terms of which a measure is the difference, in its unit.
+    """Return the size of the terms whose difference a measure is, in its unit.
 
     Parameters
     ----------
@@ -774,7 +774,7 @@ def larger_term(name: str, values: dict):
 
 
 def set_final_floors(measures: dict, tolerance: float) -> dict:
-    """Return measures with final floors; that of a difference is tolerance x its larger term."""
+    """Raise the error floors of measures that are differences of much larger terms."""
     values = {
         name: measure.value for name, measure in measures.items() if measure.value is not None
     }

@@ -43,7 +43,7 @@ EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_and_displacements(response) -> tuple:
-    """Return slip and displacement (k, i) [m] of every interface at the samples of a Response.
+    """Return slip and relative displacement (k, i) [m] of every interface in a Response.
 
     For an interface that slides in a plane, the slip is the path length, which only grows, and the
     slide is that in the first direction.
@@ -61,12 +61,12 @@ def slips_and_displacements(response) -> tuple:
 
 
 def find_segment_borders(drive) -> list:
-    """Return the times [s] at which a drive changes from a segment to the next."""
+    """Return the times [s] at which a drive changes from one segment to the next."""
     return [segment.start for segment in drive.segments[1:]]
 
 
 def convert_event_log(log) -> Events:
-    """Convert an EventLog of the exact engine to an Events table."""
+    """Convert the event log of an exact engine to an Events table."""
     part = slice(-MAX_EVENTS, None)
     kind = KIND_BY_SHIFTED_LOG_NUMBER[log.kind[part] + LOG_OFFSET]
     slide = np.where(kind == SEGMENT_BORDER, np.nan, log.slide[part])
@@ -102,7 +102,7 @@ def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
 
 
 def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
-    """Return for each interface whether it slips in the window, as a list of bool (i).
+    """Return for each interface whether it slips in a window.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.
 
 
 def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
-    """Return the stick intervals [(start, end)] [s] of a window.
+    """Return the intervals [(start, end)] [s] of a window in which the interface sticks.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -
 
 
 def select_last_cycle(spans, end: float, period: float) -> list:
-    """Select the stick intervals that represent the last cycle of a periodic motion.
+    """Select the stick intervals that belong to the last cycle of a periodic motion.
 
     They begin in the last cycle but one and end before `end`. The list is empty if the interface
     always sticks.
@@ -167,7 +167,7 @@ def select_last_cycle(spans, end: float, period: float) -> list:
 def measure_ringing_in_sticks(
     window, modes, drive, log=None, max_stick_slip: float = 0.0, repeats: bool = False
 ) -> tuple:
-    """Return frequency [Hz] and damping ratio [1] of the ringing during stick, and their errors.
+    """Return frequency [Hz] and damping ratio [1] of the free vibration in stick intervals.
 
     They are computed from the acceleration at the output. The result is ({}, {}) if nothing rings,
     if the drive has no frequency (sweep, recorded signal), or if the samples do not resolve the
@@ -201,7 +201,7 @@ def measure_ringing_in_sticks(
 
 
 def add_uncertainty(measures: dict, stated_errors: dict | None) -> dict:
-    """Add errors that the run itself states, by name, to the errors of measures."""
+    """Add errors that a run itself states to the errors of its measures."""
     return {
         name: replace(m, error=m.error + (stated_errors or {}).get(name, 0.0))
         if m.error is not None
@@ -211,7 +211,7 @@ def add_uncertainty(measures: dict, stated_errors: dict | None) -> dict:
 
 
 def is_all_stuck(window, max_stick_slip: float) -> bool:
-    """Return whether no interface or strip of a window slips by more than a given slip [m].
+    """Return whether no interface or strip slips by more than a given distance [m] in a window.
 
     The limit applies to half the range of the slip and is not below its round-off.
     """
@@ -221,7 +221,7 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
 
 
 def join_logs(logs, shifts) -> object:
-    """Join the EventLogs of successive runs to a single one, with a border between them.
+    """Join the event logs of successive runs, with a segment border between them.
 
     shifts: times [s] by which the runs start later than the first one.
     """

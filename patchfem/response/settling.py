@@ -77,7 +77,7 @@ def classify_motions(a, tolerance: float, floor=0.0) -> np.ndarray:
 
 
 def geometric_remainder(three) -> complex | None:
-    """Return the remaining sum of a geometric series through three values, or None.
+    """Return the sum of the remaining terms of a geometric series through three values, or None.
 
     See `geometric_remainders`.
     """
@@ -86,7 +86,7 @@ def geometric_remainder(three) -> complex | None:
 
 
 def geometric_remainders(three):
-    """Return the remaining sums of geometric series through three values (Aitken's method).
+    """Return the sums of the remaining terms of geometric series (Aitken's method).
 
     It is what the series still adds to the last of three equally spaced values (..., 3), and NaN if
     the changes do not shrink. A beat is a series of complex values with a complex ratio.
@@ -99,7 +99,7 @@ def geometric_remainders(three):
 
 
 def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
-    """Extrapolate the steady amplitude of a motion [m] and estimate its error [m].
+    """Extrapolate the amplitudes of windows to the steady amplitude [m] and its error [m].
 
     (None, None) if no bounded limit can be estimated.
     """
@@ -111,7 +111,7 @@ def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
 
 
 def extrapolate_steady_amplitudes(a, p) -> tuple:
-    """Extrapolate the steady amplitudes of motions, and estimate their errors.
+    """Extrapolate the amplitudes of windows to steady amplitudes and errors for n motions.
 
     In a linear rig the remaining free motion is multiplied by one complex factor per window, so
     that Aitken's method extrapolates the phasors. Friction acts differently on changes of the
@@ -168,7 +168,7 @@ def extrapolate_steady_amplitudes(a, p) -> tuple:
 
 
 def plane_map_remainders(p) -> np.ndarray:
-    """Return the remaining sums (n,) of differences that a linear map of the plane generates.
+    """Sum the remaining differences (n,) of points that a linear map of the plane generates.
 
     By the Cayley-Hamilton theorem d3 = t d2 - q d1, with the trace t and the determinant q of the
     map; the sum of all further differences is ((t - q) d3 - q d2)/(1 - t + q). NaN if all
@@ -187,12 +187,12 @@ def plane_map_remainders(p) -> np.ndarray:
 
 
 def _unpack_single(estimate: tuple) -> tuple:
-    """Return value and error (1,) of a single motion as floats; None for NaN."""
+    """Return value and error of a single motion as floats, with None for NaN."""
     return tuple(None if np.isnan(one[0]) else float(one[0]) for one in estimate)
 
 
 def window_amplitude_means(extremes, window: int) -> tuple:
-    """Return the amplitude of each window [m], and the mean of the amplitudes of its cycles [m].
+    """Return the amplitude [m] of each window, and the mean amplitude [m] of its cycles.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def window_amplitude_means(extremes, window: int) -> tuple:
 
 
 def remaining_free_motion(extremes, window: int, decay=0.0):
-    """Return the decaying free motion [m] that the amplitude of the last window contains.
+    """Return the decaying free motion [m] that the last window still contains.
 
     A free motion at a frequency near that of the drive beats. If the beat is short, the cycles of
     one window differ: the excess of the amplitude of the window over the mean of its cycles
@@ -289,7 +289,7 @@ def beat_mean_amplitudes(extremes, window: int) -> tuple:
 
 
 def slip_period(time, rate) -> float:
-    """Return the longest time [s] between the starts of the last three slips.
+    """Return the longest time [s] between the starts of the last slip intervals.
 
     It is 0 if there are fewer than two slips, or if the last one is more than 1.5 times this long
     ago, because the interface then sticks. The interface slips while its rate exceeds SLIP_SPEED_TOL of the
@@ -311,7 +311,7 @@ def slip_period(time, rate) -> float:
 
 
 def _increases_steadily(a) -> np.ndarray:
-    """Return whether the last windows (n, w) increase by similar steps, which noise does not do."""
+    """Return whether the amplitudes of the last windows (n, w) grow by similar increments."""
     steps = np.diff(a[:, -6:], axis=1)
     if a.shape[1] < 4:
         return np.zeros(len(a), bool)

@@ -43,7 +43,7 @@ def harmonic_weights(time, omega: float) -> list:
 
 
 def motion_harmonic(time, value, rate, omega: float, known: list | None = None) -> complex:
-    """Return the Fourier coefficient 2/T int y exp(-i omega t) dt of cubics through samples.
+    """Return a Fourier coefficient of the piecewise cubic motion through samples.
 
     Four Gauss points per step are used, so that only the cubic is approximate: h^4/384 of the
     fourth derivative.
@@ -75,7 +75,7 @@ def motion_harmonic(time, value, rate, omega: float, known: list | None = None) 
 
 
 def acceleration_harmonic(time, value, rate, omega: float) -> complex:
-    """Return the Fourier coefficient of y'' [m s-2] from y and y', by integration by parts.
+    """Return a Fourier coefficient [m s-2] of the acceleration from displacement and velocity.
 
     The acceleration of a rig with friction jumps, but its motion does not, so that a jump causes no
     error.
@@ -91,7 +91,7 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
 
 
 def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> complex:
-    """Return the harmonic of the acceleration from the known harmonic of the displacement."""
+    """Return the harmonic of the acceleration from that of the displacement."""
     span = time[-1] - time[0]
     wave = np.exp(-1j * omega * time[[0, -1]])
     border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
@@ -101,7 +101,7 @@ def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> comp
 
 
 def odd_harmonics(window, drive) -> tuple:
-    """Return the magnitudes of harmonics 1 and 3 of the acceleration at the output [m s-2].
+    """Return the magnitudes [m s-2] of the first and third harmonic of the acceleration.
 
     window: Response over complete cycles of a drive that ends as a sinusoid.
     """
@@ -120,7 +120,7 @@ def odd_harmonics(window, drive) -> tuple:
 def harmonic_measures(
     first_harmonic: float, third_harmonic: float, drive_acceleration: float = 0.0
 ) -> dict:
-    """Return the acceleration fundamental [m s-2] and distortion [1] by measure name.
+    """Return fundamental [m s-2] and distortion [1] of the acceleration as a dict.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def harmonic_measures(
 
 
 def distortion_ratio(first_harmonic, third_harmonic, drive_acceleration):
-    """Return the ratio of third to first harmonic of an acceleration (3.4); NaN for 0/0.
+    """Return the ratio of the third to the first harmonic of an acceleration.
 
     It is NaN if the first harmonic is below its floor or the round-off of the drive.
 
@@ -189,7 +189,7 @@ def friction_harmonic(window, modes, drive) -> complex:
 def read_instrument(
     window, drive, peak: float, kind: str = "peak", cutoff: float | None = None
 ) -> float:
-    """Return the absolute acceleration [m s-2] of a window as an instrument displays it.
+    """Return the absolute acceleration [m s-2] of a window as its sensor measures it.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def read_instrument(
 
 
 def _acceleration_harmonic_n(window, drive, n: int) -> complex:
-    """Return the complex n-th harmonic [m s-2] of the absolute acceleration, from the motion.
+    """Return the complex n-th harmonic [m s-2] of the absolute acceleration.
 
     Integration by parts is used, so that a jump of the acceleration causes no error.
     """

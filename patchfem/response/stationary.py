@@ -20,7 +20,7 @@ from scipy.special import stdtrit
 
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
-SEGMENTS_PER_RECORD = 16  # Length of the record over that of a segment.
+SEGMENTS_PER_RECORD = 16  # Ratio of the record length to the segment length.
 # Number of parts of the record from which the scatter is estimated; they are groups of segments,
 # each left out once.
 N_GROUPS = 10
@@ -78,7 +78,7 @@ def make_record(window, drive) -> Record:
 
 
 def random_response_measures(window, drive) -> dict:
-    """Return the measures under a stationary random drive by name, except those without value."""
+    """Return the measures of the response to a stationary random drive as a dict."""
     record = make_record(window, drive)
     out = {}
     for name, values, even in (
@@ -165,7 +165,7 @@ def mean_power(time, work) -> tuple:
 
 
 def is_steady(window, drive) -> bool:
-    """Return whether the root mean squares of both halves of a window agree within scatter."""
+    """Return whether both halves of a window have the same root mean square within scatter."""
     place = make_record(window, drive).place
     half = place.size // 2
     first = place[:half]
@@ -177,7 +177,7 @@ def is_steady(window, drive) -> bool:
 
 
 def transform_record(record: Record) -> Segments:
-    """Transform drive, displacement and acceleration over segments of 1/16 of a record."""
+    """Transform drive, displacement and acceleration in overlapping segments of a record."""
     size = max(
         min(MIN_SEGMENT_SAMPLES, record.place.size),
         2 * (record.place.size // (2 * SEGMENTS_PER_RECORD)),
@@ -200,7 +200,7 @@ def compute_spectra(window, drive) -> Spectra:
 
 
 def fit_peak(record: Record, band: tuple) -> tuple | None:
-    """Fit frequency [Hz] and damping ratio of the largest peak of H1, with half-widths.
+    """Fit natural frequency [Hz] and damping ratio to the largest peak of H1, with half-widths.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
 
 
 def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
-    """Fit ln of (omega [rad/s], damping ratio) of the mode that reproduces H1.
+    """Fit natural frequency and damping ratio of the mode that reproduces H1.
 
     A complex constant is fitted as well, for the other modes.
 
@@ -273,7 +273,7 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     size = np.abs(gain).max()
 
     def compute_residual(theta):
-        """Return the residual of H1 after a linear fit of the columns, over its largest value."""
+        """Return the relative residual of H1 after a linear least-squares fit."""
         response = expected_response(f, *np.exp(theta), span)
         columns = np.stack([response, np.ones(f.size, complex), 1j * np.ones(f.size)], axis=1)
         design = np.concatenate([columns.real, columns.imag])
@@ -288,7 +288,7 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
 
 
 def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
-    """Return the expected H1 [s2] of a mode from segments with Hann's window, in closed form.
+    """Return the H1 estimate [s2] that Hann-windowed segments give for a mode, in closed form.
 
     int_0^span h(t) r(t) exp(-2 pi i f t) dt, where h is the response of x'' + 2 zeta omega x' +
     omega^2 x = a and r the correlation of the window.

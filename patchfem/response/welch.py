@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Segments(NamedTuple):
-    """Fourier transforms of the segments of sampled records.
+    """Fourier transforms of the overlapping segments of a record.
 
     - frequency (q,): [Hz].
     - transforms (r, m, q): of r records over m segments, scaled so that 2 |X|^2 is a one-sided
@@ -22,7 +22,7 @@ class Segments(NamedTuple):
 
 
 class CrossDensities(NamedTuple):
-    """One-sided spectral densities of input and output, and complex cross density, (q,) each."""
+    """One-sided spectral densities of input and output with their cross density, (q,) each."""
 
     input: np.ndarray
     output: np.ndarray
@@ -35,7 +35,7 @@ class CrossDensities(NamedTuple):
 
 
 def transform_segments(step: float, records, size: int, *, has_window: bool = True) -> Segments:
-    """Compute Fourier transforms of record segments that overlap by half.
+    """Compute the Fourier transforms of record segments that overlap by half.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
 
 
 def average_segments(driven, response) -> CrossDensities:
-    """Average transforms (m, q) of input and output segments to spectral densities."""
+    """Average products of segment transforms to spectral densities."""
     return CrossDensities(
         input=2 * np.mean(np.abs(driven) ** 2, axis=0),
         output=2 * np.mean(np.abs(response) ** 2, axis=0),

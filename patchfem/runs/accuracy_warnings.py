@@ -147,11 +147,8 @@ def _named_measures(finding: Finding, excess: dict) -> list[str]:
     the largest error over the allowed error.
     """
     known = finding.measures
-    main = [
-        name
-        for name in MAIN_MEASURES
-        if name in excess and known[name].error < abs(known[name].value)
-    ]
+    main = [name for name in MAIN_MEASURES if name in excess]
+    main = [name for name in main if known[name].error < abs(known[name].value)]
     others = {
         name: times for name, times in excess.items() if not name.startswith(RINGING_PREFIX)
     } or excess

@@ -48,7 +48,7 @@ MAX_MASS_FRACTION = 1 + 1e-9  # sum of base^2: at most 1, plus round-off of the 
 
 
 def read_arrays(path: Path) -> dict:
-    """Read the known arrays of a .npz or .mat file by name.
+    """Read the arrays of a structure from a .npz or .mat file.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def read_arrays(path: Path) -> dict:
 
 
 def _read_member(file: ZipFile, name: str) -> np.ndarray:
-    """Read an array of a .npz file; its header is checked first."""
+    """Read one array of a .npz file after its header is checked."""
     readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     with file.open(f"{name}.npy") as member:
         shape, _, dtype = readers[npy.read_magic(member)](member)
@@ -129,7 +129,7 @@ def build_basis(
     is_forced: bool = False,
     mass: float | None = None,
 ) -> ModalBasis:
-    """Build the modal basis of a rig from arrays.
+    """Build the modal basis of a rig from the arrays of a file.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def _refuse_missing(data: dict, missing_name: str) -> None:
 def _build_basis_from_matrices(
     data: dict, pairs, driven_mass: int | None, is_forced: bool
 ) -> ModalBasis:
-    """Build the modal basis of matrices."""
+    """Build the modal basis of a rig from mass, stiffness and damping matrices."""
     for name in ("M", "K"):
         if name not in data:
             _refuse_missing(data, f"the matrix {name}")
@@ -222,7 +222,7 @@ def _build_basis_from_matrices(
 
 
 def _to_matrix(values, name: str):
-    """Return a matrix; a single number is a matrix of one row. None stays None."""
+    """Convert a single number to a matrix of one row; pass other arrays and None through."""
     if values is None or np.ndim(values) == 2:
         return values
     if np.size(values) != 1:
@@ -233,7 +233,7 @@ def _to_matrix(values, name: str):
 def _build_basis_from_modes(
     data: dict, pairs, driven_mass: int | None, is_forced: bool, mass: float | None
 ) -> ModalBasis:
-    """Build the modal basis of modal data."""
+    """Build the modal basis of a rig from natural frequencies and mode shapes."""
     if pairs or driven_mass:
         raise PatchfemError(
             "modal data have no numbered masses, which [[structure.interface]] and "
@@ -292,7 +292,7 @@ def _build_basis_from_modes(
 
 
 def _read_damping(data: dict, omega) -> tuple:
-    """Return damping ratios (n,), and the damping matrix (n, n) [1/s] or None if it is diagonal."""
+    """Read damping ratios (n,), and the damping matrix (n, n) [1/s] unless it is diagonal."""
     n = omega.size
     damping = _read_numbers(data, "damping", (n,), (n, n))
     if damping.ndim == 1:
@@ -308,7 +308,7 @@ def _read_damping(data: dict, omega) -> tuple:
 
 
 def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
-    """Return an array of finite real numbers.
+    """Convert an array of a file to finite real numbers.
 
     Parameters
     ----------
@@ -333,14 +333,14 @@ def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
 
 
 def _has_shape(values, shape: tuple) -> bool:
-    """Return whether an array has a shape; None in the shape means any length."""
+    """Return whether an array has a given shape, in which None means any length."""
     if len(shape) != values.ndim:
         return False
     return all(length in (None, size) for length, size in zip(shape, values.shape))
 
 
 def _read_names(data: dict, n: int) -> tuple | None:
-    """Return the names of n coordinates, None if the file has none."""
+    """Read the names of n coordinates; None if the file has none."""
     if "names" not in data:
         return None
     # a cell of a .mat file is an array with one string

@@ -95,7 +95,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
 
 
 def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
-    """Express a basis in new modes, with a further damping matrix.
+    """Transform a modal basis to new modes, with an additional damping matrix.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ TIME_TOL = 1e-6  # fraction of a period; round-off of times after many cycles
 
 
 class DriveKeys(NamedTuple):
-    """Keys of [drive], with what is needed to build a drive from them.
+    """Keys of [drive], with the quantities that are needed to build a drive from them.
 
     - keys: keys of [drive] in SI units.
     - mass: modal mass [kg].
@@ -34,7 +34,7 @@ class DriveKeys(NamedTuple):
 
     @property
     def levels(self) -> tuple:
-        """Acceleration, or force over the modal mass, of each level [m s-2]; () without levels."""
+        """Acceleration, or force per modal mass, of each drive level [m s-2]; () without levels."""
         mass = 1.0 if self.moving else self.mass
         return tuple(level / mass for level in self.keys.levels or ())
 
@@ -93,7 +93,7 @@ def find_max_acceleration(drive) -> float:
 
 
 def find_drive_omega(drive) -> float:
-    """Return the circular frequency [rad/s] of the cycle of a drive."""
+    """Return the angular frequency [rad/s] of the cycle of a drive."""
     return 2 * np.pi / drive.period
 
 
@@ -114,7 +114,7 @@ def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
 
 
 def find_max_frequency_ratio(drive) -> float:
-    """Return the highest frequency of a drive over that of its cycle."""
+    """Return the ratio of the highest frequency of a drive to the frequency of its cycle."""
     return 1.0 if drive.segments else drive.max_frequency_ratio
 
 
@@ -146,12 +146,12 @@ def has_full_cycle(span: float, drive) -> bool:
 
 
 def is_release(drive) -> bool:
-    """Return whether the motion is a release, which nothing drives."""
+    """Return whether the motion is a release without any drive."""
     return len(drive.segments) == 1 and find_max_acceleration(drive) == 0
 
 
 def choose_samples_per_cycle(drive, cycles: float, *, needs_history: bool = False) -> int:
-    """Return the number of equally spaced samples per cycle that a whole run stores.
+    """Return the number of equally spaced samples per cycle that are stored for all cycles.
 
     They are `SAMPLES_PER_CYCLE`, or fewer so that the run has at most `MAX_STORED_SAMPLES`. They are 0, so that
     only reversals are stored, if fewer than `MIN_SAMPLES_PER_CYCLE` remained, and under a drive.

@@ -34,7 +34,7 @@ MIN_TAYLOR_RATE = 40
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PiecewiseDrive:
-    """Drive that consists of constant and sinusoidal segments, the first from t = 0 on.
+    """Drive that consists of successive constant and sinusoidal segments.
 
     - period: duration [s] of a cycle.
     - is_periodic: whether the segments repeat after each period until the run ends; a drive that ends
@@ -79,14 +79,14 @@ def make_step(acceleration: float, period: float, *, moving: bool = True) -> Pie
 
 
 def make_release(period: float) -> PiecewiseDrive:
-    """Build a drive that is zero, for free motion; `period` [s] is that of the cycle."""
+    """Build a drive that is zero, for free motion after a release."""
     return PiecewiseDrive((DriveSegment(0.0),), period, False)
 
 
 def make_levels(
     accelerations, omega: float, cycles: float, *, moving: bool = True
 ) -> PiecewiseDrive:
-    """Build a sine of continuous phase whose amplitude changes between levels (report, 4.C).
+    """Build a sinusoidal drive of continuous phase whose amplitude changes between levels.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def make_levels(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SweepDrive:
-    """Sine whose frequency changes from `low` to `high` and then stays constant.
+    """Sinusoidal drive whose frequency is swept between two values and then stays constant.
 
     The drive is sin(2 pi int f dt) times its amplitude.
 
@@ -168,7 +168,7 @@ class SweepDrive:
 
     @property
     def max_frequency_ratio(self) -> float:
-        """Highest frequency over that of the cycle."""
+        """Ratio of the highest frequency to the frequency of the drive cycle."""
         return max(self.low, self.high) * self.period
 
     def frequency(self, t):
@@ -199,7 +199,7 @@ class SweepDrive:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordedDrive:
-    """Recorded signal, linear between its rows and zero after the last.
+    """Recorded drive, interpolated linearly between its rows and zero after the last.
 
     - time: times (k,) [s], rising from 0; at least two.
     - value: acceleration, or force over the modal mass, at these times [m s-2].
@@ -245,7 +245,7 @@ class RecordedDrive:
 
     @property
     def max_frequency_ratio(self) -> float:
-        """One, because the cycle is that of the rig."""
+        """Ratio 1, because the cycle of a recorded drive is that of the rig."""
         return 1.0
 
     @property

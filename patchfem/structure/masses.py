@@ -9,7 +9,7 @@ from . import matrices
 
 
 def make_slide_rows(pairs, n: int) -> np.ndarray:
-    """Build the rows (k, n) that give the relative displacements x_i - x_j of pairs of n masses.
+    """Return the rows (k, n) that map the motions of n masses to k relative displacements.
 
     `pairs` holds k pairs (i, j) of masses, numbered from 1; 0 is the base.
     """
@@ -61,14 +61,14 @@ def build_basis(
 
 
 def _make_weighted_rows(elements, n: int) -> np.ndarray:
-    """Build rows with rows^T rows = K of springs, or = C of dampers."""
+    """Return rows whose product rows^T rows is the matrix of given springs or dampers."""
     rows = make_slide_rows([pair for pair, _ in elements], n)
     coefficients = np.array([coefficient for _, coefficient in elements], float)
     return rows * np.sqrt(coefficients)[:, None]
 
 
 def set_lateral_displacements(basis: ModalBasis, laterals) -> ModalBasis:
-    """Turn the last faces of a basis into the second directions of its interfaces.
+    """Use the last interfaces of a basis as the lateral directions of the first ones.
 
     Parameters
     ----------

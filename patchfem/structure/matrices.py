@@ -127,7 +127,7 @@ def build_basis(
 
 
 def split_damping(D, omega) -> tuple:
-    """Split a modal damping matrix D (n, n) [1/s] into damping ratios and coupling.
+    """Split a modal damping matrix (n, n) [1/s] into damping ratios and the coupling of modes.
 
     Returns the damping ratios (n,), and D if it couples modes or damps a rigid one, else None.
     """
@@ -230,7 +230,7 @@ def _factor_mass(M):
 
 
 def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
-    """Solve root x = right, or root^T x = right, for a root of `_factor_mass`."""
+    """Solve a triangular system with the Cholesky factor of the mass matrix."""
     if root.ndim == 2:
         return solve_triangular(
             root, right, lower=True, trans="T" if transpose else "N", check_finite=False
@@ -311,14 +311,14 @@ def _project_damping_matrix(phi, C) -> np.ndarray:
 
 
 def _project_damper_rows(phi, damper_rows) -> np.ndarray:
-    """Project dampers that are known one by one on shapes; they never add energy."""
+    """Project individual dampers on mode shapes, as a matrix that never adds energy."""
     rates = damper_rows @ phi
     size = np.abs(damper_rows) @ np.abs(phi)
     return trim_round_off(rates.T @ rates, size.T @ size)
 
 
 def _decouple_equal_frequencies(phi, omega, D) -> tuple:
-    """Rotate shapes of equal frequency so that D does not couple them; return shapes and D."""
+    """Rotate mode shapes of equal frequency so that the damping does not couple them."""
     first = 0
     for last in range(1, len(omega) + 1):
         if last < len(omega) and omega[last] - omega[first] <= EQUAL_FREQUENCY_TOL * omega[last]:
@@ -350,7 +350,7 @@ def _check_row(row, n: int, name: str) -> np.ndarray:
 
 
 def _find_shape_signs(phi, output) -> np.ndarray:
-    """Return a sign (n,) per shape that makes the motion of the output positive.
+    """Return the sign (n,) of each shape for which the output moves in positive direction.
 
     At a node of the shape the largest entry is made positive instead.
     """

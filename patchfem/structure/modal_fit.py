@@ -38,7 +38,7 @@ MAX_MISFIT = 0.5  # relative residual; with more, the fit is refused
 
 
 class Columns(NamedTuple):
-    """Columns of the linear problem: modes, lower residual, upper residual.
+    """Columns of the linear fit of residues: modes, lower residual and upper residual.
 
     - design: real columns (2q, n + 2) of norm 1.
     - by_frequency, by_damping: derivatives (2q, n) over ln w_r and ln zeta_r.
@@ -52,7 +52,7 @@ class Columns(NamedTuple):
 
 
 class LinearFit(NamedTuple):
-    """Solution of the linear problem for given poles.
+    """Solution of the linear fit of residues for given poles.
 
     - residual: weighted residual (2q, p), real parts before imaginary ones.
     - coefficients: coefficients (n + 2, p) of the columns.
@@ -67,7 +67,7 @@ class LinearFit(NamedTuple):
 
 
 class FittedPoles(NamedTuple):
-    """Poles of frequency responses.
+    """Poles that are fitted to frequency responses.
 
     - w: natural frequencies (n,) [rad/s], ascending.
     - zeta: damping ratios (n,).
@@ -85,7 +85,7 @@ class FittedPoles(NamedTuple):
 
 
 class Residues(NamedTuple):
-    """Residues of the modes and of the modes outside the measured range.
+    """Residues of the modes, and residual terms of modes outside the measured range.
 
     - modes: residues A (n, p) of the modes.
     - lower: residues L (p,) of the modes below the range.
@@ -98,7 +98,7 @@ class Residues(NamedTuple):
 
 
 class ModalFit:
-    """Separable least-squares problem of modes in frequency responses.
+    """Separable least-squares problem that fits modes to frequency responses.
 
     The nonlinear parameters are theta = (ln w_1 ..., ln zeta_1 ...). Each response is divided by its root
     mean square.
@@ -140,7 +140,7 @@ class ModalFit:
         self.norm = np.linalg.norm(self.target)
 
     def columns(self, theta) -> Columns:
-        """Compute the columns of the linear problem, and their derivatives."""
+        """Compute the columns of the linear fit and their derivatives."""
         w, z = np.exp(np.split(theta, 2))
         s = self.omega[:, None]
         base = (self.weight * self.derivative)[:, None]
@@ -159,7 +159,7 @@ class ModalFit:
         )
 
     def solve(self, theta) -> LinearFit:
-        """Solve the linear problem for given poles."""
+        """Solve the linear fit of residues for given poles."""
         columns = self.columns(theta)
         q, r = np.linalg.qr(columns.design)
         coefficients = np.linalg.lstsq(r, q.T @ self.target, rcond=1e-13)[0]
@@ -171,7 +171,7 @@ class ModalFit:
         return self.solve(theta).residual.ravel()
 
     def jacobian(self, theta):
-        """Compute the derivatives (2q p, 2n) of the residual over theta (Kaufman 1975).
+        """Compute the derivatives (2q p, 2n) of the residual with respect to the pole parameters.
 
         Each is the change of one column outside the span of all columns, times its coefficients.
         """
@@ -237,7 +237,7 @@ class ModalFit:
 
 
 def _stack_real(values):
-    """Stack real parts over imaginary parts."""
+    """Stack the real parts of an array on its imaginary parts."""
     return np.vstack([values.real, values.imag])
 
 
@@ -248,7 +248,7 @@ def _join_complex(stacked):
 
 
 def fit_poles(omega, data, power) -> FittedPoles:
-    """Find the poles of frequency responses.
+    """Fit the poles of frequency responses.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def fit_poles(omega, data, power) -> FittedPoles:
 
 
 def add_mode(theta, w: float, zeta: float) -> np.ndarray:
-    """Add a mode to the parameters (2n,) of a fit, ln w_r then ln zeta_r.
+    """Add a mode to the parameters (2n,) of a fit.
 
     Parameters
     ----------
@@ -351,7 +351,7 @@ def _remove_weak_modes(fit: ModalFit, theta):
 
 
 def _find_starts(fit: ModalFit, theta):
-    """Yield starts (w, zeta) of a further mode at the largest peaks of the residual.
+    """Yield initial poles of a further mode at the largest peaks of the residual.
 
     The peaks are those of the residual, and those of the residual in proportion to the responses. The
     damping ratio follows from the half-power width of a peak.
@@ -477,7 +477,7 @@ def _check_misfit(poles: FittedPoles, n_modes: int) -> list:
 
 
 def _note_modes_below(poles: FittedPoles, first_response) -> list:
-    """Return a note if modes below the band make up 20 % of the first responses (p,)."""
+    """Return a note if modes below the measured band make up a large part of the responses."""
     fit = poles.fit
     lowest = fit.omega[0]
     lower_residual = fit.compute_residues(poles.theta).lower / lowest**2 * np.abs(fit.derivative[0])

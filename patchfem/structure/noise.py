@@ -23,13 +23,13 @@ SPECTRAL_LINE_TOL = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RandomRecord(RecordedDrive):
-    """Stationary random record; `band` is its lowest and its highest frequency [Hz]."""
+    """Sampled record of a stationary random drive."""
 
     band: tuple = (0.0, 0.0)
 
     @property
     def max_frequency_ratio(self) -> float:
-        """Highest frequency over that of the cycle."""
+        """Ratio of the highest frequency to the frequency of the drive cycle."""
         return max(1.0, self.band[1] * self.period)
 
 
@@ -100,7 +100,7 @@ def _build_random(drive: DriveKeys) -> RandomRecord:
 
 
 def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> tuple:
-    """Cut a spectrum at two frequencies [Hz]; None keeps the end of the spectrum.
+    """Restrict a spectrum to the range between two frequencies [Hz].
 
     Returns frequencies and densities; raises PatchfemError if an end lies outside the spectrum.
     """

@@ -17,7 +17,7 @@ MIN_MASS_FRACTION = 0.8  # fraction of the moving mass; with less, a note says h
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MeasuredModes:
-    """Measured modes, n of them.
+    """Natural modes from a measurement, with their shapes at nodes and directions.
 
     - frequency: natural frequencies (n,) [Hz].
     - zeta: damping ratios (n,).
@@ -143,7 +143,7 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
 
 
 def note_missing_mass(basis: ModalBasis) -> list:
-    """Return a note if the modes of a file contain too little of the moving mass, else no note."""
+    """Return a note if the modes of a file represent too little of the moving mass."""
     mass_fraction = float(np.sum(basis.base**2))
     if mass_fraction >= MIN_MASS_FRACTION:
         return []

@@ -44,7 +44,7 @@ CRAIG_BAMPTON = "craig-bampton"
 
 
 class ComputedModes(NamedTuple):
-    """Modes that a reduction computes.
+    """Natural modes that a reduction of sparse matrices computes.
 
     - omega: circular frequencies (m,) [rad/s], ascending.
     - participation: participation (m, a) of each mode in each static shape, before it was subtracted
@@ -58,7 +58,7 @@ class ComputedModes(NamedTuple):
 
 
 class Reduction(NamedTuple):
-    """Matrices of a structure projected on m modes and p - m static shapes.
+    """Matrices of a structure, projected on m modes and p - m static shapes.
 
     The first b static shapes are those of the boundary coordinates.
 
@@ -169,14 +169,14 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
 
 
 def _project(matrix, shapes, round_off: float) -> np.ndarray:
-    """Project a sparse matrix (n, n) on shapes (n, p); entries that are only round-off become 0."""
+    """Project a sparse matrix (n, n) on shapes (n, p), with round-off set to zero."""
     size = np.abs(shapes)
     scale = size.T @ (abs(matrix) @ size)
     return matrices.trim_round_off(shapes.T @ (matrix @ shapes), scale, round_off)
 
 
 def _refuse_indefinite(matrix, name: str) -> None:
-    """Raise PatchfemError if a principal minor of one or two rows is negative."""
+    """Raise PatchfemError if a principal minor of a matrix is negative."""
     diagonal = matrix.diagonal()
     if (diagonal < 0).any():
         k = int(np.argmin(diagonal))
@@ -199,7 +199,7 @@ def _refuse_indefinite(matrix, name: str) -> None:
 
 
 def _factorize(K) -> SparseFactor | None:
-    """Factorize a stiffness matrix K; return None if it has rigid motions."""
+    """Factorize a stiffness matrix; return None if it has rigid-body modes."""
     try:
         return SparseFactor(K, MIN_PIVOT)
     except ZeroEnergyMotion:
@@ -213,7 +213,7 @@ def _factorize(K) -> SparseFactor | None:
 
 
 def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float = 0.0) -> tuple:
-    """Compute the lowest modes of unit modal mass, at most `count`.
+    """Compute the lowest modes of a structure, normalized to unit modal mass.
 
     `factor` is that of K + shift M, with the shift in 1/s^2. Returns circular frequencies (m,) [rad/s]
     and shapes (n, m).
@@ -309,7 +309,7 @@ def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
 
 
 def _subtract_modes(static, modes, M) -> tuple:
-    """Normalize static shapes (n, a) and make them orthogonal to modes (n, m) of unit mass.
+    """Make static shapes (n, a) orthogonal to modes (n, m), and normalize them.
 
     M is the mass matrix. Returns the residual shapes (n, a) and the participation (m, a) of the modes in the static shapes.
     """
@@ -323,7 +323,7 @@ def _subtract_modes(static, modes, M) -> tuple:
 
 
 def _expand_rows(shapes, rows, n: int) -> np.ndarray:
-    """Insert rows of shapes into shapes over n coordinates, which are zero elsewhere."""
+    """Expand shapes to n coordinates, with zeros in the added rows."""
     expanded = np.zeros((n, shapes.shape[1]))
     expanded[rows] = shapes
     return expanded
@@ -398,7 +398,7 @@ def build_basis(
 
 
 def _factor_stiffness(stiffness, mass) -> np.ndarray:
-    """Return rows (s, c) with stiffness = rows^T rows, exactly zero for rigid motions.
+    """Return rows (s, c) whose product rows^T rows is a stiffness matrix.
 
     Without rigid motions they are a Cholesky factor. Eigenvalues would have round-off of the largest
     one, which leaves few digits of the lowest.

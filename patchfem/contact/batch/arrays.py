@@ -6,7 +6,7 @@ import numpy as np
 
 
 class NestedStretches(NamedTuple):
-    """Arrays from which contacts on runs of consecutive nodes (stretches) are solved.
+    """Arrays with which contacts on runs of consecutive nodes are solved.
 
     A stretch begins at a left end, from which on the Cholesky factor is kept.
 
@@ -27,7 +27,7 @@ class NestedStretches(NamedTuple):
 
 
 class CaseSolutions(NamedTuple):
-    """Solutions of q cases on m nodes.
+    """Contact solutions of q cases on m nodes.
 
     - first, stop (q,): the stretch in contact, from `first` on and before `stop`, which is 0 for none.
     - force (q, m) [N].
@@ -46,7 +46,7 @@ class CaseSolutions(NamedTuple):
 
 
 class Cases(NamedTuple):
-    """Problems of q cases, and the arrays to which their solutions are written.
+    """Contact problems of q cases, and the arrays to which their solutions are written.
 
     - first_try (q,): left end that is tried first.
     - end_limit (q,): node before which the contact is expected to end.
@@ -63,7 +63,7 @@ class Cases(NamedTuple):
 
 
 def make_cases(first_try, end_limit, gap, loads) -> Cases:
-    """Return the records of q problems, with zeros where the solutions will be written.
+    """Return q contact problems with solutions that are still zero.
 
     Parameters
     ----------

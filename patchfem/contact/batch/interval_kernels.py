@@ -23,7 +23,7 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def drop_first_node(upper, a, row):
-    """Turn the factor of the nodes from a on into that of the nodes from a + 1 on, in place.
+    """Update in place a Cholesky factor after its first node is removed.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def drop_first_node(upper, a, row):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def substitute_forward(upper, a, stop, y):
-    """Solve U^T z = y on a stretch of nodes; z is written to y.
+    """Solve U^T z = y in place for a run of consecutive nodes.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def substitute_forward(upper, a, stop, y):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def write_sums(stretches, a):
-    """Write `unit` and the sums of the stretches that begin at a."""
+    """Compute the sums for all runs of consecutive nodes that begin at a given node."""
     closing = stretches.unit[0]
     arm = stretches.unit[1]
     sums = stretches.sums[a]
@@ -89,7 +89,7 @@ def write_sums(stretches, a):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_motion(load, moment, spring, is_free, sums, stop):
-    """Return closing [m] and theta [rad] of the stretch before stop.
+    """Return closing [m] and rotation [rad] of the holder for one run of nodes in contact.
 
     With the sums a, b and c of the stretch, the equations are closing a - theta b = load and
     closing b - theta (c + spring) = moment; theta is 0 unless it is free.
@@ -120,7 +120,7 @@ def solve_motion(load, moment, spring, is_free, sums, stop):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_end(stretches, a, y, limit, loads, is_free):
-    """Return the end of the longest stretch from node a that fulfils the contact conditions at its end.
+    """Find the end of the longest run from a node that meets the contact conditions there.
 
     The last node of the stretch is pressed, and the next node is open.
 
@@ -166,7 +166,7 @@ def find_end(stretches, a, y, limit, loads, is_free):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def move_left_end(stretches, a, b, is_start):
-    """Move the left end from a to b; update the factor, and write the sums of each new left end.
+    """Move the left end of the runs of nodes, and update factor and sums node by node.
 
     A step by one node takes 2 m^2 multiplications.
 
@@ -188,7 +188,7 @@ def move_left_end(stretches, a, b, is_start):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def solve_ends(stretches, a, y, limits, loads, stop, motion, is_free):
-    """Find right ends, motions and scaled forces U f of n cases that begin at node a.
+    """Find right contact ends, holder motions and scaled forces of n cases with one left end.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolate
 
 
 class ContactBatch(NamedTuple):
-    """Contact solutions of q cases: nodes in contact, forces, openings and motions.
+    """Contact solutions of q cases: nodes in contact, forces, gaps and holder motions.
 
     - first, stop (q,): the nodes in contact, from `first` on and before `stop`.
     - force (q, m) [N]; opening (q, m) [m]; closing (q,) [m]; theta (q,) [rad].
@@ -53,7 +53,7 @@ class ContactBatch(NamedTuple):
 
 
 class _LeftEndSolutions(NamedTuple):
-    """Solutions of n cases whose contacts begin at the same node `left_end`.
+    """Solutions of n cases whose contacts begin at the same node.
 
     - lower (k, k): lower Cholesky factor of the compliance of the k nodes from `left_end` on.
     - force (n, k); stop (n,): ends of the contacts; motion (n, 2): closing [m] and theta [rad].
@@ -67,7 +67,7 @@ class _LeftEndSolutions(NamedTuple):
 
 
 class Intervals:
-    """Interface whose contact sets are stretches of consecutive nodes.
+    """Interface whose contact is a single run of consecutive nodes.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Intervals:
         self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
     def press(self, gap, load, moment=None, spring=0.0, brackets=None) -> ContactBatch:
-        """Solve the contacts of q cases.
+        """Solve the contact problems of q cases.
 
         Parameters
         ----------
@@ -148,7 +148,7 @@ class Intervals:
         return contacts
 
     def _bracket_on_coarse_grid(self, gap, loads, *, is_free: bool) -> tuple:
-        """Bracket the contacts: first node and end (q,) of stretches that contain them.
+        """Bracket the contact of q cases by solving them on a coarser grid.
 
         The brackets follow from the contacts on a coarse interface.
         """
@@ -162,13 +162,13 @@ class Intervals:
         return first, stop
 
     def fill_sums(self, first: np.ndarray) -> None:
-        """Fill `sums` for stretches that begin at the nodes `first` (q,) or next to them."""
+        """Compute the sums of the runs of nodes that begin at or next to given nodes (q,)."""
         none = np.zeros(0, int)
         cases = make_cases(none, none, np.zeros((0, self.x.size)), np.zeros((0, 3)))
         self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
 
     def _solve_all(self, cases: Cases, low: int, high: int, n_tries: int, *, is_free: bool) -> None:
-        """Solve all cases, and fill `sums` for the left ends that later calls need.
+        """Solve all cases, and compute the sums that later calls need.
 
         These are the left ends from `low` to `high` and those beside every stretch.
 
@@ -204,7 +204,7 @@ class Intervals:
     def _try_left_end(
         self, stretches, cases: Cases, indices, a: int, *, is_free: bool
     ) -> np.ndarray:
-        """Solve cases for contacts that begin at node a; return the node (n,) to try next, m for solved cases."""
+        """Solve cases whose contact may begin at a node; return the node to try next for each."""
         m = self.x.size
         limits = np.minimum(cases.end_limit[indices], m)
         nodes = slice(a, max(int(limits.max()), a + 1))
@@ -230,7 +230,7 @@ class Intervals:
     def _store_solutions(
         self, stretches, cases: Cases, indices, group: _LeftEndSolutions, *, is_free: bool
     ) -> None:
-        """Store the solutions of the cases `indices` (n,) after a step of iterative refinement."""
+        """Store the solutions of some cases after a step of iterative refinement."""
         a = group.left_end
         stop = group.stop
         nodes = slice(a, a + group.force.shape[1])
@@ -262,7 +262,7 @@ class Intervals:
             cases.solutions.gap_rate[indices, 0] = 1 - increase @ self.c[nodes, a - 1]
 
     def edge_positions(self, contacts: ContactBatch, softness, row_height: float) -> np.ndarray:
-        """Return the positions (2, q) [m] of the edges, as in `edges.ContactEdge`.
+        """Return the positions (2, q) [m] of both contact edges, between the nodes.
 
         An end of the interface that is in contact is an edge.
 
@@ -292,7 +292,7 @@ class Intervals:
         return np.clip(positions, x[0], x[-1])
 
     def stiffness(self, contacts: ContactBatch, *, is_rotation: bool = False) -> np.ndarray:
-        """Return the stiffnesses (q,) of contacts, as `edges.set_stiffness` does.
+        """Return the contact stiffnesses (q,) for edges that lie between the nodes.
 
         The edges of the contacts lie between nodes. The stiffnesses are those of a translation [N/m], or of a rotation
         about x = 0 [N m/rad].
@@ -317,7 +317,7 @@ class Intervals:
         return stiffness + np.where((stop < m) & is_long, right_change, 0.0)
 
     def _opening(self, gap, displacement, motion, x=None) -> np.ndarray:
-        """Return the openings (q, m) [m]; x: positions (m,) [m], those of all nodes by default."""
+        """Return the gaps under load (q, m) [m] at given positions or at all nodes."""
         x = self.x if x is None else x
         return gap + motion[:, 1:] * x - motion[:, :1] + displacement
 
@@ -335,7 +335,7 @@ class Intervals:
         return np.divide(leaving, leaving + entering, out=fractions, where=is_valid)
 
     def _residual(self, cases: Cases, displacement, opening, *, is_free: bool) -> np.ndarray:
-        """Return the largest residual (q,), as in `unilateral.compute_residuals`.
+        """Return the largest relative residual (q,) of the contact conditions.
 
         An overlap within OPENING_NOISE of its terms counts as 0.
         """
@@ -360,6 +360,6 @@ class Intervals:
 
 
 def _substitute(lower: np.ndarray, rows: np.ndarray, *, is_backward: bool = False) -> np.ndarray:
-    """Solve for each of the rows (n, k) with a lower factor (k, k), or with its transpose."""
+    """Solve triangular systems for each of the rows (n, k) by substitution."""
     right_sides = np.ascontiguousarray(rows).T
     return dtrsm(1.0, lower, right_sides, lower=1, trans_a=int(is_backward), overwrite_b=1).T

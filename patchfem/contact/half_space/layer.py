@@ -28,7 +28,7 @@ class WaveCompliance(NamedTuple):
 
 
 def layer_compliance(k, height: float, thickness: float, layers: Layers) -> WaveCompliance:
-    """Return the compliance of a coated layer on a rigid base for waves of pressure and shear.
+    """Return the compliance of a coated layer on a rigid base over wavenumber.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def layer_compliance(k, height: float, thickness: float, layers: Layers) -> Wave
 
 
 def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
-    """Solve for the waves k (n,) > 0 [1/m] that reach through all layers."""
+    """Compute the compliance for wavenumbers k (n,) [1/m] whose waves reach all layers."""
     n_unknowns = 4 * len(depths)
     scale = moduli[0][1]
     matrix = np.zeros((k.size, n_unknowns, n_unknowns))
@@ -88,7 +88,7 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
 
 
 def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.ndarray:
-    """Return the states (n, 4, 4) of the four solutions of a layer at the depth z [m].
+    """Return displacements and tractions (n, 4, 4) of the four wave solutions at depth z [m].
 
     A state is k scale u_x, k scale u_z, tension and shear.
     """
@@ -110,7 +110,7 @@ def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.
 
 
 def end_compliance(piece: Piece) -> WaveCompliance:
-    """Return the compliances (nx, nx) [m2/N] that free ends add to those between guides.
+    """Return the compliances (nx, nx) [m2/N] that free ends add to those of guided ends.
 
     The guides are without friction. They prevent displacements across them under a pressure, and along them under a
     shear, so `layer_compliance` is the closed form between them. The error of the cells near a force is the same with
@@ -126,7 +126,7 @@ def end_compliance(piece: Piece) -> WaveCompliance:
 
 
 def guide_ends(stencil: np.ndarray, component: int) -> np.ndarray:
-    """Return the stencil of a grid whose first and last column are guided.
+    """Return the stencil of a grid whose end columns are held in one displacement component.
 
     The guides prevent motion along x (component 0) or inward (component 1).
     """

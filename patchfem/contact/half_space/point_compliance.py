@@ -60,7 +60,7 @@ class PointCompliance:
     def solve_forces(
         self, active: np.ndarray, motion: np.ndarray, max_iterations: int = 400
     ) -> np.ndarray:
-        """Solve for the forces on the active points that move them by a given motion.
+        """Solve for the forces on the active points that produce a prescribed motion.
 
         The method is that of conjugate gradients, preconditioned by the stiffness of each wave.
 
@@ -104,14 +104,14 @@ class PointCompliance:
 
 
 class SmoothModes(NamedTuple):
-    """Eigenfunctions (n, r) [1] of a compliance, and their compliances (r,) [m2/N]."""
+    """Eigenfunctions (n, r) of a smooth compliance, with their compliances (r,) [m2/N]."""
 
     modes: np.ndarray
     mode_compliances: np.ndarray
 
 
 def smooth_modes(positions, change, x) -> SmoothModes:
-    """Return the eigenfunctions of a symmetric compliance that is smooth along x.
+    """Compute the eigenfunctions of a symmetric compliance that varies smoothly along x.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def smooth_modes(positions, change, x) -> SmoothModes:
 
 
 def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
-    """Find the edges of the contact between the points, as in `contact.edges`.
+    """Find the contact edges between equally spaced points.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
 
 
 def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> float:
-    """Return the stiffness motion . C^-1 motion of a contact set with edges between its points.
+    """Return the stiffness of a contact whose edges lie between equally spaced points.
 
     Each edge adds the change along the parabola through the set with one point less and one more (`contact.edges`). The
     compliances of these points are taken from the edge of the longest contact, because they are the same at all edges
@@ -201,7 +201,7 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> f
 
 
 def _contact_length(active: np.ndarray, edge: ContactEdge) -> int:
-    """Count the points of the contact that ends at `edge`, up to MAX_REFERENCE_POINTS."""
+    """Count the points of the contact interval that ends at a given edge."""
     if edge.side > 0:
         first = max(edge.node - MAX_REFERENCE_POINTS + 1, 0)
         points = active[first : edge.node + 1][::-1]

@@ -191,7 +191,7 @@ def _formed_growing_force(path, before, after, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_list(increment, bond_list, v0, dt):
-    """Return force and stored energy after an increment.
+    """Return force and stored energy of all bonds of a list after an increment.
 
     The energy excludes the bonds that form on the increment. Each bond stores the work of its force when its stretch
     goes to zero at constant damage.
@@ -217,7 +217,7 @@ def sum_list(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_strips(increment, bond_list, v0, dt):
-    """Return `sum_list` without the initial bonds."""
+    """Return force and stored energy of a bond list without its initial bonds."""
     bonds = bond_list.bondlist
     status = bond_list.status
     clocks = bond_list.now
@@ -262,7 +262,7 @@ def _sum_strips(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_force(increment, bond_list, v0, dt):
-    """Return the force [1] after an increment; the friction force is mu_s N times it.
+    """Return the force [1] of a bond list after an increment, relative to the friction limit.
 
     Twin: `quadrature.Quadrature`.
 
@@ -280,7 +280,7 @@ def list_force(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_energy(increment, bond_list, v0, dt):
-    """Return the stored energy / friction limit [m] after an increment.
+    """Return the ratio of the stored energy of a bond list to the friction limit [m].
 
     The bonds that form on the increment are included. The law must have friction.reading = "stretch".
 
@@ -303,7 +303,7 @@ def list_energy(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrand(is_energy, increment, bond_list, v0, dt):
-    """Return energy or force after an increment, the integrand of the mean over the increment.
+    """Return energy or force of a bond list after an increment, for averaging over it.
 
     For reading="report" the force excludes the initial bonds, whose mean has a closed form.
     """
@@ -316,7 +316,7 @@ def _integrand(is_energy, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_mean(increment, bond_list, v0, dt):
-    """Return the path-mean force [1] of an increment.
+    """Return the force [1] of a bond list, averaged over the path of an increment.
 
     - reading="stretch", p = 1: closed form, `list_slope`.
     - reading="stretch", other orders: from the energy balance, so that no step creates energy. Damage dissipates the
@@ -401,7 +401,7 @@ def _needs_energy_balance(increment, bond_list):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _mean_from_energy(is_short, increment, bond_list, v0, dt):
-    """Return the path-mean force from the energy balance: loss by damage plus gain in stored energy."""
+    """Return the path-mean force of a bond list from its energy balance."""
     last = list_energy(increment, bond_list, v0, dt)
     gain = last - bond_list.status[STATUS.energy]
     eps = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
@@ -414,7 +414,7 @@ def _mean_from_energy(is_short, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
-    """Average energy or force over an increment by Simpson's rule, given the value at the end."""
+    """Average energy or force of a bond list over an increment by Simpson's rule."""
     first = _first_integrand(is_energy, bond_list)
     middle = _integrand(is_energy, 0.5 * increment, bond_list, v0, 0.5 * dt)
     return (first + 4 * middle + last) / 6
@@ -422,7 +422,7 @@ def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
-    """Average energy or force over an increment by panels of five Gauss points; each is twice as long as the last."""
+    """Average energy or force of a bond list over an increment by panels of Gauss points."""
     path = abs(increment) / bond_list.now[CLOCK.length]
     if path <= MAX_PANEL_LENGTH:
         return _integrate_panel(is_energy, (0.0, 1.0), increment, bond_list, v0, dt)
@@ -440,7 +440,7 @@ def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _first_integrand(is_energy, bond_list):
-    """Return `_integrand` of the present state from the status of the list."""
+    """Return the energy or force of a bond list in its present state."""
     status = bond_list.status
     clocks = bond_list.now
     if is_energy:

@@ -30,7 +30,7 @@ def sum_form(law: Bonds) -> float:
 
 
 def cutoff_age(order: float, tail: float) -> float:
-    """Return the age R/eps [1] beyond which bonds carry only the fraction `tail` of the friction limit.
+    """Return the age R/eps [1] beyond which bonds carry a negligible part of the friction limit.
 
     It solves Q(p + 1, R/eps) = tail, with Q the regularised upper incomplete gamma function and p > -1.
     """
@@ -40,7 +40,7 @@ def cutoff_age(order: float, tail: float) -> float:
 
 
 def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0) -> np.ndarray:
-    """Return the parameters of a law, with the indices of `LAW`.
+    """Return the parameters of a bond law as an array for compiled code.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
 
 
 def make_clocks(law: Bonds) -> np.ndarray:
-    """Return the clocks (6,) of a list before any motion."""
+    """Return the clocks (6,) of a bond list before any motion."""
     return np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
 
 
@@ -123,7 +123,7 @@ def gamma_table(law: Bonds) -> np.ndarray:
 
 
 def list_capacity(law: Bonds, reach: float, merge: float) -> int:
-    """Return the number of strips to allocate: after a merge, for a long step, and work space.
+    """Return the number of strips for which a bond list needs memory.
 
     Parameters
     ----------

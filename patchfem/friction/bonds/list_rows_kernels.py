@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 
 class StripRows(NamedTuple):
-    """Rows of the array of strips.
+    """Rows of the array that stores the strips of a bond list.
 
     - start, end: relative displacement [m] at the start and at the end of the strip; of a spread strip, which
       represents several passes over the same range, the lower and the upper end of this range
@@ -90,7 +90,7 @@ class LawNumbers(NamedTuple):
 
 
 class Clocks(NamedTuple):
-    """Indices of the clocks of a list.
+    """Indices of the clocks of a bond list.
 
     - displacement, path: relative displacement and path [m] since the start
     - damage: int dR/eps, with the bond length of each step
@@ -108,7 +108,7 @@ class Clocks(NamedTuple):
 
 
 class ListStatus(NamedTuple):
-    """Indices of the status of a list.
+    """Indices of the status numbers of a bond list.
 
     - head, end: first strip, and last strip + 1
     - n_spread: number of spread strips, which are the first ones of the list

@@ -55,7 +55,7 @@ class MatureBonds(NamedTuple):
 
 
 class StripRange(NamedTuple):
-    """Indices of the strips of a list.
+    """Range of indices of the strips of a bond list.
 
     Spread strips are those from `head` to `first`, and strips of a single pass those from `first` to `end`.
     """

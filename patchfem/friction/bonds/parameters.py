@@ -15,7 +15,7 @@ MAX_LINEAR_GROWTH = 1e-9  # growth J of a step up to which the growth along it c
 
 @dataclass(frozen=True, slots=True)
 class Bonds:
-    """Parameters of eqs. 2.10 to 2.17.
+    """Parameters of the bonds of the nonlocal friction law (eqs. 2.10 to 2.17).
 
     - static: friction coefficient mu_s
     - length: bond length eps_0 [m]
@@ -57,7 +57,7 @@ class ElasticSplit(NamedTuple):
 
 
 def grown_fraction(growth, back):
-    """Return the fraction of the growth in a step that happened before a position of the step.
+    """Return the fraction of the growth of a bond that precedes a position within a step.
 
     The speed is constant in the step.
 
@@ -91,7 +91,7 @@ def growth_path_ratio(law: Bonds, speed: float) -> float:
 
 
 def split_elastic(law: Bonds, play, increment, eps) -> ElasticSplit:
-    """Split an increment by the play operator.
+    """Split an increment of displacement into an elastic and a damaging part (play operator).
 
     Source: Visintin, Differential Models of Hysteresis, 1994.
 
@@ -154,7 +154,7 @@ def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: flo
 
 
 def grow(law: Bonds, eps, v0: float, v1: float, increment: float, dt: float):
-    """Return the bond length after a step (2.10), which tends to (A eps_0 + B eps_k)/(A + B).
+    """Return the length of growing bonds after a time step (eq. 2.10).
 
     A and B are the exponents of `growth_exponents`. At rest the bonds heal; a step without motion and time changes
     nothing.

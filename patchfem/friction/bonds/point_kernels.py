@@ -89,14 +89,14 @@ def _integrate_short_powers(x, decay):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _powers_from_cubic(x, decay, cubic):
-    """Return the integrals of `_integrate_powers` from that of y^3 exp(-y)."""
+    """Return the integrals of y exp(-y) and y^2 exp(-y) from that of y^3 exp(-y)."""
     second = (cubic + x * x * x * decay) / 3
     return (second + x * x * decay) / 2, second, x * second - cubic
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_mean(m, z, increment, sigma, eps):
-    """Return the path-mean stretch of a point over an increment; 10 ns.
+    """Return the stretch of the bonds of a point, averaged over the path of an increment.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def bond_mean(m, z, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_bond_mean(m, z, increment, sigma, eps):
-    """Return `bond_mean` of an increment up to MAX_SHORT_PATH eps.
+    """Return the path-mean stretch of the bonds of a point over a short increment.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def _mean_stretch(m, z, increment, sigma, eps, shapes):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_step(m, z, s2, increment, sigma, eps):
-    """Advance the bonds of a point by an increment.
+    """Advance the bonds of a contact point by an increment of displacement.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def bond_step(m, z, s2, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_bond_step(m, z, s2, increment, sigma, eps):
-    """Return `bond_step` of an increment up to MAX_SHORT_PATH eps.
+    """Advance the bonds of a contact point by a short increment of displacement.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _split_elastic(play, increment, half):
-    """Return the elastic part of an increment and the play after it (`parameters.split_elastic`)."""
+    """Split an increment of a point with an elastic range; return its elastic part and the play."""
     start = play * half
     end = start + increment
     if end >= half:
@@ -214,7 +214,7 @@ def _split_elastic(play, increment, half):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
-    """Return `bond_mean` of a point with an elastic range.
+    """Return the path-mean stretch of the bonds of a point with an elastic range.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
-    """Advance the bonds of a point with an elastic range by an increment.
+    """Advance the bonds of a contact point with an elastic range by an increment.
 
     Parameters
     ----------
@@ -265,7 +265,7 @@ def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def grow(eps, v0, v1, path, dt, growth):
-    """Return the bond length after a step (eq. 2.10), as `parameters.grow` does.
+    """Return the length of growing bonds after a time step (eq. 2.10).
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ def _integrate_slowness(v, min_speed):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_end_stretch(m, z, increment, sigma, eps):
-    """Return the stretch of a point at the end of an increment, the z of `bond_step`.
+    """Return the stretch of the bonds of a point at the end of an increment.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def bond_end_stretch(m, z, increment, sigma, eps):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_point(bonds, s0, s1, initial, length):
-    """Change the load of a point at rest, as `recursion.press_bonds` does.
+    """Change the normal load on the bonds of a contact point at rest.
 
     Parameters
     ----------

@@ -61,7 +61,7 @@ class _StepIntegrals(NamedTuple):
 
 
 class _Release(NamedTuple):
-    """Change of the bonds of all points under a change of the pressure at rest.
+    """Change of the bonds of all points when the pressure changes at rest.
 
     - kept: factor on the bonds of the strips, (k, m) or (m,)
     - formed: density (m,) [Pa] of an unstretched cohort that is added
@@ -86,7 +86,7 @@ class Quadrature:
     tail: float = 1e-9
 
     def start(self, sigma, directions: int = 1) -> Strips:
-        """Return the initial cohort: unstretched, fully grown bonds of density m_0 sigma.
+        """Return unstretched, fully grown bonds of a given initial density.
 
         Parameters
         ----------
@@ -124,7 +124,7 @@ class Quadrature:
         )
 
     def step(self, state: Strips, dq, s0, s1, dt: float) -> Step:
-        """Advance the bonds by a straight increment; return mean traction and dissipated energy.
+        """Advance the bonds by an increment; return mean traction and dissipated energy.
 
         The mean traction is exact for reading="stretch" and p = 1, and else comes from Gauss points. For
         reading="stretch" its component along the increment comes from the energy balance, so no step creates energy.
@@ -172,7 +172,7 @@ class Quadrature:
         return self.law.static / self.law.length * np.reshape(mean, (len(dq), -1))
 
     def _mean_from_energy(self, state: Strips, gain, dq, s0, s1, dt: float) -> np.ndarray:
-        """Return the mean traction (d, m) [Pa] whose work is the gain in stored energy plus the loss."""
+        """Return the mean traction (d, m) [Pa] of an increment from its energy balance."""
         mean, dissipated = self._integrate_step(state, dq, s0, s1, dt)
         path, direction = length_and_direction(dq)
         along = (dissipated + gain) / path
@@ -247,7 +247,7 @@ class Quadrature:
         )
 
     def _release_by_moments(self, state: Strips, s0, s1) -> _Release:
-        """Return the change of the bonds at rest that leads to the moments of `recursion.press_bonds`.
+        """Return the change of the bonds at rest for which the moments obey their closed form.
 
         A negative density removes unstretched bonds.
         """
@@ -289,7 +289,7 @@ class Quadrature:
         return np.vstack([_sum_strips(state, surviving_density(state)[:, None]), moments])
 
     def advance(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
-        """Return the bonds after an increment, without the integrals of `step`.
+        """Advance the bonds by an increment without computing traction and energy.
 
         This takes at most a tenth of the time of `step`.
 

@@ -118,7 +118,7 @@ class _StretchComponents(NamedTuple):
 
 
 class _StripParts(NamedTuple):
-    """Parts of strips on which u does not change its sign, each (n,).
+    """Parts of strips within which the stretch does not change its sign.
 
     - strip: index of the strip
     - start, length: distance of the part from the end of the strip, and length [m]
@@ -300,7 +300,7 @@ def _gauss_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
 
 
 def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> np.ndarray:
-    """Sum force and energy over weighted points of each strip, (n, d + 1).
+    """Sum force and energy over the weighted points of each strip.
 
     distance: distance (n, points) [m] of the points from the end of their strip; weight (n, points) [m].
     """
@@ -383,7 +383,7 @@ def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _IntegrationPie
 
 
 def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _StripParts:
-    """Split strips where u = 0; strips whose line does not pass through u = 0 stay whole."""
+    """Split strips of bonds at the position of zero stretch."""
     is_straight = stretch.across == 0
     cut = np.where(is_straight, np.clip(-stretch.along, 0.0, strips.length), 0.0)
     strip = np.tile(np.arange(cut.size), 2)
@@ -449,7 +449,7 @@ def _jacobi_rule(order: float) -> _GaussRule:
 
 
 def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
-    """Return Gauss rules (n, N_GAUSS_POINTS) of pieces; from a steep end the integrand grows as t^order."""
+    """Return the Gauss rules of the pieces into which strips are divided."""
     legendre = _legendre_rule()
     jacobi = _jacobi_rule(order)
     steep_end = steep_end[:, None]

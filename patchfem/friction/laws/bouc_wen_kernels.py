@@ -60,7 +60,7 @@ def _loading_rate(w, n):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrand(u, n, unloading, is_loading):
-    """Return dx/du and |y| of the variable u: w on loading, |y| on unloading."""
+    """Return the rates of displacement and |y| for the integration variable."""
     if is_loading:
         return 1 / _loading_rate(u, n), -expm1(-u)
     return 1 / (1 - unloading * u**n), u
@@ -68,7 +68,7 @@ def _integrand(u, n, unloading, is_loading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_piece(low, size, n, unloading, is_loading):
-    """Integrate dx and |y| dx over an interval of the integration variable u by the Gauss rule."""
+    """Integrate displacement and |y| over an interval by a Gauss rule."""
     path = 0.0
     area = 0.0
     for k in range(GAUSS_POINTS.size):
@@ -80,7 +80,7 @@ def _integrate_piece(low, size, n, unloading, is_loading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrate_from_zero(size, n, unloading, is_loading):
-    """Integrate dx and |y| dx from u = 0 in the variable sqrt(u), where fractional powers are smooth."""
+    """Integrate displacement and |y| from zero, where fractional powers are not smooth."""
     path = 0.0
     area = 0.0
     for k in range(GAUSS_POINTS.size):
@@ -133,7 +133,7 @@ def _scale_area(area, path, wanted):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _unload(y, x, n, unloading):
-    """Unload from y < 0 over a path x, at most to y = 0.
+    """Unload the normalized force from y < 0 over a path, at most to y = 0.
 
     Returns y, the remaining path and the integral of y.
     """
@@ -152,7 +152,7 @@ def _unload(y, x, n, unloading):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _follow_path(y, x, n, s):
-    """Return y after a path x >= 0 in units of eps, and the integral of y over x."""
+    """Return the normalized force y after a path x >= 0, and its integral over the path."""
     area = 0.0
     if y < 0:
         y, x, area = _unload(y, x, n, 1 - 2 * s)
@@ -199,7 +199,7 @@ def _knee_rate(u, n, s):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _follow_knee(u, x, n, s):
-    """Return u = 1 - y after a path x, and the integral of u, near the limit.
+    """Return 1 - y after a path x, and its integral, for forces near the friction limit.
 
     A Runge-Kutta step of order 4 in w gives u. The integral of u over the path is that of 1/(dw/dx) over u, which
     Simpson's rule gives.

@@ -8,7 +8,7 @@ MAX_EXP_ARGUMENT = 36.0  # argument y beyond which 1 - exp(-y) rounds to 1
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def exp_minus(y):
-    """Return exp(-y) to within 2e-13 for y >= -1, and its value at MAX_ARGUMENT beyond that.
+    """Approximate exp(-y) within 2e-13 for y >= -1.
 
     It is the 16th power of twelve terms of the Taylor series of exp(-y/16). The terms are added in pairs, so that few
     operations wait for each other.

@@ -169,7 +169,7 @@ def relax_stretch(numbers, stretch, increment, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, direction, states):
-    """Set the state z, and return where the rates have a kink.
+    """Initialize the bristle stretch, and return the path at which its rate has a kink.
 
     The limit increases below MAX_STRIBECK_RATIO v_s; a step that starts above would not resolve this increase.
 

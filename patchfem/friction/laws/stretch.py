@@ -10,7 +10,7 @@ CONSTANT_LENGTH_FLAG = -1.0  # value of a_s that marks a constant bond length
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:
-    """Return the numbers (6,) of bond growth (eq. 2.10) and breakaway for compiled code.
+    """Return the parameters (6,) of bond growth and breakaway as an array for compiled code.
 
     They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m], eps_k [m] and the fraction of
     the bond length that stretches without damage.
@@ -77,7 +77,7 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
 
 
 def _state_scales(law: Bonds) -> tuple | None:
-    """Return typical magnitudes of (eps, m, z, s2).
+    """Return typical magnitudes of the state variables of bonds.
 
     They are () for a constant length, and None if rates cannot integrate the law.
     """
@@ -89,7 +89,7 @@ def _state_scales(law: Bonds) -> tuple | None:
 
 
 def unpack_bonds(element: Element, memory) -> np.ndarray:
-    """Return the bonds in the memory of a `points_element`.
+    """Return the state of the bonds that the memory of an element contains.
 
     Parameters
     ----------

@@ -138,7 +138,7 @@ def rate_equation(numbers, stretch, velocity, direction):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def integrate_stretch(numbers, stretch, mean_square, increment, direction):
-    """Return the stretch, the mean square and the work of these bonds after an increment.
+    """Return stretch, mean square stretch and work of mature bonds after an increment.
 
     Returns
     -------

@@ -25,7 +25,7 @@ MAX_TANH_ARGUMENT = 15.0  # argument beyond which tanh is 1 to within 2e-13
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def tanh_fit(y):
-    """Return tanh(y) to within 2e-13 without a branch, so that loops over cases vectorise.
+    """Approximate tanh(y) within 2e-13 without branches, so that loops vectorize.
 
     The value is y times a ratio of polynomials of y^2 with the smallest maximum error (Remez). Their terms are added
     in pairs, so that few operations wait for each other. It takes half the time of an exponential.

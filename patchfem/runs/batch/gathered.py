@@ -393,9 +393,7 @@ def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -
     errors = {name: np.zeros(len(models)) for name in columns[0]}
     parts = []
     for case, (model, pressed_case) in enumerate(zip(models, cases)):
-        values, half, quarter, coarse = (
-            select_known_values(measures, case) for measures in columns
-        )
+        values, half, quarter, coarse = (select_known_values(run, case) for run in columns)
         kinds = (
             step_errors(values, half, quarter, steps=steps),
             coarser_errors(quarter, coarse, order=2.0),

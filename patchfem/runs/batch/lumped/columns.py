@@ -332,9 +332,7 @@ def _judge_outcomes(sizes: CaseScales, runs: Runs, drifts) -> _SteadyOutcomes:
         is_bounded = False
         if runs.steady is not None:
             is_bounded = ~np.isnan(runs.steady[0])
-            steady = [
-                np.where(is_bounded, known, value) for known, value in zip(runs.steady, steady)
-            ]
+            steady = [np.where(is_bounded, *values) for values in zip(runs.steady, steady)]
         numbers, *steady = classify_periodic(
             window_amplitude_means(runs.extremes, runs.window)[0],
             runs.extremes,

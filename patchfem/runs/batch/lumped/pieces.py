@@ -169,9 +169,8 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     """
     reading = join_readings([run.reading for run in finished])
     models = [case.model for case in cases]
-    energies = {
-        name: np.array([run.ledger[name] for run in finished]) for name in finished[0].ledger
-    }
+    ledgers = [run.ledger for run in finished]
+    energies = {name: np.array([ledger[name] for ledger in ledgers]) for name in ledgers[0]}
     tolerance = np.array([model.accuracy.tolerance for model in models])
     loop = reading.loop()
     is_rigid = cases[0].groups[0].static > 0
