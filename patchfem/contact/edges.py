@@ -35,7 +35,7 @@ class ContactEdge(NamedTuple):
 
 
 def edge_offset_fraction(aspect):
-    """Return the distance of an edge from its node as a fraction of the last cell in contact.
+    """Return the inward shift of a contact edge as a fraction of the last cell in contact.
 
     The edge lies inside the position that `ContactEdge.fraction` gives. The offset decreases with
     the aspect, first with its square and then in proportion. The three numbers fit Hertz contact on

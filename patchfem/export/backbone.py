@@ -165,7 +165,7 @@ def backbone_charts(curves: dict) -> list:
 
 
 def _curve_marks(method: str, x, y, errors, is_log: bool) -> list:
-    """Return the marks of a curve: a line through the points of a method, and their error bars."""
+    """Return the chart marks of a backbone curve: a line and error bars."""
     style = {"shape": "circle", "errors": errors}
     if is_log:
         style["floor"] = BAR_FLOOR_FACTOR * float(y.min(initial=1.0))
@@ -254,7 +254,7 @@ class FormattedPoint(NamedTuple):
 
 
 def _format_point(curve: Curve, k: int) -> FormattedPoint:
-    """Format point k of the curve of a method."""
+    """Format one point of a backbone curve with its errors."""
     return FormattedPoint(
         formatting.format_quantity(curve.amplitude[k], "m", 3),
         formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
@@ -313,7 +313,7 @@ def _describe_ends(mode: str, curve: Curve) -> str:
 
 
 def _describe_largest_damping(curve: Curve) -> list:
-    """Describe the largest damping ratio of a curve; [] for a single amplitude."""
+    """Describe the largest damping ratio of a curve in a sentence, as a list."""
     count = curve.amplitude.size
     if count < 2:
         return []

@@ -123,7 +123,7 @@ def _create_parent_folder(out: Path | None) -> Iterator[None]:
 
 
 def _make_folder(place: Path, out: Path) -> None:
-    """Create a folder; Missing if this is not possible."""
+    """Create a folder, or raise Missing."""
     try:
         place.mkdir(parents=True)
     except OSError as error:

@@ -101,7 +101,7 @@ def _by_tolerance(runs: list) -> list[list]:
 
 
 def _format_outcome(group: list) -> str:
-    """State whether a tolerance is met, by the run itself or by settings that were tried next."""
+    """State whether a tolerance is met by the run itself or by settings tried next."""
     first = group[0]
     last = group[-1]
     if first.meets_tolerance():
@@ -164,7 +164,7 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
 
 
 def _format_shares(run: Cost, name: str) -> str:
-    """Format the stated error of a measure and, in brackets, its distance to the best run.
+    """Format the error of a measure and its distance to the most accurate run.
 
     Both are relative to the value.
     """
@@ -175,7 +175,7 @@ def _format_shares(run: Cost, name: str) -> str:
 
 
 def _format_relative(difference: float | None, size: float) -> str:
-    """Format a difference relative to a size; "-" if either is missing, "exact" below round-off."""
+    """Format a difference relative to a size, or "-" if one of them is missing."""
     if difference is None or not size:
         return "-"
     ratio = difference / size
@@ -183,7 +183,7 @@ def _format_relative(difference: float | None, size: float) -> str:
 
 
 def detailed_measures(runs: list, tolerance: float) -> list:
-    """Return the measures of the detailed table.
+    """Return the measures that the detailed cost table shows.
 
     They are those of MAIN that the setting changes, and the worst measure of each run; if there are
     none of these, all measures that it changes.
@@ -195,7 +195,7 @@ def detailed_measures(runs: list, tolerance: float) -> list:
 
 
 def write(folder: Path, curves: dict) -> Path:
-    """Write cost.csv into a folder, which is created, and return its path.
+    """Write the table of a cost curve to cost.csv in a folder, and return its path.
 
     There is one row per run: knob, setting, CPU seconds (`seconds`), elapsed seconds
     (`wall_seconds`), timings, and of each measure its value, the error that the run states and its
@@ -247,7 +247,7 @@ def write(folder: Path, curves: dict) -> Path:
 
 
 def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path:
-    """Write the picture of a curve into a folder that exists, and return its path.
+    """Write the picture of a cost curve into a folder, and return its path.
 
     Its name is cost.svg, or cost_KNOB.svg.
 
@@ -313,7 +313,7 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
 
 
 def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
-    """Return the chart of the worst error of each run against its CPU seconds.
+    """Return the chart of the largest error of each run against its CPU time.
 
     The error is that of the measure that is farthest from the tolerance. A hollow point misses its
     tolerance.
@@ -365,7 +365,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
 
 
 class Point(NamedTuple):
-    """A run and the relative error of its worst measure."""
+    """Run of a cost curve, with the relative error of its worst measure."""
 
     run: Cost
     share: float
@@ -378,7 +378,7 @@ def _axis_range(values: list, min_ratio: float) -> list:
 
 
 def _place_labels(points: list, x_range: list, y_range: list) -> list:
-    """Return the labels of the points, which move up if they would overlap.
+    """Return the labels of points, raised where they would overlap.
 
     A label stands above its point and lists the settings of all equal runs.
     """

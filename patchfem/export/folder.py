@@ -22,7 +22,7 @@ SCENE = "scene.resolved.toml"
 
 
 class WrittenRun(NamedTuple):
-    """A run whose results are on disk.
+    """Finished run whose results are on disk.
 
     summary: content of summary.json; result: the run; bodies: the pressed pieces for a picture, or
     {}; place: device and inode of the folder, which identify it after it has been renamed.
@@ -37,7 +37,7 @@ class WrittenRun(NamedTuple):
 def run_into(
     run_plan, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
 ) -> WrittenRun:
-    """Run a plan into a results folder; `write_run_page` writes the page afterwards.
+    """Run a plan and write its results into a folder, without the page.
 
     The folder is locked first. An older results folder is replaced only when the new one is
     complete, and a folder with other files is refused before anything runs. A run with [wear] and a
@@ -85,7 +85,7 @@ def run_into(
 
 
 def _partial_result(error: NotConverged) -> Result:
-    """Return what a run had computed before it failed to converge, with the reason as a warning."""
+    """Return the results of a run that failed to converge, with the reason as a warning."""
     result = error.partial_result
     return replace(
         result,
@@ -97,7 +97,7 @@ def _partial_result(error: NotConverged) -> Result:
 
 
 def saves_state(run_plan) -> bool:
-    """Return whether the run of a plan saves its state."""
+    """Return whether the run of a plan saves its state for a later resume."""
     return (run_plan.model.wear is not None and run_plan.model.patch is not None) or is_march(
         run_plan
     )
@@ -127,7 +127,7 @@ def is_complete(run_plan, target: Path) -> bool:
 
 
 def write_results(result: Result, path: Path) -> WrittenRun:
-    """Write all files of a run except its page into the folder `path`."""
+    """Write all files of a run, except its page, into a folder."""
     start_time = perf_counter()
     bodies = {}
     text = result.plan.model.source.resolved
@@ -169,7 +169,7 @@ def write_run_page(written: WrittenRun, folder: Path) -> Path:
 
 
 def _folder_identity(folder: Path) -> tuple:
-    """Return device and inode of a folder."""
+    """Return the device and inode numbers that identify a folder."""
     status = os.stat(folder)
     return status.st_dev, status.st_ino
 

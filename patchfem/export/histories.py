@@ -14,7 +14,7 @@ LEDGER = ("friction_work", "energy_stored", "energy_dissipated", "energy_created
 
 
 def result_contents(result: Result) -> netcdf.Contents:
-    """Return the content of result.nc in SI.
+    """Return the contents of result.nc in SI units.
 
     It consists of histories, interface frames, levels, events, curve and provenance.
     """
@@ -64,12 +64,12 @@ def result_contents(result: Result) -> netcdf.Contents:
 
 
 def largest_multiplier(extra: dict) -> float:
-    """Return the largest |Floquet multiplier|."""
+    """Return the largest magnitude of the Floquet multipliers of a run."""
     return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
 
 
 def collect_histories(result: Result) -> tuple:
-    """Return the histories of a run and its modal coordinates.
+    """Return the histories and the modal coordinates of a run.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def collect_histories(result: Result) -> tuple:
 
 
 def _interface_histories(result: Result) -> dict:
-    """Return the histories (i, k) of the interfaces of a rig of masses, and those of its output."""
+    """Return the histories (i, k) of all interfaces of a rig of masses, and of its output."""
     response = result.response
     columns = {
         "relative_displacement": ("slides", response.slide),
@@ -157,7 +157,7 @@ def _interface_histories(result: Result) -> dict:
 
 
 def _coordinate_description(rig) -> str:
-    """Return the description of `modal_coordinate` if the coordinates are not modes; else ""."""
+    """Describe the coordinates of a run if they are not modes, else return ""."""
     if rig is None or rig.structure.lists_modes or rig.modes.shapes is None:
         return ""
     if any(str(name).startswith("mode ") for name in rig.modes.names):
@@ -166,7 +166,7 @@ def _coordinate_description(rig) -> str:
 
 
 def _level_columns(levels) -> dict:
-    """Return the columns of a run in levels: drive, sticking, outcome, measures and errors."""
+    """Return the results of a run over its drive levels as columns."""
     out = {
         "level_drive": (levels[0].unit, np.array([level.drive for level in levels])),
         "level_stuck": ("1", np.array([level.stuck for level in levels], np.int8)),

@@ -80,7 +80,7 @@ INTERFACE_DESCRIPTIONS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Contents:
-    """Content of a netCDF file.
+    """Variables, coordinates and attributes of a netCDF file.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class Contents:
         coordinates: dict | None = None,
         attributes: dict | None = None,
     ) -> "Contents":
-        """Return this content with additional entries.
+        """Return a copy of the contents with additional entries.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class Contents:
         )
 
     def to_xarray(self):
-        """Return the content as an xarray.Dataset."""
+        """Convert the contents to an xarray.Dataset."""
         import xarray as xr
 
         variables, coordinates = (
@@ -127,7 +127,7 @@ class Contents:
 
 
 def _xarray_variable(xr, dimensions, values, attributes=None):
-    """Return an xarray variable of numbers or strings without conversion.
+    """Return an xarray variable of numbers or strings without unit conversion.
 
     To look for arrays of other packages, xarray would import all of Dask, which takes a quarter of
     its own import time.
@@ -150,7 +150,7 @@ def run_contents(
     interfaces: tuple = (),
     coordinate: str = "",
 ) -> Contents:
-    """Return the content of result.nc for a run.
+    """Return the contents of result.nc for a run.
 
     Parameters
     ----------
@@ -252,7 +252,7 @@ def run_contents(
 def add_events(
     data: Contents, time, interface, kind, slide, count: int, meanings, source: str
 ) -> Contents:
-    """Return the content with the table of events (e,).
+    """Add the table of events (e,) to the contents of a file.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ CURVE_COLUMNS = {
 
 
 def add_curve(data: Contents, curve: dict) -> Contents:
-    """Return the content with a curve of steady motions (c,).
+    """Add a curve of steady motions (c,) to the contents of a file.
 
     curve: frequency [Hz], level, amplitude [m], regime, multiplier, folds, and if they exist the
     columns of CURVE_COLUMNS and the errors of all that is read.
@@ -384,7 +384,7 @@ DECAY = {
 
 
 def add_decay(data: Contents, decay) -> Contents:
-    """Return the content with a `response.decay_curve.DecayCurve` over decay_time."""
+    """Add a decay curve to the contents of a file."""
     dimension = "decay_time"
     variables = {}
     for name, (unit, text) in DECAY.items():
@@ -412,7 +412,7 @@ def add_decay(data: Contents, decay) -> Contents:
 
 
 def add_spectra(data: Contents, spectra) -> Contents:
-    """Return the content with `response.stationary.Spectra` over frequency."""
+    """Add the spectra of a random response to the contents of a file."""
     columns = {
         "base_acceleration_spectrum": (
             "m2 s-3",
@@ -447,7 +447,7 @@ def add_spectra(data: Contents, spectra) -> Contents:
 
 
 def add_surfaces(data: Contents, gap) -> Contents:
-    """Return the content with the gap (m,) [m] of the unloaded surfaces, wear included.
+    """Add the unloaded gap (m,) [m] between the surfaces to the contents of a file.
 
     With strips the gap is (s, m).
     """
@@ -463,7 +463,7 @@ def add_surfaces(data: Contents, gap) -> Contents:
 
 
 def add_faces(data: Contents, faces) -> Contents:
-    """Return the content with the patches of interfaces, each on separate nodes, frame by frame.
+    """Add the patches of all interfaces, frame by frame, to the contents of a file.
 
     faces: list of `runs.patch.faces.Face`. The number at the end of a name is that of the
     interface, from 1.
@@ -496,7 +496,7 @@ EDGE_PEAK = (
 
 
 def add_wear(data: Contents, history: dict, units: dict) -> Contents:
-    """Return the content with measures over the cycles of wear.
+    """Add the measures over the wear cycles to the contents of a file.
 
     Parameters
     ----------
@@ -534,7 +534,7 @@ def _variable_attributes(name: str, dimensions: int = 1) -> dict:
 
 
 def add_provenance(data: Contents, summary: dict, scene_text: str, versions: dict) -> Contents:
-    """Return the content with its origin: program, scene, outcome, measures and versions.
+    """Add program, scene, outcome, measures and versions to the contents of a file.
 
     It names neither host nor path.
 
@@ -565,7 +565,7 @@ def add_provenance(data: Contents, summary: dict, scene_text: str, versions: dic
 
 
 def write_netcdf(data: Contents, path: Path) -> None:
-    """Write the content as netCDF4 to `path`.
+    """Write contents as a netCDF4 file.
 
     A file is created in memory, so that a full disk gives one OSError and leaves nothing open. A
     file with more than MAX_VALUES_IN_MEMORY numbers is created on disk; errors of writing are raised when it is
@@ -591,7 +591,7 @@ def write_netcdf(data: Contents, path: Path) -> None:
 
 
 def _write_file(opened: h5py.File, data: Contents) -> None:
-    """Write the content into an open HDF5 file."""
+    """Write contents into an open HDF5 file."""
     with h5netcdf.File(opened, "w") as file:
         file.attrs.update(data.attributes)
         _write_variables(file, data)
@@ -626,7 +626,7 @@ class _CachingFile(h5py.File):
 
 
 def _write_variables(file, data: Contents) -> None:
-    """Write variables and coordinates into an open file.
+    """Write variables and coordinates into an open HDF5 file.
 
     Coordinates that are not a dimension are named by the variables that have them.
     """

@@ -20,7 +20,7 @@ from .summary import count_cycles, package_versions, summarise_run
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SceneText:
-    """The scene of a run: as written, with all defaults in SI, and the keys of the command line."""
+    """Scene of a run as text: as written, with all defaults, and the command-line keys."""
 
     name: str
     text: str
@@ -32,7 +32,7 @@ class SceneText:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Verdict:
-    """Summary of a run and the sentence about its outcome.
+    """Summary of a run with the sentence on its outcome.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PressedPatch:
-    """A patch in contact, or none.
+    """Solved patch that a page shows, or none.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class PressedPatch:
     film: dict | None = None
 
     def touches(self) -> bool:
-        """Return whether a part of the patch is in contact."""
+        """Return whether the two pieces touch anywhere."""
         return (
             self.x is not None
             and bool(self.fields)
@@ -102,7 +102,7 @@ class PressedPatch:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Motion:
-    """Histories of a run.
+    """Histories of a run that its page shows.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Wear:
-    """Wear of a patch.
+    """Wear of a patch that its page shows.
 
     history: measures over the cycles; states: profiles; period: of a cycle [s].
     """
@@ -141,7 +141,7 @@ class Wear:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evaluations:
-    """Evaluations besides the histories; each is None if the run does not have it."""
+    """Curves, levels, spectra and decay of a run; None for those that it does not have."""
 
     curve: object = None
     decay: object = None
@@ -152,7 +152,7 @@ class Evaluations:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measured:
-    """Measured responses to compare with.
+    """Measured responses that are compared with a run.
 
     Attributes
     ----------
@@ -176,18 +176,18 @@ class Measured:
     share: float = 1.0
 
     def is_comparable(self) -> bool:
-        """Return whether the drive has a frequency, with which rows can be compared."""
+        """Return whether the drive has a frequency, so that measured rows can be compared."""
         return self.input is not None and self.frequency is not None
 
     def factors(self) -> tuple:
-        """Return the readings of accelerometer and gauge per peak acceleration and displacement."""
+        """Return the readings of the instruments per unit of peak acceleration and displacement."""
         acceleration, displacement = self.gains
         return acceleration * self.share, displacement
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunData:
-    """All that the page of a run shows."""
+    """Data that the page of a run shows."""
 
     source: SceneText
     verdict: Verdict
@@ -226,7 +226,7 @@ def collect_run_data(result: Result) -> RunData:
 
 
 def _verdict(result: Result) -> Verdict:
-    """Return how the run ended."""
+    """Return the summary and the outcome of a run."""
     summary = summarise_run(result)
     steady = None
     if "regime" in result.extra:
@@ -243,7 +243,7 @@ def _verdict(result: Result) -> Verdict:
 
 
 def _patch(result: Result) -> PressedPatch:
-    """Return the pressed patch with its fields."""
+    """Return the solved patch of a run with its fields."""
     faces = [
         (face.surface.x, face.fields, f"interface {face.name}")
         for face in result.extra.get("faces", ())
@@ -264,7 +264,7 @@ def _patch(result: Result) -> PressedPatch:
 
 
 def _evaluations(result: Result) -> Evaluations:
-    """Return the evaluations of the run."""
+    """Return the curves, levels, spectra and decay of a run."""
     extra = result.extra
     levels = None
     wear = None
@@ -279,7 +279,7 @@ def _evaluations(result: Result) -> Evaluations:
 
 
 def _bench_motion(result: Result, tables: dict) -> Motion:
-    """Return the histories of a bench."""
+    """Return the histories of a bench run for its page."""
     response = result.response
     window = result.window
     history = {"time": response.time, "displacement": response.slide, "force": response.force}
@@ -309,7 +309,7 @@ def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
 
 
 def _rig_motion(result: Result) -> Motion:
-    """Return the histories of a rig."""
+    """Return the histories of a rig run for its page."""
     response = result.response
     window = result.window
     rig = result.plan.model.rig

@@ -23,7 +23,7 @@ COORDINATES = (
 
 
 class Variable(NamedTuple):
-    """A variable of a netCDF file: names of its dimensions, values, and unit as in the file."""
+    """Variable of a netCDF file with dimensions, values and unit."""
 
     dims: tuple
     values: np.ndarray
@@ -87,7 +87,7 @@ def read_variables(path: Path, names: set | None = None) -> tuple:
 
 
 def _check_variable(name: str, variable: Variable, sizes: dict) -> None:
-    """Raise ValueError for a variable that cannot be one of results.
+    """Raise ValueError for a variable that a results file cannot contain.
 
     sizes: lengths of the dimensions so far, to which those of this variable are added.
     """
@@ -118,6 +118,6 @@ def is_real(values) -> bool:
 
 
 def require_valid(is_valid: bool, text: str) -> None:
-    """Raise ValueError with a message unless a condition is true."""
+    """Raise ValueError with a message if a condition is false."""
     if not is_valid:
         raise ValueError(text)

@@ -102,7 +102,7 @@ def page_html(data: RunData) -> str:
 
 
 def draw_figures(data: RunData) -> tuple:
-    """Return the charts of a run, each with its anchor, and the HTML of their containers."""
+    """Return the charts of a run, and the HTML of the elements that contain them."""
     chart_data = []
     figures = []
     for picture in (find_picture(name, data) for name in PICTURES):
@@ -124,7 +124,7 @@ def draw_figures(data: RunData) -> tuple:
 
 
 class Picture(NamedTuple):
-    """A picture of a run: a function of `charts`, its arguments, and a caption."""
+    """Picture of a run: drawing function, its arguments and a caption."""
 
     charts: Callable
     values: tuple
@@ -132,7 +132,7 @@ class Picture(NamedTuple):
 
 
 def find_picture(name: str, data: RunData) -> Picture | None:
-    """Return the picture of this name (a key of PICTURES); None if the run has no data for it."""
+    """Return the picture with a given name; None if the run has no data for it."""
     return PICTURES[name](data)
 
 
@@ -222,7 +222,7 @@ def _wear_picture(data: RunData) -> Picture | None:
 
 
 def _edge_peaks_sentence(history: dict) -> str:
-    """State after which cycles the peak pressure is that of a node at the edge of the contact."""
+    """State after which wear cycles the peak pressure lies at the edge of the contact."""
     above = np.asarray(history.get("pressure_peak_at_edge", ()))
     if not (above > 0).any():
         return ""
@@ -330,7 +330,7 @@ def _stress_picture(data: RunData) -> Picture | None:
 
 
 def _mesh_sentence(data: RunData) -> str:
-    """Return the sentence about pressure peaks that the stress in the pieces misses; else ""."""
+    """State that the plotted stress misses pressure peaks at the surface; "" if it does not."""
     sigma = data.patch.fields["normal_stress"][0]
     mesh_pressure = data.patch.bodies["pressure"]
     if sigma.size == mesh_pressure.size:
@@ -445,7 +445,7 @@ def _histories_picture(data: RunData) -> Picture | None:
 
 
 def _drive_sentence(data: RunData) -> str:
-    """Return the sentence, for the end of a caption, on what drives the run.
+    """Describe the drive of a run in a sentence for the end of a caption.
 
     With a curve, it gives the frequency of the motion that is shown.
     """
@@ -508,7 +508,7 @@ PICTURES = {
 
 
 def _unsettled_sentence(data: RunData) -> str:
-    """Return the sentence about a motion that is not steady; "" if it is."""
+    """State that a motion is not steady; "" if it is."""
     outcome = data.verdict.summary["outcome"]
     return (
         ""
@@ -521,7 +521,7 @@ def _unsettled_sentence(data: RunData) -> str:
 
 
 def _measured_section(data: RunData) -> list:
-    """Return the section with computed and measured values; [] if they cannot be compared."""
+    """Return the section that compares computed and measured values, as a list."""
     responses = data.measured
     measures = data.verdict.summary["measures"]
     if not responses.is_comparable():
@@ -573,7 +573,7 @@ LEVEL_COLUMNS = (
 
 
 def _levels_section(levels: list) -> Section:
-    """Return the section about all levels.
+    """Return the section on all drive levels.
 
     A row has drive, amplitude, acceleration, distortion, the outcome if it is known, and whether
     the interface sticks.
@@ -619,7 +619,7 @@ def _levels_section(levels: list) -> Section:
 
 
 def measure_entry(value: float, unit: str, error: float | None) -> dict:
-    """Return a measure as an object of the summary.
+    """Return a measure in the form of an entry of the summary.
 
     Parameters
     ----------
@@ -634,7 +634,7 @@ def measure_entry(value: float, unit: str, error: float | None) -> dict:
 
 
 def _measures_section(data: RunData) -> Section:
-    """Return the section about all measures with errors, in other units, and with definitions."""
+    """Return the section with all measures, their errors and definitions."""
     rows = []
     definitions = data.verdict.means
     measures = data.verdict.summary["measures"]
@@ -678,7 +678,7 @@ def _measures_section(data: RunData) -> Section:
 
 
 def _cost_section(data: RunData) -> Section:
-    """Return the section about what was computed, by which equations, and how long it took."""
+    """Return the section on the computed effects, their equations and the CPU time."""
     summary = data.verdict.summary
     rows = [
         [escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"]
@@ -704,7 +704,7 @@ def _cost_section(data: RunData) -> Section:
 
 
 def _origin_section(data: RunData) -> Section:
-    """Return the section about the scene as written and as understood, the files and the versions."""
+    """Return the section on scene, files and versions from which a run came."""
     versions = ", ".join(f"{k} {v}" for k, v in data.versions.items())
     lacks = ["fields.vtkhdf"] * (data.patch.x is None) + ["interfaces"] * (not data.patch.faces)
     file_entries = [file_entry for file_entry in RESULT_FILES if file_entry[0] not in lacks]
@@ -742,7 +742,7 @@ def run_page(result: Result, bodies: dict | None = None, film: dict | None = Non
 
 
 def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
-    """Draw the first of the named pictures for which a run has data, as matplotlib Axes.
+    """Draw the first of the named pictures that a run has data for, as matplotlib Axes.
 
     Parameters
     ----------
@@ -772,5 +772,5 @@ def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = Non
 
 
 def _add_pieces(data: RunData, bodies: dict | None, film: dict | None = None) -> RunData:
-    """Return the data with the pressed pieces and their film."""
+    """Add the solved pieces and their animation to the data of a page."""
     return replace(data, patch=replace(data.patch, bodies=bodies or None, film=film or None))

@@ -11,7 +11,7 @@ PAGE = "report.html"
 
 
 def write_report(folders: list, out: Path | None = None) -> Path:
-    """Write the page of results folders and return its path.
+    """Write the page on one or several results folders, and return its path.
 
     Several runs, or several sweeps over the same keys, are shown side by side; the page of a single
     sweep is rebuilt.
@@ -52,7 +52,7 @@ def write_report(folders: list, out: Path | None = None) -> Path:
 
 
 def _write_page(text: str, out: Path) -> Path:
-    """Write a page and create its folder."""
+    """Write a page to a file, and create the folder of the file."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -58,7 +58,7 @@ STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")
 
 
 class Folder:
-    """Context of a results folder, which is locked at entry.
+    """Results folder as a context manager, which is locked while files are written.
 
     `path` is the partial folder into which files are written. At exit without an error it replaces
     an older folder; at exit with an error it is removed except for saved STATES. The next entry
@@ -144,7 +144,7 @@ class Folder:
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
     def _dropped_note(self) -> str:
-        """Return the note that saved states are deleted; "" if there are none."""
+        """Return the note that saved states of an earlier run are deleted, or ""."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""
         return (
@@ -153,7 +153,7 @@ class Folder:
         )
 
     def _abandon(self) -> None:
-        """Remove everything except a saved state; without one, remove the folder as well."""
+        """Remove an incomplete results folder, but keep a saved state."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             shutil.rmtree(self.path, ignore_errors=True)
             return
@@ -166,12 +166,12 @@ class Folder:
 
 
 def is_state(name: str) -> bool:
-    """Return whether a file of this name is the state of an interrupted run."""
+    """Return whether a file name is that of the state of an interrupted run."""
     return STATES.fullmatch(name) is not None
 
 
 def refuse_others(place: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
-    """Raise PatchfemError for a path that is not a folder, or that contains other files.
+    """Raise PatchfemError for a path that is no folder or contains foreign files.
 
     Parameters
     ----------

@@ -23,13 +23,13 @@ PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matp
 
 
 def measure_object(measure) -> dict:
-    """Return a Measure as {"value", "unit", "error", "floor"}.
+    """Convert a Measure to the JSON object of a summary.
 
     Numbers that are not finite become None. A measure without a value also has its "reason".
     """
 
     def clean(number):
-        """Return a number as float; None if it is not finite."""
+        """Convert a number to float, or to None if it is not finite."""
         return None if number is None or not math.isfinite(number) else float(number)
 
     out = {
@@ -52,7 +52,7 @@ def make_summary(
     messages: tuple,
     seconds: dict,
 ) -> dict:
-    """Return the content of summary.json.
+    """Return the contents of summary.json.
 
     Parameters
     ----------
@@ -87,12 +87,12 @@ def make_summary(
 
 
 def write_json(value: dict, path: Path) -> None:
-    """Write a value as strict JSON with a final newline; ValueError if it has NaN or infinity."""
+    """Write a value as strict JSON; raise ValueError for NaN or infinity."""
     write_text(path, json.dumps(value, indent=1, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def read_summary(path: Path) -> dict:
-    """Read summary.json.
+    """Read and check a summary.json file.
 
     OSError if it cannot be read, ValueError if `make_summary` cannot have made it.
     """
@@ -113,7 +113,7 @@ def read_summary(path: Path) -> dict:
 
 
 def _parse_int(digits: str) -> int:
-    """Return an integer; ValueError if no float can represent it."""
+    """Parse an integer; raise ValueError if it is too large for a float."""
     if len(digits) > 300:
         raise ValueError(f"a whole number of {len(digits)} digits cannot come from a run")
     return int(digits)
@@ -121,7 +121,7 @@ def _parse_int(digits: str) -> int:
 
 @cache
 def _summary_model() -> type:
-    """Return the pydantic model of what readers of a summary rely on."""
+    """Return the pydantic model of the entries on which readers of a summary rely."""
     from pydantic import BaseModel
 
     class Number(BaseModel):
@@ -144,7 +144,7 @@ def _summary_model() -> type:
 
 
 def summarise_run(result: Result) -> dict:
-    """Return the content of summary.json for a run."""
+    """Return the contents of summary.json for a run."""
     run_plan = result.plan
     summary = make_summary(
         __version__,
@@ -168,7 +168,7 @@ def summarise_run(result: Result) -> dict:
 
 
 def runaway_data(result: Result) -> dict:
-    """Return drive and knee [m s-2] of a motion that did not settle above the knee; else {}.
+    """Return the drive [m s-2] of an unsettled motion, and the drive that friction can bound.
 
     It is {"run_away": {"drive", "knee"}}: the acceleration of the base, and the one above which
     friction alone does not limit the amplitude at resonance.
@@ -186,7 +186,7 @@ def runaway_data(result: Result) -> dict:
 
 
 def loop_entry(result: Result) -> dict:
-    """Return the slide amplitude [m] and the loss factor of a bench; {} if the slide does not repeat.
+    """Return the slide amplitude [m] and the loss factor of a periodic bench as a dict.
 
     It is {"loop": {"slide_amplitude", "loss_factor", "error"}}. The loss factor is the work of a
     cycle over 2 pi times the largest elastic energy, W/(pi k A^2) with the equivalent stiffness k.
@@ -214,7 +214,7 @@ def loop_entry(result: Result) -> dict:
 
 
 def contact_entry(result: Result) -> dict:
-    """Return where a pressed patch is in contact, x in m; {} for strips and if nothing touches.
+    """Return where a solved patch without strips is in contact [m], as a dict.
 
     It is {"contact": {"from", "to": ends of the interface, "stretches": [[begin, end] of each part
     in contact]}}.
@@ -245,7 +245,7 @@ def count_cycles(result: Result) -> float | None:
 
 
 def effect_entries(result: Result) -> list:
-    """Return the effects of a run as [{"effect", "equations", "seconds"}].
+    """Return the computed effects of a run with equations and CPU time.
 
     The law and the modes share one loop, whose time is assigned to the law.
     """
@@ -275,7 +275,7 @@ def effect_entries(result: Result) -> list:
 
 
 def package_versions() -> dict:
-    """Return the versions, by name, of the interpreter and of the packages that compute."""
+    """Return the versions of Python and of the packages that compute, as a dict."""
     installed = list_installed_versions()
     return {"python": ".".join(map(str, sys.version_info[:3]))} | {
         name: installed[name] for name in PACKAGES if name in installed

@@ -207,7 +207,7 @@ def _require_finite(per_mass) -> np.ndarray:
 
 
 def _factor_mass(M):
-    """Compute the lower Cholesky factor (n, n) of M, or the roots (n,) of a diagonal M."""
+    """Return the Cholesky factor (n, n) of the mass matrix, or roots (n,) if it is diagonal."""
     diagonal = np.diag(M)
     scale = np.sqrt(np.maximum(diagonal, 0.0))
     if not (M - np.diag(diagonal)).any():

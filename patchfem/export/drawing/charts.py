@@ -42,7 +42,7 @@ MAX_FRAME_WIDTH = 300
 
 
 def make_axis(label: str, unit: str = "", log: bool = False) -> dict:
-    """Return an axis of a chart.
+    """Return an axis of a chart as a dict with label, unit and scale.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def make_axis(label: str, unit: str = "", log: bool = False) -> dict:
 
 
 def make_chart(title: str, x: dict, y: dict, marks: list) -> dict:
-    """Return a chart of marks.
+    """Return a chart as a dict with its axes and marks.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def make_chart(title: str, x: dict, y: dict, marks: list) -> dict:
 
 
 def make_mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
-    """Return a mark.
+    """Return a chart mark (line, points, band, ...) as a dict.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def make_mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
 
 
 def make_dots(x, y, colour: str, name: str = "", **style) -> dict:
-    """Return points.
+    """Return a chart mark of points with optional error bars.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def make_dots(x, y, colour: str, name: str = "", **style) -> dict:
 
 
 def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **style) -> dict:
-    """Return a line; a line with many points is reduced by `sample_indices`.
+    """Return a chart mark of a line, with fewer points if there are many.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **
 
 
 def sample_indices(x, y, max_points: int) -> np.ndarray:
-    """Return the indices of at most `max_points` points of a line.
+    """Select the indices of points that represent a line with many points.
 
     From every stretch of the line these are the lowest and the highest x and y.
 
@@ -151,7 +151,7 @@ def sample_indices(x, y, max_points: int) -> np.ndarray:
 
 
 def limit_characters(all_charts: list, max_characters: int) -> list:
-    """Reduce lines and bands so that all charts take about `max_characters` characters.
+    """Reduce the points of lines and bands until the charts take a given number of characters.
 
     A number takes NUMBER characters.
     """
@@ -169,7 +169,7 @@ def limit_characters(all_charts: list, max_characters: int) -> list:
 
 
 def _reduce_mark(mark: dict, fraction: float) -> dict:
-    """Reduce a line or band to a fraction of its points."""
+    """Reduce a chart line or band to a fraction of its points."""
     rows = {"line": ("x", "y"), "band": ("x", "low", "high")}.get(mark["kind"])
     if rows is None or np.size(mark["x"]) <= MIN_LINE_POINTS:
         return mark
@@ -179,7 +179,7 @@ def _reduce_mark(mark: dict, fraction: float) -> dict:
 
 
 def contact_range(x, sigma) -> tuple | None:
-    """Return the ends x [m] of the pressed part of a patch; None if the whole patch is shown.
+    """Return the ends [m] of the loaded part of a patch; None if the full patch is shown.
 
     Only this part is shown if less than half of the length is pressed.
     """
@@ -261,7 +261,7 @@ def faces_charts(faces: list) -> list:
 
 
 def contact_window(x, depth, sigma, ratio: float) -> tuple:
-    """Return the part (left, right, height) [m] of both pieces that shows the contact.
+    """Return the section (left, right, height) [m] of both pieces around the contact.
 
     Its proportions are right - left = 2 height ratio.
 
@@ -288,7 +288,7 @@ def contact_window(x, depth, sigma, ratio: float) -> tuple:
 
 
 def stress_charts(x, depths, mises, sigma) -> list:
-    """Return charts of the von Mises stress in both pieces, whole and around the contact.
+    """Return charts of the von Mises stress in both pieces, full and around the contact.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def stress_charts(x, depths, mises, sigma) -> list:
 
 
 def worn_map_chart(x, width: float, depth) -> list:
-    """Return a map of the worn depth of strips over x and the width.
+    """Return a map of the worn depth of the strips over length and width of a patch.
 
     Parameters
     ----------
@@ -389,7 +389,7 @@ def worn_map_chart(x, width: float, depth) -> list:
 
 
 def reduce_grid(x, depth, cells, max_cells: int) -> tuple:
-    """Reduce a grid to about `max_cells` cells, each with the mean over its area.
+    """Average a grid of values over blocks until it has about a given number of cells.
 
     Parameters
     ----------
@@ -418,7 +418,7 @@ def reduce_grid(x, depth, cells, max_cells: int) -> tuple:
 
 
 def _frame_size(ratio: float) -> list:
-    """Return width and height [px] of a frame with this ratio of both."""
+    """Return width and height [px] of a picture with a given aspect ratio."""
     if FRAME_HEIGHT * ratio <= MAX_FRAME_WIDTH:
         return [round(FRAME_HEIGHT * ratio), FRAME_HEIGHT]
     return [MAX_FRAME_WIDTH, round(MAX_FRAME_WIDTH / ratio)]
@@ -454,7 +454,7 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
 
 
 def loop_charts(loops: list) -> list:
-    """Return the friction loop of every interface; loops: (name, slide [m], force [N]) each."""
+    """Return the charts of the friction loops of all interfaces."""
     return [
         chart
         for name, slide, force in loops
@@ -487,7 +487,7 @@ def cycle_envelope(time, value, period: float) -> tuple:
 
 
 def first_complete_time(time, period: float, window_start: float) -> float:
-    """Return the time [s] after which the stored samples show the motion itself.
+    """Return the time [s] from which the stored samples represent the motion itself.
 
     Every later cycle has at least MIN_SAMPLES_PER_CYCLE samples. The last window is always stored completely, so
     the time is never after its start.
@@ -513,7 +513,7 @@ def history_charts(
     title: str = "Last cycles",
     joined: bool = False,
 ) -> list:
-    """Return charts of the whole run, and of its last cycles (rig) or friction force (bench).
+    """Return charts of the motion over all cycles, and of the last cycles or the friction force.
 
     Parameters
     ----------
@@ -666,7 +666,7 @@ def measured_charts(rows: list, frequency: float, level: float, acceleration, di
 
 
 def regime_stretches(curve: dict) -> list:
-    """Return stretches [(regime, first, last + 1)] of neighbouring points with the same regime.
+    """Split a curve into ranges of neighbouring points with the same regime.
 
     curve: a curve of steady motions.
     """
@@ -676,14 +676,14 @@ def regime_stretches(curve: dict) -> list:
 
 
 def curve_axis(curve: dict) -> tuple:
-    """Return the horizontal axis of a curve: its values, their name and unit."""
+    """Return name, values and unit of the horizontal axis of a curve."""
     if np.ptp(curve["frequency"]) > 0:
         return np.asarray(curve["frequency"]), "drive frequency", "Hz"
     return np.asarray(curve["level"]) / G_N, "drive level", "g"
 
 
 def regime_sentence(steady: dict | None) -> str:
-    """Return a sentence about regime and stability of a steady motion; "" if they are not known."""
+    """Return a sentence on regime and stability of a steady motion, or ""."""
     if steady is None:
         return ""
     size = steady["multiplier"]
@@ -833,13 +833,13 @@ def spectra_charts(found, frequency: float | None) -> list:
 
 
 def _positive_line(x, y, colour: str, name: str = "") -> dict | None:
-    """Return a line through the positive values; None if there are none."""
+    """Return a chart line through the positive values; None if there are none."""
     is_positive = np.isfinite(y) & (y > 0)
     return make_line(x[is_positive], y[is_positive], colour, name) if is_positive.any() else None
 
 
 def decay_charts(decay) -> list:
-    """Return charts of frequency and damping ratio of a released output against its amplitude.
+    """Return charts of frequency and damping ratio of a release against its amplitude.
 
     decay: a `response.decay_curve.DecayCurve`, whose errors become bars.
     """
@@ -877,7 +877,7 @@ def decay_charts(decay) -> list:
 
 
 def levels_chart(rows: list) -> list:
-    """Return the chart of the amplitude after every level, with arrows in the order of the test.
+    """Return the chart of the amplitude after each drive level, with arrows in test order.
 
     The axis is logarithmic for more than three decades; a level without motion is then left out.
 

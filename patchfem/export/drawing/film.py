@@ -35,7 +35,7 @@ MAX_FRAME_SECONDS = 0.3  # longest duration of a frame [s]
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """Data and settings that all frames of an animation share.
+    """Data and settings that the frames of an animation have in common.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Film:
         )
 
     def panels(self, frame: Frame) -> tuple:
-        """Return the panels of a frame, with the windows and colours of the film."""
+        """Return the panels of one frame of the film."""
         return tuple(
             replace(panel, window=window, top=top, over=over)
             for panel, window, top, over in zip(
@@ -90,7 +90,7 @@ class Film:
 
 
 def make_film(series: Series, magnify: float | None = None) -> Film:
-    """Return what the frames of the last cycle of a series have in common.
+    """Collect what the frames of the last cycle have in common, such as windows and colours.
 
     Parameters
     ----------
@@ -157,14 +157,14 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
 
 
 def _enclosing_window(windows: list) -> tuple:
-    """Return the smallest window that contains several windows."""
+    """Return the smallest window that encloses several windows."""
     low = np.min(windows, axis=0)
     high = np.max(windows, axis=0)
     return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
 
 
 def write_film(series: Series, head: str, magnify: float | None, out: Path) -> str:
-    """Write the film of a series in the format that the suffix of `out` names.
+    """Write the animation of a series of fields to a file, in the format of its suffix.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def _find_ffmpeg(out: Path) -> str:
 
 
 def _movie_writer(out: Path, seconds: float):
-    """Return a matplotlib writer for a .gif or .mp4 file; seconds: duration of a frame."""
+    """Return a matplotlib writer for a .gif or .mp4 file with a given frame duration."""
     if out.suffix == ".gif":
         from .gif_writer import GifWriter
 
@@ -247,7 +247,7 @@ def _movie_writer(out: Path, seconds: float):
 
 
 def _finish_file(writer, out: Path) -> None:
-    """Close the file; raise Missing with the last line of ffmpeg if this fails."""
+    """Close a movie file; raise Missing with the last line of ffmpeg if this fails."""
     try:
         writer.finish()
     except subprocess.CalledProcessError as error:

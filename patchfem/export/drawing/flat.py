@@ -36,7 +36,7 @@ def draw_frame(frame: Frame, head: str, magnify: float | None, path: Path) -> No
 
 
 class Picture:
-    """Figure of a frame that `show` can change to another frame of the same series.
+    """Figure of one frame, which can be changed to another frame of the same series.
 
     Axes and colours stay as they are first drawn.
 
@@ -101,20 +101,20 @@ class Picture:
         self._head(head, shown)
 
     def freeze_layout(self, dpi: float) -> None:
-        """Lay out the axes at this resolution and keep the layout for all later frames."""
+        """Lay out the axes of the figure, and keep this layout for later frames."""
         self.figure.set_dpi(dpi)
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
 
     def _head(self, head: str, shown: tuple) -> None:
-        """Write the titles of both panels."""
+        """Write the titles of both panels of the figure."""
         whole_bodies, contact_bodies = self.bodies
         whole_bodies.axes.set_title(f"{head}\n{shown[0].title()}")
         contact_bodies.axes.set_title(f"where they touch, {shown[1].title(False)}")
 
 
 class _Bodies:
-    """Cells of a panel, coloured by their stress, with the borders of the pieces."""
+    """Drawn cells of both pieces, coloured by their stress, with their borders."""
 
     def __init__(self, axes, frame: Frame, panel: Panel):
         from matplotlib.collections import LineCollection, PolyCollection
@@ -149,7 +149,7 @@ class _Bodies:
         self.show(frame, panel)
 
     def show(self, frame: Frame, panel: Panel) -> None:
-        """Change the cells and borders to those of another frame."""
+        """Change the drawn cells and borders to those of another frame."""
         for is_drawn, corners, collection in self.cells:
             collection.set_verts(panel.places[corners])
             collection.set_array(frame.cell_data["von_mises"][is_drawn] * self.scale)

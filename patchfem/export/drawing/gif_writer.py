@@ -16,7 +16,7 @@ N_TINTS = 16  # tints of each curve from white to its colour
 
 
 class GifWriter(AbstractMovieWriter):
-    """Writer of frames with one palette of 256 colours.
+    """Writer of an animated GIF whose frames share a palette of 256 colours.
 
     `matplotlib.animation.PillowWriter` chooses 256 colours for each frame, so that the same stress
     has another colour in the next frame.
@@ -30,7 +30,7 @@ class GifWriter(AbstractMovieWriter):
         self.palette.putpalette(_make_palette().tobytes())
 
     def grab_frame(self, **savefig):
-        """Add the figure in its current state."""
+        """Add the current state of the figure as a frame."""
         buffer = BytesIO()
         self.fig.savefig(buffer, **savefig, format="rgba", dpi=self.dpi)
         image = Image.frombuffer(
@@ -39,7 +39,7 @@ class GifWriter(AbstractMovieWriter):
         self.frames.append(image.quantize(palette=self.palette, dither=Image.Dither.NONE))
 
     def finish(self):
-        """Write the file."""
+        """Write the animation to the file."""
         first, *others = self.frames
         duration = round(1000 / self.fps)
         first.save(
@@ -53,7 +53,7 @@ class GifWriter(AbstractMovieWriter):
 
 
 def _make_palette() -> np.ndarray:
-    """Return the palette (256, 3) uint8: the scale of stresses, greys, and tints of both curves."""
+    """Return the 256 colours of an animation: stress scale, greys and tints of the curves."""
     scale = colormaps["viridis"](np.linspace(0, 1, N_SCALE))[:, :3]
     greys = np.linspace(0, 1, N_GREYS)[:, None] * np.ones(3)
     fraction = np.linspace(0, 1, N_TINTS)[:, None]

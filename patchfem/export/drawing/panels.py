@@ -18,7 +18,7 @@ DRAWN_MOTION_FRACTION = 0.05  # Largest motion or gap as drawn / height of a pan
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Panel:
-    """One view of both pieces.
+    """View of both pieces in a window, with magnified motion and a colour scale.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ def make_panels(
 
 
 def _stressed_cells(frame: Frame, window: tuple) -> np.ndarray:
-    """Return which cells (cells,) bool of a window have a stress."""
+    """Return a mask of the cells of a window that have a stress."""
     left, right, bottom, top = window
     x, y = cell_centres(frame).T
     return (
@@ -131,7 +131,7 @@ def _stressed_cells(frame: Frame, window: tuple) -> np.ndarray:
 
 
 def _colour_limit(mises, area) -> float:
-    """Return the stress [Pa] at the upper end of the colours of some cells.
+    """Return the stress [Pa] at the upper end of the colour scale of some cells.
 
     It is the largest stress, unless this is a peak in a corner.
     """
@@ -143,7 +143,7 @@ def _colour_limit(mises, area) -> float:
 def _make_panel(
     frame: Frame, motion: tuple, window: tuple, is_drawn, magnify: float | None, limit: float
 ) -> Panel:
-    """Return the panel of a window.
+    """Return the view of both pieces in a window.
 
     Parameters
     ----------
@@ -210,12 +210,12 @@ def _weighted_quantile(values, weight, fraction: float) -> float:
 
 
 def upper_points(frame: Frame) -> np.ndarray:
-    """Return the numbers of the points of the upper piece."""
+    """Return the indices of the points that belong to the upper piece."""
     return np.unique(np.concatenate([block.ravel() for block in frame.cells(1)]))
 
 
 def upper_piece_slide(frame: Frame) -> float:
-    """Return the slide [m] of the upper piece as a whole.
+    """Return the slide [m] of the upper piece as a rigid body.
 
     It is the motion of its rigid far face, extrapolated to y = 0.
     """
@@ -228,7 +228,7 @@ def upper_piece_slide(frame: Frame) -> float:
 
 
 def upper_piece_slides(points, moves) -> np.ndarray:
-    """Return the slides (f,) [m], as `upper_piece_slide`, of an upper piece.
+    """Return the slides (f,) [m] of the upper piece in f frames.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def upper_piece_slides(points, moves) -> np.ndarray:
 
 
 def drawn_displacement(frame: Frame) -> np.ndarray:
-    """Return the displacement (N, 2) [m] as drawn.
+    """Return the magnified displacement (N, 2) [m] with which the points are drawn.
 
     For the upper piece it includes the shape of its surface, decreasing towards its far face, so
     that the drawn gap is the computed one.
@@ -263,7 +263,7 @@ def drawn_displacement(frame: Frame) -> np.ndarray:
 
 
 def surface_shape_motion(points, up, x, surface) -> np.ndarray:
-    """Return what the shape of its surface adds to the motion (f, n) [m] of an upper piece.
+    """Return the motion (f, n) [m] of an upper piece that is due to its surface shape.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def surface_shape_motion(points, up, x, surface) -> np.ndarray:
 
 
 def round_down_factor(factor: float, minimum: float = 1.0) -> float:
-    """Return a factor > 0 rounded down to 1, 2 or 5 times a power of ten, but at least `minimum`."""
+    """Round a magnification factor down to 1, 2 or 5 times a power of ten."""
     if factor < minimum:
         return minimum
     power = 10.0 ** np.floor(np.log10(factor))
@@ -370,7 +370,7 @@ def interface_curves(frame: Frame, stress_range: tuple | None = None) -> tuple:
 
 
 def outer_edges(frame: Frame, cells) -> tuple:
-    """Return the outer edges (e, 2) of some cells as point numbers, and those below a coating.
+    """Return the outer edges (e, 2) of some cells, and the edges below a coating.
 
     cells: (cells,) bool.
     """

@@ -141,7 +141,7 @@ if not films:
 
 
 def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
-    """Write script and fields for the last cycle of a results folder; return a line on them.
+    """Write a ParaView script and the fields of the last cycle; return a line about them.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
 
 
 def _colour_range(series: Series, film: Film, of: str) -> tuple:
-    """Return the ends of the colours of a stress [Pa].
+    """Return the smallest and largest stress [Pa] of a colour scale.
 
     For the von Mises stress they are those of pictures; for a component they are symmetric about 0.
     """
@@ -194,7 +194,7 @@ def _colour_range(series: Series, film: Film, of: str) -> tuple:
 
 
 def get_stress(cell_data: dict, of: str) -> np.ndarray:
-    """Return a stress (cells,) [Pa] of STRESSES; tension is positive."""
+    """Return one component of the stress (cells,) [Pa], with tension positive."""
     place = STRESSES[of][1]
     return cell_data["von_mises"] if place is None else cell_data["stress"][:, place]
 
@@ -228,7 +228,7 @@ def script_text(out: Path, film: Film, of: str, ends: tuple, status: bool = Fals
 
 
 def add_motion(frame: Frame, of: str = "von_mises") -> Frame:
-    """Return a frame with the additional arrays `motion` and `slide` (n, 3) [m].
+    """Return a frame with added point arrays for the motion and the slide.
 
     Their sum is the displacement as drawn. The arrays that the script colours [MPa] are added as
     well.

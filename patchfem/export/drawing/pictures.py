@@ -35,7 +35,7 @@ MAX_PLAIN_RATIO = 1e3
 
 
 def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
-    """Return a figure of the width of the page, and its axes side by side.
+    """Return a figure of the page width with axes side by side.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
 
 
 def _figure_svg(figure) -> str:
-    """Return the SVG of a figure without date, creator and addresses.
+    """Return the SVG text of a figure without date and program name.
 
     The only addresses left are those of the XML namespaces.
     """
@@ -82,7 +82,7 @@ def _figure_svg(figure) -> str:
 
 
 def returns_svg(draw):
-    """Turn a function that draws a Figure into one that returns its SVG text.
+    """Wrap a function that draws a Figure so that it returns SVG text.
 
     The attribute `figure` of the result returns the Figure itself, which a notebook shows as the
     same SVG, as it does each of its axes.
@@ -111,7 +111,7 @@ def returns_svg(draw):
 
 @returns_svg
 def draw_charts(made: list, onto=None, height: float = HEIGHT):
-    """Draw charts, as `charts` describes them, side by side.
+    """Draw charts side by side into one figure.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def draw_charts(made: list, onto=None, height: float = HEIGHT):
 
 
 def _write_plain_numbers(axis) -> None:
-    """Label a logarithmic axis by numbers such as 0.1, 0.2, 0.5, or by powers of ten."""
+    """Label a logarithmic axis with plain numbers or powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = sorted(axis.get_view_interval())
@@ -166,7 +166,7 @@ def _write_plain_numbers(axis) -> None:
 
 
 def _write_label(axis, label: dict) -> None:
-    """Write a label at a point (x, y), `raised` [points] above it, to its left or right."""
+    """Write a label beside a point of a chart."""
     on_left = label.get("side") == "left"
     axis.annotate(
         label["text"],
@@ -181,12 +181,12 @@ def _write_label(axis, label: dict) -> None:
 
 
 def _mark_colour(mark: dict) -> str:
-    """Return the colour of a mark."""
+    """Return the colour in which a chart mark is drawn."""
     return COLOURS.get(mark["colour"], mark["colour"])
 
 
 def _draw_line(axis, mark: dict) -> None:
-    """Draw a line."""
+    """Draw the line of a chart mark on axes."""
     axis.plot(
         mark["x"],
         mark["y"],
@@ -199,7 +199,7 @@ def _draw_line(axis, mark: dict) -> None:
 
 
 def _draw_dots(axis, mark: dict) -> None:
-    """Draw points with error bars."""
+    """Draw the points and error bars of a chart mark on axes."""
     axis.errorbar(
         mark["x"],
         mark["y"],
@@ -214,7 +214,7 @@ def _draw_dots(axis, mark: dict) -> None:
 
 
 def _draw_band(axis, mark: dict) -> None:
-    """Draw a band between two curves."""
+    """Draw the band of a chart mark between two curves."""
     axis.fill_between(
         mark["x"],
         mark["low"],
@@ -227,7 +227,7 @@ def _draw_band(axis, mark: dict) -> None:
 
 
 def _draw_span(axis, mark: dict) -> None:
-    """Draw a vertical strip."""
+    """Draw a shaded vertical strip of a chart."""
     axis.axvspan(
         mark["left"],
         mark["right"],
@@ -239,7 +239,7 @@ def _draw_span(axis, mark: dict) -> None:
 
 
 def _draw_rule(axis, mark: dict) -> None:
-    """Draw a vertical line."""
+    """Draw a vertical line of a chart."""
     axis.axvline(
         mark["x"],
         color=_mark_colour(mark),
@@ -250,7 +250,7 @@ def _draw_rule(axis, mark: dict) -> None:
 
 
 def _draw_arrow(axis, mark: dict) -> None:
-    """Draw a line with an arrowhead in its middle; with a floor the axis is logarithmic."""
+    """Draw a line of a chart with an arrowhead in its middle."""
     _draw_line(axis, mark)
     (a, b), (c, d) = mark["x"], mark["y"]
     tail, tip = (
@@ -266,7 +266,7 @@ def _draw_arrow(axis, mark: dict) -> None:
 
 
 def _draw_cells(axis, mark: dict) -> None:
-    """Draw cells between the lines x and y, coloured by value; the first ones add a colour bar."""
+    """Draw the rectangular cells of a chart, coloured by their values."""
     first = not axis.collections
     drawn = axis.pcolormesh(
         mark["x"], mark["y"], mark["value"].T, vmin=0.0, vmax=mark["top"], rasterized=True

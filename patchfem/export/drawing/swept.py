@@ -15,7 +15,7 @@ MIN_MEASURE_RATIO = 100.0  # The same for the values of the measure.
 
 
 def sweep_chart(dataset, measure: str) -> dict:
-    """Return the chart of a measure against the key with the most values.
+    """Return the chart of a measure of a sweep against the key with the most values.
 
     Hollow points miss the tolerance.
 
@@ -74,7 +74,7 @@ def sweep_chart(dataset, measure: str) -> dict:
 
 
 def _make_key_axis(key: str, along) -> tuple:
-    """Return the positions (n,) of the values of a key, and their axis; words are evenly spaced."""
+    """Return the chart axis of a swept key, and the positions (n,) of its values."""
     if along.dtype.kind != "f":
         places = np.arange(float(along.size))
         ticks = [(place, str(word)) for place, word in zip(places, along.values)]
@@ -94,12 +94,12 @@ def _spans_ratio(values, ratio: float) -> bool:
 
 
 def _choose_axis_unit(values, unit: str) -> tuple:
-    """Return unit and scale for an axis of these values [SI]."""
+    """Choose unit and scale of a chart axis for given values [SI]."""
     return choose_axis_unit(values, unit) if unit in UNIT_LADDERS else (unit, 1.0)
 
 
 def _format_key(key, place: int) -> str:
-    """Format a value of a key."""
+    """Format a value of a swept key with its unit."""
     value = key.values[place]
     unit = key.attrs.get("units", "1")
     if key.dtype.kind != "f":

@@ -81,7 +81,7 @@ def view(
 
 
 def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
-    """Write a film of the last cycle."""
+    """Write the last cycle of a results folder as an animation."""
     if frame is not None:
         raise PatchfemError(
             f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame"
@@ -94,7 +94,7 @@ def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | Non
 
 
 def _open_window(one: Frame, head: str, magnify) -> None:
-    """Open a window; Missing without a screen or without OpenGL."""
+    """Open a window with the fields; raise Missing without a screen or OpenGL."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -110,7 +110,7 @@ def _open_window(one: Frame, head: str, magnify) -> None:
 
 
 def explain_missing_opengl() -> str | None:
-    """Return the reason why OpenGL cannot draw here; None if it can.
+    """Return the reason why OpenGL is not available; None if it is.
 
     A child process draws a tiny picture.
     """
@@ -171,7 +171,7 @@ def make_plotter(one: Frame, head: str, magnify: float | None, off_screen: bool 
 
 
 def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
-    """Draw both pieces in a panel."""
+    """Draw both pieces of a frame in a panel of the window."""
     import pyvista as pv
 
     unit, scale = choose_axis_unit([panel.top], "Pa")
@@ -229,7 +229,7 @@ def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> 
 
 
 def _draw_stresses(plotter, one: Frame) -> None:
-    """Draw the stresses along the interface."""
+    """Draw the stresses along the interface in the window."""
     import pyvista as pv
 
     x, curves, unit = interface_curves(one)

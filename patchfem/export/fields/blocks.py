@@ -30,7 +30,7 @@ CODES = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Block:
-    """Cells with their fields.
+    """Mesh of one part (a piece, the interface or the strips) with its fields.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Block:
 
 
 def make_block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
-    """Return a Block of points and cells.
+    """Return a mesh block with given points and cells.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def make_block(points, cells: list, point_data: dict, cell_data: dict) -> Block:
 
 
 def build_blocks(lower: dict, upper: dict, x, interface: dict, width: float = 0.0) -> dict:
-    """Return the blocks of a pair of pieces by name.
+    """Return the mesh blocks of both pieces and their interface as a dict.
 
     The interface moves with the lower piece.
 
@@ -124,7 +124,7 @@ def build_blocks(lower: dict, upper: dict, x, interface: dict, width: float = 0.
 
 
 def _strips_block(x, width: float, areal: dict) -> Block:
-    """Return strips side by side over the width [m], in the plane of the interface.
+    """Return a mesh block of strips side by side in the plane of the interface.
 
     The values (f, s, k) of a strip are constant from edge to edge; the width is along z.
     """
@@ -143,7 +143,7 @@ def _strips_block(x, width: float, areal: dict) -> Block:
 
 
 def _piece_block(body: dict) -> Block:
-    """Return the block of a piece."""
+    """Return the mesh block of one piece."""
     frames = len(body["displacement"])
     cells = len(body["material"])
     move = np.zeros((frames, len(body["points"]), 3), np.float32)
@@ -164,7 +164,7 @@ def _piece_block(body: dict) -> Block:
 
 
 def merge_blocks(blocks: dict) -> Block:
-    """Merge blocks of one time into one block with the cell array `part` of CODES.
+    """Merge the mesh blocks of one frame into one, with a cell array of part codes.
 
     Values that a block does not have are NaN, or -1 for codes.
     """
@@ -191,7 +191,7 @@ def merge_blocks(blocks: dict) -> Block:
 
 
 def _concatenate_arrays(parts: list, sizes: list) -> dict:
-    """Concatenate arrays by name, with NaN or -1 for a block that does not have an array."""
+    """Concatenate the arrays of several blocks, filled with NaN or -1 where they are missing."""
     out = {}
     for name in dict.fromkeys(name for part in parts for name in part):
         like = next(part[name] for part in parts if name in part)

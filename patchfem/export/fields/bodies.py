@@ -54,7 +54,7 @@ DISPLACEMENT_STEP_FRACTION = 2.0**-14
 
 
 def write_fields(result, path: Path) -> dict:
-    """Write both pieces and the interface of a pair, frame by frame.
+    """Write the fields of both pieces and the interface to a file, frame by frame.
 
     Returns the pressed state for the picture of the report, after all wear; only tensor grids have
     it. A stress beyond the yield strength of a named material is added to the notes of the result.
@@ -129,7 +129,7 @@ def _nodal_loads(patch, fields: dict, side: str) -> tuple:
 
 
 def _piece_displacements(patch, loads: list) -> list:
-    """Return the displacements (1 + f, nodes, 2) of both pieces.
+    """Compute the displacements (1 + f, nodes, 2) of both pieces in all frames.
 
     Equal pieces share one factorisation.
     """
@@ -145,7 +145,7 @@ def _piece_displacements(patch, loads: list) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _PieceFields:
-    """Mesh of a piece and what computes its fields; equal pieces share it.
+    """Mesh of a piece with the operators that compute its fields.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class _PieceFields:
 
 
 def _mesh_and_stress(piece, grid) -> _PieceFields:
-    """Return mesh, stress and recovery of a piece."""
+    """Return the mesh, the stress and the stress recovery of a piece."""
     cells = get_cells(piece)
     if isinstance(piece, Piece):
         points = cells.points
@@ -269,7 +269,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
 
 
 def _holder_motion(patch, fields: dict, points, some: slice) -> np.ndarray:
-    """Return the motion (f, n, 2) [m] of the upper holder at points (n, 2) [m] in some frames."""
+    """Return the motion (f, n, 2) [m] of points that move with the upper holder."""
     same = np.ones((len(fields["time"][some]), 1))
     rotation, closing, slide = (
         fields[f"holder_{name}"][some, None] if f"holder_{name}" in fields else constant * same

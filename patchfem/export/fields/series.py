@@ -28,7 +28,7 @@ MIN_STEP_RATIO = 3.0
 
 
 def last_consecutive_frames(times) -> tuple:
-    """Return the numbers of consecutive frames up to the last of the times (f,) [s].
+    """Return the indices of the last frames whose times (f,) [s] are consecutive.
 
     For a rig they are the frames of its last cycle, without the pressed state long before it; for a
     bench all frames of its slide.
@@ -40,7 +40,7 @@ def last_consecutive_frames(times) -> tuple:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Frame(Block):
-    """One time of a series: all blocks as one mesh, as from `merge_blocks`, and each of them.
+    """Fields at one time: all mesh blocks, and the same merged into one mesh.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Frame(Block):
     number: int
 
     def cells(self, part: int) -> list:
-        """Return the cells of a part as arrays (c, nodes), one per number of nodes.
+        """Return the cells of a part as arrays (c, nodes), one per cell size.
 
         part: 0 lower piece, 1 upper piece, 2 interface.
         """
@@ -71,13 +71,13 @@ class Frame(Block):
         ]
 
     def interface(self) -> np.ndarray:
-        """Return the indices (m,) of the points of the interface, in order of x."""
+        """Return the indices (m,) of the interface points in order of x."""
         nodes = np.unique(np.concatenate([block.ravel() for block in self.cells(2)]))
         return nodes[np.argsort(self.points[nodes, 0], kind="stable")]
 
 
 class Series:
-    """Context that reads the fields of a results folder frame by frame.
+    """Reader of the fields in a results folder, frame by frame, as a context manager.
 
     times: (f,) [s].
 
@@ -116,7 +116,7 @@ class Series:
             raise
 
     def _open(self) -> None:
-        """Read times, units and blocks, and check them."""
+        """Read and check the times, units and mesh blocks of the file."""
         self.root = self.file["VTKHDF"]
         if self.root.attrs["Type"] == b"UnstructuredGrid":
             raise PatchfemError(
@@ -137,7 +137,7 @@ class Series:
             self._check_block(name, self.root[name])
 
     def _check_block(self, name: str, group) -> None:
-        """Raise ValueError for a block whose cells or arrays do not fit its points in every frame."""
+        """Raise ValueError if the cells or arrays of a mesh block do not fit its points."""
         points, nodes, ends, types = (
             group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types")
         )
@@ -222,11 +222,11 @@ class Series:
         )
 
     def names(self, block: str, kind: str) -> tuple:
-        """Return the names of the arrays of a block; kind: "PointData" or "CellData"."""
+        """Return the names of the point or cell arrays of a mesh block."""
         return tuple(self.root[block][kind])
 
     def stack(self, block: str, kind: str, name: str, numbers: list) -> np.ndarray:
-        """Return an array of a block in several frames (f, n, ...).
+        """Return an array of a mesh block in several frames (f, n, ...).
 
         Parameters
         ----------
@@ -246,16 +246,16 @@ class Series:
         return np.stack([rows[int(start) : int(start) + size] for start in first])
 
     def points(self, block: str) -> np.ndarray:
-        """Return the points (n, 3) [m] of a block."""
+        """Return the point coordinates (n, 3) [m] of a mesh block."""
         return self.root[block]["Points"][:]
 
     def cells(self, block: str) -> tuple:
-        """Return connectivity and offsets (c + 1,) of the cells of a block."""
+        """Return connectivity and offsets (c + 1,) of the cells of a mesh block."""
         return self.root[block]["Connectivity"][:], self.root[block]["Offsets"][:]
 
     @staticmethod
     def _block(group, number: int) -> Block:
-        """Read a block in one frame."""
+        """Read the mesh block of a part in one frame."""
         data = [
             {name: _read_rows(group, kind, name, number, size) for name in group[kind]}
             for kind, size in (
@@ -273,6 +273,6 @@ class Series:
 
 
 def _read_rows(group, kind: str, name: str, number: int, size: int) -> np.ndarray:
-    """Read the values of an array in one frame."""
+    """Read the values of a field array in one frame."""
     first = int(group[f"Steps/{kind}Offsets/{name}"][number])
     return group[f"{kind}/{name}"][first : first + size]

@@ -59,7 +59,7 @@ def find_yielding(asked, bodies: dict) -> dict:
 
 
 def _yielding_note(known: Strength, highest: tuple, pieces: int) -> str:
-    """Return the note about a material; highest: (stress [Pa], side, position [m])."""
+    """Return the note on a material that yields, with the highest stress and its position."""
     stress, side, (x, y) = highest
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (

@@ -45,7 +45,7 @@ EMPTY = Block(
 
 
 def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | None = None) -> None:
-    """Write a series of fields on fixed meshes.
+    """Write a series of fields on fixed meshes as VTKHDF.
 
     The file is written completely under another name and then renamed. Its HDF5 version is one that
     the reader of VTK knows.
@@ -101,7 +101,7 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
 
 
 def _write_frames(file, steps: list, later: list, count: int) -> None:
-    """Write arrays frame after frame; each frame is on disk before it counts.
+    """Write field arrays frame after frame, each safely on disk before it is counted.
 
     VTK reads beyond its memory unless there are as many times as frames.
 
@@ -125,7 +125,7 @@ def _write_frames(file, steps: list, later: list, count: int) -> None:
 
 
 def _write_frame(dataset, values, nearest, number: int) -> None:
-    """Write a frame of an array, with one chunk per component.
+    """Write one frame of a field array, with one HDF5 chunk per component.
 
     A chunk has the bytes of its numbers shuffled and deflated, as HDF5 does it. A chunk of zeros is
     left out, because readers get 0 for a missing chunk.
@@ -151,7 +151,7 @@ def _write_frame(dataset, values, nearest, number: int) -> None:
 
 
 def _set_frame_count(steps: list, times: list, count: int) -> None:
-    """Set the number of frames that count."""
+    """Set the number of frames that readers of the file see."""
     for group, all_times in zip(steps, times):
         group.attrs["NSteps"] = np.int64(count)
         group["Values"].resize((count,))
@@ -197,7 +197,7 @@ def round_to_step(values, step: float) -> np.ndarray:
 
 
 def _rounding_function(dataset, step: float, bits: int):
-    """Return the function that rounds an array, and state the rounding in its attributes.
+    """Return a function that rounds a field array, and record the rounding in the file.
 
     It rounds to the power of two at or below `step`, or to `bits` if the step is 0 or outside the range
     of float32.
@@ -211,12 +211,12 @@ def _rounding_function(dataset, step: float, bits: int):
 
 
 def _create_group(parent, name: str):
-    """Create a group whose entries keep their order."""
+    """Create an HDF5 group that keeps the order of its entries."""
     return parent.create_group(name, track_order=True)
 
 
 def _field_texts(blocks: dict, units: dict) -> dict:
-    """Return the field arrays of text: the units of all arrays, and the meanings of their codes."""
+    """Return the units of all arrays and the meanings of their codes as text arrays."""
     names = dict.fromkeys(
         name for block in blocks.values() for name in (*block.point_data, *block.cell_data)
     )
@@ -231,7 +231,7 @@ def _field_texts(blocks: dict, units: dict) -> dict:
 
 
 def _create_steps(group, times):
-    """Create the group `Steps` with the times."""
+    """Create the VTKHDF group that contains the times."""
     steps = _create_group(group, "Steps")
     steps.attrs["NSteps"] = np.int64(len(times))
     steps.create_dataset("Values", data=np.asarray(times, np.float64), maxshape=(None,))
@@ -239,7 +239,7 @@ def _create_steps(group, times):
 
 
 def _write_field_data(group, steps, text: dict, count: int) -> None:
-    """Write field arrays of text, which are the same in all frames."""
+    """Write text arrays that are the same in all frames."""
     field = group["FieldData"]
     offsets = _create_group(steps, "FieldDataOffsets")
     sizes = _create_group(steps, "FieldDataSizes")
@@ -251,7 +251,7 @@ def _write_field_data(group, steps, text: dict, count: int) -> None:
 
 
 def _write_mesh(group, block: Block) -> None:
-    """Write the mesh of a block."""
+    """Write points and cells of a mesh block."""
     group.attrs["Version"] = VERSION
     group.attrs.create("Type", np.bytes_("UnstructuredGrid"))
     group["NumberOfPoints"] = np.array([len(block.points)], np.int64)
@@ -266,7 +266,7 @@ def _write_mesh(group, block: Block) -> None:
 
 
 def _write_block(group, block: Block, times, settings: tuple) -> None:
-    """Write a block.
+    """Write a mesh block with its arrays.
 
     settings: units by name; the field arrays of text; the list for arrays that are written frame after
     frame, None if all are written at once; and the steps of rounding by name, None without
@@ -287,7 +287,7 @@ def _write_block(group, block: Block, times, settings: tuple) -> None:
 
 
 def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
-    """Write the arrays of a block; settings: as for `_write_block`, without the text."""
+    """Write the point and cell arrays of a mesh block."""
     (units, later, rounding), target, offsets = (
         settings,
         group[kind],

@@ -47,7 +47,7 @@ ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
 
 def export_fields(folder: Path, out: Path, frame: int | None = None) -> str:
-    """Write the fields of a results folder in the format of a suffix; return a line on the file.
+    """Convert the fields of a results folder to the format of a file suffix.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def export_fields(folder: Path, out: Path, frame: int | None = None) -> str:
 
 
 def _write_format(series: Series, out: Path, number: int) -> str:
-    """Write a series, or its frame of a number, in the format of a suffix."""
+    """Write a series of fields, or one frame of it, in the format of a file suffix."""
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
             raise PatchfemError(f"{out}: this is the file to export; choose another name with -o")
@@ -99,17 +99,17 @@ def _write_format(series: Series, out: Path, number: int) -> str:
 
 
 def _format_frame_count(count: int) -> str:
-    """Return the number of frames as text."""
+    """Return the number of frames with its noun."""
     return f"{count} frame{'s' * (count != 1)}"
 
 
 def frames_folder(path: Path) -> Path:
-    """Return the folder of the frames of a .pvd."""
+    """Return the folder that contains the frames of a .pvd file."""
     return path.with_name(path.stem + "_frames")
 
 
 def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
-    """Write the series as a .pvd, which any ParaView opens; return the number of frames.
+    """Write a series of fields as .pvd with one file per frame; return the number of frames.
 
     A folder with the same stem contains a .vtm per frame, which names the blocks, and a .vtu per
     block. Frames of a longer series in this folder are removed.
@@ -163,7 +163,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
 
 
 def _write_vtm(folder: Path, stem: str, frame: Frame) -> list:
-    """Write a frame as a .vtm and a .vtu per block; return the file names, the .vtm first."""
+    """Write a frame as a .vtm file with a .vtu file per mesh block; return their names."""
     names = [f"{stem}_{name}.vtu" for name in frame.blocks]
     for name, block_data in zip(names, frame.blocks.values()):
         write_vtu(folder / name, block_data, frame.time, frame.units)
@@ -196,7 +196,7 @@ def _write_listing(path: Path, kind: str, version: str, lines: list) -> None:
 
 
 def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> None:
-    """Write a block, or a whole frame as one mesh, with inline arrays.
+    """Write a mesh block, or a merged frame, as a .vtu file.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ def _field_meanings(names: tuple, units: dict) -> list:
 
 
 def _array_xml(name: str, values, unit: str | None = None, attributes: str = "") -> str:
-    """Return an array as XML."""
+    """Return a field array as an XML element of VTK."""
     values = np.ascontiguousarray(values)
     kind = TYPES[values.dtype.newbyteorder("<").str[1:]]
     if values.ndim > 1:
@@ -286,7 +286,7 @@ def _compress_array(values) -> str:
 
 
 def write_csv(path: Path, frame: Frame) -> None:
-    """Write the interface of a frame as CSV: a row per node in order of x, a column per field.
+    """Write the interface of a frame as CSV, with a row per node and a column per field.
 
     The values are in SI, with the unit in the header.
     """

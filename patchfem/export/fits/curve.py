@@ -28,7 +28,7 @@ CSV_HEADERS = (
 
 
 def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
-    """Describe the files of a fit to a curve of frequency and damping ratio.
+    """Collect the files of a fit to measured frequency and damping against amplitude.
 
     The paths in the fitted scene are relative to `folder`.
     """
@@ -57,7 +57,7 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
 
 
 def _collect_fit_data(fitted: FittedCurve) -> dict:
-    """Return the contents of fit.json of a fit to a curve."""
+    """Return the contents of fit.json for a fit to a frequency and damping curve."""
     keys = fitted.keys
     measured = fitted.measured
     deviation = (fitted.model - measured.value) / np.abs(measured.value)
@@ -78,7 +78,7 @@ def _collect_fit_data(fitted: FittedCurve) -> dict:
 
 
 def _csv_rows(fitted: FittedCurve) -> list:
-    """Return the rows of fit.csv of a fit to a curve.
+    """Return the rows of fit.csv for a fit to a frequency and damping curve.
 
     Errors are half the width of a 95 % interval.
     """

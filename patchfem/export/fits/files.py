@@ -21,7 +21,7 @@ FITTED_SCENE = "scene.fitted.toml"
 
 
 class FitFiles(NamedTuple):
-    """Contents of the files that a fit writes.
+    """Contents of all files that a fit writes.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def write_fit(files: FitFiles, folder: Folder) -> None:
 
 
 def describe_measurement(title: str, measured: str, quantity: str, outcome) -> dict:
-    """Return the first entries of fit.json: program, title, measurement and outcome."""
+    """Return the first entries of fit.json: program, title, measured file and outcome."""
     return {
         "patchfem": __version__,
         "title": title,
@@ -87,12 +87,12 @@ def describe_measurement(title: str, measured: str, quantity: str, outcome) -> d
 
 
 def describe_values(keys: FittedKeys) -> dict:
-    """Return the fitted values by key, as written in fit.json."""
+    """Return all fitted values for fit.json, as a dict of scene keys."""
     return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
 
 
 def describe_value(bound: Range, fit: Fit, k: int) -> dict:
-    """Return value k of a fit with its interval and range, as written in fit.json."""
+    """Return one fitted value with its confidence interval and range for fit.json."""
     ends = fit.intervals.ends[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {
@@ -109,7 +109,7 @@ def describe_value(bound: Range, fit: Fit, k: int) -> dict:
 
 
 def describe_unknown(bounds: list, fit: Fit) -> list:
-    """Return the changes of fitted values that leave the residual unchanged, for fit.json."""
+    """Return for fit.json the changes of fitted values that the data do not determine."""
     return [
         {bound.key: part for bound, part in zip(bounds, row) if part}
         for row in fit.intervals.unknown.tolist()

@@ -24,7 +24,7 @@ DOT_SIZE = 3.5  # diameter of the dots of measured rows in fit.svg [points]
 
 
 def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
-    """Describe the files of a fit to a friction loop.
+    """Collect the files of a fit to a measured friction loop.
 
     The paths in the fitted scene are relative to `folder`.
     """

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 @dataclass(frozen=True, slots=True)
 class FitOptions:
-    """Options of a fit to a measurement or a patch, besides the free keys.
+    """Options of a fit, besides the keys that are fitted.
 
     Each kind of fit refuses the options that it does not have.
 

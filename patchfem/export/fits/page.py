@@ -70,7 +70,7 @@ def page_html(
 
 
 def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
-    """Return the top of the page of a fit: values with intervals, summary and warnings."""
+    """Return the head of the page of a fit as HTML: values, summary and warnings."""
     values_text = "; ".join(
         f"{escape(key)} = {_value_with_ends(described)}" for key, described in values.items()
     )
@@ -85,7 +85,7 @@ def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
 
 
 def _value_with_ends(described: dict) -> str:
-    """Format a fitted value of fit.json with its interval."""
+    """Format a fitted value with the ends of its confidence interval."""
     value, unit, ends = format_fitted(described)
     interval = f" ({ends[0]} to {ends[1]})" if ends else ""
     return f"{value} {unit}".strip() + interval
@@ -111,7 +111,7 @@ def _values_table(values: dict) -> str:
 
 
 def _format_bound(described: dict, end: float) -> str:
-    """Format a bound of the range of a fitted value."""
+    """Format a bound that limited a fitted value."""
     value, unit, _ = format_fitted(described | {"value": end, "interval": None})
     return f"{value} {unit}"
 

@@ -27,7 +27,7 @@ Y_MARGIN = 1.05  # upper end of the axis of stiffness / largest stiffness
 
 
 def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
-    """Describe the files of laws of a single point that are fitted to a patch.
+    """Collect the files of single-point laws that are fitted to a patch.
 
     The paths in the fitted scenes are relative to `folder`.
     """
@@ -106,7 +106,7 @@ def _difference_sizes(deviations, slides) -> dict:
 
 
 def _relative_loss(fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
-    """Return the largest difference of the loss of a law from that of the patch.
+    """Return the largest difference of the loss of a law relative to that of the patch.
 
     It is relative to the loss of the patch, also where this loss is tiny. If the patch
     dissipates nothing, the difference is that of `fitted_law.deviations`.
@@ -180,12 +180,12 @@ def _draw_charts(fitted: FittedPatch) -> list:
 
 
 def _mask_nonpositive(values) -> np.ndarray:
-    """Return values with NaN in place of those that are not positive, for a logarithmic axis."""
+    """Replace values that are not positive by NaN, for a logarithmic axis."""
     return np.where(values > 0, values, np.nan)
 
 
 def _format_fit_data(fit_data: dict) -> list:
-    """Return the fit_data as lines of text."""
+    """Return the results of a fit to a patch as lines of text."""
     low, high = (format_quantity(end, "m", 3) for end in fit_data["amplitudes"])
     out = [
         f"{fit_data['outcome']}: laws of a single point fitted to a patch under a load of "
@@ -228,7 +228,7 @@ def _format_stiffness(fit_data: dict) -> str:
 
 
 def _best_law_sentence(fit_data: dict) -> str:
-    """Name the best law and its largest errors with their signs."""
+    """Name the law that fits a patch best, with its largest errors."""
     stiffness, loss = (fit_data["laws"][fit_data["law"]][part] for part in COMPARED_QUANTITIES)
     return (
         f"Law '{fit_data['law']}' fits best; its largest errors over this range are "
@@ -239,7 +239,7 @@ def _best_law_sentence(fit_data: dict) -> str:
 
 
 def _error_sentences(law: str, fit_data: dict) -> list:
-    """Describe the errors that a law has in place of the patch."""
+    """Describe the errors of using a fitted law in place of the patch."""
     low, high = (format_quantity(end, "m", 3) for end in fit_data["amplitudes"])
     stiffness, loss = (fit_data["laws"][law][part] for part in COMPARED_QUANTITIES)
     side = "larger" if loss["largest"] > 0 else "smaller"
@@ -283,5 +283,5 @@ def _format_signed_percent(fraction: float) -> str:
 
 
 def _format_in_unit(value: float, unit: str) -> str:
-    """Format a value [SI] in a readable unit."""
+    """Format a value [SI] in a unit that suits its size."""
     return format_quantity(value, SENTENCE_UNITS.get(unit, unit), 5)

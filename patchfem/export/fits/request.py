@@ -56,7 +56,7 @@ FITS_BY_OPTION = {
 
 @dataclass(frozen=True, slots=True)
 class Listener:
-    """Functions by which a fit reports to its caller.
+    """Callbacks by which a fit reports its progress.
 
     - say: takes a line of text.
     - progress: takes the completed fraction, from 0 to 1.
@@ -135,7 +135,7 @@ def fit_into(
 
 
 def choose_kind(scene: Scene, to: str) -> str:
-    """Choose the kind of fit by the tables of a scene and the measured file."""
+    """Choose the kind of fit from the tables of a scene and the measured file."""
     if scene.wear is not None:
         return "wear"
     if scene.kind not in ("rig", "linear"):
@@ -172,7 +172,7 @@ def _fit_rows(
     folder: Folder,
     listener: Listener,
 ) -> FitFiles:
-    """Fit a rig to rows of measured responses.
+    """Fit a rig to a table of measured responses.
 
     Finished searches are stored in the folder, so that an interrupted fit can be continued.
     """

@@ -33,7 +33,7 @@ AXIS_MARGIN = 1.1  # end of the line of equal values / largest value of a point
 
 
 class SearchCheckpoint:
-    """Results of searches by name, stored in a file while a fit runs.
+    """Results of finished searches, stored in a file so that a fit can be resumed.
 
     Results that were stored for other inputs are ignored.
 
@@ -60,7 +60,7 @@ class SearchCheckpoint:
                 self.known = content["ends"]
 
     def __call__(self, name: str, ends: list | None = None):
-        """Return the stored result of a search, or None; first store `ends` as its result if given."""
+        """Return the stored result of a search, after storing a new one if it is given."""
         if ends is not None:
             self.known[name] = ends
             write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
@@ -68,7 +68,7 @@ class SearchCheckpoint:
 
 
 def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
-    """Describe the files of a fit to rows of measured responses.
+    """Collect the files of a fit to a table of measured responses.
 
     The paths in the fitted scene are relative to `folder`.
     """
@@ -87,7 +87,7 @@ def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
 
 
 def rows_fit_data(fitted: FittedRows) -> dict:
-    """Return the contents of fit.json of a fit to rows.
+    """Return the contents of fit.json for a fit to a table of measured responses.
 
     Scores are root mean squares of ln(computed/measured).
     """
@@ -127,7 +127,7 @@ def rows_fit_data(fitted: FittedRows) -> dict:
 
 
 def _instrument_settings(fitted: FittedRows) -> dict:
-    """Return the settings and gains of the instruments of a rig."""
+    """Return settings and gains of the instruments of a rig."""
     read = fitted.models.read
     out = {
         "reading": "peak" if read is None else read.reading,
@@ -142,7 +142,7 @@ def _instrument_settings(fitted: FittedRows) -> dict:
 
 
 def _search_starts(fitted: FittedRows) -> list:
-    """Return the first and last values of each search, and its training score."""
+    """Return for each search its first and last values and its training score."""
     names = [bound.key for bound in fitted.keys.ranges]
     search = fitted.search
     out = []
@@ -161,7 +161,7 @@ def _search_starts(fitted: FittedRows) -> list:
 
 
 def _fold_scores(fitted: FittedRows) -> list:
-    """Return the fits that leave out readings, and their scores on these readings."""
+    """Return the cross-validation fits with their scores on the left-out readings."""
     names = [bound.key for bound in fitted.keys.ranges]
     return [
         {
@@ -176,7 +176,7 @@ def _fold_scores(fitted: FittedRows) -> list:
 
 
 def _placebo_scores(fitted: FittedRows) -> list:
-    """Return the scores of each placebo, a fit repeated with another value of a fixed key.
+    """Return the scores of fits that are repeated with another value of a fixed key.
 
     Placebos leave out no readings, so they have no score "left_out".
     """
@@ -189,7 +189,7 @@ def _placebo_scores(fitted: FittedRows) -> list:
 
 
 def _row_entries(fitted: FittedRows) -> list:
-    """Return the measured and computed readings of every row, in SI units."""
+    """Return measured and computed readings of each condition in SI units."""
     cells = fitted.cells
     keys = zip(cells.row.tolist(), map(bool, cells.felt))
     number = {key: n for n, key in enumerate(keys)}
@@ -235,7 +235,7 @@ def _csv_rows(fit_data: dict) -> list:
 
 
 def _format_cell(value: float | None, unit: float) -> str:
-    """Format a reading [SI] in the unit of its column; "" if there is no reading."""
+    """Format a reading [SI] in the unit of its column, or "" if it is missing."""
     return "" if value is None else f"{value / unit:.6g}"
 
 
@@ -248,7 +248,7 @@ def _draw_charts(fit_data: dict) -> list:
 
 
 def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
-    """Chart computed against measured readings of one quantity, fitted and held out."""
+    """Chart computed against measured readings of one quantity, both fitted and held out."""
     groups: dict = {}
     for row in fit_data["rows"]:
         reading = row[name]
@@ -278,7 +278,7 @@ def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
 
 
 def _format_fit_data(fit_data: dict) -> list:
-    """Return the fitted values and the scores of all models as lines of text."""
+    """Return fitted values and scores of all model variants as lines of text."""
     finished_scores = [one["training"] for one in fit_data["starts"] if one["training"] is not None]
     n_best = sum(rms <= min(finished_scores) * SAME_SCORE for rms in finished_scores)
     out = [
@@ -310,7 +310,7 @@ def _format_fit_data(fit_data: dict) -> list:
 
 
 def _score_line(name: str, score: dict | None) -> str:
-    """Format the scores of a model as a line of a table."""
+    """Format the scores of a model variant as a table row."""
     cells = []
     for kind in ("acceleration", "displacement", "all"):
         value = None if score is None else score[kind]

@@ -6,7 +6,7 @@ from ...formatting import SENTENCE_UNITS, choose_display_unit, round_to_error
 
 
 class FormattedValue(NamedTuple):
-    """Fitted value and the ends of its interval ([] without one) as text, with their unit."""
+    """Fitted value and its confidence interval as text, with their unit."""
 
     value: str
     unit: str
@@ -31,13 +31,13 @@ def format_values(fit_data: dict, width: int = 26) -> list:
 
 
 def named_values(fit_data: dict) -> dict:
-    """Return the fitted keys and offsets of fit.json by the names that a page shows."""
+    """Return the fitted keys and offsets by the names that a page displays."""
     offsets = fit_data.get("offsets", {})
     return fit_data["values"] | {f"offset of the {name}": one for name, one in offsets.items()}
 
 
 def format_line(name: str, described: dict) -> str:
-    """Return a line of text with a fitted value, its interval and the bound that it reaches."""
+    """Return a line with a fitted value, its interval and the bound that it reached."""
     value, unit, ends = format_fitted(described)
     interval = "not determined"
     if ends:

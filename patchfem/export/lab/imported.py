@@ -21,7 +21,7 @@ OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slid
 
 
 class Estimate(NamedTuple):
-    """Settings for the estimate of modes or of a response; "" stands for the default.
+    """User settings for the estimation of modes or of a frequency response.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Estimate(NamedTuple):
 def convert_file(
     file: Path, out: Path, requests: Iterable[str], zero: bool, settings: Estimate
 ) -> dict:
-    """Write the records (.csv), modes (.toml) or response (.uff) of a file.
+    """Convert a laboratory file to records (.csv), modes (.toml) or a response (.uff).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def convert_file(
 
 
 def _write_table(file: Path, out: Path, requests, zero: bool) -> dict:
-    """Write records as a table."""
+    """Write measured records as a table."""
     laboratory_records = laboratory.read_records(file, records.parse_requests(requests))
     values = records.shift_to_zero(laboratory_records.values) if zero else laboratory_records.values
     units = {name: SI_UNITS[name] for name in values}
@@ -130,7 +130,7 @@ def _write_table(file: Path, out: Path, requests, zero: bool) -> dict:
 
 
 def _write_decay(file: Path, out: Path, requests, begin_text: str) -> dict:
-    """Write frequency and damping of a free decay as a table."""
+    """Write frequency and damping ratio of a measured decay as a table."""
     values, notes = _read_records(file, requests)
     curve, curve_notes = measured.compute_decay_curve(
         values, _parse_quantity(begin_text, "time", f"--begin {begin_text}")
@@ -158,7 +158,7 @@ def _write_decay(file: Path, out: Path, requests, begin_text: str) -> dict:
 
 
 def _write_modes(file: Path, out: Path, requests, settings: Estimate) -> dict:
-    """Write modes as tables of a scene."""
+    """Write identified modes as tables of a scene."""
     shapes, notes = _read_shapes(file, requests, settings)
     if shapes is not None:
         modes = measured.list_shape_modes(*shapes)
@@ -196,7 +196,7 @@ def _write_modes(file: Path, out: Path, requests, settings: Estimate) -> dict:
 
 
 def _write_response(file: Path, out: Path, requests, settings: Estimate) -> dict:
-    """Write a frequency response as a universal file."""
+    """Write an estimated frequency response as a universal file."""
     if settings.decay or settings.begin or settings.band:
         raise PatchfemError(
             "--decay, --begin and --band can be used only for modes (-o modes.toml)"
@@ -217,7 +217,7 @@ def _write_response(file: Path, out: Path, requests, settings: Estimate) -> dict
 
 
 def _read_records(file: Path, requests) -> tuple:
-    """Read records and check that one of them is a response."""
+    """Read measured records, and check that one of them is a response."""
     laboratory_records = laboratory.read_records(file, records.parse_requests(requests), OUTPUT)
     if (
         laboratory_records.channel_list
@@ -231,7 +231,7 @@ def _read_records(file: Path, requests) -> tuple:
 
 
 def _read_shapes(file: Path, requests, settings: Estimate) -> tuple:
-    """Return ((shapes, points), notes) of a universal file with modes or frequency responses.
+    """Read mode shapes or frequency responses of a universal file, with notes.
 
     (None, ()) for any other file.
     """
@@ -261,7 +261,7 @@ def _read_shapes(file: Path, requests, settings: Estimate) -> tuple:
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Return the value of an option in SI; None if it is ""."""
+    """Convert the text of an option to SI; return None for ""."""
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
@@ -269,19 +269,19 @@ def _parse_quantity(text: str, kind: str, option: str) -> float | None:
 
 
 def _parse_segment(text: str) -> float | None:
-    """Return the length of a segment [s]; None for the default."""
+    """Convert an option to the segment length [s]; None means the default."""
     return _parse_quantity(text, "time", f"--segment {text}")
 
 
 def _parse_window(text: str) -> str | None:
-    """Return the name of the window; None for the default."""
+    """Convert an option to the name of a window function; None means the default."""
     if text not in ("", "hann", "none"):
         raise PatchfemError(f"--window {text}: hann or none")
     return text or None
 
 
 def _parse_band(text: str) -> tuple:
-    """Return both ends of a band [Hz]."""
+    """Convert an option to both ends of a frequency band [Hz]."""
     if not text:
         return (0.0, float("inf"))
     low, dots, high = text.partition("..")

@@ -10,7 +10,7 @@ LONGEST = 63  # largest number of characters of a name in MATLAB
 
 
 def write_arrays(path: Path, histories: Histories) -> None:
-    """Write all arrays of a folder by name, histories as (k, 1).
+    """Write all arrays of a results folder as variables of a MATLAB file.
 
     `units.NAME` is the unit of NAME.
     """

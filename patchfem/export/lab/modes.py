@@ -19,7 +19,7 @@ COHERENCE = 6
 
 
 def structure_text(modes, source: str) -> str:
-    """Return [structure] and its [[structure.mode]] as text.
+    """Return the tables [structure] and [[structure.mode]] of a scene as text.
 
     modes: `identify.measured_modes.ListedModes`; source: name of the file with the measurement.
     """
@@ -50,12 +50,12 @@ def structure_text(modes, source: str) -> str:
 
 
 def make_printable(text: str) -> str:
-    """Return a text as one line of printable characters, for a comment."""
+    """Convert a text to one line of printable characters, for a comment."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def write_response(path: Path, estimate, drive: str, response: str) -> None:
-    """Write an estimated frequency response (dataset 58, type 4) and its coherence (type 6).
+    """Write an estimated frequency response and its coherence as universal datasets 58.
 
     Response and reference are at point 1 in direction +x. If the input is a force, structure.file
     can read the file.

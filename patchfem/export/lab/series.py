@@ -24,7 +24,7 @@ LOOPS = (
 
 
 class Column(NamedTuple):
-    """History of one quantity over time.
+    """History of one quantity over time, with its unit.
 
     name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if
     there is only one.
@@ -43,7 +43,7 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Histories:
-    """Columns of equal length.
+    """Histories of equal length from one results folder.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ class Histories:
     arrays: dict
 
     def loops(self) -> list:
-        """Return the friction loops as pairs of columns (slide, resistance), one per interface."""
+        """Return the friction loop of each interface as a pair of columns."""
         columns_by_name = {(column.name, column.number): column for column in self.columns}
         found = {}
         for slide, force in LOOPS:

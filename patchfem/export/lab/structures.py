@@ -35,7 +35,7 @@ NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
 class Elements(NamedTuple):
-    """Friction elements.
+    """Friction elements of a rig as arrays for other programs.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def export_structure(model: Model, out: Path) -> str:
 
 
 def _omitted_features(model: Model) -> str:
-    """Return the end of a sentence about what the file lacks of the scene."""
+    """Return a clause on the features of the scene that the exported file lacks."""
     rig = model.rig
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
         rig.springs.travel < MAX_TRAVEL
@@ -116,7 +116,7 @@ def _omitted_features(model: Model) -> str:
 
 
 def rig_matrices(model: Model) -> dict:
-    """Return the matrices and vectors of a rig.
+    """Return the matrices and vectors of a rig for other programs.
 
     For a drive other than a sine, Fex1 is that of 1 N or 1 m/s^2; for a release it is 0.
 
@@ -158,7 +158,7 @@ def rig_matrices(model: Model) -> dict:
 
 
 def _coordinate_basis(slides) -> np.ndarray:
-    """Return the modal coordinates (n, n) of the written coordinates, for slides (i, n)."""
+    """Return the modal motions (n, n) of the coordinates in which a rig is exported."""
     i, n = slides.shape
     if not i or i > n:
         return np.eye(n)
@@ -171,7 +171,7 @@ def _coordinate_basis(slides) -> np.ndarray:
 
 
 def _is_speed_only(rig) -> bool:
-    """Return whether the friction depends only on the speed."""
+    """Return whether the friction force depends on the speed only."""
     return all(interface.numbers.law == "tanh" for interface in rig.friction.interfaces)
 
 
@@ -230,7 +230,7 @@ def friction_elements(model: Model) -> Elements:
 
 
 def _write_nlvib(file, arrays: dict, elements: Elements) -> None:
-    """Write the variables of NLvib, column vectors, and a cell array of its structures."""
+    """Write a rig as variables of the MATLAB tool NLvib."""
     from scipy.io import savemat
 
     cells = np.empty((1, elements.limit.size), dtype=object)

@@ -6,7 +6,7 @@ from .series import Column
 
 
 def write_columns(path: Path, time, columns: list) -> None:
-    """Write columns with headers such as `force [N]`.
+    """Write histories as a table with headers such as `force [N]`.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ SI = {
 
 
 def write_histories(path: Path, histories: Histories) -> int:
-    """Write the columns over time and the loops; return the number of datasets 58.
+    """Write histories and friction loops as universal datasets 58; return their number.
 
     Identification line 1 is the name of the history (for a loop, "force over slide"), line 2 the
     program, line 4 the title; the node is the number of the interface or mode, or 1, and the
@@ -77,7 +77,7 @@ def write_histories(path: Path, histories: Histories) -> int:
 
 
 def write_sets(path: Path, sets: list) -> None:
-    """Write datasets by pyuff into a new file, with correct byte counts; Missing without pyuff.
+    """Write universal datasets into a new file by pyuff, with correct byte counts.
 
     Datasets of type 58 are binary.
     """
@@ -101,7 +101,7 @@ def write_sets(path: Path, sets: list) -> None:
 
 
 def _write_byte_count(path: Path, start: int, size: int) -> None:
-    """Write the number of bytes after the eleven lines of text into a dataset 58.
+    """Correct the number of bytes in the header of a universal dataset 58.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def _write_byte_count(path: Path, start: int, size: int) -> None:
 
 
 def _function_dataset(name: str, abscissa: Column, ordinate: Column, kind: int, title: str) -> dict:
-    """Return a dataset 58 of a column over another one."""
+    """Return a universal dataset 58 of one column over another."""
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
     return {
         "type": 58,

@@ -51,7 +51,7 @@ def export_histories(folder: Path, out: Path) -> str:
 
 
 def _thinning_note(histories) -> str:
-    """Return the note about early rows of histories that contain only reversals; else ""."""
+    """Return the note on early histories of which only the reversals are stored, or ""."""
     displacement = next(
         (column.values for column in histories.columns if column.name.endswith("displacement")),
         None,

@@ -34,7 +34,7 @@ PAGE_COLOURS = {
 
 
 class Section(NamedTuple):
-    """A part of a page: its anchor, heading and HTML, in which strings are already escaped."""
+    """Section of a page with anchor, heading and escaped HTML."""
 
     anchor: str
     heading: str
@@ -44,7 +44,7 @@ class Section(NamedTuple):
 def document_html(
     title: str, lead: str, sections: list, data: dict | None = None, scripts: tuple = ()
 ) -> str:
-    """Build the HTML of a page.
+    """Build the HTML of a page from its sections.
 
     The drawing library and the data are packed; the browser unpacks them (`unpack.js`).
 
@@ -94,7 +94,7 @@ def document_html(
 
 
 def table_html(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
-    """Build the HTML of a table in a frame that scrolls sideways.
+    """Build the HTML of a table that scrolls sideways.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def sentence_html(text: str) -> str:
 
 
 def with_line_breaks(text: str) -> str:
-    """Return a text as HTML in which the names of keys may break after a dot."""
+    """Convert a text to HTML in which long key names may break after a dot."""
     return re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", ".<wbr>", escape(text))
 
 
@@ -158,7 +158,7 @@ def warning_box(texts: Sequence, heading: str = "") -> str:
 
 
 def figure_html(number: int | str, svg: str, caption: str, alternative: str) -> str:
-    """Build the HTML of a figure from SVG, in the colours of the page.
+    """Build the HTML of a figure from its SVG, in the page colours.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def figure_html(number: int | str, svg: str, caption: str, alternative: str) -> 
 
 
 def to_json(value) -> str:
-    """Return JSON of arrays, numbers, strings and containers of them.
+    """Convert arrays, numbers, strings and containers of them to JSON.
 
     Numbers have DIGITS digits, and null stands for those that are not finite.
     """

@@ -20,7 +20,7 @@ ERROR_DIGITS = 3
 
 
 class DrawnCases(NamedTuple):
-    """Cases that a page draws.
+    """Cases of a sweep that its page draws.
 
     cases: their numbers; said: a sentence that says which they are, "" for all.
     """
@@ -80,7 +80,7 @@ def _evenly_spaced(number: int, max_number: int) -> np.ndarray:
 
 
 def _extreme_cases(values) -> list:
-    """Return the indices of the smallest and largest of values (n,); [] if none is finite."""
+    """Return the indices of the smallest and the largest value (n,), if they are finite."""
     values = np.asarray(values, float)
     return (
         []

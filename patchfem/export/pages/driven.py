@@ -17,7 +17,7 @@ DRIVE_UNITS = {
 
 
 def format_resolved(text) -> str:
-    """Write a quantity of a resolved scene, such as `49.03325 m/s^2`, in a usual unit: `5 g`."""
+    """Format a quantity of a resolved scene in a usual unit, such as "5 g"."""
     value, _, unit = str(text).partition(" ")
     name = unit
     scale = 1.0
@@ -56,7 +56,7 @@ def _describe_waveform(keys: dict) -> str:
 
 
 def _drive_values(keys: dict) -> dict:
-    """Return the fields of the phrase of a waveform, as text by name (see `effects.Waveform`)."""
+    """Return the values that the phrase of a waveform contains, as text."""
     values = {key: _format_drive_value(key, value) for key, value in keys.items()}
     values["seed"] = keys.get("seed", 0)
     sized = next((name for name in ("displacement", "acceleration", "force") if name in keys), None)
@@ -104,7 +104,7 @@ def _describe_by_level(name: str, values: dict) -> str:
 
 
 def _describe_slide(keys: dict) -> str:
-    """Describe the prescribed slide."""
+    """Describe the prescribed slide of a bench in a phrase."""
     kind = keys["kind"]
     if kind == "file":
         return f"the slide of {Path(keys['file']).name}"
@@ -119,7 +119,7 @@ def _describe_slide(keys: dict) -> str:
 
 
 def list_changed_keys(sets: tuple) -> str:
-    """List the keys that were changed with --set; sets: `key=value` strings as given."""
+    """List the scene keys that command-line options --set changed."""
     return shorten(
         ", ".join(
             f"{key} = {value}"
@@ -130,7 +130,7 @@ def list_changed_keys(sets: tuple) -> str:
 
 
 def run_command(path: Path, sets: tuple) -> str:
-    """Return the command that repeats a run in the folder of its scene.
+    """Return the command line that repeats a run.
 
     sets: `key=value` strings as given; files are named without their folder.
     """

@@ -36,7 +36,7 @@ MAIN_MEASURES = (
 
 
 class Sentences(NamedTuple):
-    """Sentences of the summary of a sweep; "" for those that do not apply.
+    """Sentences of which the summary of a sweep consists.
 
     Attributes
     ----------
@@ -72,7 +72,7 @@ class Sentences(NamedTuple):
 
 
 class SweepHeadline(NamedTuple):
-    """Summary of a sweep with the tables that it is based on.
+    """Summary of a sweep, with the tables on which it is based.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class SweepHeadline(NamedTuple):
         ]
 
     def answer(self) -> str:
-        """Return the answer in one sentence.
+        """Return the main result of the sweep in one sentence.
 
         It states how far the key may go, where the peak is, what matters most and how far the
         results scatter, or the range of the main measure. Brackets contain what qualifies it: cases
@@ -136,7 +136,7 @@ class SweepHeadline(NamedTuple):
         return f"{text.rstrip('.')} ({first}{notes[1:].rstrip('.')})."
 
     def _answer_parts(self) -> list:
-        """Return the sentences of the answer."""
+        """Return the sentences of which the main result consists."""
         sentences = self.said
         of_random_cases = [sentence for sentence in (sentences.rank, sentences.scatter) if sentence]
         over_key = sentences.limit or sentences.peak
@@ -152,7 +152,7 @@ class SweepHeadline(NamedTuple):
 
 
 def summarise_sweep(table: dict) -> SweepHeadline:
-    """Summarise a sweep; table: as for `sweep.page_html`."""
+    """Summarize the results of a sweep in sentences."""
     measures = table["measures"]
     tolerance = table.get("tolerance", np.nan)
     values = measure_columns(table)
@@ -222,7 +222,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
 
 
 def _trusted_cases(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
-    """Return whether each case meets the tolerance and has settled.
+    """Return a mask of the cases that meet the tolerance and have settled.
 
     It need not have settled if no settled case has the measure, or if the measure is a steady
     estimate.
@@ -234,7 +234,7 @@ def _trusted_cases(name: str, measure: dict, tolerance, settled: np.ndarray) -> 
 
 
 def _cases_within_floor(measures: dict, tolerance) -> dict:
-    """Return, by measure, the cases that meet the tolerance only by its floor, and this floor.
+    """Return for each measure the cases whose error is only below the error floor.
 
     The floor is given as text.
     """
@@ -250,7 +250,7 @@ def _cases_within_floor(measures: dict, tolerance) -> dict:
 
 
 def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
-    """State how far unsettled cases move, if that is farther than any settled case; else "".
+    """State how far cases that have not settled move beyond all settled cases, or "".
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ def _end_peaks_sentence(table: dict) -> str:
 
 
 def _qualification_sentence(table: dict, outcome: np.ndarray, is_stated: bool) -> str:
-    """State what qualifies the whole summary; "" if nothing does.
+    """State limitations that apply to the whole summary of a sweep; "" if there are none.
 
     This is how many cases of an interrupted sweep have no result, that no case has settled, and
     that no case has a value of the requested measure.

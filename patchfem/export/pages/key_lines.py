@@ -8,13 +8,13 @@ from ..written import shorten_to_spacing
 
 
 def is_varied(key: dict) -> bool:
-    """Check whether a key has more than one value."""
+    """Return whether a swept key has more than one value."""
     texts = key["texts"]
     return any(text != texts[0] for text in texts)
 
 
 def key_formatter(key: dict) -> Callable[[int], str]:
-    """Return a function that formats the value of a key in a case.
+    """Return a function that formats the value of a swept key in a case.
 
     It shows enough digits to distinguish neighbouring values.
     """
@@ -31,7 +31,7 @@ def key_formatter(key: dict) -> Callable[[int], str]:
 
 
 def group_cases_along_key(key: dict, others: list) -> list:
-    """Return the cases of each combination of the other keys, ordered by the value of the key."""
+    """Group the cases by the values of all other keys, ordered along one key."""
     lines = {}
     for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():
         lines.setdefault(tuple(other["texts"][case] for other in others), []).append(case)

@@ -12,23 +12,23 @@ LIBRARY_FOLDER = Path(__file__).parent
 
 @cache
 def packed_bokeh() -> str:
-    """Return BokehJS as one packed text of JavaScript."""
+    """Return the BokehJS library as compressed JavaScript text."""
     return pack_text("\n".join(read_file(f"bokehjs/{name}") for name in LIBRARY_FILES))
 
 
 def pack_text(text: str) -> str:
-    """Return a string as gzip in base64 for `unpack.js`; equal strings have equal results."""
+    """Compress a text (gzip, base64), with equal results for equal texts."""
     return b64encode(compress(text.encode(), 6, mtime=0)).decode()
 
 
 @cache
 def read_file(name: str) -> str:
-    """Return a file of this folder as text."""
+    """Return a script or style file of this folder as text."""
     return (LIBRARY_FOLDER / name).read_text(encoding="utf-8")
 
 
 def escape_script(text: str) -> str:
-    """Return JavaScript in which no text ends the script element around it or hides its end.
+    """Escape JavaScript text so that it can stand in an HTML script element.
 
     `</script` and `<!--` occur only in strings and regular expressions, in which a backslash has no
     effect.

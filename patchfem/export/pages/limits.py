@@ -55,7 +55,7 @@ ROUND_OFF_CHANGE = 1e-8
 
 
 class KeyLimit(NamedTuple):
-    """Limit of the key for one measure, along the line of cases with the smallest limit.
+    """Largest value of a swept key up to which a measure stays within its limit.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class KeyLimit(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """Limits of the key of a sweep.
+    """Largest allowed values of a swept key for all measures.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Limits(NamedTuple):
         return np.asarray(self.key["values"], float)
 
     def is_resolved(self, limit: KeyLimit) -> bool:
-        """Check whether a case other than the first is within a limit."""
+        """Return whether a case other than the first lies within a limit."""
         sizes = self.sizes()
         return sizes[limit.inside] > sizes.min()
 
@@ -128,7 +128,7 @@ class Limits(NamedTuple):
 def find_limits(
     keys: list, measures: dict, trusted: dict, grid: bool = True, patch: dict | None = None
 ) -> Limits:
-    """Find the limits of the key with the most values.
+    """Find the largest allowed values of the swept key with the most values.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def find_limits(
 def _limit_along_line(
     name: str, key: dict, line: np.ndarray, values: np.ndarray, errors: np.ndarray
 ) -> KeyLimit | None:
-    """Find the limit of a measure along one line of cases.
+    """Find the largest allowed key value for a measure along one line of cases.
 
     None if the first case has no value, or all others have none.
 
@@ -238,7 +238,7 @@ def _limit_along_line(
 
 
 def _interpolate(low: float, high: float, part: float, by_factors: bool) -> float:
-    """Interpolate a key between two cases, linearly or in its logarithm.
+    """Interpolate the value of a key between two cases, linearly or logarithmically.
 
     part: fraction of the distance from `low` to `high`.
     """
@@ -248,7 +248,7 @@ def _interpolate(low: float, high: float, part: float, by_factors: bool) -> floa
 
 
 def _sort_key(limit: KeyLimit) -> tuple:
-    """Return the sort key of a limit: the smallest value first.
+    """Return the key by which limits are sorted, the smallest first.
 
     At equal values a limit between two cases comes before an open one.
     """
@@ -256,7 +256,7 @@ def _sort_key(limit: KeyLimit) -> tuple:
 
 
 def limits_json(limits: Limits) -> list:
-    """Return the limits as stored in sweep.json, in SI.
+    """Return the limits of a swept key as stored in sweep.json, in SI units.
 
     `value` of the key, interpolated between the cases `low` and `high`, is the one at which a
     measure differs by `change` from its value in the first case.
@@ -277,7 +277,7 @@ def limits_json(limits: Limits) -> list:
 
 
 def limits_sentence(limits: Limits) -> str:
-    """State in one sentence how far the key may go; "" if the cases do not show it."""
+    """State in one sentence up to which key value measures stay within limits, or ""."""
     if limits.key is None:
         return ""
     motion = _motion_sentence(limits)
@@ -357,7 +357,7 @@ def _exceeded_sentence(limits: Limits, ends: list) -> str:
 
 
 def _first_to_change(limits: Limits, ends: list) -> str:
-    """Name the measures that may change first, and the one that changes last.
+    """Name the measures that reach their limits first, and the one that does so last.
 
     The last one is left out if it is among the first.
     """
@@ -373,7 +373,7 @@ def _first_to_change(limits: Limits, ends: list) -> str:
 
 
 def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
-    """Write a limit with notes in brackets, such as the gap that an angle opens over the patch."""
+    """Format the limit of a key with notes in brackets."""
     notes = [note for note in (_format_gap(limits, limit), *notes) if note]
     return (
         f"{_format_limit(limits, limit)} ({'; '.join(notes)})"
@@ -383,12 +383,12 @@ def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
 
 
 def _format_limit(limits: Limits, limit: KeyLimit) -> str:
-    """Write a limit in the unit of the limits, rounded down."""
+    """Format the limit of a key, rounded down."""
     return f"{format_number(_round_down(limits, limit), _count_digits(limits, limit))} {limits.unit}".strip()
 
 
 def _round_down(limits: Limits, limit: KeyLimit) -> float:
-    """Round a limit down to the digits that are shown, but for round-off."""
+    """Round a limit down to the digits that are shown."""
     value = limit.value * limits.scale
     if not value:
         return value
@@ -407,7 +407,7 @@ def _count_digits(limits: Limits, limit: KeyLimit) -> int:
 
 
 def _format_gap(limits: Limits, limit: KeyLimit) -> str:
-    """Write the gap that an angle opens over the patch; "" for other keys or an unknown size."""
+    """Format the gap that a tilt angle opens over the patch, or "" for other keys."""
     side = (limits.patch or {}).get(GAP_OF_ANGLE.get(limits.key["name"], ("", ""))[1])
     if not side or not limit.value:
         return ""
@@ -417,12 +417,12 @@ def _format_gap(limits: Limits, limit: KeyLimit) -> str:
 
 
 def _format_position(limits: Limits, limit: KeyLimit, *notes: str) -> str:
-    """Write the position of a limit, and between which cases it lies."""
+    """Format a limit and the cases between which it lies."""
     return f"at about {_format_limit(limits, limit)} ({'; '.join([*notes, f'between {_format_cases(limits, limit)}'])})"
 
 
 def _format_cases(limits: Limits, limit: KeyLimit) -> str:
-    """Write the values of the key in the two cases around a limit: `0.1 and 0.32 mrad`."""
+    """Format the key values of the two cases around a limit, such as "0.1 and 0.32 mrad"."""
     format_case = key_formatter(limits.key)
     inside = format_case(limit.inside)
     beyond = format_case(limit.beyond)
@@ -430,7 +430,7 @@ def _format_cases(limits: Limits, limit: KeyLimit) -> str:
 
 
 def _choose_unit(limits: Limits) -> tuple:
-    """Choose the (unit, scale from SI) in which all values of the key are shown.
+    """Choose the unit and scale in which all values of a key are shown.
 
     It is the unit in which the cases are written, unless the smallest limit would be a number below
     MIN_NUMBER or above MAX_NUMBER; for an angle it is the largest unit in which the smallest limit
@@ -464,7 +464,7 @@ def _choose_unit(limits: Limits) -> tuple:
 
 
 def _convert_to_unit(key: dict, unit: str, scale: float) -> dict:
-    """Return a key with the strings of its values in a unit."""
+    """Return a swept key whose values are formatted in a given unit."""
     if all(str(text).partition(" ")[2] in ("", unit) for text in key["texts"]):
         return key
     return key | {
@@ -475,7 +475,7 @@ def _convert_to_unit(key: dict, unit: str, scale: float) -> dict:
 
 
 def limits_table(limits: Limits, measures: dict) -> str:
-    """Return the limits of all measures as an HTML table; "" if there are none.
+    """Return the limits of a swept key for all measures as an HTML table, or "".
 
     Parameters
     ----------
@@ -534,7 +534,7 @@ def limits_table(limits: Limits, measures: dict) -> str:
 
 
 def _format_change(change: float) -> str:
-    """Write a relative change in percent; from ten times on as a factor; 0 for round-off."""
+    """Format a relative change in percent, or as a factor if it is large."""
     if abs(change) < ROUND_OFF_CHANGE:
         return "0 %"
     return f"{100 * change:+.3g} %" if change < 9 else f"&times; {format_number(1 + change, 3)}"

@@ -28,7 +28,7 @@ MAX_STEADY_ERROR = 0.01
 
 
 class Estimate(NamedTuple):
-    """A value and its error, NaN if it is not known."""
+    """Value with its error; NaN if it is unknown."""
 
     value: float
     error: float
@@ -42,7 +42,7 @@ UNKNOWN = Estimate(np.nan, np.nan)
 
 
 class SweptPeak(NamedTuple):
-    """The peak along one line of cases.
+    """Peak of a response curve along one line of cases.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class SweptPeak(NamedTuple):
 
 
 class Peak(NamedTuple):
-    """A peak, with the name and SI unit of its measure and the values of the other keys as text."""
+    """Peak of a response curve with its measure, its unit and the values of the other keys."""
 
     name: str
     held: str
@@ -77,7 +77,7 @@ class Peak(NamedTuple):
 
 
 def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
-    """Find the peak of each line of cases over a swept frequency.
+    """Find the peak of each response curve over a swept frequency.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _find_swept_peak(
 def _find_minimum(
     square: np.ndarray, g: np.ndarray, peak_index: int, low: int, high: int
 ) -> tuple | None:
-    """Find the minimum of the polynomial through 1/y^2 over f^2 in some cases.
+    """Find the minimum of the polynomial of 1/y^2 over f^2 through some cases.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def _find_crossing(
 
 
 def peaks_sentence(peaks: list) -> str:
-    """State where the peak is, or from where to where it moves; "" if there is none."""
+    """State the frequency of the peak, or how it changes over the cases, or ""."""
     known_peaks, unknown_peaks = (
         [peak for peak in peaks if peak.swept.height.is_known() == is_known]
         for is_known in (True, False)
@@ -324,7 +324,7 @@ def peaks_sentence(peaks: list) -> str:
 
 
 def _unknown_peaks(peaks: list, others: bool) -> str:
-    """State for which lines of cases the peak is not known.
+    """State for which lines of cases the peak is unknown.
 
     others: whether it is known for some.
     """
@@ -342,7 +342,7 @@ def _unknown_peaks(peaks: list, others: bool) -> str:
 
 
 def _known_peaks_sentence(peaks: list) -> str:
-    """State where the first and the last known peaks are."""
+    """State the first and the last known peak of a sweep."""
     if not peaks:
         return ""
     first = peaks[0]
@@ -358,25 +358,25 @@ def _known_peaks_sentence(peaks: list) -> str:
 
 
 def _format_frequency(peak: Peak) -> str:
-    """Write the frequency of a peak."""
+    """Format the frequency of a peak with its error."""
     spacing = format_number(peak.swept.case_spacing, 2)
     return f"{format_value(*peak.swept.frequency, unit='Hz')} (cases lie {spacing} Hz apart)"
 
 
 def _format_height(peak: Peak) -> str:
-    """Write the height of a peak."""
+    """Format the height of a peak with its error."""
     return format_value(*peak.swept.height, format_zero(peak.name), peak.unit)
 
 
 def _format_width(peak: Peak) -> str:
-    """Write the half-power width of a peak, as the end of a clause."""
+    """Format the half-power width of a peak as a clause."""
     if peak.swept.half_power_width.is_known():
         return f", half-power width {format_value(*peak.swept.half_power_width, unit='Hz')}"
     return f", half-power width {OPEN}" if peak.swept.falls_unresolved else ""
 
 
 def peaks_table(peaks: list) -> str:
-    """Return the peaks as an HTML table; "" if there are none."""
+    """Return the peaks of a sweep as an HTML table, or ""."""
     if not peaks:
         return ""
     rows = [[escape(peak.held), *_peak_cells(peak)] for peak in peaks]
@@ -394,7 +394,7 @@ def peaks_table(peaks: list) -> str:
 
 
 def _peak_cells(peak: Peak) -> list:
-    """Return the strings of frequency, height and half-power width."""
+    """Format frequency, height and half-power width of a peak as table cells."""
     swept = peak.swept
     if not swept.height.is_known():
         return ["not known", "not known", "&ndash;"]

@@ -41,7 +41,7 @@ MM_PER_M = 1e3
 
 
 def pack_array(values) -> dict:
-    """Return an array as {low, step, shape, data}: value = low + step * number.
+    """Pack an array as integers with offset and step size.
 
     The numbers have 16 bits and are written in base64; 65535 stands for a value that is not finite.
     Rounding changes a value by at most 1e-5 of the range.
@@ -66,7 +66,7 @@ def pack_array(values) -> dict:
 
 
 def player_data(folder: Path) -> dict | None:
-    """Return what the player shows of the results in a folder; None if they have no fields.
+    """Return the data of the animation player for a results folder; None without fields.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def player_data(folder: Path) -> dict | None:
 
 
 def write_page(folder: Path, out: Path) -> str:
-    """Write a page with the player of the results in a folder, and return a line about it.
+    """Write a page with an animation player of a results folder.
 
     Missing if the results have no fields.
     """
@@ -99,7 +99,7 @@ def write_page(folder: Path, out: Path) -> str:
 
 
 def _read_frames(folder: Path) -> dict:
-    """Read the sampled frames of a results folder."""
+    """Read the frames that the player shows from a results folder."""
     with Series(folder) as series:
         cycle = np.array(last_consecutive_frames(series.times))
         numbers = cycle[
@@ -161,7 +161,7 @@ def _read_frames(folder: Path) -> dict:
 
 
 def _contact_range(x, sigma) -> tuple | None:
-    """Return the ends x [m] of the view around the nodes in contact in any frame; x (n,), sigma (f, n).
+    """Return the ends [m] of a view that contains the contact in every frame.
 
     The view is about twice as long as the contact. None if the contact is longer than MAX_CONTACT_FRACTION times the
     length.
@@ -176,7 +176,7 @@ def _contact_range(x, sigma) -> tuple | None:
 def _read_piece(
     series: Series, side: str, numbers: list, max_cells: int, fine_range: tuple | None
 ) -> dict:
-    """Read a piece and reduce it to about `max_cells` cells.
+    """Read the mesh and fields of a piece, reduced to fewer cells.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _read_piece(
 
 
 def _separate_slide(upper: dict, x, line: dict) -> np.ndarray:
-    """Separate the slide (f,) [m] of the upper piece from its moves, and add the gap to them."""
+    """Separate the slide (f,) [m] of the upper piece from its displacements, and add the gap."""
     points = upper["points"]
     moves = upper["moves"]
     slide = upper_piece_slides(points, moves)
@@ -227,7 +227,7 @@ def _separate_slide(upper: dict, x, line: dict) -> np.ndarray:
 
 
 def _pack_piece(piece: dict, scale: float) -> dict:
-    """Return a piece as packed data, with lengths in mm and stresses times `scale`."""
+    """Pack the mesh and fields of a piece for the player."""
     mesh = piece["mesh"]
     return {
         "points": pack_array(piece["points"][mesh.nodes] * MM_PER_M),
@@ -239,7 +239,7 @@ def _pack_piece(piece: dict, scale: float) -> dict:
 
 
 def _pack_curve(values, label: str, unit: str) -> dict:
-    """Return a curve as packed data in a suitable unit."""
+    """Pack a curve for the player in a suitable unit."""
     name, scale = choose_axis_unit(values, unit)
     return {"label": label, "unit": name, "values": pack_array(values * scale)}
 

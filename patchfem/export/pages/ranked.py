@@ -48,7 +48,7 @@ TREND_ERROR_FACTOR = 2.5
 
 
 class RankedKeys(NamedTuple):
-    """Ranking of the keys, and scatter of the results of random cases.
+    """Swept keys ranked by their influence, and scatter of the results of random cases.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class RankedKeys(NamedTuple):
 
 
 def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
-    """Rank the keys of a sweep and find the scatter of its random cases.
+    """Rank the keys of a sweep by their influence, and compute the scatter of random cases.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
 
 
 def too_few(table: dict, settled: np.ndarray) -> str:
-    """State that too few of the random cases have settled, and what helps; "" if enough have.
+    """State that too few random cases have settled, and what to do; "" if enough have.
 
     The consequence is that no ranking is possible, or that the scatter is not known.
     """
@@ -140,7 +140,7 @@ def too_few(table: dict, settled: np.ndarray) -> str:
 
 
 def measure_name(name: str) -> str:
-    """Return the name of a measure in a sentence."""
+    """Return the name of a measure as it is used in sentences."""
     return MEASURE_LABELS.get(name, measure_label(name))
 
 
@@ -262,13 +262,13 @@ def _trend_sentence(
 
 
 def asked_first(names: tuple, table: dict) -> tuple:
-    """Return names of measures, preceded by the measure that the sweep was requested for."""
+    """Return names of measures, with the one that the user asked for first."""
     first = table.get("first", "")
     return (first, *(name for name in names if name != first)) if first else names
 
 
 def sobol_indices(table: dict) -> dict:
-    """Return the Sobol indices by measure, [Share], of a grid or of random cases; {} for others.
+    """Return the Sobol indices of the keys for each measure of a grid or of random cases.
 
     They are computed once for a table and stored in it.
     """
@@ -353,7 +353,7 @@ def ranking_sentence(
 
 
 def _group_overlapping(shares: list) -> list:
-    """Return the Sobol indices in groups, the largest first.
+    """Group keys whose Sobol indices overlap within their intervals, largest first.
 
     The interval of each index overlaps that of the first index of its group.
     """
@@ -367,12 +367,12 @@ def _group_overlapping(shares: list) -> list:
 
 
 def _all_overlap(group: list) -> bool:
-    """Return whether no index of a group lies outside the interval of another."""
+    """Return whether the intervals of all Sobol indices of a group overlap."""
     return all(index.low <= other.total <= index.high for index in group for other in group)
 
 
 def _list_keys(group: list) -> str:
-    """List the keys of a group; of many keys only the first."""
+    """List the keys of a group in a sentence; of many only the first."""
     names = [index.key for index in group]
     if len(names) > MAX_NAMED_KEYS + 1:
         names[MAX_NAMED_KEYS:] = [f"{len(names) - MAX_NAMED_KEYS} other keys"]
@@ -380,7 +380,7 @@ def _list_keys(group: list) -> str:
 
 
 def _format_shares(group: list) -> str:
-    """Write the shares of a group."""
+    """Format the Sobol indices of a group of keys."""
     if len(group) == 1:
         return format_percent(group[0])
     if all(map(_may_be_zero, group)):
@@ -398,32 +398,32 @@ def _format_shares(group: list) -> str:
 
 
 def format_percent(index) -> str:
-    """Write the total index of a key; if its interval includes 0, the upper end of the interval."""
+    """Format the total Sobol index of a key in percent."""
     if not _may_be_zero(index):
         return f"{100 * index.total:.0f} %"
     return f"at most {_upper_percent(index)} %" if _upper_percent(index) else "below 1 %"
 
 
 def _may_be_zero(index) -> bool:
-    """Return whether an index may be 0."""
+    """Return whether the interval of a Sobol index includes 0."""
     return index.total < 0.01 or (index.low < 0.005 and index.total < 0.1)
 
 
 def _upper_percent(index) -> int:
-    """Return the upper end [%] of the interval of an index, rounded up; 0 up to 1 %."""
+    """Return the upper end [%] of the interval of a Sobol index."""
     percent = int(np.ceil(100 * index.high - 1e-9))
     return percent if percent > 1 else 0
 
 
 def _format_interval(index) -> str:
-    """Write the interval of an index in brackets; "" if it has none."""
+    """Format the interval of a Sobol index in brackets, or ""."""
     low = round(100 * index.low)
     high = round(100 * index.high)
     return f" ({low} to {high} %)" if low != high and not _may_be_zero(index) else ""
 
 
 def measure_quantiles(table: dict, trusted: dict) -> dict:
-    """Return the quantiles of the measures of random cases.
+    """Return the quantiles of each measure over the random cases.
 
     Cases count if they have a value and have settled; if no case with a value has settled, all
     cases with a value count.
@@ -470,7 +470,7 @@ def measure_quantiles(table: dict, trusted: dict) -> dict:
 def describe_scatter(
     quantiles: dict, n_cases: int, settled: bool = True, names: tuple = SCATTER_MEASURES
 ) -> str:
-    """State the range in which 90 % of the random cases lie, and how many miss the tolerance.
+    """State the range that contains 90 % of the random cases, and how many miss the tolerance.
 
     Parameters
     ----------
@@ -519,7 +519,7 @@ def describe_scatter(
 
 
 def share_bars(ranks: dict) -> str:
-    """Return bars of the shares of the keys for each measure as HTML; "" if there are none."""
+    """Return bars of the Sobol indices of all keys and measures as HTML, or ""."""
     if not ranks:
         return ""
     parts = []
@@ -548,7 +548,7 @@ def share_bars(ranks: dict) -> str:
 
 
 def _bar_svg(index) -> str:
-    """Return the bar of a key's Sobol indices as SVG."""
+    """Return the bar of the Sobol indices of one key as SVG."""
     first, total, low, high = (f"{100 * part:.1f}" for part in index[1:])
     return (
         f"<svg viewBox='0 0 100 8' preserveAspectRatio=none role=img aria-label='{format_percent(index)}'>"
@@ -558,7 +558,7 @@ def _bar_svg(index) -> str:
 
 
 def _format_range(index) -> str:
-    """Write the interval of an index."""
+    """Format the interval of a Sobol index."""
     return (
         "&ndash;"
         if index.low == index.high
@@ -567,7 +567,7 @@ def _format_range(index) -> str:
 
 
 def quantile_table(quantiles: dict, n_cases: int) -> str:
-    """Return the quantiles of random cases as an HTML table; "" if there are none.
+    """Return the quantiles over random cases as an HTML table, or "".
 
     If the cases that are left out may be the extreme ones, no quantiles are given. For a measure
     that only some motions have, the quantiles are those of these motions.

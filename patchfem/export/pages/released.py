@@ -19,7 +19,7 @@ ZERO_FRACTION = 1e-9
 
 
 def describe_release(result: Result) -> str:
-    """Describe the motion of a run with drive.kind = "free"; "" for any other run.
+    """Describe the motion of a released rig in a sentence; "" for any other run.
 
     The text has no full stop at the end.
     """
@@ -35,7 +35,7 @@ def describe_release(result: Result) -> str:
 
 
 def _describe_decay(decay) -> str:
-    """Return a clause about frequency and damping of the second and the last known swing."""
+    """Return a clause on frequency and damping at the start and at the end of a decay."""
     known_swings = (
         []
         if decay is None
@@ -52,7 +52,7 @@ def _describe_decay(decay) -> str:
 
 
 def describe_swing(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
-    """Describe a released motion from its stored samples, which include the reversals.
+    """Describe a released motion from its stored samples and reversals.
 
     Parameters
     ----------

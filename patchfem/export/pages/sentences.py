@@ -85,7 +85,7 @@ SHARP_BUT_UNKNOWN = f"{EXACT_NOTE}, except where the error is unknown"
 
 
 def display_units(name: str, value: float, unit: str, error: float | None = None) -> list:
-    """Return the units [(unit, scale)] in which a measure is shown, the metric one first.
+    """Return the units and scales in which a measure is shown, metric first.
 
     The size of the value, or of its error, chooses them.
 
@@ -119,7 +119,7 @@ def display_units(name: str, value: float, unit: str, error: float | None = None
 
 
 def format_value_and_error(name: str, measure: dict, scale: float | None = None) -> tuple:
-    """Return value and error of a measure as strings.
+    """Format the value and the error of a measure as two strings.
 
     They are in the first unit of the measure, or in SI times `scale`.
 
@@ -150,12 +150,12 @@ def format_value_and_error(name: str, measure: dict, scale: float | None = None)
 
 
 def is_share(name: str) -> bool:
-    """Return whether a measure is a fraction, which is shown in %."""
+    """Return whether a measure is a fraction that is shown in percent."""
     return re.sub(r"_\d+$", "", name).endswith("fraction")
 
 
 def format_measure(name: str, value: float, unit: str, digits: int) -> str:
-    """Write the value of a measure with a number of digits in a suitable unit: `46.68 mJ`.
+    """Format the value of a measure in a suitable unit, such as "46.68 mJ".
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def format_measure(name: str, value: float, unit: str, digits: int) -> str:
 
 
 def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
-    """Write two values of a measure in one unit, or in two if their ratio exceeds 1000.
+    """Format two values of a measure in one unit, or in two if they differ greatly.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> t
 
 
 def format_with_error(name: str, measure: dict) -> str:
-    """Write a measure with its error in its first unit, `14.808 ± 0.041 um`; "-" if unknown."""
+    """Format a measure with its error, such as "14.808 ± 0.041 um"."""
     value, error = format_value_and_error(name, measure)
     if value == "-":
         return value
@@ -219,14 +219,14 @@ def format_with_error(name: str, measure: dict) -> str:
 
 
 def format_below_minimum(name: str, measure: dict) -> bool:
-    """Return whether value minus error is below the smallest possible value, 0."""
+    """Return whether a value minus its error is below the smallest possible value."""
     value = measure["value"]
     error = measure["error"]
     return minimum_value(name) == 0 and value is not None and bool(error) and error >= value > 0
 
 
 def format_zero(name: str, measure: dict = NONE) -> float:
-    """Return the value of a measure below which it is shown as 0 [SI].
+    """Return the value [SI] below which a measure is shown as 0.
 
     It is the floor of its definition, or the floor in the run if this is smaller: a floor that the
     run has raised to the tolerance times larger terms is what is required of it, not what is known.
@@ -237,7 +237,7 @@ def format_zero(name: str, measure: dict = NONE) -> float:
 
 
 def format_imperial(name: str, measure: dict) -> str:
-    """Write the value in imperial units with the digits that its error allows; "" if it is 0.
+    """Format a measure in imperial units with as many digits as its error allows.
 
     A value within its error counts as 0.
     """
@@ -365,7 +365,7 @@ def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
     error = loop["error"]
 
     def number(scale: float) -> str:
-        """Write the loss factor times `scale` with its error."""
+        """Format the loss factor with its error."""
         if error is not None and factor <= error:
             return f"at most {formatting.format_number((factor + error) * scale, 2)}"
         value, off = formatting.round_to_error(
@@ -387,7 +387,7 @@ def _error_or_floor(measure: dict) -> float:
 
 
 class Statement(NamedTuple):
-    """A part of the headline: a measure, or "", and a text with {} for its value and error."""
+    """Part of a headline: a measure, and a text into which its value is inserted."""
 
     measure: str
     text: str
@@ -438,7 +438,7 @@ def headline_sentence(
 def _fill_statement(
     statement: Statement, measures: dict, number: Callable[[str, str], str] | None
 ) -> str:
-    """Return a statement with the value of its measure; "" if the measure has no value."""
+    """Insert the value of a measure into a statement; "" if it has no value."""
     name, text = statement
     if not name:
         return text
@@ -452,7 +452,7 @@ def _fill_statement(
 
 
 def _wear_statements(measures: dict) -> list:
-    """Return the statement on the worn depth or, if there is none, on the worn volume."""
+    """Return the statement on the worn depth, or else on the worn volume."""
     texts_by_measure = {
         "worn_depth_max": "{} worn off at the deepest place",
         "worn_volume": "{} worn off",
@@ -461,7 +461,7 @@ def _wear_statements(measures: dict) -> list:
 
 
 def _motion_statements(measures: dict, released: str) -> list:
-    """Return the statements on the motion."""
+    """Return the statements of a headline on the motion."""
     if released:
         rows = [("", released), ("friction_work", "friction dissipates {} during the whole run")]
     else:
@@ -498,7 +498,7 @@ def _energy_statements(summary: dict) -> list:
 
 
 def _patch_statements(summary: dict) -> list:
-    """Return the statements on the pressed patch."""
+    """Return the statements of a headline on the solved patch."""
     fraction = summary["measures"].get("contact_fraction", {}).get("value")
     where = describe_contact(summary.get("contact"), fraction)
     statements = _at_each_interface(
@@ -558,7 +558,7 @@ def describe_contact(contact: dict | None, fraction: float | None = None) -> str
     digits = max(0, -floor(log10(shortest_length * scale)))
 
     def number(position: float) -> str:
-        """Write a position [m] in the unit of the sentence."""
+        """Format a position [m] in the unit of the sentence."""
         return (
             f"{round(position * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".")
             if digits
@@ -668,7 +668,7 @@ def _absolute_limits(names: list, measures: dict, tolerance: float) -> str:
 
 
 def _plain_value(name: str, value: float, unit: str) -> str:
-    """Write a value [SI] of a measure with three digits in a suitable unit."""
+    """Format a value [SI] of a measure with three digits."""
     display_unit, scale = display_units(name, value, unit)[0]
     return f"{formatting.format_number(value * scale, 3)} {display_unit}".rstrip()
 
@@ -688,7 +688,7 @@ def measure_link(text: str, name: str, more: str = "") -> str:
 
 
 def find_definition(name: str, pressed: bool = False):
-    """Return the definition of a measure, also of one that ends in the number of an interface.
+    """Return the definition of a measure, whose name may end in an interface number.
 
     None if there is none. pressed: whether a patch was pressed, which has a load of its own.
     """
@@ -706,13 +706,13 @@ def measure_meaning(name: str) -> str:
 
 
 def measure_group(name: str, pressed: bool = True) -> str:
-    """Return the group of a measure, one of GROUPS; pressed: as for `find_definition`."""
+    """Return the group of measures under which a measure is shown."""
     row = find_definition(name, pressed)
     return GROUPS[0] if row is None else row.group
 
 
 def order_measures(measures: dict) -> dict:
-    """Return the measures in the order in which they are shown.
+    """Sort measures in the order in which they are shown.
 
     Under a random drive those that a record determines come first; their scatter is shown with them
     and is left out.
@@ -726,7 +726,7 @@ def order_measures(measures: dict) -> dict:
 
 
 def record_interval(name: str, measures: dict) -> tuple:
-    """Return a measure of a random drive and its 95 % interval over records, as strings.
+    """Format a measure under random drive with its 95 % interval over records.
 
     They have the digits that the scatter of records allows; ("", "") for any other measure.
     """
@@ -811,7 +811,7 @@ def notebook_html(summary: dict, sentence: str, cycles: float | None, released: 
 
 
 def _format_record_interval(name: str, measures: dict) -> str:
-    """Write the interval over other records in brackets, and state that ± is the numerical error."""
+    """Format the interval over other random records, and explain the error."""
     text = record_interval(name, measures)[1]
     numerics = (
         "± is the numerical error; " if "±" in format_with_error(name, measures[name]) else ""
@@ -820,7 +820,7 @@ def _format_record_interval(name: str, measures: dict) -> str:
 
 
 def _format_measure_line(name: str, measure: dict, range_text: str, shaken: bool) -> str:
-    """Write a measure with its error and what it refers to, or the reason why it has no value."""
+    """Format a measure with its error, or the reason why it has no value."""
     if measure.get("reason"):
         return f"- ({measure['reason']})"
     qualifier = QUALIFIERS.get(re.sub(r"_\d+$", "", name))

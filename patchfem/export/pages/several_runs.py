@@ -45,7 +45,7 @@ CHARTS = (
 
 
 class FinishedRun(NamedTuple):
-    """A finished run as stored in its folder.
+    """Finished run, as read from its results folder.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ def read_run(folder: Path) -> FinishedRun:
 
 
 def _read_arrays(path: Path) -> dict:
-    """Read the variables of CHARTS that have finite values."""
+    """Read the variables that charts of several runs need."""
     if not path.is_file():
         return {}
     drawn_names = {name for _, *axes in CHARTS for name, _ in axes}
@@ -103,7 +103,7 @@ def _read_arrays(path: Path) -> dict:
 
 
 def page_html(runs: list) -> str:
-    """Return the HTML page of several `FinishedRun`s; differences are relative to the first."""
+    """Return the HTML page that compares several runs with the first of them."""
     names = number_duplicates([run.name for run in runs])
     charts = []
     for title, x, y in CHARTS:
@@ -145,7 +145,7 @@ def page_html(runs: list) -> str:
 
 
 def number_duplicates(names: list) -> list:
-    """Return the names, with a number added to those that occur more than once."""
+    """Append a number to names that occur more than once."""
     return [
         name if names.count(name) == 1 else f"{name} ({number})"
         for number, name in enumerate(names, 1)
@@ -153,7 +153,7 @@ def number_duplicates(names: list) -> list:
 
 
 class Line(NamedTuple):
-    """A line of a figure: the name of its run and its coordinates [SI]."""
+    """Line of a chart: the name of its run and its coordinates [SI]."""
 
     name: str
     x: np.ndarray
@@ -161,7 +161,7 @@ class Line(NamedTuple):
 
 
 def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
-    """Return the lines of all runs that have two variables, by the pair of their units.
+    """Group the chart lines of all runs by the units of their two variables.
 
     The units of runs can differ: the levels of a drive are forces in one run and accelerations in
     another one. Such lines cannot share an axis.
@@ -197,7 +197,7 @@ def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
 
 
 def _chart_figure(number: int, title: str, axes: tuple, units: tuple, lines: list) -> dict:
-    """Return a figure.
+    """Return the chart of several runs as an HTML figure.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def _chart_figure(number: int, title: str, axes: tuple, units: tuple, lines: lis
 
 
 def _axis_unit(arrays: list, unit: str) -> tuple:
-    """Return the unit (name, scale) of an axis that shows some arrays [SI]."""
+    """Choose unit and scale of an axis for several arrays [SI]."""
     if unit in UNIT_LADDERS:
         return choose_axis_unit(np.concatenate(arrays), unit)
     return unit, 1.0
@@ -255,7 +255,7 @@ def drive_period(run: FinishedRun) -> float | None:
 
 
 def _select_last_cycles(run: FinishedRun) -> np.ndarray:
-    """Return which samples lie in the last N_SHOWN_CYCLES cycles of a sine.
+    """Return a mask of the samples in the last cycles of a sinusoidal drive.
 
     Without a sine it is the last tenth of the run; on a bench all samples.
     """
@@ -268,7 +268,7 @@ def _select_last_cycles(run: FinishedRun) -> np.ndarray:
 
 
 def _flatten_tables(table, prefix: str = "") -> dict:
-    """Flatten nested tables: "contact.tilt.angle" -> value.
+    """Flatten nested scene tables to a dict of dotted keys.
 
     Entries of lists are named by their name or number.
     """
@@ -288,7 +288,7 @@ def _flatten_tables(table, prefix: str = "") -> dict:
 
 
 def _differences_table(runs: list, names: list) -> str:
-    """Return a table of the keys whose values differ between the resolved scenes."""
+    """Return an HTML table of the scene keys in which runs differ."""
     flat_scenes = [_flatten_tables(run.resolved) for run in runs]
     keys = [
         key
@@ -308,7 +308,7 @@ def _differences_table(runs: list, names: list) -> str:
 
 
 def _format_scene_value(value) -> str:
-    """Write a value of a resolved scene as HTML; long texts are cut."""
+    """Format a scene value as HTML, cut if it is long."""
     if value is None:
         return "&ndash;"
     if isinstance(value, float):
@@ -318,7 +318,7 @@ def _format_scene_value(value) -> str:
 
 
 def _measures_table(runs: list, names: list) -> str:
-    """Return a table of the measures of all runs.
+    """Return an HTML table of the measures of all runs.
 
     Values that differ from those of the first run by more than both errors are marked.
     """
@@ -344,7 +344,7 @@ def _measures_table(runs: list, names: list) -> str:
 
 
 def _format_cell(name: str, measure: dict | None, first: dict | None) -> str:
-    """Write a measure as a cell, with its change from the first run if both have one unit."""
+    """Format a measure as a table cell with its change from the first run."""
     if measure is None or measure["value"] is None or not math.isfinite(measure["value"]):
         return "&ndash;"
     text = escape(format_with_error(name, measure))
@@ -357,7 +357,7 @@ def _format_cell(name: str, measure: dict | None, first: dict | None) -> str:
 
 
 def _format_change(value: float, first: dict) -> str:
-    """Write the change from the first value in per cent, or as a factor if it is large.
+    """Format a change in percent, or as a factor if it is large.
 
     It is a dash if the first value is 0 within its error, because any ratio would then only depend
     on this error.

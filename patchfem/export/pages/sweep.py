@@ -100,7 +100,7 @@ def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
 
 
 def _script_data(table: dict, first: str | None, cases: np.ndarray, is_exact: bool) -> dict:
-    """Return the data of some cases for the scripts; is_exact: with all digits."""
+    """Return the data of the drawn cases for the scripts of a page."""
     keys = [_key_data(item, cases) for item in table["keys"]]
     measures = [
         _measure_data(name, item, cases, table.get("tolerance", np.nan))
@@ -194,12 +194,12 @@ def _measure_data(name: str, measure: dict, cases, tolerance=np.nan) -> dict:
 
 
 def _axis_key(keys: list) -> str:
-    """Return the name of the key with the most values, which is along the axis."""
+    """Return the swept key with the most values, which is plotted along the axis."""
     return max(keys, key=lambda key: np.unique(key["values"]).size)["name"] if keys else ""
 
 
 def _explorer_html(drawn_note: str, folders: list | None) -> str:
-    """Return the controls and the empty figure, which `explorer.js` fills.
+    """Return the controls and the empty figure of the interactive plot as HTML.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def _change_section(table: dict, key_limits: limits.Limits) -> list:
 
 
 def _lead_html(table: dict, summary: SweepHeadline) -> str:
-    """Return the verdict as HTML: the answer, number of cases, keys, outcomes, other sentences."""
+    """Return the summary of a sweep as HTML: main result, cases, keys and outcomes."""
     number = len(table["outcome"])
     swept_keys = " × ".join(one["name"] for one in table["keys"])
     outcome_counts = ", ".join(
@@ -275,7 +275,7 @@ def _lead_html(table: dict, summary: SweepHeadline) -> str:
 
 
 def _cases_table(table: dict) -> str:
-    """Return the first cases as a table with keys, outcome and the measures that vary."""
+    """Return the first cases of a sweep as an HTML table."""
     shown_measures = [
         name
         for name in ranked.asked_first(
@@ -348,7 +348,7 @@ def _cases_table(table: dict) -> str:
 
 
 def _keep_unit_together(text: str) -> str:
-    """Return a value of a key as HTML without a line break before its unit."""
+    """Format a key value as HTML without a line break before its unit."""
     return escape(text).replace(" ", "&nbsp;") if NUMBER.match(text) else escape(text)
 
 
@@ -360,7 +360,7 @@ def _is_varied(values) -> bool:
 
 
 def _format_number(value: float, error: float, floor: float) -> str:
-    """Write a value with its error, rounded by this error; floor: its floor in the same unit."""
+    """Format a value with its error, rounded according to the error."""
     if not np.isfinite(value):
         return "&ndash;"
     return " ± ".join(
@@ -369,7 +369,7 @@ def _format_number(value: float, error: float, floor: float) -> str:
 
 
 def _meanings_table(table: dict) -> str:
-    """Return a table of the definitions of the measures."""
+    """Return an HTML table of the definitions of the measures."""
     rows = [
         (
             f" id='measure-{escape(name)}'",
@@ -385,7 +385,7 @@ def _meanings_table(table: dict) -> str:
 
 
 def _repeat_section(table: dict) -> str:
-    """Return the command and the scene of the sweep as HTML."""
+    """Return the command line and the scene of a sweep as HTML."""
     return (
         "<p>The sweep was run with this command in the folder of its scene:</p>"
         f"<pre>{escape(table['command'])}</pre><details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>"

@@ -11,7 +11,7 @@ COLUMNS_PER_ROW = 3.0  # ratio of columns to rows, if there are enough lines of 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ReducedMesh:
-    """A coarser mesh, and how it derives from the finer one.
+    """Coarser mesh for display, with its relation to the finer mesh.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class ReducedMesh:
     areas: np.ndarray
 
     def means(self, values) -> np.ndarray:
-        """Return the area-weighted means (c, k) of values (m, k) on the cells of the finer mesh."""
+        """Average values (m, k) on the cells of the finer mesh over coarser cells (c, k)."""
         sums = np.add.reduceat(values[self.order] * self.areas[:, None], self.starts)
         return (sums / np.add.reduceat(self.areas, self.starts)[:, None])[self.groups]
 
@@ -45,7 +45,7 @@ class ReducedMesh:
 def reduce_mesh(
     points, cells, material, max_cells: int, fine_range: tuple | None = None
 ) -> ReducedMesh:
-    """Reduce a mesh to about `max_cells` cells.
+    """Merge the cells of a mesh until about a given number remains.
 
     In a grid, every so many lines are kept, including the outer lines and those between two
     materials, so that the outline stays the same. In any other mesh all points of a box between
@@ -94,7 +94,7 @@ def reduce_mesh(
 
 
 def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None) -> tuple:
-    """Return the indices of the kept lines at or before each point, and the number of rows.
+    """Return for each point the index of the last selected line before it.
 
     The indices count columns along x and rows in depth.
     """
@@ -127,7 +127,7 @@ def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None
 
 
 def select_lines(lines, count: int, fine_range: tuple | None = None) -> np.ndarray:
-    """Return the indices of at most `count` + 1 sorted lines (n,), evenly spaced.
+    """Select evenly spaced grid lines, at most a given number.
 
     The first and the last line are included. fine_range: (left, right) between which half of the lines
     are taken, if there are so many.
