@@ -40,6 +40,7 @@ PAGES = (
     "studies/report/README.md",
     "studies/report/conclusions.md",
     "studies/report/items.md",
+    "studies/speed/README.md",
     "studies/table_1/README.md",
     "tests/README.md",
 )

@@ -1,15 +1,16 @@
 """Commands for the first hour: a template scene, a demo run, editor support, citations."""
 
 import json
+import sys
 from pathlib import Path
 
 from ..disk import atomic_write
+from ..scene import joint_laws, starting
 from ..scene import scene as scenes
 from ..scene import schema as schemas
-from ..scene import starting
 from . import examine, sources
 from .run import run
-from .shared import Json, NoPage, Out, Refused, choose_folder, out_option, print_message
+from .shared import Json, NoPage, Out, Refused, choose_folder, flag, out_option, print_message, word
 
 
 def new(
@@ -17,27 +18,82 @@ def new(
     /,
     *,
     out: out_option("file to write, such as mine.toml; default: the screen") = None,
+    ask: flag("ask what you know about a joint and what you want to compute") = False,
+    know: word("answer to the first question of --ask, such as loop,roughness") = "",
+    want: word("answer to the second question of --ask, such as loss,squeal") = "",
 ):
     """Print a template scene of this KIND; without KIND, list the kinds.
 
+    With --ask, or --know and --want, write the scene of a joint with the law that answers your questions.
+
     Example: patchfem new joint -o mine.toml
     """
+    if ask or know or want:
+        _write_joint(kind, out, know, want)
+        return
     if not kind:
         width = max(map(len, starting.TEMPLATE_DESCRIPTIONS))
         for name, description in starting.TEMPLATE_DESCRIPTIONS.items():
             print(f"{name:<{width}}  {description}")
         return
-    text = starting.read_template(kind)
+    description = starting.TEMPLATE_DESCRIPTIONS.get(kind, "")
+    verb = starting.NEXT_VERBS.get(kind, "run")
+    _write_scene(starting.read_template(kind), out, [description], verb)
+
+
+def _write_scene(text: str, out: Path | None, description: list[str], verb: str) -> None:
+    """Write a scene to a new file and print its description and the next command; print it if there is no file."""
     if out is None:
         print(text, end="")
         return
-    if out.exists():
+    _refuse_existing(out)
+    atomic_write.write_text(out, text)
+    lines = "\n".join(description)
+    print(f"{out}: {lines}\nnext: patchfem {verb} {out}")
+
+
+def _refuse_existing(out: Path | None) -> None:
+    """Raise Refused if the file to write exists."""
+    if out is not None and out.exists():
         raise Refused(f"{out}: already exists; choose another file with -o, or remove it")
 
-    atomic_write.write_text(out, text)
-    print(
-        f"{out}: {starting.TEMPLATE_DESCRIPTIONS[kind]}\nnext: patchfem {starting.NEXT_VERBS.get(kind, 'run')} {out}"
+
+def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
+    """Write the scene of a joint for the answers to two questions; an answer that is "" is asked for."""
+    if kind != "joint":
+        raise Refused("--ask, --know and --want are for a joint: patchfem new joint --ask")
+    _refuse_existing(out)
+    known = known or _ask("--know", "What do you know about the joint?", joint_laws.KNOWLEDGE)
+    wanted = wanted or _ask("--want", "What do you want to compute?", joint_laws.WISHES)
+    choice = joint_laws.choose_law(known, wanted)
+    _write_scene(
+        joint_laws.compose_scene(choice), out, joint_laws.describe_choice(choice), verb="run"
     )
+
+
+def _ask(option: str, question: str, answers: dict[str, str]) -> str:
+    """Ask a question on the terminal and return the answer.
+
+    Parameters
+    ----------
+    option : str
+        Option that answers the question without a terminal, for the message.
+    question : str
+    answers : dict
+        Word of an answer -> its meaning.
+
+    Raises
+    ------
+    Refused
+        If there is no terminal, or if the input ends before the answer.
+    """
+    if sys.stdin is None or not sys.stdin.isatty():
+        raise Refused(f"--ask: no terminal to ask at; give {option}, from {', '.join(answers)}")
+    print_message(joint_laws.format_question(question, answers))
+    line = sys.stdin.buffer.readline()
+    if not line:
+        raise Refused(f"--ask: the input ended before the answer; give {option}")
+    return line.decode("utf-8", "replace").strip()
 
 
 def demo(*, out: Out = None, no_page: NoPage = False):

@@ -2,7 +2,7 @@
 
 import pytest
 from pydantic import BaseModel
-from reference import limits, records
+from reference import joint_laws, limits, records
 from reference.keys import FILE, Equations, effects_table, tables, text
 from scene_texts import SMALL_PATCH, STRUCTURE
 
@@ -35,7 +35,7 @@ def section(header: str) -> list:
 
 
 def test_exact_the_committed_file_is_what_the_records_say():
-    for page in (records.Measures, records.Materials, limits, Equations):
+    for page in (records.Measures, records.Materials, limits, Equations, joint_laws):
         assert page.FILE.read_text("utf-8") == page.text(), "run python tests/support/reference"
     assert FILE.read_text("utf-8") == PAGE, "run python tests/support/reference"
 

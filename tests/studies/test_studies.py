@@ -130,7 +130,7 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     )
     assert said.code == 0, said.err
     blocks = re.findall(
-        r"(?s)```text\n(element_size .*?)```", (STUDIES / "README.md").read_text("utf-8")
+        r"(?s)```text\n(element_size .*?)```", (STUDIES / "speed/README.md").read_text("utf-8")
     )
     (names, ours, said), (printed, theirs, sentence) = (
         table(one) for one in (said.out.split("results:")[0], blocks[bool(words)])

@@ -6,8 +6,8 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from reference import keys, limits, records
+from reference import joint_laws, keys, limits, records
 
-for page in (keys, keys.Equations, records.Measures, records.Materials, limits):
+for page in (keys, keys.Equations, records.Measures, records.Materials, limits, joint_laws):
     page.FILE.write_text(page.text(), encoding="utf-8")
     print(page.FILE)

@@ -1,0 +1,288 @@
+"""Choice of a friction law for a joint, from what an engineer knows about it and wants to compute.
+
+`JOINT_LAWS` is the only table: the questions of `patchfem new joint --ask`, its sentences and the table "Which law for
+my joint?" of guide/friction.md come from it.
+"""
+
+import textwrap
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from ..exceptions import PatchfemError
+from .keys.types import advise_on_name
+from .starting import TEMPLATE_FOLDER
+
+GUIDE_SECTION = 'patchfem/scene/guide/friction.md, "Which law for my joint?"'
+COMMENT_WIDTH = 120  # columns of a scene
+NOTHING = "nothing"  # word of KNOWLEDGE that excludes the others
+
+# word of an answer -> what it means
+KNOWLEDGE = {
+    "damping": "damping of the joint at several amplitudes",
+    "loop": "a measured loop of force over slide",
+    "material": "shapes and materials of the pieces",
+    "roughness": "a trace of the faces, or their rms height, slope and curvature",
+    "stiffness": "stiffness before slip, or the bond length",
+    "coefficient": "friction coefficient",
+    "speed": "friction force at several sliding speeds",
+    "rest": "friction force after rests of several durations",
+    NOTHING: "none of these",
+}
+WISHES = {
+    "loss": "energy dissipated per cycle",
+    "force-limit": "force at which the joint slips",
+    "reversal": "force just after a reversal, small loops",
+    "ageing": "force after a rest",
+    "squeal": "vibration that begins by itself, stick-slip",
+    "smooth": "friction as a smooth function of the speed",
+    "averaging": "friction law of Oden and Pires",
+}
+
+
+class JointLaw(NamedTuple):
+    """Friction law that answers some questions about a joint.
+
+    - known: words of KNOWLEDGE that the keys of the law need.
+    - wanted: words of WISHES that the law answers.
+    - law: value of `friction.law`.
+    - keys: keys of [friction] besides `law` and `static`, and tables of [contact].
+    - gives: accuracy of the answer, with its condition.
+    - cannot: what the law does not describe.
+    - scene: name of a template scene.
+    """
+
+    known: tuple[str, ...]
+    wanted: tuple[str, ...]
+    law: str
+    keys: tuple[str, ...]
+    gives: str
+    cannot: str
+    scene: str
+
+
+# Laws in the order of preference where several need no more knowledge than there is: measurements of the joint first,
+# then its parts, then single numbers.
+JOINT_LAWS = (
+    JointLaw(
+        ("damping",),
+        ("loss", "force-limit"),
+        "iwan",
+        ("stiffness", "chi", "beta"),
+        "in micro-slip the energy per cycle grows as amplitude^(chi + 3), the damping ratio as amplitude^(chi + 1)",
+        "no effect of speed or rest; one contact point or a rigid patch, under a constant load",
+        "joint_laws/iwan",
+    ),
+    JointLaw(
+        ("loop",),
+        ("loss", "force-limit", "reversal"),
+        "bouc-wen",
+        ("stiffness", "exponent", "shape"),
+        "the measured loop; in micro-slip the energy per cycle grows as amplitude^(exponent + 2)",
+        "small loops do not close, and the joint creeps under a mean force (law iwan does neither); no effect of speed; "
+        "constant load",
+        "joint_laws/bouc-wen",
+    ),
+    JointLaw(
+        ("coefficient", "material", "roughness"),
+        ("loss", "force-limit"),
+        "coulomb",
+        ("[contact.shear]", "[contact.asperities]"),
+        "slip that begins at the edges, from the stiffness of the pieces and of their rough faces",
+        "theories of rough contact differ, and the run prints their range; the pieces are plane, and nothing beyond "
+        "them gives way",
+        "joint_laws/rough-plates",
+    ),
+    JointLaw(
+        ("coefficient", "material"),
+        ("loss", "force-limit"),
+        "coulomb",
+        ("[contact.shear]",),
+        "slip that begins at the edges, and its damping, from the stiffness of the pieces",
+        "the faces are smooth, so the joint is too stiff where they are rough; the pieces are plane, and nothing beyond "
+        "them gives way",
+        "joint",
+    ),
+    JointLaw(
+        ("coefficient", "stiffness"),
+        ("loss", "force-limit"),
+        "elastic-plastic",
+        ("stiffness",),
+        "loop area to 1 % above an amplitude of 2.2 bond lengths",
+        "dissipates nothing up to one bond length; the force just after a reversal is wrong (rms 14 % at 3 bond "
+        "lengths)",
+        "joint_laws/elastic-plastic",
+    ),
+    JointLaw(
+        ("coefficient", "stiffness"),
+        ("reversal", "loss", "force-limit"),
+        "nonlocal",
+        ("bond_length",),
+        "smooth loops at amplitudes of about one bond length",
+        "small loops do not close; creeps by 0.27 bond lengths per cycle under a force of 0.4 to "
+        "0.6 of the limit, unless `breakaway` is set",
+        "joint_laws/nonlocal",
+    ),
+    JointLaw(
+        ("rest",),
+        ("ageing", "loss", "force-limit"),
+        "nonlocal",
+        ("bond_length", "kinetic", "rest_growth", "rest_speed", "slip_growth"),
+        "bonds that grow during a rest, exponentially with the time constant rest_speed/rest_growth",
+        "no ageing with the logarithm of time; the peak of the force shows only 28 to 92 % of the growth; without "
+        "`kinetic` nothing ages",
+        "joint_laws/ageing",
+    ),
+    JointLaw(
+        ("speed",),
+        ("squeal", "loss", "force-limit"),
+        "lugre",
+        ("kinetic", "stribeck_speed", "stiffness", "micro_damping", "viscous"),
+        "friction that falls with the speed: growth from steady sliding, and stick-slip",
+        "no ageing; no squeal by coupling of modes, because the load is constant; small loops do not "
+        "close; creeps under a mean force",
+        "joint_laws/lugre",
+    ),
+    JointLaw(
+        ("coefficient",),
+        ("squeal", "force-limit"),
+        "coulomb",
+        ("kinetic",),
+        "stick-slip from a coefficient that is lower in slip; exact between events",
+        "friction does not fall with the speed, so no vibration grows from steady sliding",
+        "joint_laws/stick-slip",
+    ),
+    JointLaw(
+        ("coefficient",),
+        ("force-limit", "loss"),
+        "coulomb",
+        (),
+        "loop area too large by at most 1 % from an amplitude of 100 bond lengths",
+        "no stiffness and no loss before slip; the force is wrong after each reversal (rms 34 % at 100 bond lengths)",
+        "joint_laws/coulomb",
+    ),
+    JointLaw(
+        ("speed",),
+        ("smooth",),
+        "tanh",
+        ("reference_speed",),
+        "the force static*load*tanh(speed/reference_speed)",
+        "never sticks: creeps under any force; no stiffness before slip; friction does not fall with the speed",
+        "joint_laws/tanh",
+    ),
+    JointLaw(
+        ("coefficient", "material", "stiffness"),
+        ("averaging",),
+        "convolution",
+        ("bond_length",),
+        "friction from the pressure averaged over some bond lengths behind each point",
+        "no memory, no stiffness before slip; under an even pressure it is Coulomb's law; no `[contact.shear]`",
+        "joint_laws/convolution",
+    ),
+)
+
+
+class Choice(NamedTuple):
+    """Law for the answers of a user: the row of JOINT_LAWS, and both answers as lists of words."""
+
+    row: JointLaw
+    known: list[str]
+    wanted: list[str]
+
+
+def parse_answer(answer: str, words: Iterable[str], name: str) -> list[str]:
+    """Return the words of an answer, separated by commas; a repeated word counts once.
+
+    Parameters
+    ----------
+    answer : str
+        Such as "loop, roughness".
+    words : iterable of str
+        Words that may occur.
+    name : str
+        Option of the question, for the message.
+
+    Raises
+    ------
+    PatchfemError
+        If a word is unknown, or if there is none.
+    """
+    permitted = list(words)
+    parts = [part.strip().lower() for part in answer.split(",")]
+    chosen = list(dict.fromkeys(part for part in parts if part))
+    if not chosen:
+        raise PatchfemError(f"{name}: no answer; use one or more of {', '.join(permitted)}")
+    for word in chosen:
+        if word not in permitted:
+            raise PatchfemError(
+                f"{name}: unknown answer '{word}'; {advise_on_name(word, permitted)}"
+            )
+    if NOTHING in chosen and len(chosen) > 1:
+        raise PatchfemError(f"{name}: '{NOTHING}' excludes other answers")
+    return chosen
+
+
+def choose_law(known: str, wanted: str) -> Choice:
+    """Choose the law that answers most wishes; of several, the one that needs least further knowledge.
+
+    Parameters
+    ----------
+    known : str
+        Words of KNOWLEDGE, separated by commas.
+    wanted : str
+        Words of WISHES, separated by commas.
+
+    Raises
+    ------
+    PatchfemError
+        If an answer has an unknown word or none.
+    """
+    known_words = parse_answer(known, KNOWLEDGE, "--know")
+    wanted_words = parse_answer(wanted, WISHES, "--want")
+
+    def rank(row: JointLaw) -> tuple[int, int]:
+        # a friction coefficient can be assumed from tables, the other knowledge cannot
+        missing = set(row.known).difference(known_words, {"coefficient"})
+        return -len(set(row.wanted).intersection(wanted_words)), len(missing)
+
+    return Choice(min(JOINT_LAWS, key=rank), known_words, wanted_words)
+
+
+def format_question(question: str, meanings: dict[str, str]) -> str:
+    """Return a question with the words of its answers, one on each line."""
+    width = max(map(len, meanings))
+    answers = [f"  {word:<{width}}  {meaning}" for word, meaning in meanings.items()]
+    return "\n".join([f"{question} (words, separated by commas)", *answers])
+
+
+def describe_choice(choice: Choice) -> list[str]:
+    """Return sentences on the chosen law, its accuracy and limits, and the answers that it does not use."""
+    row = choice.row
+    missing = [word for word in row.known if word not in choice.known]
+    unused = [word for word in choice.known if word not in (*row.known, NOTHING)]
+    unanswered = [word for word in choice.wanted if word not in row.wanted]
+    sentences = [
+        f"law: {row.law}; keys: {', '.join(['static', *row.keys])}",
+        f"what it gives: {row.gives}",
+        f"what it cannot: {row.cannot}",
+    ]
+    if missing:
+        assumed = "; ".join(f"{word} ({KNOWLEDGE[word]})" for word in missing)
+        sentences.append(f"assumed in the scene, because you do not know it: {assumed}")
+    if unused:
+        sentences.append(f"not used: {', '.join(unused)}")
+    if unanswered:
+        sentences.append(
+            f"not answered by this law: {', '.join(unanswered)}; ask again with --want {unanswered[0]}"
+        )
+    return [*sentences, f"see {GUIDE_SECTION}"]
+
+
+def compose_scene(choice: Choice) -> str:
+    """Return the scene of the chosen law, with the sentences of `describe_choice` as comments at its head."""
+    lines = []
+    for sentence in describe_choice(choice):
+        lines += textwrap.wrap(
+            sentence, COMMENT_WIDTH, initial_indent="# ", subsequent_indent="#   "
+        )
+    scene = (TEMPLATE_FOLDER / f"{choice.row.scene}.toml").read_text(encoding="utf-8")
+    return "\n".join(lines) + "\n\n" + scene

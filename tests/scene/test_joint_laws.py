@@ -1,0 +1,141 @@
+"""`patchfem new joint --ask`: each answer leads to a law whose scene runs, and the table says what the laws do."""
+
+import os
+import pty
+import subprocess
+import sys
+import tomllib
+
+import numpy as np
+import pytest
+from command_line import cli
+
+import patchfem as pf
+from patchfem.scene import load, loads
+from patchfem.scene.joint_laws import JOINT_LAWS, KNOWLEDGE, WISHES, choose_law, compose_scene
+
+ROWS = {f"{row.law}-{row.scene.rpartition('/')[2]}": row for row in JOINT_LAWS}
+POINT = '[normal]\nload = "100 N"\n[friction]\nstatic = 0.3\n'
+PATH = '[slide]\nkind = "file"\nfile = "path.csv"\n'  # 3 um, back to 1.5 um, to 3 um again
+BRISTLES = 'stiffness = "3e7 N/m"\n'  # the limit of 30 N is reached at 1 um
+# friction force at 3 um for the second time divided by that for the first time, in percent
+SMALL_LOOPS = {
+    'law = "elastic-plastic"\n' + BRISTLES: 100,
+    'law = "iwan"\nchi = -0.5\nbeta = 0.1\n' + BRISTLES: 100,
+    'law = "nonlocal"\nbond_length = "1 um"\n': 69,
+    'law = "lugre"\nstribeck_speed = "1 m/s"\n' + BRISTLES: 69,
+    'law = "bouc-wen"\n' + BRISTLES: 69,
+}
+REFUSED = {
+    "joint --know loop,roughnes --want loss": "--know: unknown answer 'roughnes'; did you mean 'roughness'?",
+    "joint --know loop --want lost": "--want: unknown answer 'lost'; did you mean 'loss'?",
+    "joint --know , --want loss": "--know: no answer; use one or more of damping, loop",
+    "joint --know nothing,loop --want loss": "--know: 'nothing' excludes other answers",
+    "joint --ask": "no terminal to ask at; give --know, from damping, loop",
+    "joint --know loop": "no terminal to ask at; give --want, from loss, force-limit",
+    "joint --want loss": "no terminal to ask at; give --know",
+    "rig --ask": "--ask, --know and --want are for a joint: patchfem new joint --ask",
+    "--ask": "patchfem new joint --ask",
+}
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_always_the_scene_of_a_law_runs_and_has_its_keys(name):
+    row = ROWS[name]
+    choice = choose_law(",".join(row.known), ",".join(row.wanted))
+    text = compose_scene(choice)
+    tables = tomllib.loads(text)
+    friction = tables.get("friction") or tables["structure"]["interface"][0]
+    result = pf.run(text)
+    assert choice.row == row
+    assert result.outcome in ("done", "steady") and not result.warnings
+    assert friction["law"] == row.law
+    assert {*friction} - {"law", "static", "between", "load"} | {
+        f"[contact.{table}]"
+        for table in ("shear", "asperities")
+        if table in tables.get("contact", {})
+    } == {*row.keys}
+
+
+@pytest.mark.parametrize("want", WISHES)
+@pytest.mark.parametrize("know", KNOWLEDGE)
+def test_always_a_law_answers_the_wish_and_says_what_it_assumes(know, want):
+    choice = choose_law(know, want)
+    text = compose_scene(choice)
+    missing = {*choice.row.known} - {know}
+    assert want in choice.row.wanted and choice.row.cannot.split()[0] in text
+    assert ("assumed in the scene" in text) == bool(missing)
+    assert ("not used" in text) == (know not in (*choice.row.known, "nothing"))
+    assert loads(text).kind in ("bench", "rig")
+
+
+def test_always_a_second_wish_that_the_law_does_not_answer_is_named():
+    answer = cli("new", "joint", "--know", "rest", "--want", "ageing,squeal")
+    assert "# law: nonlocal" in answer.out
+    assert "not answered by this law: squeal; ask again with --want squeal" in answer.out
+
+
+@pytest.mark.parametrize("law", SMALL_LOOPS)
+def test_exact_which_laws_close_a_small_loop_inside_a_larger_one(law, tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(f"{POINT}{law}{PATH}", "utf-8")
+    (tmp_path / "path.csv").write_text(
+        "time [s],displacement [um]\n0,0\n1,3\n2,1.5\n3,3\n4,3\n", "utf-8"
+    )
+    history = pf.run(path).to_xarray()
+    first, second = np.interp([1, 3], history.time, history.friction_force.values.ravel())
+    assert 100 * second / first == pytest.approx(SMALL_LOOPS[law], abs=1)
+
+
+@pytest.mark.parametrize(("name", "power"), [("iwan-iwan", 2.5), ("bouc-wen-bouc-wen", 3.0)])
+def test_exact_the_loss_in_micro_slip_is_a_power_of_the_amplitude(name, power):
+    """chi + 3 with chi = -0.5, exponent + 2 with exponent = 1."""
+    scene = loads(compose_scene(choose_law(ROWS[name].known[0], "loss")))
+    areas = [
+        pf.run(scene, **{"slide.amplitude": amplitude}).measures["loop_area"].value
+        for amplitude in ("1 nm", "10 nm")
+    ]
+    assert np.log10(areas[1] / areas[0]) == pytest.approx(power, abs=0.03)
+
+
+@pytest.mark.parametrize("words", REFUSED)
+def test_refuses_what_is_no_answer(words):
+    answer = cli("new", *words.split())
+    assert answer.code == 2 and REFUSED[words] in answer.err and not answer.out
+
+
+def test_always_the_file_has_the_scene_and_the_screen_the_sentences(tmp_path):
+    path = tmp_path / "joint.toml"
+    words = ("new", "joint", "--know", "loop", "--want", "loss")
+    answer = cli(*words, "-o", path)
+    assert path.read_text("utf-8") == cli(*words).out and load(path).friction.law == "bouc-wen"
+    assert f"{path}: law: bouc-wen; keys: static, stiffness, exponent, shape" in answer.out
+    assert "what it cannot: " in answer.out and f"next: patchfem run {path}" in answer.out
+    assert "already exists" in cli(*words, "-o", path).err
+
+
+def converse(*answers: bytes) -> tuple[int, str]:
+    """Return exit code and screen of `patchfem new joint --ask` on a terminal with typed answers."""
+    controller, terminal = pty.openpty()
+    os.write(controller, b"".join(answers))
+    process = subprocess.run(
+        [sys.executable, "-m", "patchfem", "new", "joint", "--ask"],
+        stdin=terminal,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        timeout=60,
+    )
+    os.close(controller)
+    os.close(terminal)
+    return process.returncode, process.stdout.decode()
+
+
+def test_always_questions_are_asked_on_a_terminal():
+    code, screen = converse(b"loop, Roughness\n", b"loss\n")
+    scene = cli("new", "joint", "--know", "loop,roughness", "--want", "loss").out
+    assert code == 0 and scene in screen
+    assert all(f"  {word} " in screen for word in (*KNOWLEDGE, *WISHES))
+    code, screen = converse(b"\x04")  # end of file
+    assert code == 2 and "the input ended before the answer; give --know" in screen
+    code, screen = converse(b"\xff\n", b"loss\n")
+    assert code == 2 and "unknown answer" in screen

@@ -1,0 +1,47 @@
+"""The table of the guide that answers which friction law a joint needs."""
+
+from pathlib import Path
+
+from patchfem.scene.joint_laws import JOINT_LAWS, KNOWLEDGE, WISHES
+
+from .keys import FOLDER, grid
+
+FILE: Path = FOLDER / "guide" / "friction.md"
+BEGIN = "<!-- joint laws -->\n"
+END = "<!-- end -->"
+HEAD = (
+    "know",
+    "want",
+    "law",
+    "keys besides `static`",
+    "what it gives",
+    "what it cannot",
+)
+
+
+def text() -> str:
+    """Return the page of the guide with its table of joint laws written anew."""
+    before, _, rest = FILE.read_text("utf-8").partition(BEGIN)
+    after = rest.partition(END)[2]
+    words = f"{_define('know', KNOWLEDGE)}\n{_define('want', WISHES)}"
+    return f"{before}{BEGIN}{words}\n\n{grid(HEAD, _list_rows())}\n\n{END}{after}"
+
+
+def _define(question: str, meanings: dict) -> str:
+    """Return an item of a list with the meaning of every answer to a question."""
+    answers = "; ".join(f"`{word}`: {meaning}" for word, meaning in meanings.items())
+    return f"- What you {question}: {answers}."
+
+
+def _format_words(words: tuple) -> str:
+    """Return words or keys in the form of code."""
+    return ", ".join(f"`{word}`" for word in words)
+
+
+def _list_rows() -> list[tuple]:
+    """Return the rows of the table, as texts."""
+    rows = []
+    for row in JOINT_LAWS:
+        known, wanted, keys = map(_format_words, (row.known, row.wanted, row.keys))
+        rows.append((known, wanted, f"`{row.law}`", keys, row.gives, row.cannot))
+    return rows
