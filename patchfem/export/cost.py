@@ -90,7 +90,7 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
 
 
 def _by_tolerance(runs: list) -> list[list]:
-    """Group the runs of a curve over tolerances: each tolerance with the settings tried for it."""
+    """Group the runs of a cost curve by tolerance, each with the settings tried for it."""
     out: list[list] = []
     for run in runs:
         if out and out[-1][0].tolerance == run.tolerance:

@@ -56,7 +56,7 @@ _OPENING_BRACKETS = {"]": "[", "}": "{"}
 
 
 class FormattedNumbers(Sequence):
-    """Numbers formatted on access as in a scene; millions of strings would fill the memory.
+    """Sequence of numbers that are formatted as text only when they are accessed.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class FormattedNumbers(Sequence):
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A key with its values.
+    """Swept key with its values.
 
     - key: dotted key of the scene.
     - texts: values as a scene writes them.
@@ -104,7 +104,7 @@ class Axis:
 
 @dataclass(frozen=True, slots=True)
 class SampledRange:
-    """A key and the range from which its values are drawn.
+    """Swept key with the range from which random values are drawn.
 
     - key: dotted key of the scene.
     - low, high: ends of the range in `unit`.
@@ -119,7 +119,7 @@ class SampledRange:
     log: bool
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
-        """Return the axis of the values at these fractions of the range, each in [0, 1]."""
+        """Return the swept key with the values at given fractions of its range."""
         ends = _RangeEnds(self.low, self.high, self.unit)
         numbers = (_interpolate(ends, fraction, self.log) for fraction in fractions)
         texts = FormattedNumbers(array("d", numbers), self.unit)
@@ -128,7 +128,7 @@ class SampledRange:
 
 
 class _RangeEnds(NamedTuple):
-    """Ends of a range, both in `unit`."""
+    """Ends of a range of values in a common unit."""
 
     low: Fraction | float
     high: Fraction | float
@@ -136,7 +136,7 @@ class _RangeEnds(NamedTuple):
 
 
 class _WrittenRange(NamedTuple):
-    """Range in its written form: its ends, the number of values, and "log", "lin" or None."""
+    """Range of values as written by the user: ends, count and type of spacing."""
 
     low: str
     high: str
@@ -231,7 +231,7 @@ def describe_ranges(texts: Iterable[str]) -> list[str]:
 
 
 def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
-    """Return the axis of a list of values.
+    """Return a swept key with a given list of values.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
 def _append_axis(
     axes: list, mistakes: list, key: str, values: str, *, sampled: bool = False
 ) -> None:
-    """Read the axis of a key and append it to `axes`, or append its mistakes to `mistakes`."""
+    """Read a swept key, and append it to the list of axes or of mistakes."""
     try:
         axes.append(_read_axis(key, values, sampled=sampled))
     except ValueError as error:
@@ -279,7 +279,7 @@ def _append_axis(
 
 
 def _read_axis(key: str, text: str, *, sampled: bool = False) -> Axis | SampledRange:
-    """Return the axis of the values in a text; ValueError with one line for each mistake."""
+    """Parse the values of a swept key; raise ValueError with all mistakes."""
     require_key(key)
     pieces = _split_at_commas(text)
     can_be_span = sampled and len(pieces) == 1
@@ -326,7 +326,7 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
 
 
 def _range_about(text: str) -> str:
-    """Return ``4.0 mm..6.0 mm`` for ``5 mm +- 1 mm``; "" for a string without a tolerance.
+    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range; "" without tolerance.
 
     ValueError if the tolerance has another unit than the value.
     """
@@ -359,7 +359,7 @@ def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
 
 
 def _refuse_table(key: str, texts: tuple) -> None:
-    """Raise ValueError, with suggested keys, if a table is given plain values."""
+    """Raise ValueError for values that are assigned to a table, and suggest its keys."""
     model, name = find_key(key)
     inner = find_inner_table(model, name)
     if inner is None or is_table_or_value(model, name):
@@ -383,7 +383,7 @@ def _find_si_unit(key: str) -> str:
 
 
 def _holds_number(key: str) -> bool:
-    """Return whether a key holds one number, with or without a unit."""
+    """Return whether the value of a key is one number, with or without unit."""
     place = find_key(key)
     types = list_key_types(*place)
     is_single = find_inner_table(*place) is None and tuple not in map(get_origin, types)
@@ -391,7 +391,7 @@ def _holds_number(key: str) -> bool:
 
 
 def _split_at_commas(text: str) -> list[str]:
-    """Split a string at its commas, except those inside brackets and quotes.
+    """Split a text at commas outside brackets and quotes.
 
     A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
     """
@@ -469,7 +469,7 @@ def _require_range_ends(ends: _RangeEnds, written_range: _WrittenRange) -> None:
 
 
 def _is_log(ends: _RangeEnds, spacing: str | None) -> bool:
-    """Return whether a range is logarithmic: by its suffix, or by the ratio of its ends."""
+    """Return whether the values of a range are spaced logarithmically."""
     is_positive = ends.low > 0 and ends.high > 0
     if spacing is None and is_positive:
         return max(ends.low / ends.high, ends.high / ends.low) >= MIN_LOG_RATIO
@@ -494,7 +494,7 @@ def _list_range_values(key: str, written_range: _WrittenRange) -> list[str]:
 
 
 def _make_span(key: str, written_range: _WrittenRange) -> SampledRange:
-    """Return the range from which values are drawn."""
+    """Return the range from which random values of a key are drawn."""
     ends = _read_ends(key, written_range)
     if float not in list_key_types(*find_key(key)):
         raise ValueError(
@@ -512,7 +512,7 @@ def _make_span(key: str, written_range: _WrittenRange) -> SampledRange:
 
 
 def _interpolate(ends: _RangeEnds, fraction: Fraction | float, is_log: bool) -> float:
-    """Return the value at a fraction of a range; exact fractions are rounded only once."""
+    """Return the value at a fraction of a range of a key."""
     if not is_log:
         return float(ends.low + (ends.high - ends.low) * fraction)
     if fraction in (0, 1):
@@ -521,7 +521,7 @@ def _interpolate(ends: _RangeEnds, fraction: Fraction | float, is_log: bool) -> 
 
 
 def _format_with_unit(value: float, unit: str) -> str:
-    """Return a value with its unit, rounded to SIGNIFICANT_DIGITS significant digits."""
+    """Format a value of a swept key with its unit."""
     number = float(f"{value:.{SIGNIFICANT_DIGITS}g}")
     if unit:
         return f"{repr(number).removesuffix('.0')} {unit}"

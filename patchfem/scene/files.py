@@ -53,7 +53,7 @@ def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:
 
 
 def file_exists(path: Path) -> bool:
-    """Return whether a path names a file; False for a string that cannot be a path."""
+    """Return whether a text is the path of an existing file."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -61,7 +61,7 @@ def file_exists(path: Path) -> bool:
 
 
 def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
-    """Return (dotted key, message) of every file that the tables name and that does not exist."""
+    """List the files that a scene names and that do not exist, with a message for each."""
     return [
         (key, f"there is no file {folder / file}; paths are relative to the scene")
         for key, file in list_named_files(tables)
@@ -70,7 +70,7 @@ def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
 
 
 def require_files(scene: Any) -> Any:
-    """Return a scene; SceneError if a file that it names does not exist."""
+    """Return a scene after checking that the files that it names exist."""
     absent = list_absent_files(scene, scene.path.parent)
     if absent:
         draft = SceneDraft(str(scene.path), find_key_lines(scene.text), {})
@@ -82,7 +82,7 @@ def require_files(scene: Any) -> Any:
 
 
 def make_relative_file_sets(scene: Any, folder: Path) -> list[str]:
-    """Return ``table.key=value`` for each file of a scene, with its path relative to another folder."""
+    """Return assignments that make the file paths of a scene relative to another folder."""
     return [
         f"{key}={Path(os.path.relpath(scene.resolve_path(file), folder)).as_posix()}"
         for key, file in list_named_files(scene)

@@ -25,7 +25,7 @@ _STRING_PATTERNS = (
 
 
 def split_key(key: str) -> list[str]:
-    """Return the parts of a dotted key; an item ``mode[1]`` becomes ``mode`` and ``0``."""
+    """Split a dotted key into its parts, with items counted from 0."""
     parts = []
     for piece in key.split("."):
         item = _ITEM_PATTERN.fullmatch(piece.strip())
@@ -34,7 +34,7 @@ def split_key(key: str) -> list[str]:
 
 
 def number_items_from_one(text: str) -> str:
-    """Return a message in which ``structure.mode.0`` is written as ``structure.mode[1]``."""
+    """Write array items of a message in the form `structure.mode[1]`."""
     changed = _ITEM_IN_MESSAGE_PATTERN.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
     # an item inside another item needs a second pass
     return changed if changed == text else number_items_from_one(changed)
@@ -60,7 +60,7 @@ def locate_key(path: str | Path, text: str, key: str) -> str:
 
 @lru_cache(16)
 def find_key_lines(text: str) -> dict[str, int]:
-    """Return dotted key -> line, from 1, of a TOML text.
+    """Return the line number of every key of a TOML text.
 
     A table has the line of its header; a table without a header that of the first key in it. Items of an array of
     tables count from 0, as in ``structure.mode.0.name``. A string that is not TOML gives the keys before the first error.
@@ -79,7 +79,7 @@ def find_key_lines(text: str) -> dict[str, int]:
 
 
 class _SyntaxError(Exception):
-    """Error for a string that is not TOML at the cursor."""
+    """Exception for text at the cursor that is not valid TOML."""
 
 
 class TooManyKeyParts(ValueError):
@@ -91,7 +91,7 @@ class TooManyKeyParts(ValueError):
 
 
 class _Scanner:
-    """A cursor over TOML text that records the line of each key and skips the values."""
+    """Parser of TOML text that records the line of each key."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -102,7 +102,7 @@ class _Scanner:
         self._last_item: dict[str, int] = {}  # array of tables -> index of its last item
 
     def scan_document(self) -> None:
-        """Read the whole text."""
+        """Scan a complete TOML text."""
         prefix = ""
         while self.peek():
             if self.take("["):
@@ -129,7 +129,7 @@ class _Scanner:
         return path
 
     def last_item_path(self, path: str) -> str:
-        """Return the dotted key of a table, with the number of its last item if it is an array."""
+        """Return the dotted key of a table, with the index of its last item if it is an array."""
         return f"{path}.{self._last_item[path]}" if path in self._last_item else path
 
     def scan_pair(self, prefix: str) -> None:
@@ -144,7 +144,7 @@ class _Scanner:
         self.scan_value(path)
 
     def scan_value(self, path: str) -> None:
-        """Skip a value, and record the keys and items inside it."""
+        """Skip a value, and record the keys inside it."""
         start = self.peek()
         if start == "[":
             self.scan_items("]", lambda index: self.scan_item(f"{path}.{index}"))
@@ -156,13 +156,13 @@ class _Scanner:
             self.match(_SCALAR_PATTERN)
 
     def scan_item(self, path: str) -> None:
-        """Read one item of an array."""
+        """Scan one item of a TOML array."""
         self.peek()
         self.lines.setdefault(path, self.current_line())
         self.scan_value(path)
 
     def scan_items(self, end: str, scan_one: Callable) -> None:
-        """Read the items between brackets, separated by commas."""
+        """Scan the items between brackets, separated by commas."""
         self.position += 1
         index = 0
         while not (self.peek() and self.take(end)):
@@ -196,7 +196,7 @@ class _Scanner:
         raise _SyntaxError
 
     def match(self, pattern: re.Pattern[str]) -> str:
-        """Read what a pattern matches, at least one character."""
+        """Consume the text that a pattern matches at the cursor."""
         match = pattern.match(self.text, self.position)
         if not match or not match[0]:
             raise _SyntaxError
@@ -209,7 +209,7 @@ class _Scanner:
         return self.text[self.position : self.position + 1]
 
     def take(self, mark: str) -> bool:
-        """Skip a token such as "=" if it is at the cursor; return whether it was there."""
+        """Consume a token if it is at the cursor, and return whether it was."""
         if not self.text.startswith(mark, self.position):
             return False
         self.position += len(mark)

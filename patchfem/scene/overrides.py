@@ -42,7 +42,7 @@ PLAIN_KEYS = {
 
 
 class _ReadTable(NamedTuple):
-    """Cached table: its name, its plain values, the result of reading it, and the keys set by --set."""
+    """Cached result of reading a table with given assignments."""
 
     name: str
     raw: Any
@@ -69,7 +69,7 @@ class BaseScene:
         self._known: dict[tuple[str, ...], _ReadTable] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
-        """Return the scene with further ``table.key=value`` applied in order, as by --set.
+        """Return the scene with further assignments `table.key=value`.
 
         Tables that no key touches, or that had the same values before, are not read again; all rules are checked.
         SceneError as in `scene.loads`, and if a file that the scene names does not exist.
@@ -94,7 +94,7 @@ class BaseScene:
         return scene
 
     def _reuse(self, draft: SceneDraft, group: tuple[str, ...]) -> bool:
-        """Reuse a table that was read with the same assignments; return whether there is one."""
+        """Reuse a table that was read before with the same assignments, if there is one."""
         known = self._known.get(group)
         if known is None:
             return False
@@ -104,7 +104,7 @@ class BaseScene:
         return True
 
     def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
-        """Return the PlainNumbers that make scenes with other values of some keys without checks.
+        """Return a fast generator of scenes that differ only in plain numbers.
 
         Parameters
         ----------
@@ -128,7 +128,7 @@ class BaseScene:
 
 
 class NumberLocation(NamedTuple):
-    """Location of a number in a scene.
+    """Table and attribute of a number in a scene.
 
     - table: table of the scene.
     - part: index of a mode, name of a shape, None for the table itself.
@@ -141,7 +141,7 @@ class NumberLocation(NamedTuple):
 
 
 class PlainKey(NamedTuple):
-    """Location of a plain number, and the limit below which no rule depends on its value."""
+    """Location of a plain number, and the limit below which no check depends on its value."""
 
     location: NumberLocation
     limit: float
@@ -149,7 +149,7 @@ class PlainKey(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PlainNumbers:
-    """Scenes that differ only in numbers on whose values no rule depends.
+    """Generator of scenes that differ in numbers on which no check depends.
 
     - scene: one of these scenes.
     - keys: the numbers that differ.
@@ -159,11 +159,11 @@ class PlainNumbers:
     keys: tuple[PlainKey, ...]
 
     def are_plain(self, values: np.ndarray) -> bool:
-        """Return whether no rule depends on these values (..., number of keys) [SI]."""
+        """Return whether no check depends on given values of the keys."""
         return bool(np.all((values > 0) & (values < [key.limit for key in self.keys])))
 
     def values_by_location(self, values: Sequence) -> dict[NumberLocation, Any]:
-        """Map the location of each key to its value, and that of a dependent kinetic coefficient."""
+        """Map the location of each key to its value."""
         numbers = {key.location: value for key, value in zip(self.keys, values)}
         static = NumberLocation("friction", None, "static")
         if static in numbers and self.scene.friction.kinetic is not None:
@@ -171,7 +171,7 @@ class PlainNumbers:
         return numbers
 
     def make_table(self, name: str, numbers: dict[NumberLocation, Any]) -> Any:
-        """Return a table of the scene with values replaced by those of `values_by_location`."""
+        """Return a table of the scene with some numbers replaced."""
         table = getattr(self.scene, name)
         updates: dict[int | str | None, dict[str, Any]] = {}
         for location, value in numbers.items():
@@ -187,11 +187,11 @@ class PlainNumbers:
         return _update_table(table, changed)
 
     def replace_sets(self, sets: Sequence[str]) -> tuple:
-        """Return the ``table.key=value`` strings of the scene, those of the keys from `sets`."""
+        """Return the assignments of the scene with some of them replaced."""
         return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
     def make_scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
-        """Make the scene that `BaseScene.override(sets)` returns, without reading or checking it.
+        """Create a scene with given values without reading and checking it.
 
         `values` [SI] are those of the keys; `are_plain` must hold for them.
         """
@@ -287,7 +287,7 @@ def _find_table_name(key: str) -> str:
 
 
 def _copy_tables(raw: dict[str, Any], key: str) -> None:
-    """Replace the tables above a dotted key by copies, in which the key can then be set."""
+    """Copy the tables above a dotted key, so that the key can be set."""
     holder: Any = raw
     for piece in split_key(key)[:-1]:
         inner = find_item_or_value(holder, piece)

@@ -15,7 +15,7 @@ from .reader import read_set_value
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """Key with its bounds low < high in SI; `kind` is that of the quantity, None for a number."""
+    """Scene key with a lower and an upper bound in SI units."""
 
     key: str
     low: float
@@ -28,7 +28,7 @@ class Range:
         return quantities.find_si_unit(self.kind)
 
     def format_assignment(self, value: float) -> str:
-        """Return the ``table.key=value`` that sets the key to exactly this value in SI."""
+        """Return the assignment that sets the key to a value in SI units."""
         text = quantities.format_si(value, self.kind) if self.kind else repr(float(value))
         return f"{self.key}={text}"
 

@@ -39,12 +39,12 @@ _PLAIN_TEXT_PATTERN = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')
 
 
 def read_tables(draft: SceneDraft) -> None:
-    """Read all tables of a draft; mistakes are added to it, and wrong values become None."""
+    """Read all tables of a scene, and collect the mistakes in them."""
     draft.tables = _read_table(draft, Tables, draft.raw, "")
 
 
 def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], table_key: str) -> Any:
-    """Read the table at the dotted key `at`; report missing or wrong values, which become None."""
+    """Read one table of a scene, and report missing or wrong values."""
     if id(raw) in draft.read_before:
         return draft.read_before[id(raw)][1]
     names = attributes_by_key(model)
@@ -71,7 +71,7 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
 
 
 def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: str) -> Any:
-    """Read an inner table or array of tables; report anything else and return None."""
+    """Read a table or an array of tables inside a table."""
     inner = find_inner_table(*definition)
     if not is_array_attribute(*definition):
         if isinstance(value, dict):
@@ -121,7 +121,7 @@ def _validate_values(
 def _report_unknown(
     draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, table_key: str
 ) -> None:
-    """Report a key that the table at `at` does not have, with the key that was probably meant."""
+    """Report an unknown key with the most similar known key."""
     path = f"{table_key}.{key}" if table_key else key
     if path in removed.REMOVED_KEYS:
         draft.add_mistake(path, removed.REMOVED_KEYS[path])
@@ -181,7 +181,7 @@ def _is_table(value: Any) -> bool:
 
 
 def apply_set(draft: SceneDraft, assignment: str) -> None:
-    """Write one ``table.key=value`` of --set into a draft; a string value needs no quotes."""
+    """Apply one assignment of --set to a scene that is being read."""
     try:
         assignment.encode()
     except UnicodeEncodeError:
@@ -273,7 +273,7 @@ def read_set_value(key: str, text: str) -> Any:
 
 
 def _is_cut_by_comment(text: str) -> bool:
-    """Return whether TOML reads the end of a value as a comment."""
+    """Return whether TOML would read the end of a value as a comment."""
     if "#" not in text:
         return False
     try:

@@ -34,7 +34,7 @@ MAX_LISTED_CHARACTERS = 160
 
 @dataclass(frozen=True)
 class Scene:
-    """A valid scene in SI units.
+    """Validated scene in SI units.
 
     - path: file of the scene; its own paths are relative to the folder of this file.
     - text: content of the file.
@@ -73,7 +73,7 @@ class Scene:
         return f"Scene of {self.path.name}: {self.kind}; {effects}{sets}"
 
     def with_(self, **sets: Any) -> Scene:
-        """Return a copy with other values, as ``scene.with_(**{"contact.load": "26 lbf"})``.
+        """Return a copy of the scene with other values of some keys.
 
         Texts are written as in a scene, numbers are in SI. SceneError as in `load`, and for a length without a unit
         that is longer than any joint.
@@ -82,7 +82,7 @@ class Scene:
         return require_units(require_files(scene), sets)
 
     def tables(self) -> tables.Tables:
-        """Return all tables as one model; a missing table is None."""
+        """All tables of the scene as one record; a missing table is None."""
         names = tables.Tables.model_fields
         return tables.Tables.model_construct(**{name: getattr(self, name) for name in names})
 
@@ -91,7 +91,7 @@ class Scene:
         return format_toml(self.tables())
 
     def effect_names(self) -> list[str]:
-        """Return the effects that the scene names: tables, and ``table.key=value`` of selector keys."""
+        """Return the names of the physical effects that the scene contains."""
         return [*list_named_effects(self), "sweep"] if self.sweep else list_named_effects(self)
 
     def where(self, key: str) -> str:
@@ -176,7 +176,7 @@ def finish_scene(
     sets: tuple[str, ...],
     faults: Callable | None = None,
 ) -> Scene:
-    """Read and check a draft in which --set is applied.
+    """Check a scene that was read, and return it.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ def finish_scene(
 
 
 def move_scene(scene: Scene, path: Path) -> Scene:
-    """Return the scene for a file at another path; its file names become relative to the new folder."""
+    """Return the scene for another path, with its file names relative to the new folder."""
     return loads(scene.text, path, [*scene.sets, *make_relative_file_sets(scene, path.parent)])
 
 

@@ -39,7 +39,7 @@ def make_schema() -> dict:
 
 
 def _rebuild_validator(model: type[Table]) -> None:
-    """Build the validator of a table anew, after those of the tables inside it."""
+    """Build the pydantic validator of a table again after its inner tables."""
     for name in attributes_by_key(model).values():
         if inner := find_inner_table(model, name):
             _rebuild_validator(inner)
@@ -111,7 +111,7 @@ def _describe_selection(model: type[Table], key: str) -> str:
 
 
 def _add_units(schema: dict, kind: str) -> None:
-    """Add the pattern of a quantity to every text of a schema, and the unit to its default."""
+    """Add to a schema the pattern of quantities with units."""
     if isinstance(schema.get("default"), int | float):
         schema["default"] = f"{schema['default']:g} {find_si_unit(kind)}"
     for part in (schema, *schema.get("anyOf", ()), schema.get("items", {})):

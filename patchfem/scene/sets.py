@@ -36,7 +36,7 @@ def format_scene(tables: dict[str, Any]) -> str:
 
 
 def format_values(key: str, values: Any) -> list[str]:
-    """Return the values of one key as strings in the form of --over; a single value gives a list of one.
+    """Format the values of one key as the command-line option --over does.
 
     Texts stay as they are, but for quotes around a text with a comma or a bracket; numbers in SI get the unit of the key.
     """
@@ -63,7 +63,7 @@ def require_units(scene: Any, values: dict[str, Any]) -> Any:
 def find_oversized_lengths(
     values: dict[str, Any], patch_length: float | None = None, key_prefix: str = ""
 ) -> list[str]:
-    """Return a sentence about each bare number that would be a length greater than that of any joint.
+    """Return a sentence on each plain number that would be an implausibly long length.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def find_oversized_lengths(
 
 
 def _is_length(key: str, value: Any) -> bool:
-    """Return whether a value is a number and its key a length other than a radius."""
+    """Return whether a key is a length and its value a plain number."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     return is_number and _find_kind(key) == "length" and not key.endswith("radius")
 

@@ -39,7 +39,7 @@ def _list_table_effects(table: Any, table_key: str) -> tuple[str, ...]:
 
 
 def _iterate_effects(table: Any, table_key: str) -> Iterator[str]:
-    """Yield the effects of a table, an array of tables or a plain value."""
+    """Yield the effects that a table, an array of tables or a value contains."""
     if isinstance(table, Accuracy):
         if table.method != "auto":
             yield f"{table_key}.method={table.method}"
@@ -74,7 +74,7 @@ def _iterate_effects_of_items(items: tuple, table_key: str) -> Iterator[str]:
 
 
 class _EffectSources(NamedTuple):
-    """Attributes of a table that name effects: selectors with their value, and inner tables."""
+    """Attributes of a table from which the names of effects follow."""
 
     selectors: list[str]
     tables: list[str]
@@ -102,7 +102,7 @@ def _list_unused_keys(table: Table) -> Collection[str]:
 
 
 def _format_lines(table: Table, table_key: str) -> Iterator[str]:
-    """Yield the lines of a table: its values, then the tables inside it."""
+    """Yield the TOML lines of a table and of the tables inside it."""
     unused = _list_unused_keys(table)
     inner = []
     for key, name in attributes_by_key(type(table)).items():
@@ -130,7 +130,7 @@ def _find_kind(table: Table, name: str) -> str | None:
 
 
 def _format_value(value: Any, kind: str | None) -> str:
-    """Return a value as TOML."""
+    """Format a value as TOML."""
     if isinstance(value, Material):
         given = {key: getattr(value, name) for key, name in attributes_by_key(Material).items()}
         pairs = [

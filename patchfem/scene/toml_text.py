@@ -31,7 +31,7 @@ _ERROR_POSITION_PATTERN = re.compile(r" \(at (?:line (\d+), column (\d+)|end of 
 
 
 class ParsedText(NamedTuple):
-    """Plain values of a TOML text, and the line of every key."""
+    """Values of a TOML text, with the line of every key."""
 
     values: dict[str, Any]
     lines: dict[str, int]
@@ -106,7 +106,7 @@ def _refuse_too_many_coordinates(values: dict, text: str, path: str | Path) -> N
 
 
 def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
-    """Return the message about a syntax error that tomllib found."""
+    """Return the message on a TOML syntax error."""
     if isinstance(error, RecursionError):
         return f"{path}:1: not valid TOML: nested too deeply"
     message = str(error)

@@ -14,7 +14,7 @@ RANK_TOL = 1e-12  # smaller singular values of the normal equations / count are 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Areal:
-    """Heights z (m, n) [m] at x (n,) [m] along a row and y (m,) [m] along a column.
+    """Areal scan: heights z (m, n) [m] at x (n,) [m] along rows and y (m,) [m] along columns.
 
     Missing heights are NaN; x and y increase. source: name of the scan for messages; notes:
     sentences on its treatment.
@@ -28,15 +28,15 @@ class Areal:
 
     @property
     def missing(self) -> np.ndarray:
-        """Whether no height was measured, (m, n) bool."""
+        """Mask (m, n) of the points without a measured height."""
         return np.isnan(self.z)
 
     def row(self, k: int) -> Profile:
-        """Return the trace along x at y[k]; negative k count from the end."""
+        """Return the trace along x at one position y."""
         return self._trace(self.x, self.z, k, "row")
 
     def column(self, k: int) -> Profile:
-        """Return the trace along y at x[k]; negative k count from the end."""
+        """Return the trace along y at one position x."""
         return self._trace(self.y, self.z.T, k, "column")
 
     def _trace(self, places, heights, k: int, name: str) -> Profile:
@@ -51,7 +51,7 @@ class Areal:
 
 
 def fill_missing(z, missing) -> np.ndarray:
-    """Fill missing heights (m, n) with a smooth surface.
+    """Fill missing heights (m, n) of a scan with a smooth surface.
 
     The height of the nearest measured point is relaxed by the Laplace equation first and then by the
     biharmonic equation, which reproduces a single missing height to the fourth order of the step.
@@ -117,6 +117,6 @@ def level(scan: Areal, degree: int) -> Areal:
 
 
 def _reduce_axis(axis) -> np.ndarray:
-    """Scale an axis to the interval [-1, 1]."""
+    """Scale the positions along an axis to the interval [-1, 1]."""
     half = (axis[-1] - axis[0]) / 2
     return (axis - (axis[0] + axis[-1]) / 2) / (half if half > 0 else 1.0)

@@ -13,19 +13,19 @@ MAX_LOST = 0.1  # fraction of the rms height in such waves above which a warning
 
 
 class WaveSpectrum(NamedTuple):
-    """Falling wavelengths (k,) [m] and their mean squares (k,) [m2]."""
+    """Mean squares of the waves of a trace by wavelength, longest first."""
 
     waves: np.ndarray
     power: np.ndarray
 
     def lost_fraction(self, length: float) -> float:
-        """Return the fraction of the rms height in waves shorter than a length [m]."""
+        """Return the fraction of the rms height in waves shorter than a given length [m]."""
         total = self.power.sum()
         lost = self.power[self.waves < length * (1 - 1e-9)].sum()
         return float(np.sqrt(lost / total)) if total > 0 else 0.0
 
     def element_length(self, kept: float) -> float:
-        """Return the longest element [m] that keeps a fraction of the rms height, inf if flat."""
+        """Return the longest element [m] that resolves a given fraction of the rms height."""
         total = self.power.sum()
         if not 0 < kept < 1:
             raise PatchfemError(
@@ -64,7 +64,7 @@ def fine_fraction(profile: Profile, length: float) -> float:
 
 
 def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_LOST) -> str | None:
-    """Warn that elements [m] are too long for a trace and suggest lengths; None if they are not.
+    """Warn that elements are too long to resolve a trace; None if they are not.
 
     Parameters
     ----------

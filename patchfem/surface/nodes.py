@@ -17,12 +17,12 @@ MAX_STEP_ELEMENTS = 1.5  # elements; a larger sample spacing gets a note
 
 
 def is_note(text: str) -> bool:
-    """Return whether a sentence on a trace is a note, not a warning."""
+    """Return whether a sentence on a trace is a note rather than a warning."""
     return any(words in text for words in NOTES)
 
 
 def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
-    """Return the part of a trace over a patch, in the coordinate of the patch.
+    """Return the part of a trace over a patch, with positions relative to the patch.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _describe_centring(source: str, known, x, shift: float) -> str:
 
 
 def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarray:
-    """Average a trace over the tributary lengths of the nodes: its gap contribution.
+    """Average a trace over the tributary lengths of the interface nodes.
 
     A larger z is more open. The mean over half the way to both neighbours is integrated exactly, so
     that waves shorter than an element do not pass for long ones: a wave of two elements enters with
@@ -125,7 +125,7 @@ def average_at_nodes(profile: Profile, x: np.ndarray, integral=None) -> np.ndarr
 
 
 def _integrate(profile: Profile, places) -> np.ndarray:
-    """Integrate the trace exactly from its first sample to positions [m2], flat beyond its ends."""
+    """Integrate the heights of a trace from its first sample to given positions [m2]."""
     x = profile.x
     z = profile.z
     steps = np.diff(x)
@@ -145,7 +145,7 @@ def _check_nodes(x) -> np.ndarray:
 
 
 def _max_missing(x) -> tuple[float, float]:
-    """Return the lengths [m] that a trace may lack at either end: half an element."""
+    """Return how far [m] a trace may end inside the patch, which is half an element."""
     return MAX_MISSING_ELEMENTS * float(x[1] - x[0]), MAX_MISSING_ELEMENTS * float(x[-1] - x[-2])
 
 

@@ -20,7 +20,7 @@ EVEN_TOL = 1e-6  # relative range of the steps below which a trace counts as eve
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Trace of heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m].
+    """Trace of heights z (n,) [m] at increasing positions x (n,) [m]; NaN if not measured.
 
     Between samples the trace is straight. source: name of the trace for messages; notes: sentences
     on its treatment.
@@ -33,7 +33,7 @@ class Profile:
 
     @property
     def missing(self) -> np.ndarray:
-        """Whether no height was measured at each sample, (n,) bool."""
+        """Mask (n,) of the samples without a measured height."""
         return np.isnan(self.z)
 
     @property
@@ -48,7 +48,7 @@ class Profile:
 
 
 def level(profile: Profile) -> Profile:
-    """Subtract the least-squares line of the measured samples."""
+    """Subtract the least-squares line from a trace."""
     known = ~profile.missing
     x = profile.x
     z = profile.z
@@ -139,7 +139,7 @@ def clean(profile: Profile, max_gap: float) -> Profile:
 
 
 class RunningMedian(NamedTuple):
-    """Distance (n,) [m] of heights from the running median, and median absolute deviation (n,).
+    """Deviation of heights from their running median [m], and median absolute deviation (n,).
 
     typical_spread: median of the deviations of all windows.
     """
@@ -150,7 +150,7 @@ class RunningMedian(NamedTuple):
 
 
 def _running_median(z, window: int) -> RunningMedian:
-    """Compute running medians; the first and the last window serve the samples at the ends."""
+    """Compute the running median of a trace."""
     windows = np.lib.stride_tricks.sliding_window_view(z, window)
     half = window // 2
     median = np.empty(len(windows))
@@ -166,7 +166,7 @@ def _running_median(z, window: int) -> RunningMedian:
 
 
 def find_spikes(profile: Profile) -> np.ndarray:
-    """Find spikes, (n,) bool: heights over 8 standard deviations from the median of 7 samples.
+    """Return a mask (n,) of heights that deviate too much from the median of their neighbours.
 
     The standard deviation is 1.4826 times the largest of the median absolute deviation in the
     window, its median over all windows, and the smallest step between two heights (coarse digits).
@@ -229,6 +229,6 @@ def robust_deviation(values) -> float:
 
 
 def find_runs(flags) -> list[tuple[int, int]]:
-    """Return the first and last index of each run of true flags (n,)."""
+    """Return the first and the last index of each run of true values."""
     change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))

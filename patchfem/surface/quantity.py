@@ -15,7 +15,7 @@ SIDE = 1.959964  # standard deviations to either side that a normal interval of 
 
 
 class Quantity(NamedTuple):
-    """Value and interval [SI], unit and definition.
+    """Value of a measured quantity with interval, unit and definition.
 
     reason: why there is no value, or no interval; name: of a parameter of roughness.
     """
@@ -32,7 +32,7 @@ class Quantity(NamedTuple):
 def make_quantity(
     value: float, error: float, unit: str, text: str, min_value: float | None = None
 ) -> Quantity:
-    """Make a quantity of a value and its standard deviation.
+    """Return a quantity with the interval that follows from its standard deviation.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def make_quantity(
 
 
 def make_unknown(unit: str, text: str, reason: str) -> Quantity:
-    """Make a quantity without a value.
+    """Return a quantity that has no value, with the reason.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def format_interval(length: Quantity) -> str:
 
 
 class Mean(NamedTuple):
-    """Mean of `count` measurements; scatter: standard deviation of a single one."""
+    """Mean of a quantity over several measurements, with their scatter."""
 
     mean: Quantity
     scatter: float
@@ -79,7 +79,7 @@ class Mean(NamedTuple):
 
 
 def average_quantities(quantities: list, text: str) -> Mean | None:
-    """Average quantities that have a value; None for fewer than two.
+    """Average a quantity over the measurements that have a value; None for fewer than two.
 
     The 95 % interval s t / sqrt(n) comes from their scatter by Student's t, or from their own
     intervals if these give a wider one, because a few values may agree by chance. It does not

@@ -20,14 +20,14 @@ GIVEN = "heights and length were read in the given units"
 
 
 class Places(NamedTuple):
-    """Coordinates x (n,) in the unit of the file, with notes."""
+    """Positions x (n,) of samples in the unit of the file, with notes."""
 
     x: np.ndarray
     notes: tuple = ()
 
 
 def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
-    """Make a trace of samples, with increasing x and one height for each position.
+    """Convert samples of a file to a trace with increasing positions.
 
     Its notes state every change of the samples.
 
@@ -63,7 +63,7 @@ def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
 
 
 def require_finite(path, columns: tuple, names: tuple, lines, factors: tuple) -> None:
-    """Refuse columns of a file that are not finite or too large for a surface.
+    """Raise PatchfemError for columns that are not finite or too large.
 
     A height z may be NaN.
 
@@ -106,7 +106,7 @@ def _sample_place(path, lines, k: int) -> str:
 
 
 def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
-    """Replace positions that are even apart from the rounding of printed digits by even ones.
+    """Replace positions by equally spaced ones if they differ only by printed digits.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
 
@@ -152,7 +152,7 @@ def printed_digit(x) -> float:
 
 
 def _min_step(x) -> float:
-    """Return the distance below which two positions are the same."""
+    """Return the distance below which two positions count as equal."""
     return 1e-6 * (x[-1] - x[0]) / x.size
 
 
@@ -178,7 +178,7 @@ def _require_increasing(path, x, lines, factor: float) -> None:
 
 
 class Merged(NamedTuple):
-    """Strictly increasing positions (k,) and heights (k,) in the units of the file, with notes."""
+    """Strictly increasing positions and heights in the units of the file, with notes."""
 
     x: np.ndarray
     z: np.ndarray
@@ -186,7 +186,7 @@ class Merged(NamedTuple):
 
 
 def _merge_equal_places(path, x, z, lines) -> Merged:
-    """Replace samples at one position by their mean."""
+    """Replace samples at equal positions by their mean."""
     is_new = np.diff(x) > _min_step(x)
     if is_new.all():
         return Merged(x, z, ())
@@ -204,7 +204,7 @@ def _merge_equal_places(path, x, z, lines) -> Merged:
 
 
 def check_span(path, x, z, stated: str = "") -> tuple:
-    """Refuse heights that span more than their length, unless their unit is stated.
+    """Raise PatchfemError for heights that span more than the length of the trace.
 
     Parameters
     ----------

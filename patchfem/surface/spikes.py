@@ -12,7 +12,7 @@ WINDOW = 5  # points along each side of a median
 
 
 def find_scan_spikes(scan: Areal) -> np.ndarray:
-    """Find the spikes of a scan, (m, n) bool.
+    """Return a mask (m, n) of the spikes of a scan.
 
     A spike stands off the median of the 5 x 5 heights around it. It has at most twelve points, all
     of which stand off all of their neighbours.
@@ -26,7 +26,7 @@ def find_scan_spikes(scan: Areal) -> np.ndarray:
 
 
 def find_isolated(z, distance, deviation: float) -> np.ndarray:
-    """Find small groups of heights that stand off all of their neighbours, as no slope does.
+    """Find small groups of heights that stand out from all of their neighbours.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def find_isolated(z, distance, deviation: float) -> np.ndarray:
 
 
 def _median_distances(z, places) -> np.ndarray:
-    """Return |height - median of 5 x 5| at places (k,) of the flat heights z (m, n)."""
+    """Return the distances of some heights from the median of their 5 x 5 neighbours."""
     windows = np.lib.stride_tricks.sliding_window_view(
         np.pad(z, WINDOW // 2, "symmetric"), (WINDOW, WINDOW)
     )
@@ -74,7 +74,7 @@ def _scatter_about_medians(z, known) -> float:
 
 
 def _far_distances(z, known, threshold: float) -> np.ndarray:
-    """Return the deviation of heights (m, n) from their medians, 0 if all neighbours are near."""
+    """Return the deviations of heights (m, n) from their medians, 0 for inconspicuous ones."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
     span = np.maximum(z - minimum_filter(z, WINDOW), maximum_filter(z, WINDOW) - z)
@@ -85,7 +85,7 @@ def _far_distances(z, known, threshold: float) -> np.ndarray:
 
 
 def _select_isolated(z, far, threshold: float) -> np.ndarray:
-    """Select groups of far heights (m, n) that differ from all neighbours by threshold/2 [m]."""
+    """Select groups of deviating heights that differ from all of their neighbours."""
     from scipy.ndimage import find_objects, label
 
     groups, _ = label(far, np.ones((3, 3)))

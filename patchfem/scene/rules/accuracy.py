@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class SettingScope(NamedTuple):
-    """Where a numerical setting has an effect; strings are words separated by blanks.
+    """Kinds of scenes and laws in which a numerical setting has an effect.
 
     - kinds: kinds of scenes.
     - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for
@@ -57,7 +57,7 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 
 
 class QuadratureFacts(TableFacts):
-    """Facts for the rules of accuracy.quadrature, and of the sum over bonds."""
+    """Facts on which the rules for the sum over bonds depend."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
         super().__init__(draft, "accuracy", draft.tables.accuracy)
@@ -125,7 +125,7 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
-    """Return, for each setting without effect, the words that state where it has none."""
+    """Return the numerical settings without effect, with the reason for each."""
     accuracy = tables.accuracy
     method = "bench" if kind == "bench" else accuracy.method or "auto"
     unused = {}

@@ -22,7 +22,7 @@ RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "w
 
 
 class SimpleFacts(TableFacts):
-    """Facts of a table that has few rules."""
+    """Facts on which the rules of small tables depend."""
 
     @property
     def is_sine(self) -> bool:
@@ -112,7 +112,7 @@ def check_scene(draft: SceneDraft) -> str:
 
 
 def _check_table(draft: SceneDraft, name: str, rules: tuple[Rule, ...]) -> None:
-    """Report mistakes inside [normal], [slide] or [measured]."""
+    """Report mistakes in one of the tables [normal], [slide] or [measured]."""
     table = getattr(draft.tables, name)
     if table is None:
         return
@@ -213,7 +213,7 @@ def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> Non
 
 
 def _remark_unused(draft: SceneDraft, kind: str) -> None:
-    """Remark on keys that only matter for a patch that slides, or for a rig with friction."""
+    """Report keys that have no effect without sliding or without friction."""
     if kind == "patch" and draft.tables.contact is not None:
         shapes = draft.tables.contact.shapes.items()
         keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]

@@ -19,7 +19,7 @@ MAX_ELEMENTS = 100_000
 
 
 class PatchFacts(TableFacts):
-    """Facts for the rules of a patch: that of [contact] or that of an interface."""
+    """Facts on which the rules of a patch depend."""
 
     @cached_property
     def flat_length(self) -> float:

@@ -21,7 +21,7 @@ KEYS_UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the
 
 
 class DriveFacts(TableFacts):
-    """Facts of the drive; `wave` is the record of its waveform."""
+    """Facts on which the rules of [drive] depend."""
 
     @cached_property
     def wave(self) -> Waveform:
@@ -211,7 +211,7 @@ def check_length(draft: SceneDraft, kind: str) -> None:
 
 
 def _check_tones(drive: DriveFacts) -> None:
-    """Report lists whose number of values differs from the number of frequencies."""
+    """Report drive lists whose length differs from the number of frequencies."""
     for key in ("accelerations", "phases"):
         values = drive[key]
         if not (drive.wave.takes("frequencies") and drive.wave.takes(key)):

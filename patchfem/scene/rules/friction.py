@@ -13,7 +13,7 @@ from .view import TableView
 
 
 class LawFacts(TableFacts):
-    """Facts of a friction law, and of the patch on which it acts."""
+    """Facts on which the rules of a friction law depend."""
 
     def __init__(
         self, draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None
@@ -22,7 +22,7 @@ class LawFacts(TableFacts):
         self.contact = TableView(contact)
 
     def has_key(self, key: str) -> bool:
-        """Return whether the law has a key; True if the law is not known."""
+        """Return whether the friction law has a given key."""
         return law_takes_key(self.table.law, key)
 
     def has_trait(self, trait: str) -> bool:
@@ -41,7 +41,7 @@ class LawFacts(TableFacts):
 
     @property
     def order_requirement(self) -> str:
-        """Condition on `order` in words."""
+        """Condition on the bond order as text."""
         if self.has_trait("averaged"):
             return "> -1"
         return (
@@ -50,7 +50,7 @@ class LawFacts(TableFacts):
 
     @property
     def is_order_wrong(self) -> bool:
-        """Whether `order` is below what the law and its reading allow."""
+        """Whether the bond order is too small for the law."""
         is_strict = self.reading == "stretch" and not self.has_trait("averaged")
         return self.order <= -1 or (is_strict and self.order < 0)
 
@@ -68,7 +68,7 @@ class LawFacts(TableFacts):
 
     @property
     def load_change_description(self) -> str:
-        """Cause of a changing load, as the scene writes it; "" for a constant load."""
+        """Cause of a changing normal load as text."""
         return self.load_change or find_climbed_grooves(self.draft.tables)
 
 

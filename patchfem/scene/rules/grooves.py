@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class GrooveFacts(TableFacts):
-    """Facts for the rules of the grooves with this table key, and of the tables used with them."""
+    """Facts on which the rules of grooves depend."""
 
     @property
     def law_table(self) -> Any:
@@ -22,7 +22,7 @@ class GrooveFacts(TableFacts):
 
     @property
     def law(self) -> str:
-        """Friction law in words."""
+        """Name of the friction law as text."""
         return describe_law(self.law_table)
 
     @property
@@ -192,5 +192,5 @@ def find_groove_key(draft: SceneDraft) -> str:
 
 
 def find_groove_table(draft: SceneDraft) -> Any:
-    """Return the view of the grooves of a scene; UNKNOWN_VALUE without grooves."""
+    """Return the table of the grooves of a scene; UNKNOWN_VALUE without grooves."""
     return draft.values.contact.grooves or draft.values.normal.grooves

@@ -36,7 +36,7 @@ UNSUPPORTED_KEY = "structure.mode.lateral"  # no run supports this key yet
 
 
 class JointFacts(TableFacts):
-    """Facts of a joint: its friction law, its patch, and the other tables of the scene.
+    """Facts on which the rules of one friction interface depend.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class JointFacts(TableFacts):
         return law_has_trait(self.table.law, trait)
 
     def supports(self, *words: str) -> bool:
-        """Return whether the law supports all of these features, named as in `effects.LAWS[...].supports`."""
+        """Return whether the friction law supports all of the given features."""
         return all(law_supports(self.table, word) for word in words)
 
     @property
@@ -78,7 +78,7 @@ class JointFacts(TableFacts):
 
     @property
     def load_change_description(self) -> str:
-        """Cause of the changing load in words."""
+        """Cause of a changing normal load as text."""
         return describe_load_change(self.load_change)
 
     @cached_property
@@ -95,7 +95,7 @@ class JointFacts(TableFacts):
 
     @property
     def has_others(self) -> bool:
-        """Whether the scene has other interfaces."""
+        """Whether the scene has further interfaces."""
         return len(self.scene.structure.interface) > 1
 
     @property

@@ -19,7 +19,7 @@ from .view import TableView
 
 
 class Joint(NamedTuple):
-    """Interface with friction, as described by the facts that decide which engines support it.
+    """Friction interface, described by the facts that decide which engines support it.
 
     - law: table of its friction law.
     - compliance: key of the compliance that allows partial slip; "" if the patch slips as a whole.
@@ -111,7 +111,7 @@ def find_unsupported_feature(engine: str, motion: MotionFeatures) -> str:
 
 
 def find_first_unsupported(support: EngineSupport, motion: MotionFeatures) -> str:
-    """Return the first feature of a motion that is not supported, in words; "" if none."""
+    """Return the first unsupported feature of a motion as text; "" if there is none."""
     joint = _find_unsupported_joint(support, motion)
     if joint is not None:
         compliance = f" with {joint.compliance}" if joint.compliance else ""
@@ -131,7 +131,7 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
 
 
 def _is_supported(word: str, joint: Joint) -> bool:
-    """Return whether an engine that needs `word` in LAWS[...].supports supports an interface."""
+    """Return whether an engine supports the friction law of an interface."""
     if not law_supports(joint.law, word):
         return False
     if word == "exact":  # the event-driven solution supports only patches that slip as a whole

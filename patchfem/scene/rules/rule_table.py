@@ -18,7 +18,7 @@ from .view import TableView
 
 
 class TableFacts(TableView):
-    """Facts on which the rules of one table depend: the values, and which keys the scene sets.
+    """Facts on which the rules of one table depend.
 
     Subclasses add what follows from the values as properties. The tables do not change while rules are applied, so that
     a property which several rules use is a `cached_property`.
@@ -54,19 +54,19 @@ class TableFacts(TableView):
         return find_compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:
-        """Return whether the scene sets all of these keys of the table."""
+        """Return whether the scene sets all of the given keys of the table."""
         for name in names:
             if find_value(self._written, name) is None:
                 return False
         return True
 
     def has_any(self, *names: str) -> bool:
-        """Return whether the scene sets at least one of these keys of the table."""
+        """Return whether the scene sets at least one of the given keys of the table."""
         return any(map(self.has, names))
 
 
 class Rule(NamedTuple):
-    """One row of a table of rules; `MistakeRule`, `MissingKeyRule` and `RemarkRule` make them.
+    """Rule for a table: a condition, and the message if it holds.
 
     - report: method of `SceneDraft` that takes the key and the sentence.
     - condition: function of the facts that is true where the sentence applies.
@@ -99,7 +99,7 @@ def make_unsupported_rule(condition: Callable, key: str, feature: str, instead: 
 
 
 def apply_rules(draft: SceneDraft, rules: Iterable[Rule], facts: Any) -> None:
-    """Report every row of a table of rules whose condition holds.
+    """Report the message of every rule whose condition holds.
 
     Parameters
     ----------

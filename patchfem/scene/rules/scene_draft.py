@@ -23,7 +23,7 @@ _LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
 
 
 class SceneError(PatchfemError):
-    """Error of a scene that cannot be run; `mistakes` holds ``FILE:LINE: key: message`` lines."""
+    """Error of a scene that cannot be run, with all of its mistakes."""
 
     def __init__(self, mistakes: Iterable[str]) -> None:
         self.mistakes = list(mistakes)
@@ -67,22 +67,22 @@ class SceneDraft:
 
     @property
     def values(self) -> TableView:
-        """View of the tables read so far; a missing or invalid value is UNKNOWN_VALUE."""
+        """Tables read so far, in which missing or invalid values are UNKNOWN_VALUE."""
         if self._values.table is not self.tables:
             self._values = TableView(self.tables)
         return self._values
 
     @property
     def has_mistakes(self) -> bool:
-        """Whether a mistake was added."""
+        """Whether a mistake was reported."""
         return bool(self._mistakes)
 
     def has(self, key: str) -> bool:
-        """Return whether the scene contains a key or table, also with an invalid value."""
+        """Return whether the scene contains a key or table, even if its value is invalid."""
         return self.written_value(key) is not None
 
     def written_value(self, key: str) -> Any:
-        """Return the plain value at a dotted key, with items by number; None without a value."""
+        """Return the value at a dotted key as written; None if there is none."""
         return find_value(self.raw, key)
 
     def has_set_key(self, key: str) -> bool:

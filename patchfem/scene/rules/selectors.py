@@ -72,7 +72,7 @@ SELECTORS = {
 
 
 def split_keys(words: str) -> list[str]:
-    """Return the keys of one text of `Selector.choices`, alternatives separately."""
+    """Split a list of required keys, with alternatives as separate keys."""
     return words.replace("|", " ").split()
 
 

@@ -58,7 +58,7 @@ class CoordinateNumbers(NamedTuple):
 
 
 class StructureFacts(TableFacts):
-    """Facts for the rules of [structure]: how the rig is described, and the other tables."""
+    """Facts on which the rules of [structure] depend."""
 
     @cached_property
     def descriptions(self) -> list[str]:
@@ -72,12 +72,12 @@ class StructureFacts(TableFacts):
 
     @property
     def joined_descriptions(self) -> str:
-        """Descriptions in words."""
+        """Ways in which the structure is described, joined as text."""
         return " and ".join(self.descriptions)
 
     @property
     def description(self) -> str:
-        """The only description; "" if there is none or several."""
+        """Only description of the structure; "" if there is none or several."""
         return self.descriptions[0] if len(self.descriptions) == 1 else ""
 
     @property

@@ -9,7 +9,7 @@ from ..keys.types import Table
 
 
 class _Unknown(float):
-    """Placeholder for a missing or invalid value: a false, empty NaN whose attributes are all itself."""
+    """Placeholder for a missing or invalid value, which is false, empty and NaN."""
 
     def __bool__(self) -> bool:
         return False
@@ -26,7 +26,7 @@ UNKNOWN_VALUE = _Unknown("nan")
 
 
 class TableView:
-    """Wrapper of a table that returns UNKNOWN_VALUE for missing values and a TableView for inner tables.
+    """Wrapper of a table whose missing values are UNKNOWN_VALUE.
 
     A rule compares the values of a view without asking first whether they are there. A field of a sentence, such as
     `{length:g}`, names an attribute of the view. AttributeError for a name that the table does not have.

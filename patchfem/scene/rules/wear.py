@@ -20,7 +20,7 @@ FACTOR_KEYS = ("coefficient_factor", "bond_length_factor")
 
 
 class WearFacts(TableFacts):
-    """Facts for the rules of [wear]; `friction` is its table of friction over the worn depth."""
+    """Facts on which the rules of [wear] depend."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
         super().__init__(draft, "wear", draft.tables.wear)
@@ -81,7 +81,7 @@ class WearFacts(TableFacts):
 
     @property
     def locking_factor(self) -> float:
-        """Factor from which the pieces lock on the flanks."""
+        """Factor on the friction above which the pieces lock on the groove flanks."""
         return 1 / self.slope / self.law.static
 
 
@@ -259,5 +259,5 @@ def _check_factors(wear: WearFacts) -> None:
 
 
 def _increases_from_zero(values: tuple) -> bool:
-    """Return whether the first value is 0 and each is larger than the one before."""
+    """Return whether values start at 0 and increase strictly."""
     return values[0] == 0 and all(low < high for low, high in pairwise(values))

@@ -30,7 +30,7 @@ _HEADER_READERS = {
 
 
 class LengthFactors(NamedTuple):
-    """Factors to metres of x (and y) and of z."""
+    """Factors that convert lateral positions and heights of a file to metres."""
 
     lateral: float
     height: float
@@ -113,7 +113,7 @@ def _read_table(raw: Raw, table, factors: LengthFactors) -> Profile | Areal:
 
 
 def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profile | Areal:
-    """Read x, (y) and z: vectors, the axes and the matrix of a raster, or three matrices."""
+    """Read a trace or a scan from variables x, (y) and z of a MATLAB file."""
     z = np.asarray(z, float)
     flat = [np.asarray(values, float).ravel() for values in places]
     if all(values.size == z.size for values in flat):
@@ -131,7 +131,7 @@ def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profil
 
 
 def _load_npy(raw: Raw) -> np.ndarray:
-    """Load the array of an .npy file as a view of its bytes."""
+    """Load the array of an .npy file without copying its bytes."""
     path = raw.path
     file = io.BytesIO(raw.data)
     try:

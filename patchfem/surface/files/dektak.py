@@ -66,12 +66,12 @@ def read_dektak(raw: Raw) -> Profile:
 
 
 def _parse_unit(word: str) -> float | None:
-    """Return the factor to metres of a unit, None for no unit of length; A is the angstrom."""
+    """Return the factor of a length unit to metres; None for any other text."""
     return 1e-10 if word.lower() == "a" else parse_length_unit(word)
 
 
 def _restore_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
-    """Replace rounded positions by equal steps of the length [m] in the header, with a note.
+    """Replace rounded positions by equally spaced ones that fit the length in the header.
 
     The printed positions stay if the steps do not fit them. factor: of x to metres.
     """

@@ -66,7 +66,7 @@ _GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 
 class Line(NamedTuple):
-    """Line of a head, without the comment sign if it is a comment."""
+    """Line of the header of a text file, without its comment sign."""
 
     number: int
     text: str
@@ -74,28 +74,28 @@ class Line(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of a line without empty ones at the end; delimiter: None for blanks."""
+    """Cells of a line of a text file, with the delimiter that separates them."""
 
     cells: list
     delimiter: str | None
 
 
 class Fact(NamedTuple):
-    """Fact that a head states: a number or None, and the unit or word after it."""
+    """Statement in a file header: a number or None, with its unit or word."""
 
     number: float | None = None
     word: str = ""
 
 
 class Column(NamedTuple):
-    """Role of a column ("x", "y", "z", "index", "valid" or its name) and its unit or None."""
+    """Role of a column of a text file ("x", "y", "z", ...) and its unit."""
 
     role: str
     unit: str | None
 
 
 class ColumnNames(NamedTuple):
-    """Names of the columns, units of a separate line, and the number of the line (0 for none)."""
+    """Names and units of the columns of a text file, with the line that states them."""
 
     number: int
     names: list
@@ -103,7 +103,7 @@ class ColumnNames(NamedTuple):
 
 
 class Head(NamedTuple):
-    """Header of a text file: the lines above its rows.
+    """Header of a text file, which consists of the lines above its numbers.
 
     lines: of `Line`; names: cells of the line that names x and z with their units, [] without such
     a line; row: cells of the first row of numbers, [] with one; delimiter: of either; number: lines
@@ -138,7 +138,7 @@ class Head(NamedTuple):
         return found
 
     def facts(self, path) -> dict:
-        """Read the facts about a matrix: name of `_KEYS` -> Fact of the first line that states it.
+        """Return what the header states about a matrix of heights, such as its pixel size.
 
         Raises PatchfemError for 1,234, which may be a thousand or one, if no row has a decimal
         comma.
@@ -204,12 +204,12 @@ def read_head(path, text: str) -> Head:
 
 
 def has_column_names(cells: list) -> bool:
-    """Return whether cells name two columns of a trace or a scan."""
+    """Return whether cells of a line name the columns of a trace or a scan."""
     return len({parse_column(cell).role for cell in cells} & {"x", "y", "z", "index"}) > 1
 
 
 def _find_names_with_units(line: str, *, is_comment: bool) -> list:
-    """Return the cells of a line that names x and z with units, [] for any other line.
+    """Return the cells of a line that names the columns x and z with units, else [].
 
     Further words after the last column of a comment are left out.
     """
@@ -243,7 +243,7 @@ def parse_column(cell: str) -> Column:
 
 
 def split_cells(text: str) -> Cells:
-    """Split a line at the delimiter that leaves only numbers, else at the first that occurs.
+    """Split a line at the delimiter for which all cells are numbers.
 
     So a decimal comma is not taken for a delimiter.
     """
@@ -266,7 +266,7 @@ def strip_cells(cells: list) -> list:
 
 
 def is_number(cell: str, delimiter: str | None) -> bool:
-    """Return whether a cell is a number, possibly with a decimal comma, or a missing height."""
+    """Return whether a cell of a text file is a number or a missing height."""
     if NUMBER_PATTERN.fullmatch(cell) or MISSING.fullmatch(cell):
         return True
     return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None

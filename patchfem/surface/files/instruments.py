@@ -65,7 +65,7 @@ def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
 
 
 def _run_script(path, file: Path) -> dict:
-    """Run the script `topography` for a file and return its arrays by name."""
+    """Read a file in a separate process by SurfaceTopography; return its arrays."""
     script = Path(__file__).with_name("topography.py")
     arguments = map(str, (script, file.absolute(), MAX_POINTS, MAX_CPU_SECONDS))
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each thread takes address space

@@ -24,21 +24,21 @@ MAX_UNEVEN = 1e-6  # relative range of the steps of coordinates; those of height
 
 
 class Scale(NamedTuple):
-    """Step of an axis [m], or factor of the heights to metres, with notes."""
+    """Sample spacing [m] of an axis or factor of the heights, with notes on its source."""
 
     value: float
     notes: tuple = ()
 
 
 class Unit(NamedTuple):
-    """Unit that is used, None if none is known, with notes."""
+    """Length unit that is used for an axis or the heights, with notes on its source."""
 
     name: str | None
     notes: tuple = ()
 
 
 def is_matrix(count: int, names: list, facts: dict) -> bool:
-    """Return whether rows of numbers are a matrix and not columns x, (y,) z.
+    """Return whether rows of numbers are a matrix of heights instead of columns of points.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def is_matrix(count: int, names: list, facts: dict) -> bool:
 
 
 def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> Profile | Areal:
-    """Read the scan in a matrix of heights; a trace if it is one row or one column.
+    """Convert a matrix of heights to a scan, or to a trace if it is one row or column.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> 
 
 
 def _is_even(values) -> bool:
-    """Return whether numbers (n,) increase by one step."""
+    """Return whether numbers (n,) increase by equal steps."""
     steps = np.diff(values)
     return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
 
@@ -150,7 +150,7 @@ def _find_height_factor(path, facts: dict, units: tuple | None) -> Scale:
 
 
 def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) -> Scale:
-    """Return the sample spacing [m] along x or y: pixel size, or scan size / number of pixels."""
+    """Return the sample spacing [m] of an axis from the pixel size or the scan size."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
     pixel = None if units is None else parse_pixel_size(units[0])
     if pixel is not None:
@@ -185,7 +185,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
 
 
 def _choose_unit(path, what: str, stated: str | None, given: str | None) -> Unit:
-    """Prefer the unit that the user gave, with a note if it differs from that of the file."""
+    """Return the unit that the user gave, else that of the file, with a note if they differ."""
     if given is None or stated is None or parse_length_unit(given) == parse_length_unit(stated):
         return Unit(given or stated)
     note = f"{path}: the header gives {what} in {shorten(stated)}, but {given} is used, as given by --units"

@@ -16,7 +16,7 @@ ROUND_OFF = 1e-9  # relative to the length of an axis; nearer positions are the 
 
 
 class Axis(NamedTuple):
-    """Distinct increasing positions along an axis, and the index of the position of each point."""
+    """Distinct positions along one axis of a scan, and their index for each point."""
 
     places: np.ndarray
     numbers: np.ndarray
@@ -128,7 +128,7 @@ def make_scan_of_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> P
 
 
 def _find_axis(values) -> Axis:
-    """Find the distinct positions along an axis; positions within round-off are the same."""
+    """Find the distinct positions of points along an axis, apart from round-off."""
     order = np.argsort(values, kind="stable")
     is_new = np.diff(values[order]) > ROUND_OFF * max(float(np.ptp(values)), 1e-300)
     numbers = np.empty(values.size, np.int64)

@@ -48,7 +48,7 @@ UNPACK_ERRORS = (  # exceptions of zipfile, gzip and NumPy for a damaged file
 
 
 class Raw(NamedTuple):
-    """File in memory.
+    """Contents of a surface file in memory.
 
     path: name for messages; kind: "text", "binary", "x3p" or one of FIRST_BYTES; suffix: of the unpacked
     file in lower case; data: bytes, b"" for a "binary" file that is not packed, which another
@@ -62,7 +62,7 @@ class Raw(NamedTuple):
 
 
 def fetch(path) -> Raw:
-    """Read a file and unpack it once.
+    """Read a surface file, and decompress it if it is packed.
 
     Raises Missing or PatchfemError if it is too large, damaged or packed twice.
     """
@@ -91,7 +91,7 @@ def fetch(path) -> Raw:
 
 
 def _read_limited(file, head: bytes, size: int) -> bytes:
-    """Read a file that begins with `head` up to `size` bytes, without allocating all of them."""
+    """Read a file up to a size limit without allocating all of it at once."""
     parts = [head]
     left = size - len(head)
     while left > 0 and (part := file.read(min(left, BLOCK_BYTES))):
@@ -119,7 +119,7 @@ def _check_size(path, kind: str, size: int) -> None:
 
 
 def _unpack(path: Path, name: Path, data: bytes) -> Raw:
-    """Return the content of a packed file; `name` is its name without the packing suffix."""
+    """Decompress the contents of a packed surface file."""
     kind = _find_kind(data[:HEAD_BYTES])
     if kind == "gzip" or (kind == "zip" and path.suffix.lower() == ".zip"):
         raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
@@ -129,7 +129,7 @@ def _unpack(path: Path, name: Path, data: bytes) -> Raw:
 
 
 def _gunzip(path, data: bytes) -> bytes:
-    """Unpack a gzip file after counting its content, so a zip bomb takes no memory."""
+    """Decompress a gzip file after its size was checked without storing it."""
     limit = min(MAX_BYTES, max(MIB, MAX_UNPACK_RATIO * len(data)))
     try:
         with gzip.open(io.BytesIO(data)) as file:
@@ -155,7 +155,7 @@ def _gunzip(path, data: bytes) -> bytes:
 
 
 def _unzip(raw: Raw, *, is_unpacked: bool = False) -> Raw:
-    """Return an X3P file unchanged, and the content of any other zip file with a single member."""
+    """Return the single member of a zip file; return an X3P file unchanged."""
     archive = open_zip(raw)
     members = [member for member in archive.infolist() if not member.filename.endswith("/")]
     if any(Path(member.filename).name == "main.xml" for member in members):
@@ -169,7 +169,7 @@ def _unzip(raw: Raw, *, is_unpacked: bool = False) -> Raw:
 
 
 def open_zip(raw: Raw) -> zipfile.ZipFile:
-    """Open a zip file in memory; the size of its list of members is checked before it is read."""
+    """Open a zip file in memory after the size of its directory was checked."""
     end = raw.data.rfind(b"PK\x05\x06")
     if end < 0 or end + 22 > len(raw.data):
         raise PatchfemError(f"{raw.path}: the zip file is damaged (it has no end); pack it again")
@@ -189,7 +189,7 @@ def open_zip(raw: Raw) -> zipfile.ZipFile:
 
 
 def read_member(raw: Raw, archive: zipfile.ZipFile, name: str, max_bytes: int = MAX_BYTES) -> bytes:
-    """Read a member of a zip file; raises PatchfemError if it is too large, a bomb or damaged.
+    """Read a member of a zip file; raise PatchfemError if it is damaged or too large.
 
     Parameters
     ----------
@@ -234,12 +234,12 @@ def _check_ratio(raw: Raw, info: zipfile.ZipInfo) -> None:
 
 
 def shorten(text: str, length: int = 40) -> str:
-    """Make a string of a file printable and at most 40 characters long, for a message."""
+    """Make a text from a file printable and at most 40 characters long."""
     if not text.isprintable():
         text = text.encode("unicode_escape").decode()
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 def shorten_reason(error) -> str:
-    """Make the message of a library one printable line of at most 120 characters."""
+    """Reduce the message of a library to one printable line of 120 characters."""
     return shorten(" ".join(str(error).split()), 120)

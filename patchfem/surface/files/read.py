@@ -56,7 +56,7 @@ def read_surface(path, units: tuple | None = None) -> Profile | Areal:
 
 
 def read_profile(path, units: tuple | None = None) -> Profile:
-    """Read the trace in a file (`read_surface`); raises PatchfemError for an areal scan."""
+    """Read the trace in a file; raise PatchfemError for an areal scan."""
     surface = read_surface(path, units)
     if isinstance(surface, Areal):
         rows, columns = surface.z.shape

@@ -28,7 +28,7 @@ _NUMBER_WORDS = ("no", "one", "two", "three", "four")
 
 
 class Columns(NamedTuple):
-    """Columns (k,) by their role, NaN where a height is missing, and the line (k,) of each row."""
+    """Columns of numbers of a text file by role, with the line of each row."""
 
     values: dict
     lines: np.ndarray
@@ -92,7 +92,7 @@ def read_columns(path, body: str, head: Head, places: dict, width: int) -> Colum
 
 
 def read_matrix(path, body: str, head: Head) -> np.ndarray:
-    """Read the rows (m, n) of a matrix of heights, NaN where one is missing.
+    """Read the rows (m, n) of a matrix of heights from a text file.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def _find_delimiter(line: str, expected: str | None, count: int) -> str | None:
 
 
 def _load_table(body: str, delimiter: str | None, *, has_comma: bool) -> np.ndarray | None:
-    """Load rows of plain numbers at once; None for other rows, which are read line by line."""
+    """Read rows of plain numbers at once; return None for rows that need a parser."""
     if has_comma and "." in body:
         return None
     if has_comma:
@@ -199,7 +199,7 @@ def _split_row(place: str, line: str, delimiter: str | None, width: int) -> list
 
 
 def _parse_number(place: str, role: str, cell: str, delimiter: str | None) -> float:
-    """Parse a cell; a missing height is NaN."""
+    """Parse a number of a text file; a missing height becomes NaN."""
     if role == "z" and MISSING.fullmatch(cell):
         return np.nan
     if delimiter != "," and DECIMAL_COMMA.fullmatch(cell):

@@ -31,14 +31,14 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 class Places(NamedTuple):
-    """Index of each column that is read, by role, in the order x, (y,) z, (valid), with notes."""
+    """Indices of the columns to read from a text file, with notes on how they were found."""
 
     columns: dict
     notes: tuple = ()
 
 
 class Factors(NamedTuple):
-    """Factors of x, (y,) z to metres, with notes."""
+    """Factors that convert the columns of a text file to metres, with notes."""
 
     values: tuple
     notes: tuple
@@ -109,7 +109,7 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
 
 
 def decode_text(raw: Raw) -> str:
-    """Return the text of a file with lines that end in \\n, without quotes."""
+    """Decode a text file, with \\n at the ends of lines and without quotes."""
     path = raw.path
     data = raw.data
     if not data.strip(b"\xef\xbb\xbf \t\r\n"):
@@ -207,7 +207,7 @@ def _find_factors(
 
 
 def _is_sample_count(values: dict) -> bool:
-    """Return whether x counts 0, 1, 2, ... or 1, 2, 3, ... while y only rises or falls."""
+    """Return whether the first column of a file only numbers the samples."""
     x = values["x"]
     steps = np.diff(values["y"])
     is_count = x.size > 2 and x[0] in (0, 1) and (np.diff(x) == 1).all()

@@ -17,7 +17,7 @@ MAX_MEMORY = 1 << 32  # bytes of address space; the largest scan allowed takes a
 
 
 def main(path: str, max_points: int, max_seconds: float) -> int:
-    """Read a file and write its arrays to stdout.
+    """Read a surface file by SurfaceTopography and write its arrays to stdout.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def limit_resources(max_seconds: float) -> None:
 
 
 def read_topography(reader, max_points: int) -> tuple[dict, dict]:
-    """Return the arrays of a file and what it states about them."""
+    """Return the arrays of a surface file, with what the file states about them."""
     import numpy as np
 
     channel = reader.default_channel

@@ -31,7 +31,7 @@ _MD5 = re.compile(r"[0-9a-fA-F]{32}")
 
 
 class Axis(NamedTuple):
-    """Axis of an X3P file; is_absolute: whether each point stores its value; lengths in [m]."""
+    """Axis of an X3P file, with equal increments or with stored positions [m]."""
 
     is_absolute: bool
     data_type: str
@@ -39,12 +39,12 @@ class Axis(NamedTuple):
     offset: float
 
     def scale(self, raw_values) -> np.ndarray:
-        """Return raw values in metres."""
+        """Convert raw values of the axis to metres."""
         return raw_values * self.increment + self.offset
 
 
 class Shape(NamedTuple):
-    """Size of a surface; is_list: whether the points form a list and not a matrix."""
+    """Number of points of an X3P file along its axes or in its list."""
 
     rows: int
     columns: int
@@ -65,7 +65,7 @@ class Package(NamedTuple):
     root: Element
 
     def refuse(self, what: str) -> PatchfemError:
-        """Return the exception that states what is wrong in the file."""
+        """Return the exception that describes a fault of the file."""
         return PatchfemError(f"{self.raw.path}: {what}")
 
     def read_linked(self, link: str, checksum: str, max_bytes: int) -> bytes:
@@ -163,7 +163,7 @@ def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> P
 
 
 def _read_axis(package: Package, name: str) -> Axis:
-    """Read an axis; CY of a profile may be absent."""
+    """Read the definition of an axis from an X3P file."""
     node = package.root.find(f"Record1/Axes/{name}")
     if node is None:
         if name != "CY":
@@ -299,12 +299,12 @@ def _compute_md5(data: bytes) -> str:
 
 
 def _text(node: Element, path: str, default: str = "") -> str:
-    """Return the stripped text at a path of element names, or the default if it is empty."""
+    """Return the text of an XML element at a path, or a default."""
     return (node.findtext(path) or "").strip() or default
 
 
 class _SafeTree(TreeBuilder):
-    """Builder of an element tree of limited size without namespaces and attributes."""
+    """Builder of an XML tree with limited size and without namespaces."""
 
     def __init__(self, path) -> None:
         super().__init__()
@@ -319,14 +319,14 @@ class _SafeTree(TreeBuilder):
         )
 
     def start(self, tag: str, _attributes: dict) -> Element:
-        """Open an element."""
+        """Open an element of the XML tree."""
         self.count += 1
         if self.count > MAX_ELEMENTS:
             raise PatchfemError(f"{self.path}: main.xml has more than {MAX_ELEMENTS} elements")
         return super().start(tag.rpartition("}")[2], {})
 
     def end(self, tag: str) -> Element:
-        """Close an element."""
+        """Close an element of the XML tree."""
         return super().end(tag.rpartition("}")[2])
 
 

@@ -17,7 +17,7 @@ MIN_LENGTH_STEPS = 2.0  # steps; the raster does not resolve a shorter autocorre
 
 
 class Lobe(NamedTuple):
-    """Shortest and longest distance [m] at which the autocorrelation falls to 0.2, or None."""
+    """Shortest and longest distance [m] over which the autocorrelation falls to 0.2."""
 
     shortest: float | None
     longest: float | None
@@ -25,19 +25,19 @@ class Lobe(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Heights z (m, n) [m] about their reference surface, with steps [m] along y and along x."""
+    """Heights z (m, n) [m] of a scan about its reference surface, with the sample spacings [m]."""
 
     z: np.ndarray
     steps: tuple
 
     @cached_property
     def heights(self) -> Heights:
-        """Measured heights in a row, for parameters of their distribution."""
+        """Measured heights as a flat array."""
         return Heights(self.z[~np.isnan(self.z)], min(self.steps))
 
     @cached_property
     def slopes(self) -> tuple:
-        """Slopes between neighbours along y (m - 1, n) and along x (m, n - 1), NaN if missing."""
+        """Slopes between neighbouring points along y and along x, NaN where heights are missing."""
         return tuple(np.diff(self.z, axis=axis) / step for axis, step in enumerate(self.steps))
 
     @cached_property
@@ -91,7 +91,7 @@ def autocorrelation(z: np.ndarray) -> np.ndarray:
 
 
 def _measure_lobe(rho, steps: tuple) -> Lobe:
-    """Measure the contour of 0.2 around the middle.
+    """Find the contour on which an autocorrelation falls to 0.2.
 
     The longest distance is None if the contour is open.
     """
@@ -130,7 +130,7 @@ def aspect_ratio(surface: Surface) -> float | None:
 
 
 def missing_reason(surface: Surface, name: str) -> str:
-    """State why a parameter has no value."""
+    """State why an areal roughness parameter has no value."""
     shortest = surface.lobe.shortest
     if surface.heights.power == 0:
         return "the scan is flat"

@@ -50,7 +50,7 @@ def filter_scan(scan: Areal, cutoff: float) -> tuple[Areal, Areal]:
 
 
 def _trim(source: str, cutoff: float, axis: np.ndarray, name: str) -> slice:
-    """Return the samples of an axis that lie half a cut-off [m] or more from both of its ends."""
+    """Return the samples of an axis that are far enough from both ends for a filter."""
     length = float(axis[-1] - axis[0])
     step = length / (axis.size - 1)
     if not np.isfinite(cutoff) or cutoff < MIN_CUTOFF_STEPS * step * (1 - 1e-9):
@@ -69,7 +69,7 @@ def _trim(source: str, cutoff: float, axis: np.ndarray, name: str) -> slice:
 
 
 def mean_surface(z: np.ndarray, cutoffs: tuple) -> np.ndarray:
-    """Compute the mean surface (m, n) of heights z (m, n), NaN where missing.
+    """Compute the Gaussian mean surface (m, n) of heights z (m, n), NaN where missing.
 
     Cut-offs in steps along y and x.
     """
@@ -84,7 +84,7 @@ def mean_surface(z: np.ndarray, cutoffs: tuple) -> np.ndarray:
 
 
 def mean_line(z: np.ndarray, cutoff: float, *, tilted: bool = False) -> np.ndarray:
-    """Compute the mean line (n,) of evenly spaced heights z (n,).
+    """Compute the Gaussian mean line (n,) of equally spaced heights z (n,).
 
     Parameters
     ----------

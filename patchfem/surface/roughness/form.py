@@ -22,7 +22,7 @@ STUDENT_T = 1.833  # Student's t of 90 % with N_PARTS - 1 degrees of freedom
 
 
 class Cylinder(NamedTuple):
-    """Circle or cylinder over reduced coordinates.
+    """Circle of a trace or cylinder of a scan, fitted in scaled coordinates.
 
     level: height in the middle; rise: slope of the axis; sine: of the slope across the axis in the
     middle; angle [rad]: of the axis from x.
@@ -44,7 +44,7 @@ class Cylinder(NamedTuple):
 
 
 def parse_form(text: str) -> int | str:
-    """Parse a form: the degree of a polynomial, 1 to 9, or "cylinder"."""
+    """Parse the option for the form to remove: a polynomial degree or "cylinder"."""
     text = text.strip()
     if text == CYLINDER:
         return text
@@ -85,7 +85,7 @@ def form_degree(form: int | str) -> int:
 
 
 def _subtract_cylinder(surface: Profile | Areal) -> tuple[Profile | Areal, str]:
-    """Subtract a circle or cylinder; its name states the radius with a 90 % error (jackknife)."""
+    """Subtract the least-squares circle or cylinder from a surface; describe its radius."""
     is_scan = isinstance(surface, Areal)
     y = surface.y if is_scan else np.zeros(1)
     size = max(float(np.ptp(surface.x)), float(np.ptp(y))) / 2
@@ -114,7 +114,7 @@ def _subtract_cylinder(surface: Profile | Areal) -> tuple[Profile | Areal, str]:
 
 
 def _describe_cylinder(fitted: Cylinder, error: float, size: float, name: str) -> str:
-    """Name a circle or cylinder with its radius.
+    """Describe a circle or cylinder by its radius.
 
     `size` [m] is the unit of its reduced coordinates.
     """

@@ -42,7 +42,7 @@ SIZES = ("power", "ratio", "extreme")  # kinds that grow with the length of a se
 
 
 class Intervals:
-    """Intervals of the parameters of one trace.
+    """Confidence intervals of the roughness parameters of one trace.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Intervals:
         return _estimate_widening(Heights(np.diff(self.heights.z), self.heights.step))
 
     def interval(self, row: Parameter, value: float | None) -> tuple[float | None, float | None]:
-        """Return the bounds of a parameter with this value, (None, None) if there are none."""
+        """Return the bounds of a parameter; (None, None) if they are unknown."""
         if value is None or not row.kind or not self.spectrum.density.any():
             return None, None
         if (self.is_uneven and row.kind not in LATERAL) or (self.is_short and row.kind in SIZES):
@@ -113,7 +113,7 @@ class Intervals:
 
     @cached_property
     def is_short(self) -> bool:
-        """Whether the trace is too short for its longest waves, so Rq would grow with its length."""
+        """Whether the trace is too short for its longest waves."""
         wave = self.spectrum.dominant_wavelength
         if wave is None or wave * MIN_WAVES <= self.heights.length:
             return False

@@ -11,7 +11,7 @@ KINDS = {"profile": "traces", "areal": "scans"}
 
 
 class Means(NamedTuple):
-    """Means of `count` reports of one kind.
+    """Mean roughness parameters over several reports of one kind.
 
     values: `Mean` by name; caution: a sentence on their limits, "" for none.
     """
@@ -23,7 +23,7 @@ class Means(NamedTuple):
 
 
 def average_reports(reports: list[RoughnessReport]) -> list[Means]:
-    """Average the parameters that all traces have, and those that all scans have.
+    """Average the roughness parameters over all traces, and over all scans.
 
     Each kind needs two reports or more. The 95 % intervals come from the scatter by Student's t; the
     interval of a single file describes the same scatter and is not added.

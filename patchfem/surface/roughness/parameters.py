@@ -20,7 +20,7 @@ CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO
 
 @dataclass(frozen=True, eq=False)
 class Heights:
-    """Heights z (n,) [m] about their mean line, one every `step` [m].
+    """Equally spaced heights z (n,) [m] of a trace about its mean line.
 
     section: length [m] over which peaks, valleys and spacings are looked for, which is the cut-off;
     None for the whole trace.
@@ -54,7 +54,7 @@ class Heights:
 
     @cached_property
     def power(self) -> float:
-        """Mean square [m2]."""
+        """Mean square of the heights [m2]."""
         return float(self.z @ self.z) / self.z.size
 
     @cached_property
@@ -224,7 +224,7 @@ def fit_core(heights: Heights) -> Core | None:
 
 
 def _ratio_above(z, level: float) -> float:
-    """Return the fraction of the length above a level, for descending heights z (n,)."""
+    """Return the fraction of a trace that lies above a level."""
     n = z.size
     k = int(np.searchsorted(-z, -level))
     if k in (0, n):

@@ -31,7 +31,7 @@ MAX_DEVIATIONS = 3  # standard deviations that skewness and kurtosis of Gaussian
 
 
 class Moments(NamedTuple):
-    """Root mean squares over a trace: height [m], slope [1], curvature [1/m]."""
+    """Root mean square height [m], slope [1] and curvature [1/m] of a trace."""
 
     height: float
     slope: float
@@ -48,7 +48,7 @@ class Moments(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Peaks of a surface: radius of mean curvature [m], density [1/m2], height deviation [m]."""
+    """Asperity peaks of a surface: radius [m], density [1/m2] and height deviation [m]."""
 
     radius: float
     density: float
@@ -56,7 +56,7 @@ class Peaks(NamedTuple):
 
 
 class TraceMoments(NamedTuple):
-    """Moments of a trace and how far they can be trusted.
+    """Spectral moments of a trace, with notes on their reliability.
 
     fine: from all samples; coarse: from every second sample, None if these are too few;
     not_gaussian: a clause if the heights are not Gaussian, else ""; dust: clauses on heights that
@@ -69,7 +69,7 @@ class TraceMoments(NamedTuple):
     dust: tuple = ()
 
     def combine(self, other: "TraceMoments") -> "TraceMoments":
-        """Return the moments of the gap between two rough faces."""
+        """Return the moments of the gap between two rough surfaces."""
         coarse = self.coarse.combine(other.coarse) if self.coarse and other.coarse else None
         fine = self.fine.combine(other.fine)
         return TraceMoments(
@@ -101,7 +101,7 @@ def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
 
 
 def rms_moments(trace: Profile, every: int = 1) -> Moments:
-    """Compute the moments of an even, level trace from every n-th sample.
+    """Compute the spectral moments of a levelled trace from every n-th sample.
 
     Slope and curvature are first and second differences, which see a wave of length L as
     sinc(step/L) and its square.
@@ -134,7 +134,7 @@ def _filter_short_waves(trace: Profile, cutoff: float | None) -> Profile:
 
 
 def _describe_dust(trace: Profile) -> tuple:
-    """Describe the few heights that make up most of the mean square curvature, as dust does.
+    """Describe the few heights, such as dust, that dominate the mean square curvature.
 
     Returns () if no heights do.
     """
@@ -159,7 +159,7 @@ def _describe_dust(trace: Profile) -> tuple:
 
 
 def _describe_skew(z, moments: Moments, length: float) -> str:
-    """State skewness and kurtosis of heights z (n,) [m]; return "" if they are Gaussian.
+    """State that skewness and kurtosis of heights are not Gaussian, or return "".
 
     A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one
     independent height.
@@ -184,7 +184,7 @@ def _describe_skew(z, moments: Moments, length: float) -> str:
 
 
 def gaussian_peaks(moments: Moments) -> Peaks:
-    """Compute the peaks of the isotropic Gaussian surface whose traces have these moments.
+    """Compute the asperity peaks of an isotropic Gaussian surface from spectral moments.
 
     Raises PatchfemError if no isotropic surface of Gaussian heights has them.
     """
@@ -204,7 +204,7 @@ def gaussian_peaks(moments: Moments) -> Peaks:
 
 
 def persson_stiffness(pressure: float, height: float) -> tuple[float, float]:
-    """Compute the smallest and the largest stiffness [Pa/m] of a rough contact by Persson's theory.
+    """Compute bounds of the stiffness [Pa/m] of a rough contact by Persson's theory.
 
     The pressure is proportional to exp(-u/u_0) with u_0 = 0.4 to 0.5 of the rms height [m], so the
     stiffness p/u_0 does not depend on the shortest waves. The theory holds while little of the area

@@ -36,7 +36,7 @@ TOO_SHORT = (
 
 
 class Sampling(NamedTuple):
-    """Length and step [m], samples (along y first), and samples before resampling."""
+    """Length, sample spacing and numbers of samples of a measured surface."""
 
     length: float
     step: float
@@ -45,7 +45,7 @@ class Sampling(NamedTuple):
 
 
 class Treatment(NamedTuple):
-    """Form, filters and window of a surface; lengths in [m], None for no filter.
+    """Form removal, filters and window that were applied to a surface.
 
     form: name of the least-squares form; short: nesting index of the S-filter; cutoff: between
     waviness and roughness, for a scan the nesting index of the L-filter; window: first and last
@@ -59,7 +59,7 @@ class Treatment(NamedTuple):
 
 
 class TraceParts(NamedTuple):
-    """Trace without form, its waviness and roughness (None without cut-off), its spectrum."""
+    """Waviness, roughness and spectrum of a trace after form removal."""
 
     primary: Profile
     waviness: Profile | None
@@ -69,7 +69,7 @@ class TraceParts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RoughnessReport:
-    """Parameters of a surface.
+    """Roughness parameters of one measured surface.
 
     values: Quantity of each parameter, with its name; notes: sentences about the file and its
     treatment; surface: what the parameters are read from, `TraceParts` or the filtered scan;
@@ -90,7 +90,7 @@ class RoughnessReport:
         return "areal" if isinstance(self.surface, Areal) else "profile"
 
     def __getitem__(self, name: str) -> Quantity:
-        """Return the parameter of this name."""
+        """Return the roughness parameter with a given name."""
         return next(value for value in self.values if value.name == name)
 
 
@@ -101,7 +101,7 @@ def make_report(
     form: int | str = 1,
     short: float | None = None,
 ) -> RoughnessReport:
-    """Compute the parameters of a trace or of a scan, with intervals of a single measurement.
+    """Compute the roughness parameters of a trace or a scan with their intervals.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def fitting_cutoff(length: float, step: float) -> float | None:
 
 
 def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
-    """Cut out the part of a surface between positions [m], of a scan in x and in y.
+    """Cut out the part of a surface between given positions.
 
     As between the cursors of an instrument, it runs from the last sample at or before the first
     position to the last at or before the second. Raises PatchfemError for a window that is reversed

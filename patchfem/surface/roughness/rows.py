@@ -33,7 +33,7 @@ VALLEY_RATIO = 0.8  # material ratio below which the void is that of the valleys
 
 
 class Parameter(NamedTuple):
-    """Parameter of a trace or of a scan.
+    """Definition of a roughness parameter of a trace or a scan.
 
     compute: function of `Heights`, or of a scan's `Surface`; None if it needs more. kind of its
     interval (`intervals`): "power", "slope" and "band" by degrees of freedom of the spectrum,
@@ -164,13 +164,13 @@ _BASE = (  # names without their letter
 
 
 def _name_primary(row: Parameter) -> Parameter:
-    """Name a row for the primary profile, whose only section is the whole trace."""
+    """Return the definition of a parameter for the primary profile."""
     kind = "extreme" if row.name in ("p", "v") else row.kind
     return row._replace(name=f"P{row.name}", text=f"{row.text}, of the levelled trace", kind=kind)
 
 
 def _name_roughness(row: Parameter) -> Parameter:
-    """Name a row for the roughness profile."""
+    """Return the definition of a parameter for the roughness profile."""
     mean = ", mean over the sections of one cut-off" if row.name in ("p", "v", "z") else ""
     name = row.name if row.name.startswith("Mr") else f"R{row.name}"
     return row._replace(name=name, text=f"{row.text}{mean}, of the roughness profile")
@@ -222,7 +222,7 @@ WINDOW = (
 
 
 def _make_distribution_row(name: str, unit: str, text: str, compute: Callable) -> Parameter:
-    """Make a row of a scan that depends only on how often each height occurs."""
+    """Return the definition of an areal parameter that depends on the heights alone."""
     return Parameter(name, unit, text, lambda surface: compute(surface.heights))
 
 

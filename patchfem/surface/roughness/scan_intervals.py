@@ -13,7 +13,7 @@ MIN_PAIRS = 0.1  # pairs of heights / those at lag zero; lags with fewer pairs a
 
 
 class ScanIntervals(NamedTuple):
-    """Bounds (low, high) of parameters by name, and whether the heights are not Gaussian."""
+    """Bounds of the areal roughness parameters of one scan."""
 
     bounds: dict
     is_uneven: bool
@@ -44,7 +44,7 @@ def scan_intervals(z: np.ndarray, values: dict) -> ScanIntervals:
 
 
 class MomentScatter(NamedTuple):
-    """Relative variance of the mean square; means of rho^3, rho^4 and |rho|^3 over all lags."""
+    """Statistical scatter of the mean square and higher moments of a scan."""
 
     variance: float
     cubes: float

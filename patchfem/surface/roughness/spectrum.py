@@ -31,11 +31,11 @@ class Spectrum:
 
     @property
     def step(self) -> float:
-        """Distance of two frequencies [1/m]."""
+        """Spacing of the frequencies [1/m]."""
         return float(self.frequency[1] - self.frequency[0])
 
     def band(self, probability: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
-        """Return bounds (k,) [m3] of the true density with a probability (chi-square)."""
+        """Return bounds (k,) [m3] that contain the true density with a given probability."""
         freedom = 2 * self.tapers
         low, high = (chi_square_factor(freedom, (1 + side * probability) / 2) for side in (1, -1))
         return self.density * low, self.density * high
@@ -78,14 +78,14 @@ class Spectrum:
 
 
 def chi_square_factor(freedom: float, probability: float) -> float:
-    """Return freedom / chi-square quantile: bound of a mean square relative to its estimate."""
+    """Return the ratio of the bound of a mean square to its estimate."""
     from scipy.special import chdtri
 
     return float(freedom / chdtri(freedom, 1 - probability))
 
 
 def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> Spectrum:
-    """Estimate the spectral density of heights by sine tapers.
+    """Estimate the power spectral density of heights by the multitaper method.
 
     Method: Riedel and Sidorenko, IEEE Trans. Signal Process. 43, 188, 1995.
 

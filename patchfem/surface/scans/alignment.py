@@ -39,7 +39,7 @@ MARGIN = 0.1  # fraction of the shorter side within which wear may run out undet
 
 @dataclass(frozen=True, eq=False)
 class ScanAlignment:
-    """Alignment of a second scan on a first one.
+    """Rotation and shift that align a second scan with a first one.
 
     - placement: result of the coarse search.
     - state: parameters of the model (`model.Parameter`), (6,).
@@ -80,7 +80,7 @@ class ScanAlignment:
 
 
 def align_scans(before: Areal, after: Areal) -> ScanAlignment:
-    """Align the second scan on the unworn heights of the first one.
+    """Align the second scan with the first one on their unworn parts.
 
     Raises
     ------
@@ -99,7 +99,7 @@ def align_scans(before: Areal, after: Areal) -> ScanAlignment:
 
 
 def _find_place(before: Areal, after: Areal) -> tuple:
-    """Fit all placements to coarse images, and the best one to finer images.
+    """Align coarse images from every candidate placement, then refine the best one.
 
     Returns the placement, the second scan mirrored or inverted by it, and the state (6,).
     """
@@ -119,7 +119,7 @@ def _find_place(before: Areal, after: Areal) -> tuple:
 
 
 def _fit_images(before: Areal, after: Areal, state, step: float) -> tuple:
-    """Register two images of a pixel size [m]; return their relative noise and the parameters."""
+    """Align two images of the scans; return their relative noise and the parameters."""
     rasters = []
     for scan in (before, after):
         z, known = resample_image(scan, step)
@@ -162,7 +162,7 @@ def _find_unworn_planes(model: ScanModel, state) -> list:
 
 
 def _are_apart(model: ScanModel, first: Floor, second: Floor) -> bool:
-    """Return whether the distance of two planes exceeds their noise."""
+    """Return whether two planes differ by more than their noise."""
     difference = (first.state - second.state)[:3]
     distance = difference[0] + (model.at / model.before.half) @ difference[1:]
     return float(np.median(np.abs(distance))) > MIN_DISTANCE * max(first.scale, second.scale)

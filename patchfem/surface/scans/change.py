@@ -49,7 +49,7 @@ GROWN = f"apart from what grew, {UNSURE}"
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Differences of two areal scans.
+    """Measured differences of two areal scans.
 
     - before, after: the scans without spikes.
     - volumes: measures of the depth map; None, like `alignment`, without a common place.
@@ -71,7 +71,7 @@ class Change:
 
     @property
     def values(self) -> dict:
-        """Every `Quantity` by its name."""
+        """All quantities of the comparison as a dict."""
         if self.volumes is None:
             return refuse_measures(self.why)
         values = self.volumes.values
@@ -137,7 +137,7 @@ def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
 
 
 def remove_specks(alignment: ScanAlignment) -> tuple:
-    """Remove isolated outliers from the depth; return the alignment and the number removed.
+    """Remove isolated outliers from the depth between two scans, and count them.
 
     A speck is a small group of heights that differs from all of its neighbours, such as dust, a
     dropout or the remainder of a spike. Worn asperities do not differ like this.
@@ -155,7 +155,7 @@ def remove_specks(alignment: ScanAlignment) -> tuple:
 
 
 def _collect_registration(alignment: ScanAlignment) -> dict:
-    """Return shift and rotation as quantities by name."""
+    """Return shift and rotation of the second scan as quantities."""
     values = (*alignment.shift, alignment.angle)
     errors = np.sqrt(np.diag(alignment.covariance))[[1, 2, 0]]
     return {
@@ -179,7 +179,7 @@ def remove_spikes(scan: Areal) -> tuple:
 
 
 def refuse_hidden_wear(change: Change) -> Quantity:
-    """Return the wear that a plane may hide, which has no value, with the reason."""
+    """Return the quantity of wear that a plane may hide, which cannot be known."""
     if change.volumes is None:
         return make_unknown("m", HIDDEN, change.why)
     if change.volumes.values["worn_volume"].low > 0:
@@ -188,7 +188,7 @@ def refuse_hidden_wear(change: Change) -> Quantity:
 
 
 def _why_no_wear(volumes: Volumes) -> str:
-    """State why no wear is shown."""
+    """Explain in a sentence why a comparison shows no wear."""
     if volumes.is_ambiguous:
         return EITHER
     return GROWN if volumes.values["grown_volume"].low > 0 else UNSURE
@@ -264,7 +264,7 @@ def _describe_wear(change: Change) -> list:
 
 
 def _describe_unmeasured(change: Change) -> list:
-    """State the fraction of the worn area whose heights are missing."""
+    """State which fraction of the worn area has no measured heights."""
     worn = change.volumes.worn
     missing = (worn & ~np.isfinite(change.alignment.depth)).sum()
     fraction = float(missing) / max(float(worn.sum()), 1.0)

@@ -27,7 +27,7 @@ MAX_CORRELATION_AREA = 100.0  # heights; upper limit of the estimated area
 
 
 class ScanErrors(NamedTuple):
-    """Drawn errors of a depth map.
+    """Random samples of the errors of a depth map.
 
     - fields: mean error of the depth in each tile, (draws, rows, columns) [m].
     - tile: heights along the side of a tile.
@@ -39,7 +39,7 @@ class ScanErrors(NamedTuple):
     correlation_area: float
 
     def error_of_sum(self, weight, noise: float) -> np.ndarray:
-        """Draw errors (draws,) of the weighted sum of the depths.
+        """Return random errors (draws,) of a weighted sum of depths.
 
         Parameters
         ----------
@@ -59,7 +59,7 @@ class ScanErrors(NamedTuple):
 
 
 def draw_scan_errors(depth, unworn, plane_error) -> ScanErrors:
-    """Draw errors of a depth map.
+    """Draw random errors of a depth map with the correlation of its noise.
 
     Parameters
     ----------

@@ -32,7 +32,7 @@ BLOCK = 1 << 20  # heights of a depth map that are computed at a time, which lim
 
 
 class Parameter(IntEnum):
-    """Indices of the parameters in the parameter vector; slopes are heights [m] at the edges."""
+    """Indices of the alignment parameters of two scans: rotation, shift and plane."""
 
     OFFSET = 0
     SLOPE_X = 1
@@ -48,7 +48,7 @@ ALL = (*PLANE, *PLACE)
 
 
 class Raster(NamedTuple):
-    """Heights z (m, n) [m], NaN where none was measured, at x (n,) and y (m,) [m]."""
+    """Heights z (m, n) [m] of a scan on a regular grid."""
 
     x: np.ndarray
     y: np.ndarray
@@ -71,7 +71,7 @@ class Raster(NamedTuple):
 
 
 def make_raster(scan: Areal) -> Raster:
-    """Return the raster of a scan with heights about their mean."""
+    """Return a scan on a regular grid, with heights about their mean."""
     return Raster(scan.x, scan.y, scan.z - np.nanmean(scan.z))
 
 
@@ -81,7 +81,7 @@ def rotation(angle: float) -> np.ndarray:
 
 
 class _Linearized(NamedTuple):
-    """Difference (k,) [m] of two scans before a plane is added, and its Jacobian (k, 6).
+    """Depth (k,) [m] between two scans without a plane, and its Jacobian (k, 6).
 
     place: rotation [rad] and shifts [m] of the second scan.
     """
@@ -92,7 +92,7 @@ class _Linearized(NamedTuple):
 
 
 class ScanModel:
-    """Depth of a second scan below a first one at a random sample of heights of the first.
+    """Depth of a second scan below a first one, as a function of the alignment.
 
     Parameters
     ----------
@@ -174,13 +174,13 @@ class ScanModel:
         )
 
     def overlap(self, places) -> np.ndarray:
-        """Return whether all four neighbours of each position in the second scan were measured."""
+        """Return a mask of positions at which the second scan can be interpolated."""
         from scipy.ndimage import map_coordinates
 
         return map_coordinates(self.known, places, order=1, mode="constant", cval=0.0) > 0.999
 
     def read(self, places) -> np.ndarray:
-        """Interpolate the heights [m] of the second scan at rows and columns (2, k)."""
+        """Interpolate the heights [m] of the second scan."""
         from scipy.ndimage import map_coordinates
 
         return map_coordinates(self.spline, places, order=3, prefilter=False, mode="mirror")
@@ -198,7 +198,7 @@ class ScanModel:
         return difference + (state[0] + jacobian[:, 1:3] @ state[1:3]), jacobian
 
     def _linearize_place(self, state, place: tuple) -> "_Linearized":
-        """Read the second scan at the position of a state, and compute the Jacobian there."""
+        """Interpolate the second scan for given parameters, with the Jacobian."""
         at = self.at
         slopes = self.slopes
         z = self.before.z[self.rows, self.columns]
@@ -223,12 +223,12 @@ class ScanModel:
         return np.clip(step, -bound, bound)
 
     def tolerances(self, scale: float) -> np.ndarray:
-        """Return the changes (6,) of the parameters that change the depth by `scale` [m]."""
+        """Return the parameter changes (6,) that change the depth by a given amount."""
         shift = scale / max(float(np.sqrt((self.slopes**2).mean())), 1e-12)
         return np.array([scale, scale, scale, shift / self.reach, shift, shift])
 
     def blocks(self, count: int) -> list:
-        """Return the sampled heights of each tile, whose modes are starting points of a fit."""
+        """Return the sampled heights of each tile, from which fits start."""
         part = np.clip(((self.at / self.before.half + 1) / 2 * N_TILES).astype(int), 0, N_TILES - 1)
         tile = part[:, 0] + N_TILES * part[:, 1]
         order = np.argsort(tile, kind="stable")
@@ -236,7 +236,7 @@ class ScanModel:
         return [part for part in parts if part.size >= MIN_TILE_HEIGHTS]
 
     def _select(self, chosen) -> "ScanModel":
-        """Return the model of the chosen heights only."""
+        """Return the model restricted to some of its sampled heights."""
         out = copy(self)
         out.rows = self.rows[chosen]
         out.columns = self.columns[chosen]
@@ -245,7 +245,7 @@ class ScanModel:
         return out
 
     def cut(self, state) -> "ScanModel":
-        """Return the model of only those heights that overlap the second scan at parameters `state`."""
+        """Return the model restricted to heights that overlap the second scan."""
         inside = self.overlap(self.places(self.at, state))
         if inside.sum() < MIN_HEIGHTS:
             raise PatchfemError("hardly any heights of the two scans coincide")
@@ -254,11 +254,11 @@ class ScanModel:
         return out
 
     def thin(self, count: int) -> "ScanModel":
-        """Return the model of the first `count` heights, which are a random subset."""
+        """Return the model restricted to a random subset of heights."""
         return self._select(slice(count))
 
     def map_depth(self, state) -> np.ndarray:
-        """Compute the depth (m, n) [m] at all heights of the first scan, NaN where one is missing."""
+        """Compute the depth (m, n) [m] at all points of the first scan."""
         out = np.empty(self.before.z.shape)
         for part, at in self._parts():
             places = self.places(at, state)
@@ -269,7 +269,7 @@ class ScanModel:
         return out + self.plane_map(state)
 
     def map_overlap(self, state) -> np.ndarray:
-        """Return whether each point (m, n) of the first scan lies within the second one."""
+        """Return a mask (m, n) of the points of the first scan that lie within the second."""
         out = np.empty(self.before.z.shape, bool)
         for part, at in self._parts():
             out[part] = (self.places(at, state) >= 0).all(axis=0).reshape(out[part].shape)
@@ -285,7 +285,7 @@ class ScanModel:
             yield part, np.stack(np.broadcast_arrays(x, y[part, None]), axis=-1).reshape(-1, 2)
 
     def plane_map(self, state) -> np.ndarray:
-        """Compute the heights (m, n) [m] of the plane that the parameters `state` describe."""
+        """Compute the plane (m, n) [m] that the alignment parameters describe."""
         u = (self.before.x - self.before.middle[0]) / self.before.half[0]
         v = (self.before.y - self.before.middle[1]) / self.before.half[1]
         return state[0] + state[1] * u + state[2] * v[:, None]

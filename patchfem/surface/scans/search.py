@@ -33,7 +33,7 @@ MIN_PIXEL_DISTANCE = 4  # pixels; the same for their shifts
 
 
 class Placement(NamedTuple):
-    """Coarse position of the second scan on the first one.
+    """Approximate position of the second scan relative to the first one.
 
     angle [rad], shift (2,) [m]: as defined in `model`; mirrored: axis of the second scan that was
     mirrored first, "x", "y" or ""; is_inverted: whether its heights changed sign; correlation: of
@@ -49,7 +49,7 @@ class Placement(NamedTuple):
 
 
 def transform_scan(scan: Areal, mirrored: str, is_inverted: bool) -> Areal:
-    """Mirror a scan in x or y about its middle, and change the sign of its heights if inverted."""
+    """Mirror a scan about its middle, and invert its heights on request."""
     x = scan.x[0] + scan.x[-1] - scan.x[::-1] if mirrored == "x" else scan.x
     y = scan.y[0] + scan.y[-1] - scan.y[::-1] if mirrored == "y" else scan.y
     z = {"": scan.z, "x": scan.z[:, ::-1], "y": scan.z[::-1]}[mirrored]
@@ -81,12 +81,12 @@ def find_placements(before: Areal, after: Areal) -> list:
 
 
 def pixel_size(*scans: Areal) -> float:
-    """Return the pixel size [m] of the images of a search."""
+    """Return the pixel size [m] of the images in which a placement is searched."""
     return max(max(np.ptp(scan.x), np.ptp(scan.y)) for scan in scans) / SIZE
 
 
 def resample_image(scan: Areal, step: float) -> tuple:
-    """Average a scan over pixels.
+    """Average the heights of a scan over larger pixels.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def subtract_long_waves(z, known, sigma: float) -> np.ndarray:
 
 
 def whiten_valleys(z, known) -> tuple:
-    """Return the valleys of an image with a whitened spectrum about their mean, and the mask."""
+    """Return the valleys of an image with whitened spectrum, and their mask."""
     from scipy.fft import irfft2, rfft2
     from scipy.ndimage import gaussian_filter
 
@@ -242,7 +242,7 @@ class _Search:
 
 
 class _Maximum(NamedTuple):
-    """Largest correlation of an image that is rotated by an angle [rad], and where it lies."""
+    """Largest correlation of two images at one rotation, with its shift."""
 
     value: float
     angle: float

@@ -63,7 +63,7 @@ SIGNED = ("from", "to", "area_net")  # sizes that may be negative
 
 @dataclass(frozen=True, eq=False)
 class ScanTrack:
-    """Wear track of two scans.
+    """Measured wear track of two scans.
 
     - values: sizes by the names of TEXTS.
     - scatter: standard deviation of a single group of sections by name.
@@ -83,7 +83,7 @@ class ScanTrack:
 
 
 class _RotatedMap(NamedTuple):
-    """Depth (v, u) [m] at positions along (v,) and across (u,) [m] a track.
+    """Depth map in coordinates along and across a wear track.
 
     The positions are measured from the middle of the map.
     """
@@ -94,12 +94,12 @@ class _RotatedMap(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Distance of neighbouring positions of a section [m]."""
+        """Spacing of the points across the track [m]."""
         return float(self.across[1] - self.across[0])
 
 
 class _Length(NamedTuple):
-    """Ends of a track along its direction and its length with bounds [m].
+    """Length of a wear track with its ends and bounds [m].
 
     is_cut: whether the track runs over the edge of the map.
     """
@@ -194,7 +194,7 @@ def _refuse_track(why: str) -> ScanTrack:
 
 
 def find_direction(depth, worn, x, y) -> tuple:
-    """Find the direction of the worn part.
+    """Find the direction of the worn area of a scan.
 
     Returns its angle [rad] from x anticlockwise, above -pi/2 to pi/2, and the coherence, 0 to 1, of
     the gradients.
@@ -247,7 +247,7 @@ def _rotate_map(depth, x, y, angle: float) -> _RotatedMap:
 
 
 def _mean_section(depth, min_measured: float = MIN_MEASURED) -> np.ndarray:
-    """Average sections (k, u), NaN where too few of them are measured."""
+    """Average cross sections (k, u) of a wear track."""
     known = np.isfinite(depth)
     count = known.sum(axis=0)
     mean = np.where(known, depth, 0.0).sum(axis=0) / np.maximum(count, 1)
@@ -255,7 +255,7 @@ def _mean_section(depth, min_measured: float = MIN_MEASURED) -> np.ndarray:
 
 
 def _find_deep_span(section, noise: float) -> tuple | None:
-    """Find the first and last position of the deepest part of a mean section.
+    """Find the ends of the deepest part of a mean cross section.
 
     None if no unworn part lies on either side of it, or if other parts lost as much in total.
     """
@@ -275,7 +275,7 @@ def _find_deep_span(section, noise: float) -> tuple | None:
 
 
 def _measure_length(rotated: _RotatedMap, span: tuple, complete) -> _Length:
-    """Measure the length between the positions where the lost area is half of its median.
+    """Measure a wear track between the positions where its section has half the median area.
 
     The bounds are the lengths between three quarters and between one quarter of the median.
     """
@@ -298,7 +298,7 @@ def _measure_length(rotated: _RotatedMap, span: tuple, complete) -> _Length:
 
 
 def _measure_group(rotated: _RotatedMap, rows, span: tuple) -> dict | None:
-    """Measure the mean of neighbouring sections; None if it does not show the whole track."""
+    """Measure the mean of neighbouring cross sections of a wear track."""
     section = _mean_section(rotated.depth[rows], 0.5)
     first, last = span
     known = np.flatnonzero(np.isfinite(section))

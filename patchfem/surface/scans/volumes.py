@@ -30,7 +30,7 @@ MEASURES = {  # name: (unit, definition)
 
 
 class Volumes(NamedTuple):
-    """Measures of a depth map.
+    """Worn and grown volumes, areas and depths from a depth map.
 
     values: `Quantity` by the names of MEASURES; worn, grown: (m, n) bool arrays; filled (m, n) [m]:
     depth with missing values taken from the nearest point, NaN outside the common region; error
@@ -47,12 +47,12 @@ class Volumes(NamedTuple):
 
 
 def refuse_measures(reason: str) -> dict:
-    """Return all measures without values, with the reason."""
+    """Return all volumes and depths without values, with the reason."""
     return {name: make_unknown(*meaning, reason) for name, meaning in MEASURES.items()}
 
 
 def measure_volumes(alignment: ScanAlignment, x, y) -> Volumes:
-    """Measure a depth map at x (n,) and y (m,) [m].
+    """Compute worn volumes, areas and depths from a depth map.
 
     A volume is the sum of the depths over the changed points and those around them. Its error
     combines the drawn errors of the depth (`errors`) with that of steep walls, which instruments
@@ -112,7 +112,7 @@ def _nearest_known(depth) -> tuple:
 
 
 def _measure_volume(alignment: ScanAlignment, cell, depth, changed, opposite, walls) -> tuple:
-    """Sum the depth over a changed part and its rim.
+    """Integrate the depth over a changed region and its rim.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _estimate_wall_error(alignment: ScanAlignment, changed) -> np.ndarray:
 
 
 def _measure_share(alignment: ScanAlignment, cell, worn, walls, nearest) -> Quantity:
-    """Measure the worn fraction of the common region.
+    """Compute the worn fraction of the common region of two scans.
 
     Near the edge of round wear the area above a threshold falls linearly with the threshold. The
     areas above three and six standard deviations of the mean of 3 x 3 depths are extrapolated to a
@@ -191,7 +191,7 @@ def _measure_share(alignment: ScanAlignment, cell, worn, walls, nearest) -> Quan
 
 
 def _measure_largest(alignment: ScanAlignment, worn) -> Quantity:
-    """Measure the largest median depth of 3 x 3 heights, less the bias of a maximum over noise.
+    """Estimate the largest depth of a depth map, corrected for noise.
 
     The noise of the medians is drawn from those of unworn heights.
     """

@@ -12,7 +12,7 @@ MIN_UNWORN_SQUARES = 50  # fewer squares do not determine the scatter of a mean
 
 
 def find_change(depth, unworn, noise: float) -> tuple:
-    """Find the heights that lost material and those that gained material.
+    """Return masks of the points that lost and that gained material.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def find_change(depth, unworn, noise: float) -> tuple:
 
 
 def _find_deep_squares(relative, unworn) -> np.ndarray:
-    """Find heights whose squares are deeper than unworn squares scatter, small squares first.
+    """Find squares of points that are deeper than the scatter of unworn squares.
 
     A height that a smaller square shows is left out of larger squares, which would spread its depth
     over unworn neighbours.
@@ -67,7 +67,7 @@ def detection_limit(depth, unworn) -> float:
 
 
 def mean_of_square(values, side: int) -> tuple:
-    """Return mean and fraction of the measured values in the square around each point."""
+    """Return the mean of the measured values in a square around each point."""
     from scipy.ndimage import uniform_filter
 
     measured = np.isfinite(values)
@@ -78,7 +78,7 @@ def mean_of_square(values, side: int) -> tuple:
 
 
 def widen(mask, count: int) -> np.ndarray:
-    """Widen a mask (m, n) by a number of points on each side."""
+    """Dilate a mask (m, n) by a number of points."""
     from scipy.ndimage import maximum_filter
 
     return maximum_filter(mask, 2 * count + 1) if count else mask
