@@ -73,11 +73,9 @@ def test_exact_importing_imports_nothing_of_weight():
 
 
 def test_exact_the_names_are_all_there():
-    assert (
-        pf.__all__ == api.__all__
-        and set(pf.__all__) <= set(dir(pf))
-        and all(hasattr(pf, name) for name in dir(pf))
-    )
+    assert pf.__all__ == api.__all__
+    assert set(pf.__all__) <= set(dir(pf))
+    assert all(hasattr(pf, name) for name in dir(pf))
     assert (Path(pf.__file__).parent / "py.typed").is_file()
     with pytest.raises(AttributeError, match="no attribute 'sweeep'"):
         pf.sweeep  # noqa: B018
@@ -94,10 +92,8 @@ def test_exact_the_numbers_are_those_of_the_command_line(name, runs, tmp_path):
     said = json.loads(answer.out)
     result = runs[name]
     assert said["measures"] == {key: measure_object(one) for key, one in result.measures.items()}
-    assert (
-        said["outcome"] == result.outcome == str(result.outcome)
-        and said["warnings"] == result.warnings
-    )
+    assert said["outcome"] == result.outcome == str(result.outcome)
+    assert said["warnings"] == result.warnings
     here = result.to_xarray()
     there = xr.load_dataset(tmp_path / "out" / "result.nc")
     xr.testing.assert_identical(here, there)
@@ -120,15 +116,7 @@ def test_exact_saving_writes_the_folder_of_the_command_line(runs, tmp_path):
         runs["bench"].save(tmp_path / "here")
 
 
-@pytest.mark.parametrize(
-    "of",
-    [
-        pf.load,
-        pf.build,
-        pf.plan,
-    ],
-    ids=["Scene", "Model", "Plan"],
-)
+@pytest.mark.parametrize("of", [pf.load, pf.build, pf.plan], ids=["Scene", "Model", "Plan"])
 def test_exact_every_stage_can_be_handed_on(of, runs):
     measures = pf.run(of(RIG)).measures
     assert {name: measure_object(one) for name, one in measures.items()} == {
@@ -143,10 +131,8 @@ def test_exact_a_text_and_a_file_are_told_apart(tmp_path):
     path = tmp_path / "a[1].toml"
     path.write_text(POINT + COULOMB + STRUCTURE, "utf-8")
     assert pf.load(path).tables() == pf.load(POINT + COULOMB + STRUCTURE).tables()
-    assert (
-        pf.load(path).path == path
-        and pf.load("[normal]\nload = '1 N'\n" + BENCH[len(POINT) :]).path.name == "<text>"
-    )
+    assert pf.load(path).path == path
+    assert pf.load("[normal]\nload = '1 N'\n" + BENCH[len(POINT) :]).path.name == "<text>"
     with pytest.raises(pf.SceneError, match=r"none\.toml: cannot be read"):
         pf.load("none.toml")
     with pytest.raises(pf.SceneError, match=r"<text>:\d+: slide.file: there is no file path\.csv"):
@@ -297,10 +283,8 @@ def test_always_one_except_catches_every_failure(name):
 
 def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):
     measures = runs["bench"].measures
-    assert (
-        list(measures) == measures._ipython_key_completions_()
-        and len(measures) == len(list(measures)) > 8
-    )
+    assert list(measures) == measures._ipython_key_completions_()
+    assert len(measures) == len(list(measures)) > 8
     assert measures["loop_area"] is measures.loop_area is measures.get(
         "loop_area"
     ) and "loop_area" in dir(measures)
@@ -368,11 +352,9 @@ def test_always_what_one_prints_is_short(name, runs):
 
 def test_exact_a_result_has_what_the_contract_names(runs):
     result = runs["rig"]
-    assert (
-        isinstance(result, pf.Result)
-        and isinstance(result.outcome, pf.Outcome)
-        and result.notes == []
-    )
+    assert isinstance(result, pf.Result)
+    assert isinstance(result.outcome, pf.Outcome)
+    assert result.notes == []
     assert result.outcome.sentence in repr(result) and isinstance(result.warnings, list)
     assert {"to_xarray", "save", "plot", "measures", "outcome", "warnings", "notes"} <= set(
         dir(result)
@@ -397,18 +379,14 @@ def test_exact_a_picture_is_axes_or_the_run_lacks_it(picture, name, runs):
     draw = getattr(runs[name].plot, picture)
     if name in PICTURES[picture]:
         new = draw()
-        assert (
-            isinstance(new, Axes)
-            and new is new.figure.axes[0]
-            and new._repr_svg_().startswith("<svg")
-        )
+        assert isinstance(new, Axes)
+        assert new is new.figure.axes[0]
+        assert new._repr_svg_().startswith("<svg")
         _, mine = Figure().subplots(1, 2)
         mine.plot([0, 1], [0, 1], label="measured")
-        assert (
-            draw(ax=mine) is mine
-            and len(mine.figure.axes) == 2
-            and mine.lines[0].get_label() == "measured"
-        )
+        assert draw(ax=mine) is mine
+        assert len(mine.figure.axes) == 2
+        assert mine.lines[0].get_label() == "measured"
         assert len(mine.lines) == len(new.lines) + 1 and not hasattr(mine, "_repr_svg_")
         for here, there in zip(mine.lines[1:], new.lines, strict=True):
             np.testing.assert_array_equal(here.get_xydata(), there.get_xydata())

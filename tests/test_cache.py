@@ -17,6 +17,7 @@ import numba
 import pytest
 from limits import limited
 from scene_texts import PLASTIC, POINT, TRIANGLE
+from test_inner import CALLS, KERNELS
 
 import patchfem
 from patchfem import compiled
@@ -65,10 +66,10 @@ def slid(home: Path, cache: Path) -> dict:
     return answer
 
 
-def begun(cache: Path, before: str = "") -> subprocess.Popen:
-    """A process that slides as `slid` does, under way; before: what it runs first."""
+def begun(cache: Path, code: str = BENCH) -> subprocess.Popen:
+    """A process that slides as `slid` does, or that runs other code."""
     return subprocess.Popen(
-        [sys.executable, "-c", before + BENCH, SCENE],
+        [sys.executable, "-c", code, SCENE],
         stdout=subprocess.PIPE,
         text=True,
         env=os.environ | {"PATCHFEM_CACHE": str(cache)},
@@ -97,6 +98,8 @@ def test_exact_of_two_processes_on_an_empty_cache_one_compiles(answers):
 
 
 def test_always_another_takes_over_from_a_process_that_is_killed_while_it_compiles(tmp_path):
+    (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
+    calls = CALLS.format(tmp_path / "some_kernels.py")
     mark = tmp_path / "compiles"
     stuck = begun(
         tmp_path,
@@ -107,7 +110,8 @@ def compile_and_store(*arguments):
     pathlib.Path({str(mark)!r}).touch()
     time.sleep(600)
 machine.compile_and_store = compile_and_store
-""",
+"""
+        + calls,
     )
     end = time.monotonic() + 120
     while not mark.exists() and time.monotonic() < end:
@@ -122,13 +126,15 @@ def sleep(seconds):
     pathlib.Path({str(waits)!r}).touch()
     time.sleep(seconds)
 compiled.sleep = sleep
-""",
+"""
+        + calls,
     )
     while not waits.exists() and time.monotonic() < end:
         time.sleep(0.05)
     assert waits.exists() and other.poll() is None and not list(tmp_path.rglob("*.code"))
     stuck.kill()
-    assert json.loads(other.communicate(timeout=300)[0])["numba"] and list(tmp_path.rglob("*.code"))
+    assert other.communicate(timeout=300)[0].split()[:2] == ["6.0", "True"]
+    assert list(tmp_path.rglob("*.code"))
     stuck.communicate()
 
 
@@ -138,18 +144,8 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, plac
     first = answers[0]
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
     again = slid(home, cache)
-    codes = {path: path.read_bytes() for path in cache.rglob("*.code")}
-    assert not again["numba"] and again["said"] == [] and codes
+    assert not again["numba"] and again["said"] == []
     assert (again["work"], again["peak"]) == (first["work"], first["peak"])
-    for path in codes:  # damaged: compiled again
-        path.write_bytes(codes[path][:-1])
-    third = slid(home, cache)
-    assert (
-        third["numba"]
-        and third["said"] == []
-        and not any(path.read_bytes() == codes[path][:-1] for path in codes)
-    )
-    assert (third["work"], third["peak"]) == (first["work"], first["peak"])
 
     law = home / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
     text, count = re.subn(
@@ -178,11 +174,9 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, an
     hook.build_machine_code(home / "patchfem" / "compiled" / "generic", smallest)
     first = slid(home, tmp_path / "cache")
     native = answers[0]
-    assert (
-        not first["numba"]
-        and first["said"] == []
-        and not list((tmp_path / "cache").rglob("*.code"))
-    )
+    assert not first["numba"]
+    assert first["said"] == []
+    assert not list((tmp_path / "cache").rglob("*.code"))
     assert native["numba"] and native["said"]
     assert (first["work"], first["peak"]) == pytest.approx(
         (native["work"], native["peak"]), rel=1e-9
@@ -275,10 +269,8 @@ def wheel(folder: Path, **more) -> Path:
 def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
     bare = wheel(tmp_path / "bare")
     full = wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
-    assert (
-        bare.name.endswith("-py3-none-any.whl")
-        and not (bare.parent / "patchfem/compiled/generic").exists()
-    )
+    assert bare.name.endswith("-py3-none-any.whl")
+    assert not (bare.parent / "patchfem/compiled/generic").exists()
     assert not full.name.endswith("-any.whl")
     assert len(list((full.parent / "patchfem/compiled/generic").rglob("*.code"))) > 7
     measures = {}
@@ -423,20 +415,16 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "session"))
     found = compiled.cache_folder()
-    assert (
-        found == tmp_path / "session" / "patchfem" / compiled.compute_kernel_key()
-        and found.is_dir()
-    )
+    assert found == tmp_path / "session" / "patchfem" / compiled.compute_kernel_key()
+    assert found.is_dir()
     assert str(base) in compiled.explain_cache_folder()
     monkeypatch.delenv("XDG_RUNTIME_DIR")
     user_cache.make_process_folder.cache_clear()
     try:
         first = compiled.cache_folder()
-        assert (
-            first.is_relative_to(temporary)
-            and first.is_dir()
-            and not (temporary / "patchfem").exists()
-        )
+        assert first.is_relative_to(temporary)
+        assert first.is_dir()
+        assert not (temporary / "patchfem").exists()
         assert os.stat(user_cache.make_process_folder()).st_mode & 0o77 == 0
         assert compiled.cache_folder() == first  # the same in one process
         user_cache.make_process_folder.cache_clear()
@@ -543,8 +531,6 @@ def test_exact_what_is_said_of_a_cache_without_room():
     if compiled.IS_JIT_DISABLED:
         assert not said
     else:
-        assert (
-            "at every command" in said[0]
-            and "is the limit on the size" in said[0]
-            and "once" in said[1]
-        )
+        assert "at every command" in said[0]
+        assert "is the limit on the size" in said[0]
+        assert "once" in said[1]

@@ -5,11 +5,12 @@ import builtins
 import re
 from pathlib import Path
 
-import patchfem
+from import_graph import sources, syntax_nodes
 
-PACKAGE = Path(patchfem.__file__).parent
+ROOT = Path(__file__).parents[1]
 PARAMETER = re.compile(r"\s*\w[\w, ]* : (?P<type>.+)")
 RETURNED = re.compile(r"\s*(?P<type>_?[A-Z]\w*)( or None)?")
+DOCUMENTED = (ast.FunctionDef, ast.ClassDef, ast.Module)
 CLASS_NAME = re.compile(r"(?<![\w.\"])[A-Z][a-z]+(?:[A-Z][a-z]+)*(?![\w.\"])")
 HEADINGS = {"Parameters", "Returns", "Yields", "Raises", "Notes", "Examples", "References", "See"}
 # units, and classes of other packages that docstrings name without importing them
@@ -17,14 +18,23 @@ OTHER_NAMES = {"Pa", "Hz", "Path", "Callable", "Sequence", "Iterable", "CompileR
 OTHER_NAMES |= {"CalledProcessError", "DiscreteField", "FormExtraParams"}
 QUOTED = re.compile(r"`([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)(?:\(\))?`")
 # modules that comments name without importing them, a prefix, and columns of files that users write
-QUOTED_NAMES = {"typing", "email", "socket", "calendar", "rub_", "x_um", "amplitude_ratio_y"}
+QUOTED_NAMES = {
+    "__init__",
+    "typing",
+    "email",
+    "socket",
+    "calendar",
+    "rub_",
+    "x_um",
+    "amplitude_ratio_y",
+}
 OTHER_PACKAGES = {"scipy", "numpy", "matplotlib", "ADDING"}
 
 
-def find_definitions(tree) -> set:
+def find_definitions(nodes: tuple) -> set:
     """Return the names that a module defines or imports."""
     names = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.ClassDef):
             names.add(node.name)
         elif isinstance(node, ast.Import | ast.ImportFrom):
@@ -49,29 +59,26 @@ def find_types(docstring: str):
         before = line
 
 
-def find_unknown(trees: dict) -> list:
-    """Return (file, function, name) of the classes in docstrings that nothing defines."""
-    known = set.union(*map(find_definitions, trees.values())) | OTHER_NAMES | set(dir(builtins))
+def find_unknown(modules: dict) -> list:
+    """Return (module, function, name) of the classes in docstrings that nothing defines."""
+    known = set.union(*map(find_definitions, modules.values())) | OTHER_NAMES | set(dir(builtins))
     return [
-        (path, getattr(node, "name", "module"), name)
-        for path, tree in trees.items()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
+        (module, getattr(node, "name", "module"), name)
+        for module, nodes in modules.items()
+        for node in nodes
+        if isinstance(node, DOCUMENTED)
         for name in find_types(ast.get_docstring(node) or "")
         if name not in known
     ]
 
 
-def read_trees() -> dict:
-    """Return the syntax tree of each file of the package by its path."""
-    return {
-        str(path.relative_to(PACKAGE)): ast.parse(path.read_text("utf-8"))
-        for path in PACKAGE.rglob("*.py")
-    }
+def parse_modules() -> dict:
+    """Return the nodes of each module of the package by its dotted name."""
+    return {name: syntax_nodes(text) for name, text in sources(ROOT).items()}
 
 
 def test_always_docstrings_name_classes_that_exist():
-    assert find_unknown(read_trees()) == []
+    assert find_unknown(parse_modules()) == []
 
 
 def test_exact_an_old_name_is_found():
@@ -79,16 +86,16 @@ def test_exact_an_old_name_is_found():
         'def move(path):\n    """Move.\n\n    Parameters\n    ----------\n'
         '    path : Slide\n\n    Returns\n    -------\n    Motion or None\n    """\n'
     )
-    assert find_unknown({"a.py": ast.parse(text)}) == [
-        ("a.py", "move", "Slide"),
-        ("a.py", "move", "Motion"),
+    assert find_unknown({"a": syntax_nodes(text)}) == [
+        ("a", "move", "Slide"),
+        ("a", "move", "Motion"),
     ]
 
 
-def find_words(tree) -> set:
-    """Return the names that code of a module uses, and the words of its strings."""
+def find_words(nodes: tuple) -> set:
+    """Return the names that code of a module uses."""
     words = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             words.add(node.name)
         elif isinstance(node, ast.Name):
@@ -102,39 +109,36 @@ def find_words(tree) -> set:
     return words
 
 
-def find_unknown_quoted(trees: dict) -> list:
-    """Return (file, name) of the names in backquotes in docstrings that no code uses."""
-    known = set.union(*map(find_words, trees.values())) | QUOTED_NAMES | set(dir(builtins))
-    known |= {part.removesuffix(".py") for path in trees for part in Path(path).parts}
-    docstrings = {
-        path: [
-            ast.get_docstring(node, clean=False) or ""
-            for node in ast.walk(tree)
-            if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module)
-        ]
-        for path, tree in trees.items()
-    }
-    described = {text for texts in docstrings.values() for text in texts}
-    for tree in trees.values():
-        for node in ast.walk(tree):
+def find_unknown_quoted(modules: dict) -> list:
+    """Return (module, name) of the names in backquotes in docstrings that no code uses."""
+    known = set.union(*map(find_words, modules.values())) | QUOTED_NAMES | set(dir(builtins))
+    known |= {part for module in modules for part in module.split(".")}
+    described = set()
+    quoted = []
+    for module, nodes in modules.items():
+        for node in nodes:
+            if isinstance(node, DOCUMENTED):
+                docstring = ast.get_docstring(node, clean=False) or ""
+                described.add(docstring)
+                quoted += [(module, name) for name in QUOTED.findall(docstring)]
+    for nodes in modules.values():
+        for node in nodes:
             is_text = isinstance(node, ast.Constant) and isinstance(node.value, str)
             if is_text and node.value not in described:
                 known |= set(re.findall(r"\w+", node.value))
     return [
-        (path, name)
-        for path, texts in docstrings.items()
-        for text in texts
-        for name in QUOTED.findall(text)
+        (module, name)
+        for module, name in quoted
         if name.split(".")[0] not in OTHER_PACKAGES and not known.issuperset(name.split("."))
     ]
 
 
 def test_always_docstrings_quote_names_that_exist():
-    assert find_unknown_quoted(read_trees()) == []
+    assert find_unknown_quoted(parse_modules()) == []
 
 
 def test_exact_an_old_quoted_name_is_found():
     text = (
         'def move(path):\n    """Move along a path (`slide.old`, `path`)."""\n    return "slide"\n'
     )
-    assert find_unknown_quoted({"a.py": ast.parse(text)}) == [("a.py", "slide.old")]
+    assert find_unknown_quoted({"a": syntax_nodes(text)}) == [("a", "slide.old")]

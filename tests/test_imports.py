@@ -96,6 +96,7 @@ FOLDERS = {  # kind of scene -> its text, folders that `patchfem run` loads for 
 }
 
 
+@pytest.mark.share(0, 1, 3, 7, 8)
 @pytest.mark.parametrize("kind", FOLDERS)
 def test_exact_a_run_loads_the_folders_of_its_scene(scene, tmp_path, kind):
     """A run in a fresh process loads code of these folders of the physics and of no other."""
@@ -217,6 +218,7 @@ COMMANDS = {  # what a command does -> scene, words, modules of ours and package
 }
 
 
+@pytest.mark.share(0, 2, 3, 5, 6, 7, 10, 11)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_a_command_loads_no_more_than_it_needs(scene, tmp_path, name):
     text, words, modules, packages = COMMANDS[name]
@@ -249,6 +251,7 @@ def test_exact_little_is_loaded_before_the_command_line_answers_an_interrupt():
     assert roots <= {"patchfem", "importlib", "types", "warnings"}
 
 
+@pytest.mark.share(1, 3)
 @pytest.mark.parametrize(
     "text",
     [STRUCTURE, COULOMB_RIG, PLASTIC_RIG, RINGING],

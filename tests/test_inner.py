@@ -112,14 +112,14 @@ def test_always_kernels_are_compiled_by_it():
 
 def test_exact_calls_from_python_are_kept(tmp_path):
     """A function that compiled code alone is meant to call is compiled once, not in every process, where Python does;
-    one that allocates is told, for numba must come up for it each time."""
+    one that allocates is told, for numba must come up for it each time. Damaged code is compiled again."""
     (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
     code = CALLS.format(tmp_path / "some_kernels.py")
     environment = os.environ | {
         "PATCHFEM_CACHE": str(tmp_path),
         "NUMBA_CACHE_DIR": str(tmp_path / "numba"),
     }
-    for kept in (False, True):
+    for kept in (False, True, False):
         done = subprocess.run(
             [sys.executable, "-c", code],
             env=environment,
@@ -133,3 +133,5 @@ def test_exact_calls_from_python_are_kept(tmp_path):
             "3",
             "some_kernels.lengthened",
         ]
+        for path in tmp_path.rglob("*.code") if kept else ():
+            path.write_bytes(path.read_bytes()[:-1])

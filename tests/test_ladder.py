@@ -24,16 +24,7 @@ from patchfem.scene.text import EFFECT_KEYS
 
 HERE = Path(__file__).parents[1]
 # may know a Scene
-SCENE = (
-    "",
-    "__main__",
-    "api",
-    "commands.*",
-    "scene",
-    "scene.*",
-    "model",
-    "model.*",
-)
+SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")
 # one scene asked again with other values of its keys
 SCENE_ALSO = (
     "campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
@@ -49,28 +40,11 @@ OUTSIDE = {
     "meshio": ("mesh.files", "export.*"),
 }
 # must be read in this order
-PHYSICS = [
-    "core",
-    "mesh",
-    "surface",
-    "elasticity",
-    "contact",
-    "slip",
-    "dynamics",
-    "runs",
-]
+PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]
 ORDERED = ("dynamics", "runs", "export")  # folders with a reading order of their own
 FUNCTION_LINES = 120  # longest: a command whose options take a line each
 # these name a thing
-KNOWING = (
-    ast.Name,
-    ast.Attribute,
-    ast.alias,
-    ast.ClassDef,
-    ast.arg,
-    ast.AnnAssign,
-    *FUNCTIONS,
-)
+KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *FUNCTIONS)
 
 
 def reading_order(tree: dict, folder: str = "") -> list:
@@ -236,9 +210,9 @@ def test_exact_the_package_is_a_ladder():
 def test_exact_the_checker_sees_what_there_is():
     tree = sources(HERE)
     found = [one for name, text in tree.items() for one in imports(name, text, tree)]
-    assert (
-        len(tree) > 100 and len(reading_order(tree)) > 10 and sum(one.is_own for one in found) > 500
-    )
+    assert len(tree) > 100
+    assert len(reading_order(tree)) > 10
+    assert sum(one.is_own for one in found) > 500
     assert {"numpy", "core"} <= {one.target for one in found}
     assert any(one.is_text and one.target.endswith("kernels") for one in found)
     assert re.search(r"patchfem(\.\w+)+", tree["effects"])  # else `of_effects` looks at nothing

@@ -152,10 +152,8 @@ def test_refuses_a_damaged_file(weighing, tmp_path, damage):
     text = weighing[0].read_bytes()
     assert json.loads(text.partition(b"\n")[0])["calls"] == ["tan"]
     (tmp_path / "a.code").write_bytes(damage(text))
-    assert (
-        machine.load_file(tmp_path / "a.code") is None
-        and machine.load_file(tmp_path / "none.code") is None
-    )
+    assert machine.load_file(tmp_path / "a.code") is None
+    assert machine.load_file(tmp_path / "none.code") is None
 
 
 def test_exact_nothing_returned_and_what_was_raised(tmp_path):
@@ -172,11 +170,9 @@ def test_exact_nothing_returned_and_what_was_raised(tmp_path):
 def test_exact_yes_and_no(tmp_path):
     out = np.zeros(1)
     answer, code = kept(tmp_path / "above.code", above, 2.0, out)
-    assert (
-        answer is True is code(words_of(3.0, out))
-        and code(words_of(1.0, out)) is False
-        and out[0] == 1
-    )
+    assert answer is True is code(words_of(3.0, out))
+    assert code(words_of(1.0, out)) is False
+    assert out[0] == 1
 
 
 def test_refuses_what_numba_alone_can_run(tmp_path):

@@ -100,11 +100,9 @@ def test_exact_a_command_ends_with_its_code_and_all_it_said(scene, tmp_path, kin
         capture_output=True,
         timeout=60,
     )
-    assert (
-        done.returncode == 2
-        and f"{scene}:2: drive.kind" in done.stderr
-        and "Traceback" not in done.stderr
-    )
+    assert done.returncode == 2
+    assert f"{scene}:2: drive.kind" in done.stderr
+    assert "Traceback" not in done.stderr
     assert done.stdout == "x" * 99999 + "\n" + "of the thread\n" * (kind == "thread")
     assert (tmp_path / "end").read_text() == "of atexit"
 

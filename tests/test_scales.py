@@ -65,11 +65,7 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
             digits = len(re.sub(r"e.*|\D", "", text.split(" ")[0]).lstrip("0"))
             assert digits <= MAX_SIGNIFICANT_DIGITS and abs(said - value) <= max(
                 0.501 * last, 1e-13 * abs(value)
-            ), (
-                text,
-                value,
-                bar,
-            )
+            ), (text, value, bar)
             assert bar <= last or digits < MAX_SIGNIFICANT_DIGITS, (text, value, bar)
         assert unit == "1" or "e" not in text.split(" ")[0], text
     assert bars > 100
@@ -130,25 +126,16 @@ def test_exact_a_value_ends_where_its_error_does():
     ) == ("1", "10")
     assert round_to_error(1.2830634121, 1.3e-9) == ("1.283063", "") and round_to_error(
         1.2830634121, 3e-6
-    ) == (
-        "1.28306",
-        "",
-    )
+    ) == ("1.28306", "")
     assert round_to_error(166.07, 91.7) == ("166", "92") and round_to_error(0.0, 1e-3) == (
         "0",
         "0.001",
     )
-    assert (
-        round_to_error(2.0, None) == ("2", "")
-        and round_to_error(None) == ("-", "")
-        and round_to_error(float("inf"), 1.0) == ("inf", "")
-    )
-    assert (
-        format_number(3.16227766e-6, 6) == "3.16228e-6"
-        and format_number(1e5 / 3, 2) == "33000"
-        and format_number(1.5, 4) == "1.5"
-    )
-    assert (
-        format_quantity(0.04668, "J", 4, 1e-10) == "46.68 mJ"
-        and format_quantity(1.694e-21, "J", 4, 1e-10) == "0"
-    )
+    assert round_to_error(2.0, None) == ("2", "")
+    assert round_to_error(None) == ("-", "")
+    assert round_to_error(float("inf"), 1.0) == ("inf", "")
+    assert format_number(3.16227766e-6, 6) == "3.16228e-6"
+    assert format_number(1e5 / 3, 2) == "33000"
+    assert format_number(1.5, 4) == "1.5"
+    assert format_quantity(0.04668, "J", 4, 1e-10) == "46.68 mJ"
+    assert format_quantity(1.694e-21, "J", 4, 1e-10) == "0"

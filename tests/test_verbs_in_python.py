@@ -114,10 +114,8 @@ def test_a_report_lays_the_folders_of_a_list_side_by_side(saved, tmp_path):
     assert page == tmp_path / "both.html"
     assert all(f">{name}<" in page.read_text("utf-8") for name in ("block", "pieces"))
     alone = pf.report(one, tmp_path / "one.html").read_text("utf-8")
-    assert (
-        alone == pf.report([str(one)], out=tmp_path / "other.html").read_text("utf-8")
-        and ">pieces<" not in alone
-    )
+    assert alone == pf.report([str(one)], out=tmp_path / "other.html").read_text("utf-8")
+    assert ">pieces<" not in alone
     with pytest.raises(pf.PatchfemError, match="at least one results folder"):
         pf.report([])
 
@@ -248,11 +246,9 @@ def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatc
     (tmp_path / "other" / "notes.txt").write_text("mine", "utf-8")
     (tmp_path / "scene.toml").write_text(scene, "utf-8")
     answer = cli(words[0], "scene.toml", *words[1:], "-o", "other")
-    assert (
-        answer.code == 2
-        and "notes.txt" in answer.err
-        and (tmp_path / "other" / "notes.txt").is_file()
-    )
+    assert answer.code == 2
+    assert "notes.txt" in answer.err
+    assert (tmp_path / "other" / "notes.txt").is_file()
 
 
 @pytest.mark.parametrize(

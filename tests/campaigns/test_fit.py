@@ -308,10 +308,8 @@ def test_exact_static_and_load_are_known_by_their_product(tmp_path):
     )
     static, _, load_ = found.keys.fit.values
     assert static * load_ == pytest.approx(31, rel=5e-3)
-    assert (
-        np.isnan(found.keys.fit.intervals.ends[[0, 2]]).all()
-        and np.isfinite(found.keys.fit.intervals.ends[1]).all()
-    )
+    assert np.isnan(found.keys.fit.intervals.ends[[0, 2]]).all()
+    assert np.isfinite(found.keys.fit.intervals.ends[1]).all()
     assert any(
         "friction.static and normal.load cannot be determined separately" in text
         and "only their product is known" in text

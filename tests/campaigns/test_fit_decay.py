@@ -41,7 +41,8 @@ def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLI
 
 def test_exact_the_parameters_of_a_computed_decay_are_recovered(tmp_path):
     """Stiffness and exponent of an Iwan joint from its own curve, and the fitted scene has it."""
-    found = pf.fit(START, to=written(tmp_path / "decay.csv", IWAN), free=FREE, out=tmp_path / "out")
+    path = written(tmp_path / "decay.csv", IWAN)
+    found = pf.fit(START, to=path, free=FREE, starts=2, out=tmp_path / "out")
     values = {name: one["value"] for name, one in found["values"].items()}
     assert values["friction.stiffness"] == pytest.approx(1e6, rel=1e-5)
     assert values["friction.chi"] == pytest.approx(-0.35, abs=1e-5)
@@ -83,12 +84,10 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     written(tmp_path / "decay.csv", IWAN)
     ask = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
     assert "--hold" in cli(*ask, "--hold", "frequency=1 Hz").err
-    answer = cli(*ask, "--set", "friction.stiffness=1e6 N/m", "-o", "out")
-    assert (
-        answer.code == 0
-        and "3 amplitudes of decay.csv by balance" in answer.out
-        and "friction.chi" in answer.out
-    )
+    answer = cli(*ask, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")
+    assert answer.code == 0
+    assert "3 amplitudes of decay.csv by balance" in answer.out
+    assert "friction.chi" in answer.out
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert unheard(page) == [] and page.count("<svg") == 1 and "rms of the residual" in page
     both = tmp_path / "backbone.csv"

@@ -65,9 +65,8 @@ def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
         ("worn_area", volume / 10e-3),
     ):
         one = found[name]
-        assert (
-            one["value"] == pytest.approx(truth, rel=1e-11) and one["low"] <= truth <= one["high"]
-        )
+        assert one["value"] == pytest.approx(truth, rel=1e-11)
+        assert one["low"] <= truth <= one["high"]
     assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(
         found
     )
@@ -103,10 +102,8 @@ def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
         < track["hidden_wear"]["value"]
         < track["depth_mean"]["value"]
     )
-    assert (
-        end < 0
-        and "is a wedge that a trace within this part alone could not show" in found["verdict"]
-    )
+    assert end < 0
+    assert "is a wedge that a trace within this part alone could not show" in found["verdict"]
 
 
 def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
@@ -123,10 +120,8 @@ def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
         share = (x - x[0]) / (x[-1] - x[0])
         under = ((low[..., None] * (1 - share) + high[..., None] * share) <= depth).all(axis=-1)
         best = float(((low + high) / 2)[under].max())
-        assert (
-            best <= sum(ends) / 2 + 1e-12
-            and sum(ends) / 2 - best < 0.04 * max(depth[0], depth[-1]) + 1e-12
-        )
+        assert best <= sum(ends) / 2 + 1e-12
+        assert sum(ends) / 2 - best < 0.04 * max(depth[0], depth[-1]) + 1e-12
     assert hidden_line(x, 3.0 + x) == pytest.approx((2.0, 5.0), rel=1e-12)
     assert hidden_line(x, np.maximum(x, 0.0)) == (0.0, 0.0)
 
@@ -197,11 +192,9 @@ def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
     (runs / "empty").mkdir(exist_ok=True)
     (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
     answer = cli("compare", *(runs / name for name in names), "-o", tmp_path / "out")
-    assert (
-        answer.code == (4 if "nowhere" in names else 2)
-        and told in answer.err
-        and "Traceback" not in answer.err
-    )
+    assert answer.code == (4 if "nowhere" in names else 2)
+    assert told in answer.err
+    assert "Traceback" not in answer.err
     assert not (tmp_path / "out").exists()
 
 
@@ -213,9 +206,8 @@ def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
         ("--units", "um,um"),
     ):
         answer = cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
-        assert (
-            answer.code == 2 and f"{words[0]} can only be used for measured surfaces" in answer.err
-        )
+        assert answer.code == 2
+        assert f"{words[0]} can only be used for measured surfaces" in answer.err
         assert "leave it out" in answer.err
     (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
     answer = cli(
@@ -227,11 +219,9 @@ def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
         (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
     (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
     answer = cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
-    assert (
-        answer.code == 2
-        and "bad/result.nc: cannot be read" in answer.err
-        and "Traceback" not in answer.err
-    )
+    assert answer.code == 2
+    assert "bad/result.nc: cannot be read" in answer.err
+    assert "Traceback" not in answer.err
 
 
 def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
@@ -275,16 +265,12 @@ def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
     assert float((one.depth * one.after.surface.area).sum()) == pytest.approx(
         volume["value"], rel=1e-11
     )
-    assert (
-        one.depth.shape == (4, one.after.surface.x.size)
-        and one.depth.max() == found["worn_depth_max"]["value"]
-    )
+    assert one.depth.shape == (4, one.after.surface.x.size)
+    assert one.depth.max() == found["worn_depth_max"]["value"]
     assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
     hidden = found["hidden_wear"]["value"]
-    assert (
-        "that a scan alone could not show" in found["verdict"]
-        and 0 < hidden < found["worn_depth_mean"]["value"]
-    )
+    assert "that a scan alone could not show" in found["verdict"]
+    assert 0 < hidden < found["worn_depth_mean"]["value"]
 
 
 def test_exact_the_hidden_plane_lies_below_every_depth_and_is_the_highest():

@@ -152,10 +152,8 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
         )
     )
     found = json.loads(cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
-    assert (
-        found["verdict"] == "no change shown"
-        and "agree up to a plane" in found["worn_depth_max"]["reason"]
-    )
+    assert found["verdict"] == "no change shown"
+    assert "agree up to a plane" in found["worn_depth_max"]["reason"]
 
 
 def test_exact_python_gives_what_the_command_writes(files, compared):
@@ -188,10 +186,8 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
     files = [tmp_path / "data" / name for name in ("before.csv", "after.csv")]
     answer = cli(verb, *files, "-o", tmp_path / "data")
     assert answer.code == 2 and "not patchfem results" in answer.err
-    assert (
-        all(path.read_text() == rows for path in files)
-        and len(list((tmp_path / "data").iterdir())) == 2
-    )
+    assert all(path.read_text() == rows for path in files)
+    assert len(list((tmp_path / "data").iterdir())) == 2
 
 
 def test_exact_a_told_shift_is_a_length(files):

@@ -55,15 +55,11 @@ def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
         "message": "",
     }
     assert rows[1] == json.loads(json.dumps(alone)) | own
-    assert (
-        rows[2]["outcome"] == "failed"
-        and "nowhere.csv: there is no such file" in rows[2]["message"]
-    )
+    assert rows[2]["outcome"] == "failed"
+    assert "nowhere.csv: there is no such file" in rows[2]["message"]
     assert [row["direction"] for row in rows] == ["y", "y", "x"]
-    assert (
-        f"{table}:5: " in answer.err
-        and "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in (out / "report.html").read_text()
-    )
+    assert f"{table}:5: " in answer.err
+    assert "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in (out / "report.html").read_text()
 
 
 def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):

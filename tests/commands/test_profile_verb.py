@@ -89,10 +89,8 @@ def test_exact_json_in_si(trace, scan):
     first, second = answer["profiles"]
     assert first["file"] == str(trace) and first["kind"] == "profile" and second["kind"] == "areal"
     assert first["measures"]["Pq"]["value"] == pytest.approx(5 * UM / np.sqrt(2), rel=0.01)
-    assert (
-        set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"}
-        and first["measures"]["Pq"]["unit"] == "m"
-    )
+    assert set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"}
+    assert first["measures"]["Pq"]["unit"] == "m"
     assert first["cutoff"] is None and first["length"] == pytest.approx(4e-3)
     rows = np.random.default_rng(1).normal(0, 1, (12, 16))  # those of `scan`
     across, down = np.meshgrid(np.arange(16.0), np.arange(12.0))
@@ -142,11 +140,9 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
     assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
     assert found["high"] - found["value"] == pytest.approx(off * UM, rel=5e-3)
     assert "<h2>Mean of 3 traces</h2>" in (out / "report.html").read_text()
-    assert (
-        len(rows) == 5
-        and rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
-        and rows[1].endswith(",,")
-    )
+    assert len(rows) == 5
+    assert rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
+    assert rows[1].endswith(",,")
     # so that the next run may replace them
     assert {one.name for one in out.iterdir()} <= set(FILES)
     for k, name, parameter in (
@@ -223,7 +219,5 @@ def test_exact_the_flatness_of_the_brake_reuss_beam():
     assert answer["measures"]["Sz"]["value"] == pytest.approx(
         known["flatness_PV_um"] * UM, rel=1e-6
     )
-    assert (
-        sorted(answer["shape"]) == [54, 246]
-        and "596 of 13284 heights are missing" in answer["notes"][-1]
-    )
+    assert sorted(answer["shape"]) == [54, 246]
+    assert "596 of 13284 heights are missing" in answer["notes"][-1]

@@ -71,10 +71,8 @@ def test_exact_sweeps_side_by_side_are_one_table(swept):
     assert cli("report", swept / "first", swept / "second", "-o", page).code == 0
     data = data_of(page.read_text())
     table = rows(swept / "first") + rows(swept / "second")
-    assert (
-        data["keys"][0]["name"] == "sweep"
-        and data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
-    )
+    assert data["keys"][0]["name"] == "sweep"
+    assert data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
     np.testing.assert_allclose(
         amplitudes(data),
         [float(row["relative_displacement_amplitude"]) for row in table],

@@ -27,11 +27,9 @@ def test_exact_new_writes_what_it_prints(tmp_path):
     path = tmp_path / "mine.toml"
     assert cli("new", "joint").out == read_template("joint") == pf.new("joint")
     answer = cli("new", "joint", "-o", path)
-    assert (
-        answer.code == 0
-        and path.read_text("utf-8") == read_template("joint")
-        and f"patchfem run {path}" in answer.out
-    )
+    assert answer.code == 0
+    assert path.read_text("utf-8") == read_template("joint")
+    assert f"patchfem run {path}" in answer.out
     for kind, verb in NEXT_VERBS.items():
         assert f"patchfem {verb} " in cli("new", kind, "-o", tmp_path / f"{kind}.toml").out
         assert f"patchfem {verb} FILE" in " ".join(read_template(kind).replace("\n#", " ").split())

@@ -187,19 +187,15 @@ def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change
     assert sweep_into(out, scene, *over).code == 0
     before = {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()}
     told = sweep_into(out, scene, *(() if change[0] == "--over" else over), *change, "--resume")
-    assert (
-        told.code == 2
-        and f"out: this folder contains {why}; name another folder with -o" in told.err
-    )
+    assert told.code == 2
+    assert f"out: this folder contains {why}; name another folder with -o" in told.err
     assert {
         one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
     } == before
     # of the same keys
     told = sweep_into(out, scene, "--over", "normal.load=20 N,30 N", "--resume")
-    assert (
-        told.code == 0
-        and "note: 1 case of this folder is not among the values of this sweep" in told.err
-    )
+    assert told.code == 0
+    assert "note: 1 case of this folder is not among the values of this sweep" in told.err
     told = sweep_into(out, scene, "--over", "normal.load=10 N,20 N,30 N", "--resume")
     assert told.code == 0 and "not among" not in told.err and len(rows(out)) == 3
 
@@ -243,11 +239,7 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
     ]
     # nothing to tell
     assert sweep_into(out, scene, "--over", "friction.static=0.4", "--resume").code == 130
-    assert names(out) == {
-        "cases",
-        "chunks",
-        *(f"{name}.partial" for name in TABLES),
-    }
+    assert names(out) == {"cases", "chunks", *(f"{name}.partial" for name in TABLES)}
     computed.chunks_before_interrupt = math.inf
     assert sweep_into(out, scene, "--over", "friction.static=0.2,0.3", "--resume").code == 0
     assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
@@ -271,11 +263,9 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
         another.setattr(os, "getpid", lambda: 1)
         first = Folder(tmp_path / "a", ()).__enter__()
     answer = cli(*words)
-    assert (
-        answer.code == 4
-        and "another sweep (process 1)" in answer.err
-        and "remove the file a/.writer" in answer.err
-    )
+    assert answer.code == 4
+    assert "another sweep (process 1)" in answer.err
+    assert "remove the file a/.writer" in answer.err
     first.__exit__(None, None, None)
     assert cli(*words).code == 0
     # beyond the largest number of a process: it died
@@ -289,11 +279,9 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
     for part in ("2/4", "1/4", "4/4"):
         assert sweep_into(out, scene, *OVER, "--shard", part).code == 0
     early = sweep_into(out, scene, *OVER, "--collect")
-    assert (
-        early.code == 4
-        and "1 of 6 cases have no answer" in early.err
-        and not (out / "sweep.csv").exists()
-    )
+    assert early.code == 4
+    assert "1 of 6 cases have no answer" in early.err
+    assert not (out / "sweep.csv").exists()
     count = len(computed)
     # it is done
     assert sweep_into(out, scene, *OVER, "--shard", "2/4").code == 0 and len(computed) == count
@@ -305,10 +293,8 @@ def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
         sweep_into(out, scene, *OVER, "--collect", *words) for words in ((), ("-q",), ("--json",))
     )
     assert [one.code for one in (collected, quiet, told)] == [3] * 3
-    assert (
-        collected.out.splitlines()[1].startswith("6 cases: ")
-        and f"results: {out / 'sweep.csv'}" in collected.out
-    )
+    assert collected.out.splitlines()[1].startswith("6 cases: ")
+    assert f"results: {out / 'sweep.csv'}" in collected.out
     assert quiet.out == "" and json.loads(told.out)["cases"] == 6
     assert (out / "cases" / "0123456789abcdef").is_dir()
     assert_same_tables(out, swept[0])
@@ -381,10 +367,8 @@ def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
     answer = sweep_into(out, scene, *over, "--keep", "pages", "--no-page")
     assert answer.code == 2 and "--no-page" in answer.err
     assert sweep_into(out, scene, *over, "--collect").code == 0 and (out / page).is_file()
-    assert (
-        sweep_into(out, scene, *over, "--collect", "--no-page").code == 0
-        and not (out / page).exists()
-    )
+    assert sweep_into(out, scene, *over, "--collect", "--no-page").code == 0
+    assert not (out / page).exists()
 
 
 def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):

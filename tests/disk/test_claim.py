@@ -98,9 +98,8 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
     first = process(HOLD, lock)
     assert first.stdout.readline() == "taken\n"
     answer = cli(*words)
-    assert (
-        answer.code == 4 and f"another run (process {first.pid}) is writing to this" in answer.err
-    )
+    assert answer.code == 4
+    assert f"another run (process {first.pid}) is writing to this" in answer.err
     assert names(tmp_path) == {"scene.toml", ".out.writer"}
     first.kill()
     while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
@@ -144,11 +143,9 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
     path.write_text("4194305")
     own.release()  # what another one owns stays
     assert path.read_text() == "4194305"
-    assert (
-        read_start_ticks(os.getpid()).isdecimal()
-        and not is_running(4194305)
-        and is_running(os.getpid())
-    )
+    assert read_start_ticks(os.getpid()).isdecimal()
+    assert not is_running(4194305)
+    assert is_running(os.getpid())
 
 
 def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):

@@ -21,11 +21,7 @@ def pipe(tmp_path):
 
 def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
     # more than a pipe holds at once
-    parts = (
-        "[friction]\n",
-        "# " + "x" * 200_000 + "\n",
-        "static = 0.3\n",
-    )
+    parts = ("[friction]\n", "# " + "x" * 200_000 + "\n", "static = 0.3\n")
 
     def write():
         time.sleep(0.1)

@@ -52,10 +52,8 @@ def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_
     assert (
         answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err
     ), answer.err
-    assert (
-        "needed" in answer.err
-        and f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
-    )
+    assert "needed" in answer.err
+    assert f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
     assert [one.name for one in out.iterdir()] == ["summary.json"] and (
         out / "summary.json"
     ).read_text() == "older"
@@ -281,9 +279,8 @@ def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "FILE").write_text("")
     answer = cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
-    assert (
-        answer.code == 4 and f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
-    )
+    assert answer.code == 4
+    assert f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
 
 
 def test_always_a_name_that_is_too_long_wants_a_shorter_one(tmp_path):
@@ -298,7 +295,5 @@ def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
     answer = cli("run", tmp_path / "bench.toml")
-    assert (
-        answer.code == 4
-        and "the working folder no longer exists; change to an existing one" in answer.err
-    )
+    assert answer.code == 4
+    assert "the working folder no longer exists; change to an existing one" in answer.err

@@ -189,9 +189,9 @@ def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path):
 def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(tmp_path):
     killed("write_small(Path('out'), 6)", 47, tmp_path)
     [left] = (tmp_path / "out").iterdir()
-    assert (
-        is_partial_name(left.name) and left.name.startswith(".fields.") and left.suffix == ".vtkhdf"
-    )
+    assert is_partial_name(left.name)
+    assert left.name.startswith(".fields.")
+    assert left.suffix == ".vtkhdf"
     with h5py.File(left) as file:
         count = int(file["VTKHDF/Steps"].attrs["NSteps"])
         packed = [

@@ -116,10 +116,8 @@ def test_exact_a_script_shows_where_the_interface_sticks_and_slips(bench, tmp_pa
     _, (line, display), (clock, _) = simple.shown
     assert simple.coloured[id(display)] == ("POINTS", "status") and display.LineWidth == 6
     table = simple.tables["status"]
-    assert (
-        table.Annotations == ["0", "open", "1", "sticks", "2", "slips"]
-        and len(table.IndexedColors) == 9
-    )
+    assert table.Annotations == ["0", "open", "1", "sticks", "2", "slips"]
+    assert len(table.IndexedColors) == 9
     files = times_and_files(clock.Input)
     seen = set()
     with Series(bench) as series:

@@ -86,10 +86,8 @@ def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     assert rows["`reference_speed`"][:3] == ["velocity, > 0", "", "with law `tanh`"]
     assert rows["`breakaway`"][:2] == ["number, >= 0, <= 1", "0"]
     rows = {key: rest for key, *rest in section("`[drive]`")}
-    assert (
-        rows["`levels`"][0] == "list of accelerations, >= 0"
-        and rows["`from`"][2] == "with waveform `sweep`"
-    )
+    assert rows["`levels`"][0] == "list of accelerations, >= 0"
+    assert rows["`from`"][2] == "with waveform `sweep`"
     assert section("`[[structure.spring]]`")[0][:2] == [
         "`between`",
         "pair of whole numbers, >= 0, <= 1000000",

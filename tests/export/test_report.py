@@ -279,10 +279,8 @@ def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
     data.verdict.summary["warnings"] = [f"lower {key}"]
     data.verdict.means["stick_fraction"] = stick
     text = report.page_html(data)
-    assert (
-        text.count("<code>structure.travel</code>") == 2
-        and "as in <code>slip_amplitude</code>" in text
-    )
+    assert text.count("<code>structure.travel</code>") == 2
+    assert "as in <code>slip_amplitude</code>" in text
     for whole in (text, *(page for _, page in pages.values())):
         said = re.sub(r"(?s)<(script|style|pre)\b.*?</\1>", "", whole)
         assert "`" not in said
@@ -290,11 +288,9 @@ def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
 
 def test_always_captions_speak_of_what_the_run_has(pages):
     words = {name: captions(text) for name, (_, text) in pages.items()}
-    assert (
-        "shear" not in words["patch"]
-        and "cycle" not in words["patch"]
-        and "coating" not in words["patch"]
-    )
+    assert "shear" not in words["patch"]
+    assert "cycle" not in words["patch"]
+    assert "coating" not in words["patch"]
     assert "with their coatings" in words["rig"] and "4 instants of the last cycle" in words["rig"]
     assert "over the last 3 cycles" in words["rig"] and "only reversals were kept" in words["rig"]
     assert "instants of the run" in words["short"] and "last cycle" not in words["short"]

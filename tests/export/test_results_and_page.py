@@ -191,7 +191,5 @@ def test_exact_the_page_of_a_patch_shows_the_pieces(tmp_path):
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     assert cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert (
-        page.count("<figure") == page.count("</figure>") == 3
-        and "Both pieces with their coatings" in page
-    )
+    assert page.count("<figure") == page.count("</figure>") == 3
+    assert "Both pieces with their coatings" in page

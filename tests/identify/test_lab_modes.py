@@ -24,10 +24,8 @@ def test_exact_a_record_gives_its_modes_back_where_the_windowed_estimate_does_no
     np.testing.assert_allclose(found.damping, ZETA, rtol=1e-7)
     np.testing.assert_allclose(found.residue, RESIDUE, rtol=1e-7)
     assert estimate.segments == 15 and estimate.window == "hann" and found.misfit < 1e-8
-    assert (
-        found.estimate_damping[0] > 1.5 * ZETA[0]
-        and 0.2 < found.coherence[0] < found.coherence[1] < 1
-    )
+    assert found.estimate_damping[0] > 1.5 * ZETA[0]
+    assert 0.2 < found.coherence[0] < found.coherence[1] < 1
 
 
 def test_exact_a_blow_that_rings_out_within_the_record_needs_no_window():
@@ -111,10 +109,8 @@ def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
     )
     assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
     np.testing.assert_allclose(found.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
-    assert (
-        "widen the peak at 143 Hz" in found.notes[0]
-        and "0.004, and the value from the whole" in found.notes[0]
-    )
+    assert "widen the peak at 143 Hz" in found.notes[0]
+    assert "0.004, and the value from the whole" in found.notes[0]
 
 
 def test_exact_base_motion_determines_participations_but_no_mass():

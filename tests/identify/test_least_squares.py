@@ -41,11 +41,9 @@ def test_exact_a_linear_problem_has_the_closed_form_intervals():
     assert found.intervals.sensitivity == pytest.approx(
         10 * np.sqrt((DESIGN**2).mean(axis=0)), rel=1e-8
     )
-    assert (
-        found.intervals.methods == ("linear",) * 3
-        and found.at_bound == ("",) * 3
-        and found.intervals.unknown.shape == (0, 3)
-    )
+    assert found.intervals.methods == ("linear",) * 3
+    assert found.at_bound == ("",) * 3
+    assert found.intervals.unknown.shape == (0, 3)
     assert found.outcome is Outcome.DONE and found.agreed == 3 and describe_fit(found, "abc") == []
 
 
@@ -75,11 +73,9 @@ def test_exact_a_value_pressed_on_its_bound_has_the_profile_of_the_plane():
     pressed = rest + (0.3 - values[1]) ** 2 / free
     end = values[1] + np.sqrt(free * (pressed * (1 + student.ppf(0.975, 38) ** 2 / 38) - rest))
     found = Problem(lambda v: design @ v - data, [0, 0.3], [3, 5]).solve()
-    assert (
-        found.values[1] == 0.3
-        and found.at_bound == ("", "low")
-        and found.intervals.methods[1] == "profile"
-    )
+    assert found.values[1] == 0.3
+    assert found.at_bound == ("", "low")
+    assert found.intervals.methods[1] == "profile"
     assert found.values[0] == pytest.approx((data - 0.3 * LINE).mean(), abs=1e-7)
     assert found.intervals.ends[1] == pytest.approx(
         [0.3, end], rel=2e-3
@@ -149,10 +145,7 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
 
 def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():
     found = Problem(
-        lambda v: np.sin(v[0] * 9 * LINE) - np.sin(13.7 * 9 * LINE / 9),
-        [0.31],
-        [3],
-        start=[0.35],
+        lambda v: np.sin(v[0] * 9 * LINE) - np.sin(13.7 * 9 * LINE / 9), [0.31], [3], start=[0.35]
     ).solve()
     assert found.values[0] == pytest.approx(13.7 / 9, rel=1e-8)
 

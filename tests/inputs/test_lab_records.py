@@ -47,10 +47,8 @@ def test_exact_units_of_dataset_164_and_of_labels(tmp_path):
     assert found.values["force"] == pytest.approx(FORCE, rel=1e-14)
     assert np.array_equal(found.values["acceleration"], SLIDE * 9.80665)
     assert found.values["velocity"] == pytest.approx(SLIDE * 0.0254, rel=1e-14)
-    assert (
-        len(found.notes) == 1
-        and "'?' is not known; the unit of dataset 164 is used" in found.notes[0]
-    )
+    assert len(found.notes) == 1
+    assert "'?' is not known; the unit of dataset 164 is used" in found.notes[0]
     bare = read_records(written(tmp_path / "b.uff", [record(TIME, FORCE, 13)]), [])
     assert np.array_equal(bare.values["force"], FORCE) and "read as SI" in bare.notes[0]
 
@@ -73,10 +71,8 @@ def test_exact_channels_by_name_place_and_number(tmp_path):
             SLIDE,
         )
     turned = read_records(path, parse_requests(["displacement=lower,force=bridge [lbf]"]))
-    assert (
-        np.array_equal(turned.values["displacement"], -2 * SLIDE)
-        and "points along -x" in turned.notes[0]
-    )
+    assert np.array_equal(turned.values["displacement"], -2 * SLIDE)
+    assert "points along -x" in turned.notes[0]
     assert np.array_equal(turned.values["force"], FORCE * 4.4482216152605)
     with pytest.raises(
         PatchfemError, match=r"'bridge' has no unit; write --map \"force=CHANNEL \[N\]\""

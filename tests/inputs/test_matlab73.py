@@ -140,11 +140,9 @@ def test_exact_a_rig_of_version_73_is_that_of_version_7(tmp_path):
     new, old = (
         arrays.build_basis(arrays.read_arrays(tmp_path / f"{name}.mat")) for name in ("new", "old")
     )
-    assert (
-        new.names == old.names
-        and np.array_equal(new.omega, old.omega)
-        and np.array_equal(new.slide, old.slide)
-    )
+    assert new.names == old.names
+    assert np.array_equal(new.omega, old.omega)
+    assert np.array_equal(new.slide, old.slide)
 
 
 def test_refuses_what_unpacks_too_large_and_follows_no_links(tmp_path):

@@ -192,10 +192,8 @@ def test_exact_a_small_drive_is_met_as_a_large_one():
     assert other.floor == 1e-10 and one.floor == pytest.approx(
         1e-5 * 5e-9 * 9.80665 / (2 * np.pi * 120) ** 2, rel=1e-12
     )
-    assert (
-        error_floor(NAME, 0.0) == error_floor(NAME) == 1e-10
-        and error_floor("loop_area", 1e-12) == 1e-10
-    )
+    assert error_floor(NAME, 0.0) == error_floor(NAME) == 1e-10
+    assert error_floor("loop_area", 1e-12) == 1e-10
 
 
 def test_exact_errors_depend_on_the_kind_of_measure():

@@ -35,10 +35,7 @@ def test_exact_two_decays_are_bracketed_by_the_error():
     steady, error = settling.extrapolate_steady_amplitude(a, a)
     assert 0 < abs(steady - 1.0) < error
     # too early to tell the decays apart
-    assert settling.extrapolate_steady_amplitude(a[:6], a[:6]) == (
-        None,
-        None,
-    )
+    assert settling.extrapolate_steady_amplitude(a[:6], a[:6]) == (None, None)
 
 
 def test_always_no_estimate_without_a_shrinking_change():
@@ -228,10 +225,8 @@ def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
     done = pf.run(scene)
     steady = done.measures[f"{name}_steady"]
     assert truth.value == pytest.approx(443.852e-6, rel=2e-6) and done.outcome == "transient"
-    assert (
-        abs(steady.value - truth.value) <= steady.error + truth.error
-        and steady.error < 0.01 * truth.value
-    )
+    assert abs(steady.value - truth.value) <= steady.error + truth.error
+    assert steady.error < 0.01 * truth.value
     if cycles == 25:
         assert steady.error > 1e-3 * steady.value
         assert any(
@@ -244,15 +239,12 @@ def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
 def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_steady_amplitude():
     done = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 8.0}})
     steady = done.measures["relative_displacement_amplitude_steady"]
-    assert (
-        done.outcome == "transient"
-        and steady.value is None
-        and steady.reason == CHANGE_NOT_RESOLVED
-    )
+    assert done.outcome == "transient"
+    assert steady.value is None
+    assert steady.reason == CHANGE_NOT_RESOLVED
     later = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 200.0}})
-    assert (
-        later.outcome == "steady" and "relative_displacement_amplitude_steady" not in later.measures
-    )
+    assert later.outcome == "steady"
+    assert "relative_displacement_amplitude_steady" not in later.measures
 
 
 BELT = """\

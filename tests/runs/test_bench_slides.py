@@ -196,10 +196,8 @@ def test_exact_coulomb_breaks_away_at_its_static_friction():
     ends = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
     assert ends.size == 2 and force[ends] == pytest.approx(0.3 * load, rel=1e-14)
     assert np.delete(force, ends) == pytest.approx(0.2 * load, rel=1e-14)
-    assert (
-        run_.values["friction_ratio_peak"] == pytest.approx(0.3)
-        and run_.values["friction_ratio_end"] == 0.2
-    )
+    assert run_.values["friction_ratio_peak"] == pytest.approx(0.3)
+    assert run_.values["friction_ratio_end"] == 0.2
     assert run_.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
 
 

@@ -28,11 +28,7 @@ def motions():
     ):
         for count in (1, 2):
             yield MotionFeatures(
-                [Joint(Friction(law=law, static=0.3), soft)] * count,
-                varies,
-                yaws,
-                spring,
-                waveform,
+                [Joint(Friction(law=law, static=0.3), soft)] * count, varies, yaws, spring, waveform
             )
 
 

@@ -21,10 +21,7 @@ from patchfem.scene import loads
 BLOCKS = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\n'
 ALWAYS = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}
 # seconds of the graded meshes here: two levels finer stay affordable
-LEAST = {
-    True: 0.02,
-    False: 0.02,
-}
+LEAST = {True: 0.02, False: 0.02}
 
 
 def settings(seed: int, kind: str) -> list:

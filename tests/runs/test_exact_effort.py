@@ -69,6 +69,7 @@ def pieces(model) -> int:
     )
 
 
+@pytest.mark.share(0, 2, 4)
 @pytest.mark.parametrize(
     "text",
     [
@@ -87,13 +88,14 @@ def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
 
 
 def test_exact_a_linear_rig_under_a_drive_far_below_its_modes():
-    """A drive 14 000 times slower than the modes takes a piece for every second radian of the modes."""
-    text = MODES + YAW + SLOW.replace(FREQUENCY, "0.01 Hz")
+    """A drive 1400 times slower than the modes takes a piece for every second radian of the modes."""
+    text = MODES + YAW + SLOW.replace(FREQUENCY, "0.1 Hz")
     result = pf.run(text)
     assert result.plan.engine == "exact"
     assert costs.max_exact_seconds(result.plan.model) < 20
     w = 2 * np.pi * np.array([143.0, 129.0])
-    wanted = 5 * 9.80665 / w[0] ** 2  # the output is the first mode's alone
+    # the output is the first mode's alone
+    wanted = 5 * 9.80665 / (w[0] ** 2 - (0.2 * np.pi) ** 2)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
         wanted, rel=1e-7
     )
@@ -120,10 +122,8 @@ def test_exact_one_mode_under_a_drive_far_below_it(kinetic):
 def test_always_a_motion_that_rings_for_ever_is_left_to_the_march():
     text = MODES.replace("0.003", "0") + RUBS + SLOW.replace("5 g", "18 g")
     plan = pf.plan(text)
-    assert (
-        plan.engine == "march"
-        and costs.max_exact_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
-    )
+    assert plan.engine == "march"
+    assert costs.max_exact_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
 
 
 def test_exact_the_averaged_pressure_behind_a_damper_without_end_is_marched():

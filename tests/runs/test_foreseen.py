@@ -91,10 +91,8 @@ def test_always_the_plan_estimates_the_memory_of_the_histories(method, cycles):
     )
     assert 0.4 < (many.bytes - few.bytes) / (taken[1] - taken[0]) < 2.5
     assert any("drive.cycles sets their size" in one for one in many.verdict)
-    assert (
-        UPPER_LIMIT_NOTE in many.verdict
-        and UPPER_LIMIT_NOTE not in planned(text, "drive.cycles=50").verdict
-    )
+    assert UPPER_LIMIT_NOTE in many.verdict
+    assert UPPER_LIMIT_NOTE not in planned(text, "drive.cycles=50").verdict
 
 
 def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_the_window():

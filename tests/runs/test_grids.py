@@ -50,11 +50,9 @@ def grids_of_run(patch, tolerance) -> tuple:
 def test_exact_a_plan_counts_the_grids_of_the_run(text, tolerance, sets):
     patch = asked(text, *sets)
     found, (finest, levels) = expected_grids(patch, tolerance), grids_of_run(patch, tolerance)
-    assert (
-        found.finest == finest
-        and found.levels == levels
-        and found.points == max(n for n, _ in finest)
-    )
+    assert found.finest == finest
+    assert found.levels == levels
+    assert found.points == max(n for n, _ in finest)
 
 
 @pytest.mark.parametrize(

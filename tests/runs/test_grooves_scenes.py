@@ -278,9 +278,8 @@ def test_exact_the_books_end_with_the_sample_that_exceeds_the_travel(law):
 def test_always_a_lifted_mass_that_leaves_its_grooves_is_an_outcome(text):
     """In every engine; the moment stands in a note, no warning calls it a solve that failed."""
     found = run(text, **LEAVES)
-    assert (
-        found.outcome is Outcome.LEAVES_GROOVES and "left their grooves" in found.outcome.sentence
-    )
+    assert found.outcome is Outcome.LEAVES_GROOVES
+    assert "left their grooves" in found.outcome.sentence
     assert any("leaves the grooves at" in one for one in found.notes)
     assert not any("leaves the grooves" in one or "residual" in one for one in found.warnings)
     assert all(one.error is not None for one in found.measures.values() if one.value is not None)

@@ -178,6 +178,5 @@ def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
         r"limit of 3 s; lower drive.cycles",
     ) as told:
         run(scene, estimate=False)
-    assert (
-        float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3 and process_time() - begin < 30
-    )
+    assert float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3
+    assert process_time() - begin < 30

@@ -72,11 +72,9 @@ def test_exact_unlike_pieces_add_their_compliances_and_may_be_swapped():
     )
     for name, value in one.items():
         assert two[name] == pytest.approx(value, rel=1e-9, abs=1e-15)
-    assert (
-        a.pair.upper_grid.height == 9e-3
-        and a.pair.grid.height == 6.35e-3
-        and a.pair.upper_grid.coating_rows == 0
-    )
+    assert a.pair.upper_grid.height == 9e-3
+    assert a.pair.grid.height == 6.35e-3
+    assert a.pair.upper_grid.coating_rows == 0
     like = solved(tables=tilt)[0]
     other = solved(tables=tilt + UNLIKE.format("upper") + UNLIKE.format("lower"))[0]
     assert a.pieces.normal == pytest.approx(

@@ -26,12 +26,7 @@ import patchfem as pf
 IWAN = friction_of("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
 # of the same size as round-off
-ROUND = (
-    "energy_balance",
-    "work_check",
-    "energy_created",
-    "drift_per_cycle",
-)
+ROUND = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")
 
 
 def both(text, *sets):
@@ -59,12 +54,7 @@ def agree(exact, march, *besides):
 @pytest.mark.share(1, 3)
 @pytest.mark.parametrize(
     "sets",
-    [
-        (),
-        ("drive.cycles=20.3",),
-        ("drive.acceleration=2 g",),
-        ("structure.mode.axial.damping=3",),
-    ],
+    [(), ("drive.cycles=20.3",), ("drive.acceleration=2 g",), ("structure.mode.axial.damping=3",)],
 )
 def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
     exact, march = both(RIG, "accuracy.tolerance=1e-4", *sets)

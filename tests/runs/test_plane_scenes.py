@@ -68,10 +68,8 @@ def test_exact_one_direction_turned_or_not_is_the_engine_of_one_direction(tmp_pa
         matrices(tmp_path, name, turn)
         found[name] = run_of(tmp_path, name, NODES.format(name=name, lateral=lateral))
     line, plane, turned = found.values()
-    assert (
-        line.measures.slip_amplitude.value > 1e-4
-        and line.extra["engine"] == plane.extra["engine"] == "march"
-    )
+    assert line.measures.slip_amplitude.value > 1e-4
+    assert line.extra["engine"] == plane.extra["engine"] == "march"
     for name, one in line.measures.items():
         if one.value is not None:
             assert plane.measures[name].value == pytest.approx(
@@ -110,10 +108,7 @@ def test_exact_an_ellipse_turned_is_the_same_ellipse(tmp_path):
         npz = dict(np.load(tmp_path / f"{name}.npz"))
         mix = np.eye(4)
         # the first node's directions, so that its force is along neither axis
-        mix[:2, :2] = [
-            [0.8, -0.6],
-            [0.6, 0.8],
-        ]
+        mix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
         np.savez(tmp_path / f"{name}.npz", **{key: mix @ one @ mix.T for key, one in npz.items()})
         found.append(run_of(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
     first, second = found

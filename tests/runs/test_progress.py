@@ -41,8 +41,6 @@ def test_always_a_long_run_reports_its_progress():
     )
     shares = []
     pf.run(loads(head + drive), progress=shares.append)
-    assert (
-        sum(0.2 < share < 0.9 for share in shares) >= 1
-        and shares == sorted(shares)
-        and shares[-1] <= 1.0
-    )
+    assert sum(0.2 < share < 0.9 for share in shares) >= 1
+    assert shares == sorted(shares)
+    assert shares[-1] <= 1.0

@@ -104,6 +104,7 @@ def test_exact_what_is_foreseen_as_missed_is_missed_and_its_cure_meets_the_toler
     assert f"says     {found['sentence']}\n" in cli("plan", scene).out
 
 
+@pytest.mark.share(1, 2, 3)
 @pytest.mark.parametrize(
     "text",
     [

@@ -54,15 +54,11 @@ def test_exact_tones_on_a_linear_rig_are_the_sum_of_each():
 
 def test_exact_energies_balance_under_two_tones():
     m = pf.run(RIG | PLASTIC).measures
-    assert (
-        m["drift_per_cycle"].value is None
-        and "within their beat without any drift" in m["drift_per_cycle"].reason
-    )
-    assert (
-        m["energy_balance"].value < 1e-11
-        and m["energy_dissipated"].value > 0
-        and m["work_check"].value < 1e-9
-    )
+    assert m["drift_per_cycle"].value is None
+    assert "within their beat without any drift" in m["drift_per_cycle"].reason
+    assert m["energy_balance"].value < 1e-11
+    assert m["energy_dissipated"].value > 0
+    assert m["work_check"].value < 1e-9
 
 
 @pytest.mark.parametrize(

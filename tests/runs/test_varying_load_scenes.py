@@ -38,10 +38,8 @@ def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
         'static = 0.3\nbond_length = "1 um"', "static = 0.3"
     )
     found = result_of(text, *FEW)
-    assert (
-        found.measures["energy_balance"].value <= 1e-10
-        and found.measures["energy_created"].value == 0
-    )
+    assert found.measures["energy_balance"].value <= 1e-10
+    assert found.measures["energy_created"].value == 0
     fields = found.fields
     patch = found.patch
     load = found.response.extra["normal_load"]
@@ -95,10 +93,8 @@ def test_exact_a_rig_under_a_swinging_load(law):
 
 def test_refuses_heave_and_pitch_beside_a_point():
     message = only(POINT, "structure.mode.axial.normal=0.1")
-    assert (
-        message.startswith("--set: structure.mode.axial.normal: ")
-        and "use [contact] in place of" in message
-    )
+    assert message.startswith("--set: structure.mode.axial.normal: ")
+    assert "use [contact] in place of" in message
     assert "no exact solution exists with normal.amplitude" in only(
         POINT, *SWING, "accuracy.method=exact"
     )

@@ -62,10 +62,8 @@ def test_exact_friction_that_falls_with_wear_runs_in_exponentially(tolerance):
     depth = DEPTH * -np.expm1(-ALPHA * MU * LOAD / AREA * PATH * history["cycle"] / DEPTH)
     assert abs(volume.value - depth[-1] * AREA) <= volume.error < tolerance * volume.value
     assert history["worn_volume"] == pytest.approx(depth * AREA, rel=tolerance, abs=0)
-    assert (
-        abs(law.value - MU * (1 - depth[-1] / DEPTH)) <= law.error < tolerance * MU
-        and law.value < 0.7 * MU
-    )
+    assert abs(law.value - MU * (1 - depth[-1] / DEPTH)) <= law.error < tolerance * MU
+    assert law.value < 0.7 * MU
     loop = found.measures["loop_area"]
     assert (
         abs(loop.value - PATH * LOAD * MU * (1 - depth[-1] / DEPTH))
@@ -111,10 +109,8 @@ def test_exact_the_bond_length_changes_with_wear():
         "wear.friction.bond_length_factor=[1,0.1]",
     )
     grown = 1 - 0.9 * found.measures["worn_volume"].value / AREA / 8e-6
-    assert (
-        found.measures["bond_length"].value == pytest.approx(4e-6 * grown, rel=1e-12, abs=0)
-        and grown < 0.81
-    )
+    assert found.measures["bond_length"].value == pytest.approx(4e-6 * grown, rel=1e-12, abs=0)
+    assert grown < 0.81
     # elastic-plastic: loop 4 mu N (a - eps)
     assert found.measures["loop_area"].value == pytest.approx(
         4 * MU * LOAD * (10e-6 - 4e-6 * grown), rel=1e-3

@@ -240,9 +240,8 @@ def test_exact_what_runs_is_let_through(text, sets, kind):
 def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
     scene = loads(text, sets=sets)
     assert scene.remarks == [remark]
-    assert (
-        loads(scene.resolved()).remarks == [] and loads(scene.resolved()).tables() == scene.tables()
-    )
+    assert loads(scene.resolved()).remarks == []
+    assert loads(scene.resolved()).tables() == scene.tables()
 
 
 @pytest.mark.parametrize(

@@ -253,9 +253,8 @@ def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
     """What is advised, for one interface or several, is a scene that can run."""
     for text in (SCENE, SCENE.replace("[drive]", OTHER)):
         answer = cli("check", _written(folder, PATCH + text))
-        assert (
-            answer.code == 2 and "move [contact] into the interface that it presses" in answer.err
-        )
+        assert answer.code == 2
+        assert "move [contact] into the interface that it presses" in answer.err
         own = PATCH.replace("[contact", "[structure.interface.contact")
         for load in ('load = "50 N"\n', 'load = "9 N"\n'):
             text = text.replace(load, "")

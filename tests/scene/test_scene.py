@@ -21,10 +21,8 @@ def test_exact_rig_in_si():
     scene = loads(RIG, "folder/a.toml")
     assert (scene.kind, scene.title, scene.remarks) == ("rig", "143 Hz, 5 g", [])
     assert scene.contact.length == 0.0127 and scene.contact.load == 115.653761996773  # 26 lbf
-    assert (
-        scene.contact.coating.thickness == 0.0001524
-        and scene.contact.coating.material.young == 250e9
-    )
+    assert scene.contact.coating.thickness == 0.0001524
+    assert scene.contact.coating.material.young == 250e9
     assert scene.contact.substrate.name == "Ti-8Al-1Mo-1V" and scene.contact.tilt.angle == 1e-4
     assert scene.drive.acceleration == 49.03325 and scene.drive.cycles == 200.0
     assert scene.normal is None and scene.slide is None and scene.contact.shear is None

@@ -472,11 +472,9 @@ cycles = 2
 """
     assert "structure.interface[1].kinetic: 0.4 is larger" in only(text)
     scene = loads(text.replace("0.4", "0.2"))
-    assert (
-        scene.kind == "rig"
-        and scene.structure.masses == (1.0, 2.0)
-        and scene.structure.output_mass == 1
-    )
+    assert scene.kind == "rig"
+    assert scene.structure.masses == (1.0, 2.0)
+    assert scene.structure.output_mass == 1
     assert (scene.structure.interface[0].between, scene.structure.interface[0].kinetic) == (
         (2, 0),
         0.2,

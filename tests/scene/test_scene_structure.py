@@ -186,10 +186,8 @@ def test_exact_starts_of_a_scene():
     assert not compute_initial_state(loads(MASSES), found).z.any()
     one = driven(STRUCTURE, kind="free", displacement=1e-3)
     assert compute_initial_state(one, build_modes(one)).z.tolist() == [1e-3]
-    assert (
-        "structure.start" in scene.effect_names()
-        and loads(scene.resolved()).structure.start == scene.structure.start
-    )
+    assert "structure.start" in scene.effect_names()
+    assert loads(scene.resolved()).structure.start == scene.structure.start
 
 
 @pytest.mark.parametrize("sets, key, says", [
@@ -441,15 +439,11 @@ PUSH = '[drive]\nkind = "force"\nfrequency = "90 Hz"\nforce = "300 N"\ncycles = 
 def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode():
     """sqrt(k/m)/(2 pi) = 41.0936 Hz and c/(2 sqrt(k m)) = 0.00775 of 3 kg on 200 kN/m with 12 N s/m; one message."""
     message = only(BLOCK + COULOMB + SPRING + DAMPER + PUSH)
-    assert (
-        ": structure.masses: " in message
-        and 'moving_mass = "3 kg"' in message
-        and "[normal]" not in message
-    )
-    assert (
-        '[[structure.mode]] with frequency = "41.0936 Hz"' in message
-        and "damping = 0.00775" in message
-    )
+    assert ": structure.masses: " in message
+    assert 'moving_mass = "3 kg"' in message
+    assert "[normal]" not in message
+    assert '[[structure.mode]] with frequency = "41.0936 Hz"' in message
+    assert "damping = 0.00775" in message
     assert "its damping ratio" in only(BLOCK + COULOMB + SPRING + PUSH)
 
 

@@ -1,38 +1,15 @@
-"""Scenes to start from: each is of the kind that it says, runs as it stands and misses no tolerance."""
+"""Scenes to start from: the numbers that their comments tell (`commands/test_clean_screens.py` runs them)."""
 
 import numpy as np
 import pytest
 from scipy.linalg import eigh
 
 import patchfem as pf
-from patchfem.core import Outcome, PatchfemError
-from patchfem.scene import (
-    NEXT_VERBS,
-    TEMPLATE_DESCRIPTIONS,
-    find_shipped_scene,
-    load,
-    loads,
-    read_template,
-)
+from patchfem.core import PatchfemError
+from patchfem.scene import find_shipped_scene, load, loads, read_template
 
-ENDS = {
-    "patch": Outcome.DONE,
-    "joint": Outcome.DONE,
-    "bench": Outcome.DONE,
-    "rig": Outcome.STEADY,
-    "linear": Outcome.STEADY,
-    "wear": Outcome.DONE,
-}
 BLADE = (np.array([[1e6, -1e6], [-1e6, 6e6]]), np.diag([0.15, 0.25]))  # stiffness, mass
 FLATS = 7e7  # N/m
-
-
-@pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "wear")) for kind in ENDS]
-)
-def test_always_it_runs_without_a_warning(kind):
-    result = pf.run(loads(read_template(kind)))
-    assert result.outcome == ENDS[kind] and not result.warnings
 
 
 def test_exact_the_linear_scene_is_a_resonance_curve():
@@ -51,7 +28,6 @@ def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
     scene = loads(read_template("misalignment"))
     assert [axis.key for axis in scene.sweep] == ["contact.tilt.angle"] and scene.kind == "rig"
     assert load(find_shipped_scene()).measured is not None
-    assert set(TEMPLATE_DESCRIPTIONS) == {*ENDS, *NEXT_VERBS}
 
 
 def test_exact_the_numbers_that_the_damper_tells():
@@ -91,10 +67,8 @@ def test_exact_the_numbers_that_the_shrouds_tell():
     """Slides 0.3 sin(pi n/24); shrouds that hold are springs of friction limit over bond length."""
     text = read_template("shroud")
     for n, slide in ((2, "0.0776"), (4, "0.15"), (8, "0.2598")):
-        assert (
-            f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0")
-            and slide in text
-        )
+        assert f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0")
+        assert slide in text
     stiff = 0.3 * (2 * np.pi * 250) ** 2 + 0.2598**2 * 0.3 * 300 / 20e-6
     assert f"up to {np.sqrt(stiff / 0.3) / (2 * np.pi):.0f} Hz with held ones" in text
 

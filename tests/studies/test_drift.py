@@ -84,11 +84,9 @@ def test_exact_the_printed_law_locks_up_slowly(table):
     engine = table.engines(False, (1.0,), (0.0,))["report p = 1"]
     ends = slides(engine, (0.6, 0.4), (1.0, 1.0), 8, length=table.LENGTH) / table.LENGTH
     steps = np.diff(ends)
-    assert (
-        steps[0] == pytest.approx(0.098, abs=1e-3)
-        and np.all(steps > 0)
-        and np.all(np.diff(steps) < 0)
-    )
+    assert steps[0] == pytest.approx(0.098, abs=1e-3)
+    assert np.all(steps > 0)
+    assert np.all(np.diff(steps) < 0)
     assert steps[-1] * 8**2 == pytest.approx(0.2, abs=0.02)
 
 

@@ -63,9 +63,7 @@ def test_refuses_an_absent_peer_by_name(hertz, monkeypatch, capsys):
         monkeypatch.setenv(GETFEM, place)
         assert hertz.run(hertz.main) == 4
         message = capsys.readouterr().err
-        assert (
-            GETFEM in message
-            and place in message
-            and "getfem" in message.lower()
-            and "Traceback" not in message
-        )
+        assert GETFEM in message
+        assert place in message
+        assert "getfem" in message.lower()
+        assert "Traceback" not in message

@@ -30,7 +30,5 @@ def test_always_the_docstring_counts_what_the_list_holds(items):
         sum(one.verdict.split(":")[0] == verdict for one in items.ITEMS)
         for verdict in items.VERDICTS
     ]
-    assert (
-        counts == [71, 6, 0, 2]
-        and "79 items 71 work, 6 in part, none is missing, and of two" in items.__doc__
-    )
+    assert counts == [71, 6, 0, 2]
+    assert "79 items 71 work, 6 in part, none is missing, and of two" in items.__doc__

@@ -52,9 +52,8 @@ def test_figure_8_the_sentence(tmp_path, capsys):
     falls = figure.loop(2.0, 0.33)
     assert_contains(figure.__doc__, f"the cell shows {falls.peak:.2f}")
     assert falls.sticks > 50 > 10 > figure.loop(2.0).sticks
-    assert (
-        figure.ANSWER in capsys.readouterr().out and "load cell" in (tmp_path / "x.svg").read_text()
-    )
+    assert figure.ANSWER in capsys.readouterr().out
+    assert "load cell" in (tmp_path / "x.svg").read_text()
 
 
 def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
@@ -184,10 +183,8 @@ def test_runaways_the_sentence(tmp_path, capsys):
     aside = rows["grooves, yaw 0.30 at 150 Hz"].levels
     assert alone == tuple(sorted(alone)) and alone[0] == 5.25 and alone[3] - alone[0] == 0.5
     assert min(aside) == aside[2] == 4.0
-    assert (
-        not ways.motion("grooves", 135.0, 8.0)[0]
-        and not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
-    )
+    assert not ways.motion("grooves", 135.0, 8.0)[0]
+    assert not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
     for level, left in ((5.75, False), (6.25, True)):  # 400 cycles do not change it
         assert ways.motion("grooves, yaw 0.30", 135.0, level, **{"drive.cycles": 400})[0] == left
     assert ways.ANSWER in capsys.readouterr().out

@@ -119,9 +119,8 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
     path = 4 * (swing - 0.243e-6) * 135 * 600
     depth = 1e-14 * 26 * 4.4482216152605 / 0.0127**2 * path
     thicker = plain([values[0] * (1 + depth / 1e-6), *values[1:]], [1])
-    assert (
-        worn([*values, 2.0], few)[0][1] == pytest.approx(thicker[0][1], rel=1e-9) and depth > 1e-8
-    )
+    assert worn([*values, 2.0], few)[0][1] == pytest.approx(thicker[0][1], rel=1e-9)
+    assert depth > 1e-8
     assert np.array_equal(rows.row, rows.condition) and len(rows.conditions) == 28
 
 
@@ -130,11 +129,9 @@ def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
     """One random start of the second path at 143 Hz, and its end with each of two numbers at 0: the record is whole,
     and its scores are those of its own logarithms."""
     found = fitting.fit_rung("second path", "peak", "143", starts=1)
-    assert (
-        found["keys"][0] == "friction.static"
-        and len(found["values"]) == 4
-        and len(found["cells"][0]) == 20
-    )
+    assert found["keys"][0] == "friction.static"
+    assert len(found["values"]) == 4
+    assert len(found["cells"][0]) == 20
     assert found["valleys"]["starts"] == len(found["starts"]) == 3 and found["gain"] is None
     assert found["valleys"]["best"] == sum(
         one < 1.001 * min(found["starts"]) for one in found["starts"]
@@ -230,21 +227,16 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
         {"all": 0.235, "acceleration": 0.111, "displacement": 0.497}, abs=1e-3
     )
     assert strong[1]["acceleration"] == pytest.approx(0.090, abs=0.001)
-    assert (
-        one["rigid"]["fitted"]["all"] > 1.4 and one["patch"]["others"]["all"] > constant[0]["all"]
-    )
-    assert (
-        one["weight"]["at_bound"][1] == "low"
-        and len(one["spring"]["values"]) == len(one["path"]["values"]) == 3
-    )
+    assert one["rigid"]["fitted"]["all"] > 1.4
+    assert one["patch"]["others"]["all"] > constant[0]["all"]
+    assert one["weight"]["at_bound"][1] == "low"
+    assert len(one["spring"]["values"]) == len(one["path"]["values"]) == 3
     spring, path, root = (one[name]["others"] for name in ("spring", "path", "root"))
     assert (one["spring"]["fitted"]["all"], spring["all"]) == pytest.approx(
         (0.074, 0.166), abs=0.002
     )
-    assert (
-        spring["displacement"] < constant[0]["displacement"]
-        and spring["acceleration"] > constant[0]["acceleration"]
-    )
+    assert spring["displacement"] < constant[0]["displacement"]
+    assert spring["acceleration"] > constant[0]["acceleration"]
     for found in (path, root):
         assert all(found[kind] < constant[0][kind] for kind in table.KIND)
         assert found["displacement"] > spring["displacement"]

@@ -23,10 +23,8 @@ def test_always_a_series_goes_on_and_moves_its_repeat_less_than_it_was_read(repe
         one for one in repeats.columns() if (one[1].frequency, one[1].input) == (135, 5 * 9.80665)
     ]
     first, second = repeats.series(tmp_path, rows=short)
-    assert (
-        0 == first.before < first.depth == pytest.approx(second.before, rel=1e-12)
-        and second.depth > first.depth
-    )
+    assert 0 == first.before < first.depth == pytest.approx(second.before, rel=1e-12)
+    assert second.depth > first.depth
     ((read, model),) = repeats.pairs([first, second])
     assert read == np.log(6.5 / 8.4) and 0 < model < 0.02
 

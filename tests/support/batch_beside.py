@@ -5,16 +5,9 @@ import pytest
 
 LOOPS = ("loop_area", "equivalent_damping", "friction_work")
 # by extremes and phasors alone
-BITS = (
-    "relative_displacement_amplitude",
-    "relative_displacement_amplitude_steady",
-)
+BITS = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady")
 # of larger terms: known to their round-off
-DIFFERENCES = (
-    "drift_per_cycle",
-    "energy_balance",
-    "work_check",
-)
+DIFFERENCES = ("drift_per_cycle", "energy_balance", "work_check")
 
 
 def passed(found, case: int, name: str) -> float:

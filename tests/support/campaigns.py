@@ -44,6 +44,9 @@ KINDS = {  # name on the command line -> module and function
     "stick-together": ("sticks_together", "compare_rig"),
     "lanes": ("lane_cases", "compare_cases"),
     "decay-fits": ("decay_fits", "compare_fit"),
+    "scan-pairs": ("surface_pairs", "compare_scans"),
+    "trace-pairs": ("surface_pairs", "compare_traces"),
+    "roughness": ("roughness_coverage", "compare_trace"),
 }
 MAX_CPU_SECONDS = 60  # of one scene with its reference; a longer one is noted as failed
 SHARP_FACTOR = 5.0  # a sharp error is at most so many times the true error

@@ -45,9 +45,22 @@ def syntax_nodes(text: str) -> tuple:
             gc.enable()
 
 
-def imports(name: str, text: str, tree: dict) -> list:
+@cache
+def folders_and_modules(names: tuple) -> frozenset:
+    """Return the dotted names of all modules and of the folders that hold them."""
+    parts = [name.split(".") for name in names]
+    return frozenset(".".join(part[:k]) for part in parts for k in range(1, len(part) + 1))
+
+
+def imports(name: str, text: str, tree: dict) -> tuple:
     """List the imports of the file with the dotted name `name`; np.load("data.npz") is not an import."""
-    is_package = any(other.startswith(f"{name}.") for other in tree)
+    return _imports(name, text, tuple(tree))
+
+
+@cache
+def _imports(name: str, text: str, names: tuple) -> tuple:
+    known = folders_and_modules(names)
+    is_package = any(other.startswith(f"{name}.") for other in names)
     folder = name if is_package else name.rpartition(".")[0]
     package = [PACKAGE, *(part for part in folder.split(".") if part)]
     found = []
@@ -58,13 +71,12 @@ def imports(name: str, text: str, tree: dict) -> list:
             is_text = isinstance(node, ast.Call)
             module = f"{target}.{imported}".strip(".")
             # `from ..contact import gaps` imports a module
-            if is_own and imported and module in tree:
+            if is_own and imported and module in known and module in names:
                 target = module
                 imported = ""
-            exists = target and any(f"{other}.".startswith(f"{target}.") for other in tree)
-            if exists or not (is_text and is_own):
+            if (target and target in known) or not (is_text and is_own):
                 found.append(Import(target if is_own else head, imported, is_own, is_text))
-    return found
+    return tuple(found)
 
 
 def _imported_names(node, package: list):

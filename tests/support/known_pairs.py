@@ -30,15 +30,7 @@ KINDS = (
     "scale",
 )
 # the waves did not change
-SAME = (
-    "unworn",
-    "even",
-    "wedge",
-    "dust",
-    "mirrored",
-    "turned",
-    "elsewhere",
-)
+SAME = ("unworn", "even", "wedge", "dust", "mirrored", "turned", "elsewhere")
 RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # beside heights that are unworn
 
 

@@ -10,10 +10,7 @@ from patchfem.surface import Profile
 
 UM = 1e-6
 # the surface that both traces are cut from: pieces of it scatter as measured traces do
-LONG, FINE = (
-    4.096e-3,
-    2**13,
-)
+LONG, FINE = (4.096e-3, 2**13)
 
 
 class Pair(NamedTuple):

@@ -31,10 +31,7 @@ N_SAMPLES = 20000  # of the last cycle, at which the reference is read
 SAMPLING_DOUBT = 1e-6
 SAMPLED = ("friction_force_peak", "secant_stiffness", "equivalent_stiffness")
 # relative error of a step of the two integrations, whose difference is the doubt
-TOLERANCES = (
-    1e-11,
-    1e-12,
-)
+TOLERANCES = (1e-11, 1e-12)
 
 
 def draw_bench(seed: int) -> dict:

@@ -28,10 +28,7 @@ from patchfem.runs.patch import ladder as patches
 from patchfem.scene import loads
 
 # Largest age of a bond that counts, and half-width of the first bonds [bond lengths].
-MOST, FIRST_WIDE = (
-    25.0,
-    1e-6,
-)
+MOST, FIRST_WIDE = (25.0, 1e-6)
 FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps per cycle; parts of a step
 COMPARED = {
     "bench": (

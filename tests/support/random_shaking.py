@@ -11,11 +11,7 @@ from patchfem.response import stationary
 from patchfem.structure.noise import draw_random_record
 
 # frequency [Hz], damping ratio, duration [s]
-CASES = (
-    (100.0, 0.02, 10.0),
-    (100.0, 0.005, 30.0),
-    (40.0, 0.05, 20.0),
-)
+CASES = ((100.0, 0.02, 10.0), (100.0, 0.005, 30.0), (40.0, 0.05, 20.0))
 NAMES = (
     "relative_displacement_rms",
     "absolute_acceleration_rms",

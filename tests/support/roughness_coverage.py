@@ -1,18 +1,15 @@
-"""How many of the 90 % intervals of `profile` hold the mean of their surface, for surfaces that are not Gaussian too.
+"""Campaign `roughness`: whether the 90 % intervals of `profile` hold the mean of their surface, Gaussian or not.
 
-    python tests/support/roughness_coverage.py --seeds 5000-5099 --kinds lognormal pitted
-
-Each seed makes one trace of 2 mm at 1 um of each kind, reads every parameter of its levelled trace and of its roughness
+Each seed makes one trace of 2 mm at 1 um of one kind, reads every parameter of its levelled trace and of its roughness
 at 0.25 mm with its interval, and asks whether the interval holds the mean over OTHERS traces of the same surface, whose
-seeds start at 900 000. Printed, of each parameter: the share of intervals that hold, and the share of traces that have
-an interval. Seeds below 5000 are for making the intervals, those from 5000 on are held out.
+seeds start at 900 000. Seeds below 5000 are for making the intervals, those from 5000 on are held out.
 """
 
-import argparse
-import json
 from collections import defaultdict
+from functools import cache
 
 import numpy as np
+from campaigns import Row
 
 UM = 1e-6
 STEP, LENGTH, CUTOFF = UM, 2e-3, 250e-6
@@ -68,6 +65,7 @@ def trace(kind: str, seed: int):
     return Profile(np.arange(z.size) * STEP, z, f"{kind}-{seed}")
 
 
+@cache
 def means(kind: str) -> dict:
     """Mean of every parameter over the others, by name: no interval is worked out."""
     from patchfem.surface import BAND, Heights, level
@@ -96,52 +94,15 @@ def means(kind: str) -> dict:
     }
 
 
-def coverage(kind: str, seeds) -> dict:
-    """Name -> (share of the intervals that hold the mean, share of traces that have an interval)."""
+def compare_trace(seed: int, _folder, _earlier) -> dict:
+    """Compare the intervals of a trace with the means over the others; the kinds take turns."""
     from patchfem.surface import make_report
 
-    truth = means(kind)
-    held = defaultdict(list)
-    for seed in seeds:
-        for one in make_report(trace(kind, seed), CUTOFF).values:
-            if one.name in truth and one.value is not None:
-                held[one.name].append(
-                    None if one.low is None else one.low <= truth[one.name] <= one.high
-                )
-    return {
-        name: (
-            float(np.mean([one for one in values if one is not None] or [np.nan])),
-            sum(one is not None for one in values) / len(values),
-        )
-        for name, values in held.items()
-    }
-
-
-def main() -> None:
-    """Print a table for each kind, and write it where asked."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", default="1000-1019", help="first-last")
-    parser.add_argument("--kinds", nargs="*", default=list(KINDS), choices=list(KINDS))
-    parser.add_argument("-o", help="a JSON file for the shares")
-    asked = parser.parse_args()
-    first, last = map(int, asked.seeds.split("-"))
-    out = {kind: coverage(kind, range(first, last + 1)) for kind in asked.kinds}
-    print(f"{'':<22}" + "".join(f"{kind[:11]:>12}" for kind in out))
-    for name in next(iter(out.values())):
-        cells = [found.get(name, (np.nan, 0.0)) for found in out.values()]
-        print(
-            f"{name:<22}"
-            + "".join(
-                f"{'none':>12}" if has == 0 else f"{share:>7.2f}/{has:.2f}" for share, has in cells
-            )
-        )
-    for kind, found in out.items():
-        shares = [share for share, has in found.values() if has > 0]
-        print(f"{kind}: mean {np.mean(shares):.3f}, worst {min(shares):.2f}")
-    if asked.o:
-        with open(asked.o, "w", encoding="utf-8") as file:
-            json.dump(out, file, indent=1)
-
-
-if __name__ == "__main__":
-    main()
+    kind = sorted(KINDS)[seed % len(KINDS)]
+    truths = means(kind)
+    rows = []
+    for one in make_report(trace(kind, seed), CUTOFF).values:
+        if one.name in truths and one.low is not None:
+            middle = (one.low + one.high) / 2
+            rows.append(Row(one.name, middle, one.high - middle, 0.0, truths[one.name], 0.0))
+    return {"rows": rows, "group": kind}

@@ -12,10 +12,7 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.mesh.anymesh import MAX_SLOPE, PairMesh, TaggedMesh, build_pair
 
 # fine cells around the ends of the flat, growth of their size with the distance beyond
-NEAR, GROWTH = (
-    16,
-    0.1,
-)
+NEAR, GROWTH = (16, 0.1)
 
 
 def rounded_pair(

@@ -72,10 +72,8 @@ def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
     """A gap map in metres: 246 x 54 places, each at the height that SciPy reads there."""
     known = truth["brb_surface_data.mat"]
     scan = read_surface(data / "brb_surface_data.mat", ("m", "m"))
-    assert (
-        scan.z.shape == tuple(reversed(known["grid"]))
-        and np.isfinite(scan.z).sum() == known["finite"]
-    )
+    assert scan.z.shape == tuple(reversed(known["grid"]))
+    assert np.isfinite(scan.z).sum() == known["finite"]
     assert [scan.x[-1] - scan.x[0], scan.y[-1] - scan.y[0]] == pytest.approx(
         [known["extent_mm"][0] * 1e-3, known["extent_mm"][1] * 1e-3], rel=1e-6
     )

@@ -82,16 +82,12 @@ def test_exact_own_coordinate_where_the_trace_covers_the_patch():
     x = np.linspace(-8e-3, 20e-3, 5000)
     for how in ("auto", "own"):
         profile = place_over_patch(trace(x, x), EVEN, how)
-        assert (
-            average_at_nodes(profile, EVEN) == pytest.approx(EVEN, abs=2e-15)
-            and profile.notes == ()
-        )
+        assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN, abs=2e-15)
+        assert profile.notes == ()
         assert profile.x[0] <= -HALF < profile.x[1] and profile.x[-2] < HALF <= profile.x[-1]
     centred = place_over_patch(trace(x, x), EVEN, "centred")
-    assert (
-        average_at_nodes(centred, EVEN) == pytest.approx(EVEN + 6e-3, abs=2e-15)
-        and centred.notes == ()
-    )
+    assert average_at_nodes(centred, EVEN) == pytest.approx(EVEN + 6e-3, abs=2e-15)
+    assert centred.notes == ()
     assert np.array_equal(place_over_patch(profile, EVEN).x, profile.x)
 
 

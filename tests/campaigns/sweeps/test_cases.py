@@ -91,10 +91,8 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     chosen = SweepScene(Path("a.toml"), PATCH)
     one = cases("contact.load=1 N,2 N")
     two = cases("contact.load=1 N,3 N")
-    assert (
-        one.names(pinned)[0] == two.names(pinned)[0]
-        and one.names(chosen)[0] != two.names(chosen)[0]
-    )
+    assert one.names(pinned)[0] == two.names(pinned)[0]
+    assert one.names(chosen)[0] != two.names(chosen)[0]
     assert (
         one.names(chosen).tolist() == cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
     )
@@ -135,11 +133,9 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
         "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
     )
     some = found.spread_cases(100)
-    assert (
-        len(set(some)) == len(some)
-        and 50 < len(some) <= 100
-        and all(0 <= one < len(found) for one in some)
-    )
+    assert len(set(some)) == len(some)
+    assert 50 < len(some) <= 100
+    assert all(0 <= one < len(found) for one in some)
     for axis, size in enumerate(found.shape):
         assert {0, size - 1} <= {found.places(one)[axis] for one in some}
     assert found.spread_cases(720) == list(range(720))

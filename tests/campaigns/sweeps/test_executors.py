@@ -141,12 +141,10 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
     assert chunks.take() == [0] and chunks.record_death([0]) == [] and chunks.take() == [1]
     chunks.take()
     assert chunks.take(idle=False) is None and chunks.take() == [0] and chunks.take() is None
-    assert (
-        chunks.record_death([0]) == []
-        and chunks.take() == [0]
-        and chunks.record_death([0]) == [0]
-        and chunks.take() is None
-    )
+    assert chunks.record_death([0]) == []
+    assert chunks.take() == [0]
+    assert chunks.record_death([0]) == [0]
+    assert chunks.take() is None
 
 
 def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
@@ -159,10 +157,8 @@ def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
         lost += chunks.record_death(chunk) if 617 in chunk else []
     assert lost == [617] and [617] in tried
     fine = [chunk for chunk in tried if 617 not in chunk]
-    assert (
-        sorted(n for chunk in fine for n in chunk) == [n for n in range(1000) if n != 617]
-        and len(fine) <= 10
-    )
+    assert sorted(n for chunk in fine for n in chunk) == [n for n in range(1000) if n != 617]
+    assert len(fine) <= 10
 
 
 def test_exact_the_remaining_time_is_known_after_the_first_chunks():

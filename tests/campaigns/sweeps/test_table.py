@@ -23,11 +23,9 @@ def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
     assert cases.texts(0) == ("26 lbf", "1 mrad", "0.3", "coulomb")
     load, tilt, static, law = cases.axes
     assert load.values == (115.653761996773, 44.482216152605) and load.unit == "N"
-    assert (
-        tilt.values == (1e-3, 2e-3)
-        and static.values == (0.3, 0.3)
-        and law.values == ("coulomb", "tanh")
-    )
+    assert tilt.values == (1e-3, 2e-3)
+    assert static.values == (0.3, 0.3)
+    assert law.values == ("coulomb", "tanh")
 
 
 def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):

@@ -72,16 +72,13 @@ def test_exact_round_trip_of_a_universal_file_imported_fitted_overlaid_and_expor
     assert cli("export", tmp_path / "fit", "-o", tmp_path / "back.uff").code == 0
     found = functions(tmp_path / "back.uff")
     for name, truth, kind in (("displacement", slide, 8), ("force", force, 13)):
-        assert (
-            found[name]["data"].tobytes() == truth.tobytes()
-            and found[name]["x"].tobytes() == time.tobytes()
-        )
+        assert found[name]["data"].tobytes() == truth.tobytes()
+        assert found[name]["x"].tobytes() == time.tobytes()
         assert found[name]["ordinate_spec_data_type"] == kind and found[name]["func_type"] == 1
     measured = found["force over displacement"]
     fitted = found["fitted over displacement"]
-    assert (
-        measured["x"].tobytes() == slide.tobytes() and measured["data"].tobytes() == force.tobytes()
-    )
+    assert measured["x"].tobytes() == slide.tobytes()
+    assert measured["data"].tobytes() == force.tobytes()
     assert fitted["data"] == pytest.approx(force, abs=1e-4)
     again = cli(
         "import",
@@ -151,11 +148,9 @@ def test_exact_the_loop_over_the_slide_encloses_the_loop_area(method, tmp_path):
     assert abs(other - area["value"]) > 10 * (area["error"] + area["floor"])
     assert cli("export", tmp_path / "out", "-o", tmp_path / "a.uff", "--histories").code == 0
     loops = [one for name, one in functions(tmp_path / "a.uff").items() if " over " in name]
-    assert (
-        len(loops) == 1
-        and loops[0]["id1"] == "friction_force over slide"
-        and np.array_equal(loops[0]["x"], slide)
-    )
+    assert len(loops) == 1
+    assert loops[0]["id1"] == "friction_force over slide"
+    assert np.array_equal(loops[0]["x"], slide)
 
 
 def test_exact_counts_of_complex_and_even_functions(tmp_path):

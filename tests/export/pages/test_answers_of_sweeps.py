@@ -101,7 +101,7 @@ def drawn(tmp_path_factory):
         "--set",
         "drive.cycles=150",
         "--sobol",
-        "128",
+        "64",
         "-o",
         out / "swept",
     )
@@ -123,25 +123,20 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
         and one["low"] <= one["total"] <= one["high"]
         for one in shares
     )
-    assert (
-        "depends most on" in told["answer"]
-        and "90 % of the 128 random cases have" in told["answer"]
-    )
+    assert "depends most on" in told["answer"]
+    assert "90 % of the 64 random cases have" in told["answer"]
     page = (out / "report.html").read_text("utf-8")
-    assert (
-        "Keys that matter most" in page
-        and "Scatter of the answers" in page
-        and "<svg viewBox" in page
-    )
+    assert "Keys that matter most" in page
+    assert "Scatter of the answers" in page
+    assert "<svg viewBox" in page
     again = summarise_sweep(read_table(out)).said  # what `patchfem report` draws from the files
     head, count, *_ = answer.out.splitlines()
-    assert (
-        head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"]
-        and count == "128 cases: 128 steady"
-    )
+    assert head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"]
+    assert count == "64 cases: 64 steady"
     loops = read_table(out)["measures"]["loop_area"]["values"]
     low, _, high = summarise_sweep(read_table(out)).spread["loop_area"][1]
-    assert np.mean((loops >= low) & (loops <= high)) == pytest.approx(0.9, abs=0.02)
+    # the quantiles lie between the fourth and the fifth value from either end
+    assert np.count_nonzero((loops >= low) & (loops <= high)) == 64 - 2 * 4
 
 
 def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
@@ -444,8 +439,8 @@ def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(t
     scene.write_text(read_template("rig"), "utf-8")
     swept = [
         "drive.waveform=sweep",
-        "drive.from=140 Hz",
-        "drive.to=146 Hz",
+        "drive.from=142 Hz",
+        "drive.to=144 Hz",
         "drive.rate=1 Hz/s",
         "accuracy.method=harmonic",
     ]

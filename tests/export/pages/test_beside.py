@@ -100,11 +100,9 @@ def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
             read_run(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
         ]
     )
-    assert (
-        "There is no difference: the resolved scenes" in text
-        and "<b>2." not in text
-        and "(+2" not in text
-    )
+    assert "There is no difference: the resolved scenes" in text
+    assert "<b>2." not in text
+    assert "(+2" not in text
 
 
 @pytest.mark.share(0, 3, 6)

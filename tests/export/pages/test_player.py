@@ -266,11 +266,9 @@ def test_exact_in_a_browser_both_themes_a_narrow_window_and_paper(opened):
     light = until(shown, lambda found: found[0] == "rgb(28, 36, 48)" and found == shown())
     opened.themed(True, "")
     dark = until(shown, lambda found: found[0] == "rgb(228, 233, 239)" and found[1] > light[1] + 20)
-    assert (
-        light[0] == "rgb(28, 36, 48)"
-        and dark[0] == "rgb(228, 233, 239)"
-        and dark[1] > light[1] + 20
-    )
+    assert light[0] == "rgb(28, 36, 48)"
+    assert dark[0] == "rgb(228, 233, 239)"
+    assert dark[1] > light[1] + 20
     themed = "document.documentElement.dataset.drawn"
     assert until(lambda: opened.js(themed), "dark".__eq__) == "dark"
     opened.themed(True, "print")  # dark inks on white paper, whatever the reader's theme is

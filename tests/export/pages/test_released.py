@@ -71,10 +71,7 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     assert float(found[1]) * 1e-6 == pytest.approx(turns[1], rel=5e-3)
     assert abs(abs(float(found[3])) * 1e-6 - rest) < 5e-3 * 5e-4
     # the last may be within a hundredth of the rest
-    assert int(found[2]) in (
-        len(turns) - 2,
-        len(turns) - 1,
-    )
+    assert int(found[2]) in (len(turns) - 2, len(turns) - 1)
     assert float(found[4]) == pytest.approx(1e3 * (len(turns) - 1) / (2 * 143), rel=5e-3)
     work = stiffness * (5e-4**2 - rest**2) / 2
     assert float(found[5]) * {"mJ": 1e-3, "J": 1.0}[found[6]] == pytest.approx(work, rel=1e-3)
@@ -129,15 +126,11 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     data = RunData(SceneText("a", "", ""), Verdict({}, "", 43.0, "released"), {}, motion=motion)
     found = find_picture("history", data)
     early, last = history_charts(*found.values)[0]["marks"]
-    assert (
-        {early["kind"], last["kind"]} == {"line"}
-        and early["x"].size == 7
-        and early["x"][-1] == last["x"][0]
-    )
-    assert (
-        np.allclose(early["y"][:6], 1e6 * swing)
-        and "turning points and stops were kept" in found.caption
-    )
+    assert {early["kind"], last["kind"]} == {"line"}
+    assert early["x"].size == 7
+    assert early["x"][-1] == last["x"][0]
+    assert np.allclose(early["y"][:6], 1e6 * swing)
+    assert "turning points and stops were kept" in found.caption
     whole = draw_charts.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
     assert np.allclose(whole[:6], 1e6 * swing)
 

@@ -52,9 +52,8 @@ def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
         "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)],
     }
     law, load = data_of(page_html(table))["keys"]
-    assert (
-        law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]] and load["words"] is None
-    )
+    assert law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]]
+    assert load["words"] is None
 
 
 def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
@@ -137,9 +136,8 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
     folders = [f"cases/{case}" for case in range(n_cases)]
     text = page_html(swept_table(keys, measures, outcome=outcome, folders=folders, grid=False))
     data = data_of(text)
-    assert (
-        len(text.encode()) < 3e6 and f"{len(data['outcome'])} of {n_cases} cases are drawn" in text
-    )
+    assert len(text.encode()) < 3e6
+    assert f"{len(data['outcome'])} of {n_cases} cases are drawn" in text
     cases = [int(link.removeprefix("cases/")) for link in data["links"]]
     assert len(set(cases)) == len(cases) > 1000 and (cases[0], cases[-1]) == (0, n_cases - 1)
     assert data["outcome"] == [outcome[case] for case in cases] and not data["whole"]
@@ -513,11 +511,9 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
         ],
     )
     wide = chromium.opened(text, 1400)
-    assert (
-        wide.js(HIDDEN) == []
-        and wide.js(DOUBLE) == 0
-        and wide.js("document.body.scrollWidth") <= 1400
-    )
+    assert wide.js(HIDDEN) == []
+    assert wide.js(DOUBLE) == 0
+    assert wide.js("document.body.scrollWidth") <= 1400
     narrow = chromium.opened(text, 420)
     assert [one for one in narrow.js(HIDDEN) if not one.startswith("contact.tilt.angle")] == []
     assert narrow.js(DOUBLE) == 0 and narrow.js("document.documentElement.scrollWidth") <= 420

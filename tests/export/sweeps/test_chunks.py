@@ -142,9 +142,8 @@ def test_exact_a_sweep_of_columns_has_the_rows_of_one_with_summaries(swept, scen
         list(csv.DictReader(open(place / "sweep.csv", encoding="utf-8", newline="")))
         for place in (swept, tmp_path / "a")
     )
-    assert (
-        len(own) == 110 and [one | {"case": row["case"]} for one, row in zip(own, other)] == other
-    )
+    assert len(own) == 110
+    assert [one | {"case": row["case"]} for one, row in zip(own, other)] == other
     assert sum(one.stat().st_size for one in (swept / "chunks").iterdir()) < 600 * 110
 
 
@@ -224,10 +223,8 @@ def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monk
     total.measure("loop_area", "J")
     assert isinstance(total.values["loop_area"], kept.ArrayOnDisk)
     total.values["loop_area"][[3, 5]] = 1.5, 2.5
-    assert (
-        total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5]
-        and np.isnan(total.values["loop_area"]).sum() == 9
-    )
+    assert total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5]
+    assert np.isnan(total.values["loop_area"]).sum() == 9
     assert (
         np.asarray(total.values["loop_area"].reshape((11, 1))).shape
         == (11, 1)

@@ -10,22 +10,11 @@ from lane_cases import LAWS, SCENE, draw_points, rows
 from patchfem.api import build, get_base_scene, load, run_many
 from patchfem.runs import CaseResults
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.lumped import (
-    lane_check,
-    lane_numbers,
-    lane_refinement,
-    lane_runs,
-    lumped,
-)
+from patchfem.runs.batch.lumped import lane_check, lane_numbers, lane_refinement, lane_runs, lumped
 from patchfem.scene import format_assignments
 
 # beside others, without an exact batch, stand single runs
-EXACT = (
-    "coulomb",
-    "weakening",
-    "elastic-plastic",
-    "iwan",
-)
+EXACT = ("coulomb", "weakening", "elastic-plastic", "iwan")
 
 
 def models(law: str, seed: int, count: int) -> list:
@@ -208,6 +197,5 @@ def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():
     cases = models("lugre", 5, 3)
     found = CaseResults.blank(3)
     found.measure("equivalent_damping", "1")
-    assert (
-        "loop_area" not in found.values and not lane_refinement.has_large_error(cases, found).any()
-    )
+    assert "loop_area" not in found.values
+    assert not lane_refinement.has_large_error(cases, found).any()

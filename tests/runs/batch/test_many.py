@@ -40,10 +40,8 @@ def same(found: CaseResults, case: int, single) -> None:
         got = found.values[name][case], found.errors[name][case], found.floors[name][case]
         want = [np.nan if part is None else part for part in (one.value, one.error, one.floor)]
         np.testing.assert_array_equal(got, want, name)
-        assert (
-            found.units[name] == one.unit
-            and found.reasons.get(name, {}).get(case, "") == one.reason
-        )
+        assert found.units[name] == one.unit
+        assert found.reasons.get(name, {}).get(case, "") == one.reason
 
 
 def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
@@ -57,10 +55,8 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
     for case, text in zip((0, 2, 3, 4), texts):
         single = pf.run(text)
         same(found, case, single)
-        assert (
-            found.warnings.get(case, []) == single.warnings
-            and found.notes.get(case, []) == single.notes
-        )
+        assert found.warnings.get(case, []) == single.warnings
+        assert found.notes.get(case, []) == single.notes
         assert found.numerics[case]["engine"] == single.extra["engine"]
 
 

@@ -40,10 +40,7 @@ def changed(*pairs) -> str:
 
 
 # digits of the larger terms they are parts of
-LAST = {
-    "acceleration_distortion": 1e-13,
-    "drift_per_cycle": 1e-16,
-}
+LAST = {"acceleration_distortion": 1e-13, "drift_per_cycle": 1e-16}
 KINDS = {
     "wear": RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n',
     "two modes": POINT + COULOMB + MODE + SECOND + DRIVE,

@@ -62,10 +62,7 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
     yield (at, model)
     for key, name in attributes_by_key(model).items():
         # it has the tables of [contact]
-        if _is_table(model, name) and (model, name) != (
-            Interface,
-            "contact",
-        ):
+        if _is_table(model, name) and (model, name) != (Interface, "contact"):
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
             yield from tables(find_inner_table(model, name), f"[[{path}]]" if many else f"[{path}]")

@@ -107,11 +107,7 @@ infinite; any computed value of this peak would depend on the mesh.
 METHOD_COLUMNS = tuple(
     Beside(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
 )
-TABLES = (
-    ("Laws in a rig", RIGS),
-    ("Laws in a rig, continued", MORE),
-    ("Laws on a bench", BENCHES),
-)
+TABLES = (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on a bench", BENCHES))
 
 
 def text() -> str:

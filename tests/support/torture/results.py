@@ -8,10 +8,7 @@ from .trial import Trial, Wrong, strict
 
 BALANCE = 1e-8  # share of the work beyond which no run may end as settled
 # a border of the drive has no slide, a level may lack a measure: marked as missing
-MISSING = (
-    "event_slide",
-    "level_",
-)
+MISSING = ("event_slide", "level_")
 
 
 def whole(folder: Path) -> dict:

@@ -51,10 +51,8 @@ def test_exact_the_headline_names_the_order_first(share):
         EXCHANGED
     ) == (share > 0)
     if share:
-        assert (
-            compose_verdict([back])[0] == f"{EXCHANGED}; as given: increased"
-            and back.worn.mean.value is None
-        )
+        assert compose_verdict([back])[0] == f"{EXCHANGED}; as given: increased"
+        assert back.worn.mean.value is None
 
 
 def test_always_a_flat_floor_is_no_reason_to_exchange():

@@ -8,7 +8,6 @@ import re
 import known_pairs
 import numpy as np
 import pytest
-import trace_pairs
 from pairs import UM
 from worn_kinds import made
 
@@ -126,9 +125,9 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
         (abs(tilt.value) + (tilt.high - tilt.low) / 2) * length / 2, rel=1e-9
     )
     text = compose_verdict([one])[1][0]
-    assert (
-        "at most" not in text and "Uniform wear of any depth" in text and "reference mark" in text
-    )
+    assert "at most" not in text
+    assert "Uniform wear of any depth" in text
+    assert "reference mark" in text
     found = re.search(
         r"([\d.]+) urad(?: at the upper end of its interval\)| between the traces) may hide a mean "
         r"worn depth of up to ([\d.]+) ([un])m",
@@ -154,10 +153,8 @@ def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
         for keep in (False, True)
     )
     assert one.removed == (int(left.missing.sum()), 0) and kept.removed == (0, 0)
-    assert (
-        one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02)
-        and kept.worn.largest.value > 100 * UM
-    )
+    assert one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02)
+    assert kept.worn.largest.value > 100 * UM
 
 
 @pytest.mark.parametrize("shape", ["speck", "hollow", "grown"])
@@ -180,18 +177,6 @@ def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
     )
     assert one.removed[shape != "speck"] >= 8
     assert one.worn.largest.low <= pair.worn.max() <= one.worn.largest.high
-
-
-def test_two_places_with_similar_saw_teeth_have_no_depth():
-    """Three quarters of the heights agree within 30 % of the rms height, after a stretch of 0.5 %."""
-    pair = trace_pairs.draw_pair("elsewhere", 6)
-    traces = (
-        Profile(frozen_array(x), frozen_array(z), name)
-        for (x, z), name in ((pair.before, "before"), (pair.after, "after"))
-    )
-    one = compare_traces(*traces)
-    assert one.basis == ""
-    assert one.worn.mean.value is None
 
 
 @pytest.mark.parametrize("kind, seed", [("edge", 60), ("edge", 61), ("groove", 60)])

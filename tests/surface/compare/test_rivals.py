@@ -85,14 +85,10 @@ def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
     """The headline said that material grew."""
     found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 20))
     headline, said = compose_verdict([found])
-    assert (
-        headline.startswith("a scar or material that grew at the ends")
-        and found.worn.area.value is None
-    )
-    assert (
-        "of material grew at the ends" in said[0]
-        and "or the ends are unworn and in a scar" in said[0]
-    )
+    assert headline.startswith("a scar or material that grew at the ends")
+    assert found.worn.area.value is None
+    assert "of material grew at the ends" in said[0]
+    assert "or the ends are unworn and in a scar" in said[0]
     line = found.alignment.rival
     assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
 

@@ -61,10 +61,7 @@ def test_exact_without_noise_the_depth_and_the_place():
     on = p.after.x[p.worn > 0]
     assert worn.largest.value == pytest.approx(p.worn.max(), abs=1e-4 * UM)
     # between the last unworn sample and the first worn one
-    ends = [
-        on[0] - UM / 2,
-        on[-1] + UM / 2,
-    ]
+    ends = [on[0] - UM / 2, on[-1] + UM / 2]
     assert [one.value for one in worn.extent.after] == pytest.approx(ends, abs=1e-12)
     moved = [place - p.shift for place in ends]
     assert [one.value for one in worn.extent.before] == pytest.approx(moved, abs=1e-3 * UM)

@@ -14,11 +14,7 @@ from patchfem.surface.compare.section import noise_threshold
 from patchfem.surface.compare.verdict import compose_verdict
 
 # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011
-RIDGE, COUNT, HELD_OUT = (
-    60.0,
-    2401,
-    41000,
-)
+RIDGE, COUNT, HELD_OUT = (60.0, 2401, 41000)
 SHAPES = {
     "band": (lambda t: np.ones(t.size), 1.0, 1.0),
     "parabola": (lambda t: 1 - t**2, 2 / 3, 26 / 27),
@@ -244,6 +240,7 @@ def shares(seeds, deep: float) -> dict:
     return {name: float(np.mean(each)) for name, each in held.items()}
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("deep", [1.0, 3.0])
 def test_always_intervals_of_a_rounded_track_hold_its_sizes(deep):
     """Of 60 such tracks 3 um deep 41 intervals held the mean depth and 40 the width: a step could stand within the

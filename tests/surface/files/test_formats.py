@@ -393,10 +393,8 @@ def test_always_a_fault_of_the_library_ends_with_its_process(tmp_path, monkeypat
         with pytest.raises(PatchfemError, match=said):
             read(tmp_path, data, name)
     found = read(tmp_path, data, "good.opdx")
-    assert (
-        found.z == pytest.approx(np.array([[7e-9, 0.0, 0.0], [1.0, 1.0, 2.0]]))
-        and found.x[1] == 1.0
-    )
+    assert found.z == pytest.approx(np.array([[7e-9, 0.0, 0.0], [1.0, 1.0, 2.0]]))
+    assert found.x[1] == 1.0
     assert "read as  by SurfaceTopography 1.2" in found.notes[0]
     monkeypatch.setattr(instruments, "MAX_SECONDS", 0.5)
     with pytest.raises(

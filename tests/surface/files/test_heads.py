@@ -256,9 +256,8 @@ def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
     is_scan(found, (0.8e-6, 0.8e-6), z * 1e-9)
     sized = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
     is_scan(sized, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert (
-        len(sized.notes) == 2 and "the pixel size that you gave, 0.8 um, is used" in sized.notes[0]
-    )
+    assert len(sized.notes) == 2
+    assert "the pixel size that you gave, 0.8 um, is used" in sized.notes[0]
     for text, units, said in (
         (PAIRS, ("0.8 um", "nm"), "is a pixel size, which is needed only for a matrix"),
         (rows, ("-1 um", "nm"), "unknown unit '-1 um'"),
@@ -409,10 +408,8 @@ def test_exact_a_spike_as_tall_as_the_scan_is_long_is_told_and_kept(tmp_path):
     rows = "\n".join(" ".join(repr(float(one)) for one in row) for row in z)
     found = read(tmp_path, f"# Width: 30 um\n# Height: 20 um\n# Value units: m\n{rows}")
     assert found.z == pytest.approx(z, rel=1e-14)
-    assert (
-        len(found.notes) == 1
-        and "nm without the 6 highest and the 6 lowest of 600; write " in found.notes[0]
-    )
+    assert len(found.notes) == 1
+    assert "nm without the 6 highest and the 6 lowest of 600; write " in found.notes[0]
     with pytest.raises(PatchfemError, match="is the unit of z right"):  # not one of them but all
         read(
             tmp_path,

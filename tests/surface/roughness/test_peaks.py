@@ -176,12 +176,10 @@ def test_exact_the_three_ways_to_tell_peaks_are_one(tmp_path, monkeypatch):
         stiff[1], rel=1e-12
     )
     said = [" ".join(note for note in run.extra["notes"] if "Persson" in note) for run in runs]
-    assert (
-        "every second sample" in said[0]
-        and "every second" not in said[1]
-        and said[1]
-        and not said[2]
-    )
+    assert "every second sample" in said[0]
+    assert "every second" not in said[1]
+    assert said[1]
+    assert not said[2]
     assert any("Persson" in text for text in pf.plan(pasted).verdict)
     runs[0].save(tmp_path / "out/first")
     (tmp_path / "again.toml").write_text((tmp_path / "out/first/scene.resolved.toml").read_text())
@@ -316,10 +314,8 @@ def test_profile_prints_the_peaks_below_its_cutoff_and_they_paste_to_the_same_pa
     assert told["asperities"]["rms_height"] == pytest.approx(
         told["measures"]["Rq"]["value"], rel=1e-9
     )
-    assert (
-        told["asperities"]["cutoff"] == 0.4e-3
-        and "only waves below the cut-off of 400 um" in said.out
-    )
+    assert told["asperities"]["cutoff"] == 0.4e-3
+    assert "only waves below the cut-off of 400 um" in said.out
     assert told["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
     bare = cli("profile", "trace.csv").out
     assert "cutoff =" not in bare and "otherwise the long waves count twice" in bare

@@ -115,10 +115,8 @@ def test_exact_a_scan_that_is_mirrored_or_turned_over_has_the_same_volume(
     assert other.values["worn_volume"].value == pytest.approx(
         worn.values["worn_volume"].value, rel=1e-6
     )
-    assert (
-        mirrored in change.describe_change(other)[0]
-        and ("turned over" in change.describe_variant(other)) == turned
-    )
+    assert mirrored in change.describe_change(other)[0]
+    assert ("turned over" in change.describe_variant(other)) == turned
 
 
 @pytest.mark.slow
@@ -126,10 +124,8 @@ def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
     scan = grooved[1]
     half = Areal(scan.x, scan.y, scan.z[::-1, ::-1], scan.source)
     found = change.compare_scans(grooved[0], half)
-    assert (
-        abs(abs(found.registration["rotation"].value) - np.pi) < 0.04
-        and not found.alignment.placement.mirrored
-    )
+    assert abs(abs(found.registration["rotation"].value) - np.pi) < 0.04
+    assert not found.alignment.placement.mirrored
     assert found.values["worn_volume"].value == pytest.approx(
         worn.values["worn_volume"].value, rel=1e-6
     )
@@ -154,10 +150,8 @@ def test_always_files_in_the_wrong_order_are_named(grooved):
 @pytest.mark.slow
 def test_always_two_places_have_no_depth(grooved):
     found = change.compare_scans(grooved[0], scans(groove, seed=5)[1])
-    assert (
-        change.find_headline(found) == change.ELSEWHERE
-        and found.values["worn_volume"].value is None
-    )
+    assert change.find_headline(found) == change.ELSEWHERE
+    assert found.values["worn_volume"].value is None
     assert found.registration["shift_x"].reason
 
 
@@ -204,10 +198,8 @@ def test_always_a_noisy_height_between_holes_is_no_growth():
     z[98:103, 98:103] = after.z[98:103, 98:103]
     z[100, 100] += 1e-7
     found = change.compare_scans(before, replace(after, z=z))
-    assert (
-        found.volumes.values["grown_volume"].low == 0.0
-        and change.find_headline(found) == change.NONE
-    )
+    assert found.volumes.values["grown_volume"].low == 0.0
+    assert change.find_headline(found) == change.NONE
 
 
 def test_exact_single_holes_are_bridged_to_the_fourth_order():
@@ -281,10 +273,8 @@ def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
     assert answer.code == 0 and answer.out.startswith(
         "no wear shown\n  The heights of both scans are the same"
     )
-    assert (
-        "Another part" not in answer.out
-        and "<title>scan.x3p and scan.x3p" in (tmp_path / "out" / "report.html").read_text()
-    )
+    assert "Another part" not in answer.out
+    assert "<title>scan.x3p and scan.x3p" in (tmp_path / "out" / "report.html").read_text()
     assert {one.name for one in (tmp_path / "out").iterdir()} <= set(FILES)
     assert (
         "a shift can be given only for traces" in cli("compare", file, file, "--shift", "0 mm").err

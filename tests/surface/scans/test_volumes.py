@@ -33,19 +33,20 @@ def test_always_a_pit_whose_steep_wall_is_missing_has_its_volume_in_the_interval
     assert found.high - found.value > 0.1 * truth  # the noise of the depths alone gives 1 %
 
 
+@pytest.mark.parametrize("count", [12, pytest.param(40, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("sigma", [0.0, 4.0])
-def test_always_the_interval_of_a_volume_follows_the_correlation_of_the_noise(sigma):
+def test_always_the_interval_of_a_volume_follows_the_correlation_of_the_noise(sigma, count):
     """Of 40 grooves under white noise, and noise that is alike over 10 heights, 95 % have their volume inside."""
     truth = float(GROOVE.sum()) * STEP**2
     held = 0
     widths = []
-    for seed in range(40):
+    for seed in range(count):
         found = measure_volumes(aligned(noisy(GROOVE, seed, sigma), NOISE), AXIS, AXIS).values[
             "worn_volume"
         ]
         held += found.low <= truth <= found.high
         widths.append((found.high - found.low) / truth)
-    assert held >= 36
+    assert held >= 0.9 * count
     assert (np.median(widths) < 0.01) == (sigma == 0.0)
 
 
