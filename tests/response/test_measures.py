@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from test_loops import evenly
 
 from patchfem.core import G_N, Response, SineDrive
 from patchfem.dynamics.cycles import find_hermite_extremes
@@ -13,12 +14,6 @@ from patchfem.response import measures
 
 OMEGA = 2 * pi * 143
 DRIVE = SineDrive(5 * G_N, OMEGA)
-
-
-def cycles_of(count, steps):
-    """(time, drive phase) of `count` whole cycles with both ends."""
-    phase = 2 * pi * np.arange(count * steps + 1) / steps
-    return phase / OMEGA, phase
 
 
 def response(time, slip=None, slide=None, force=None, acceleration=None):
@@ -49,7 +44,7 @@ def response(time, slip=None, slide=None, force=None, acceleration=None):
 def test_exact_slip_with_pauses(floor):
     """Slip speed sign(sin) max(|sin| - c, 0) of a slide with speed sin: half of it is slip where |sin| = 2 c."""
     steps = 8000
-    time, _ = cycles_of(4, steps)
+    time, _ = evenly(4, steps)
     start = asin(floor)
 
     def stroke(phase):
@@ -69,7 +64,7 @@ def test_exact_slip_with_pauses(floor):
 
 
 def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
-    time, _ = cycles_of(2, 100)
+    time, _ = evenly(2, 100)
     still = measures.compute_slip_measures(response(time), DRIVE, 100)
     assert still == {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     steady = measures.compute_slip_measures(
@@ -102,7 +97,7 @@ def test_order_acceleration_peak_between_samples(shift):
     errors = []
     steps = (50, 100, 200)
     for count in steps:
-        time, phase = cycles_of(2, count)
+        time, phase = evenly(2, count)
         top = (7 + shift) * 2 * pi / count
         found = measures.compute_acceleration_peak(
             response(time, acceleration=-7 * np.cos(phase - top))
@@ -143,7 +138,7 @@ def test_exact_window_amplitudes():
 def test_order_extremes_of_a_sine():
     errors = []
     for steps in (20, 40, 80):
-        _, phase = cycles_of(1, steps)
+        _, phase = evenly(1, steps)
         at = phase + 0.35 * 2 * pi / steps
         low, high = find_hermite_extremes(np.sin(at), np.cos(at), 2 * pi / steps)
         errors.append(max(abs(high - 1), abs(low + 1)))

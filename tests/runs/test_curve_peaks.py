@@ -6,6 +6,7 @@ frequency. The seeds from 71_000_000 on were drawn for no other use.
 
 import numpy as np
 import pytest
+from motion_scenes import draw_log_uniform
 from scipy.optimize import minimize_scalar
 
 import patchfem as pf
@@ -24,22 +25,18 @@ MAIN = (
 )
 
 
-def wide(r, low, high):
-    return float(np.exp(r.uniform(np.log(low), np.log(high))))
-
-
 def scene(seed: int) -> tuple:
     """(law, text without a drive, low and high end of the sweep [Hz], force [N]) of a random rig of 1 to 3 modes under
     a force, or of a chain of three masses of which the last one rubs."""
     r = np.random.default_rng(seed)
     law = LAWS[seed % len(LAWS)]
-    own = wide(r, 60, 300)
-    mass = wide(r, 0.2, 2)
-    force = wide(r, 0.5, 50)
-    damping = wide(r, 2e-3, 2e-2)
+    own = draw_log_uniform(r, 60, 300)
+    mass = draw_log_uniform(r, 0.2, 2)
+    force = draw_log_uniform(r, 0.5, 50)
+    damping = draw_log_uniform(r, 2e-3, 2e-2)
     reach = force / (mass * (2 * np.pi * own) ** 2 * 2 * damping)
-    limit = force * wide(r, 0.05, 3.0)
-    slips = f"{reach * wide(r, 0.003, 0.3)!r} m"
+    limit = force * draw_log_uniform(r, 0.05, 3.0)
+    slips = f"{reach * draw_log_uniform(r, 0.003, 0.3)!r} m"
     if law == "chain":
         k = mass * (2 * np.pi * own) ** 2
         masses = ", ".join(f'"{mass * r.uniform(0.3, 2)!r} kg"' for _ in range(3))
@@ -63,7 +60,7 @@ def scene(seed: int) -> tuple:
             f"output = {1.0 if n == 0 else r.uniform(-1, 1)!r}\n" + "base = 1.0\n" * (n == 0)
         )
     if law != "none":
-        stiff = f'stiffness = "{limit / reach * wide(r, 1, 30)!r} N/m"\n'
+        stiff = f'stiffness = "{limit / reach * draw_log_uniform(r, 1, 30)!r} N/m"\n'
         keys = {
             "coulomb": "",
             "elastic-plastic": f'bond_length = "{slips}"\n',

@@ -31,7 +31,10 @@ def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
 
 
 def test_exact_the_numbers_that_the_damper_tells():
-    """Free and held frequency of two masses, the load of two flats of a wedge, the amplitude at the held resonance."""
+    """Free and held frequency of two masses, the load of two flats of a wedge.
+
+    The resonance with held platforms is that of `runs/test_curve_peaks.py`.
+    """
     text = read_template("damper")
     free, held = (
         np.sqrt(eigh(BLADE[0] + np.diag([0, k]), BLADE[1])[0][0]) / (2 * np.pi)
@@ -40,9 +43,10 @@ def test_exact_the_numbers_that_the_damper_tells():
     flats = 2 * 3e-3 * 0.3 * (10000 * np.pi / 30) ** 2 / (2 * np.sin(np.pi / 3))
     assert f"has {free:.0f} Hz with free platforms and {held:.0f} Hz with ones that stick" in text
     assert round(flats, -1) == 1140 and round(flats / 4) == 285
-    for pressed, place in (("1 N", free), ("100 kN", held)):
-        found = pf.run(loads(damper()), **{"structure.interface[1].load": pressed}).measures
-        assert abs(found["peak_frequency"].value - place) < found["peak_frequency"].error + 0.2
+    peak = pf.run(loads(damper()), **{"structure.interface[1].load": "1 N"}).measures[
+        "peak_frequency"
+    ]
+    assert abs(peak.value - free) < peak.error + 0.2
 
 
 def damper() -> str:

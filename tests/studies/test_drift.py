@@ -3,14 +3,11 @@
 import friction_forms
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study_fixture
 
 from patchfem.friction import FirstOrderBonds
 
-
-@pytest.fixture(scope="module")
-def table():
-    return study("drift/drift_table.py")
+table = study_fixture("drift/drift_table.py")
 
 
 def test_exact_drift_of_the_stretch_is_the_closed_form(table):

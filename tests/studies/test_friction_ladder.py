@@ -4,19 +4,14 @@ import friction_forms
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from study_module import study
+from study_module import study, study_fixture
 
 from patchfem.friction import FirstOrderBonds
 
-
-@pytest.fixture(scope="module")
-def table():
-    return study("friction_ladder/ladder.py")
+table = study_fixture("friction_ladder/ladder.py")
 
 
-@pytest.fixture(scope="module")
-def ladder():
-    return study("friction_ladder/ladder_cycles.py")
+ladder = study_fixture("friction_ladder/ladder_cycles.py")
 
 
 @pytest.fixture(scope="module")

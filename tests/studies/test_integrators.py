@@ -6,14 +6,11 @@ import sys
 import numpy as np
 import pytest
 from report_methods import accepted_force_error
-from study_module import study
+from study_module import study_fixture
 
 from patchfem.core import Missing
 
-
-@pytest.fixture(scope="module")
-def failure():
-    return study("integrators/failure.py")
+failure = study_fixture("integrators/failure.py")
 
 
 def test_exact_two_masses_by_the_event_engine(failure):
@@ -63,9 +60,7 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     assert "Newmark" in capsys.readouterr().out
 
 
-@pytest.fixture(scope="module")
-def work():
-    return study("integrators/work_precision.py")
+work = study_fixture("integrators/work_precision.py")
 
 
 @pytest.fixture(scope="module")

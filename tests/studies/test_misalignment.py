@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study, study_fixture
 
 from patchfem.closed_forms import contact as exact
 from patchfem.runs.patch.press import press_patch
@@ -15,9 +15,7 @@ from patchfem.runs.patch.values import values
 LOAD, LENGTH = 26 * 4.4482216152605, 12.7e-3
 
 
-@pytest.fixture(scope="module")
-def fixtures():
-    return study("misalignment/fixtures.py")
+fixtures = study_fixture("misalignment/fixtures.py")
 
 
 @pytest.fixture(scope="module")
@@ -25,19 +23,13 @@ def tilted(fixtures):
     return fixtures.tilted
 
 
-@pytest.fixture(scope="module")
-def conclusion():
-    return study("misalignment/conclusion_5.py")
+conclusion = study_fixture("misalignment/conclusion_5.py")
 
 
-@pytest.fixture(scope="module")
-def roll():
-    return study("misalignment/roll.py")
+roll = study_fixture("misalignment/roll.py")
 
 
-@pytest.fixture(scope="module")
-def rough():
-    return study("misalignment/rough_skin.py")
+rough = study_fixture("misalignment/rough_skin.py")
 
 
 @pytest.fixture(scope="module")
@@ -274,9 +266,7 @@ def test_always_the_picture_names_its_curves(tmp_path):
 # ---- in motion
 
 
-@pytest.fixture(scope="module")
-def moving():
-    return study("misalignment/in_motion.py")
+moving = study_fixture("misalignment/in_motion.py")
 
 
 @pytest.fixture(scope="module")

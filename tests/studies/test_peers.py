@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study, study_fixture
 
 from patchfem.closed_forms import contact as exact
 from patchfem.core import Missing
@@ -15,9 +15,7 @@ from patchfem.core import Missing
 GETFEM = "PATCHFEM_GETFEM_PYTHON"
 
 
-@pytest.fixture(scope="module")
-def hertz():
-    return study("peers/hertz_getfem.py")
+hertz = study_fixture("peers/hertz_getfem.py")
 
 
 def without(name) -> bool:

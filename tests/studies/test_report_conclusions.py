@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study_fixture
 
 import patchfem as pf
 
-
-@pytest.fixture(scope="module")
-def ten():
-    return study("report/conclusions.py")
+ten = study_fixture("report/conclusions.py")
 
 
 def test_exact_the_phases_of_the_block(ten):

@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from study_module import assert_contains, study
+from study_module import assert_contains, study, study_fixture
 
 import patchfem as pf
 
-
-@pytest.fixture(scope="module")
-def figures():
-    return study("report/figures_28_29.py")
+figures = study_fixture("report/figures_28_29.py")
 
 
 @pytest.fixture(scope="module")

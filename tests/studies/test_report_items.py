@@ -1,12 +1,8 @@
 """The items of the report: every path is there, every verdict is one, and the page is what the list says."""
 
-import pytest
-from study_module import ROOT, study
+from study_module import ROOT, study_fixture
 
-
-@pytest.fixture(scope="module")
-def items():
-    return study("report/items.py")
+items = study_fixture("report/items.py")
 
 
 def test_always_the_page_is_the_list(items):

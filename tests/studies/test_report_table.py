@@ -2,13 +2,9 @@
 
 import json
 
-import pytest
-from study_module import ROOT, study
+from study_module import ROOT, study, study_fixture
 
-
-@pytest.fixture(scope="module")
-def page():
-    return study("report/table.py")
+page = study_fixture("report/table.py")
 
 
 def test_always_the_page_is_what_the_studies_say(page):

@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study, study_fixture
 
-
-@pytest.fixture(scope="module")
-def march():
-    return study("steady/against_march.py")
+march = study_fixture("steady/against_march.py")
 
 
 @pytest.mark.share(0, 3)
@@ -61,9 +58,7 @@ def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
 # ---- the fold
 
 
-@pytest.fixture(scope="module")
-def fold():
-    return study("steady/fold.py")
+fold = study_fixture("steady/fold.py")
 
 
 @pytest.mark.slow
@@ -94,9 +89,7 @@ def test_exact_jumps_bracket_the_folds(fold, tmp_path):
 # ---- the backbone
 
 
-@pytest.fixture(scope="module")
-def backbone():
-    return study("steady/backbone.py")
+backbone = study_fixture("steady/backbone.py")
 
 
 @pytest.mark.slow

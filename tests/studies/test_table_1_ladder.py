@@ -3,7 +3,7 @@ from its records."""
 
 import numpy as np
 import pytest
-from study_module import ROOT, study
+from study_module import ROOT, study, study_fixture
 
 from patchfem.campaigns.rows.cells import read_readings
 from patchfem.campaigns.rows.computed import ModelReadings
@@ -12,9 +12,7 @@ from patchfem.core import NotConverged
 ROOT2 = "fundamental x sqrt2"
 
 
-@pytest.fixture(scope="module")
-def fitting():
-    return study("table_1/fitting.py")
+fitting = study_fixture("table_1/fitting.py")
 
 
 def test_always_every_rung_can_be_asked_under_every_reading(fitting):

@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study_fixture
 
-
-@pytest.fixture(scope="module")
-def repeats():
-    return study("report/repeats.py")
+repeats = study_fixture("report/repeats.py")
 
 
 def test_exact_the_table_in_the_order_of_its_columns(repeats):

@@ -4,12 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from study_module import study
+from study_module import study_fixture
 
-
-@pytest.fixture(scope="module")
-def bands():
-    return study("wear/bands.py")
+bands = study_fixture("wear/bands.py")
 
 
 def sentence(bands, rows, within):
@@ -49,9 +46,7 @@ def test_always_the_sentence_on_bands_in_full(bands):
     assert all(r.scatter < 0.03 for r in rows)
 
 
-@pytest.fixture(scope="module")
-def story():
-    return study("wear/rig_story.py")
+story = study_fixture("wear/rig_story.py")
 
 
 def told(story, rows, within):

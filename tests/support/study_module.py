@@ -3,6 +3,8 @@
 import importlib.util
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2] / "studies"
 
 
@@ -12,6 +14,16 @@ def study(name):
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    return module
+
+
+def study_fixture(name):
+    """Return a fixture that is the module of a study, loaded once for a file of tests."""
+
+    @pytest.fixture(scope="module")
+    def module():
+        return study(name)
+
     return module
 
 

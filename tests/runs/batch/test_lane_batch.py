@@ -5,12 +5,13 @@ The whole campaign, beside single runs, is `lanes` of tests/support/campaigns.py
 
 import numpy as np
 import pytest
+from batch_beside import solve_by_group
 from lane_cases import LAWS, SCENE, draw_points, rows
 
 from patchfem.api import build, get_base_scene, load, run_many
 from patchfem.runs import CaseResults
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.lumped import lane_check, lane_numbers, lane_refinement, lane_runs, lumped
+from patchfem.runs.batch.lumped import lane_check, lane_numbers, lane_refinement, lane_runs
 from patchfem.scene import format_assignments
 
 # beside others, without an exact batch, stand single runs
@@ -40,26 +41,14 @@ def held(law: str, seed: int, count: int, most: int | None = None) -> None:
     )
     mine = mine[:most]
     some = [cases[case] for case in mine]
-    ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
+    ones = solve_by_group(some) if law in EXACT else one_by_one.solve(some)
     lanes_of = found.select(np.array(mine))
     assert (lanes_of.outcome == ones.outcome).all()
     assert np.mean([row.holds for some in rows(lanes_of, ones) for row in some]) >= 0.97
 
 
-def lumped_answers(cases):
-    """Answers of the exact batch, group by group."""
-    found = batches.CaseResults.blank(len(cases))
-    groups = {}
-    for case, model in enumerate(cases):
-        groups.setdefault(lumped.group(model), []).append(case)
-    for places in groups.values():
-        found.insert(places, lumped.solve([cases[case] for case in places]))
-    return found
-
-
-@pytest.mark.share(
-    0, 1, 2, 4, 5
-)  # each other law is a loop in lanes and one of single runs to compile
+# each other law is a loop in lanes and one of single runs to compile
+@pytest.mark.share(0, 1, 2, 4, 5)
 @pytest.mark.parametrize("law", LAWS)
 def test_always_97_of_100_measures_lie_within_both_errors(law):
     few = law not in EXACT[:3]  # what stands beside Iwan or in single runs takes seconds
@@ -71,7 +60,7 @@ def test_exact_few_cases_are_those_of_single_runs():
     assert all(batches.choose_batch(one, 31).name == "lumped.lumped" for one in cases)
     assert all(batches.choose_batch(one, 64).name == "lumped.lanes" for one in cases)
     found = batches.solve_models(cases)
-    ones = lumped_answers(cases)
+    ones = solve_by_group(cases)
     for name, values in ones.values.items():
         np.testing.assert_array_equal(found.values[name], values)
 
@@ -100,7 +89,7 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
 
     monkeypatch.setattr(lane_runs, "collect_runs", wrong)
     found = batches.solve_models(cases)
-    ones = lumped_answers(cases)
+    ones = solve_by_group(cases)
     assert all(one["engine"] == "exact" for one in found.numerics.values())
     assert all(
         "checked against the exact engine and" in notes[-1] and "loop_area" in notes[-1]
@@ -144,7 +133,7 @@ def test_exact_lanes_answer_stuck_cases(law):
         for damping in (0.003, 0.03)
     ]
     found = batches.solve_models(cases, study=64)
-    ones = lumped_answers(cases)
+    ones = solve_by_group(cases)
     assert np.sum(found.outcome == "stuck") > 2 and all(
         one["engine"] == "lanes" for one in found.numerics.values()
     )
@@ -183,7 +172,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
         )
     )
     name = "relative_displacement_amplitude"
-    end = lumped_answers([far]).values[name][0]
+    end = solve_by_group([far]).values[name][0]
     assert end == pytest.approx(1.697322e-4, rel=1e-6)
     assert (
         abs(found.values[name + "_steady"][0] - end)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from batch_beside import held_against
+from batch_beside import held_against, solve_by_group
 from scene_texts import MODE
 
 from patchfem.api import build, get_base_scene, load
-from patchfem.runs import CaseResults
 from patchfem.runs.batch import one_by_one
 from patchfem.runs.batch.lumped import lumped
 from patchfem.scene import format_assignments
@@ -53,24 +52,11 @@ def models(law: str, seed: int, count: int) -> list:
     return out
 
 
-def batch(cases):
-    """Answers of the batch, group by group."""
-
-    found = CaseResults.blank(len(cases))
-    groups = {}
-    for case, model in enumerate(cases):
-        assert lumped.refuses(model) == ""
-        groups.setdefault(lumped.group(model), []).append(case)
-    for places in groups.values():
-        found.insert(places, lumped.solve([cases[case] for case in places]))
-    return found
-
-
 @pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
 @pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 20) for law in LAWS])
 def test_exact_batch_is_the_single_runs(law, count):
     cases = models(law, 1, count)
-    held_against(cases, one_by_one.solve(cases), batch(cases))
+    held_against(cases, one_by_one.solve(cases), solve_by_group(cases))
 
 
 def test_always_errors_of_few_cells_hold_the_result_of_many():
