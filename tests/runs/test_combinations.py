@@ -132,7 +132,7 @@ def walk(text: str, sets: list) -> str:
     return "ran"
 
 
-def walked(name: str, law: str, every: int = 1) -> None:
+def walked(name: str, law: str, every: int) -> None:
     """What check lets through of the effects and engines beside a law runs; every: the share of them that is tried."""
     text, at, effects, engines = RUNS[name]
     needed = [
@@ -152,8 +152,6 @@ def walked(name: str, law: str, every: int = 1) -> None:
         for variant, effect, engine in cases[:1] + cases[1 + first :: every]
     ]
     assert "ran" in found or (name == "interfaces" and "joints" not in LAWS[law].supports.split())
-    if engines is METHODS and every == 1:
-        assert "refused" in found
 
 
 @pytest.fixture

@@ -70,6 +70,7 @@ def ratio(result):
     )
 
 
+@pytest.mark.share(0, 3, 4, 5, 6)
 @pytest.mark.parametrize("law,method", ENGINES)
 def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
     """Twice the scale is exact in binary numbers, so nothing may change. At 2.5 times every number is rounded anew: an

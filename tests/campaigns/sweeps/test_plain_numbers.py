@@ -114,11 +114,12 @@ def cases_of(seed: int, count: int):
             count -= 1
 
 
+@pytest.mark.parametrize("count", [50, pytest.param(150, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_models_made_from_the_first_are_those_built_from_text(name):
+def test_exact_models_made_from_the_first_are_those_built_from_text(name, count):
     asked = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",))
     alike = 0
-    for sets, values in cases_of(len(name), 150):
+    for sets, values in cases_of(len(name), count):
         found = told(asked, sets, values)
         built = told(asked, sets, ())
         assert same(found, built), sets
