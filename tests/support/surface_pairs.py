@@ -28,7 +28,7 @@ CHANGES = ("reduced", "increased", "flatter")
 SHOWN_DEPTH = 0.3e-6
 
 
-class Worn(NamedTuple):
+class WearTruth(NamedTuple):
     """What an answer may not contradict."""
 
     can_show: bool  # whether the pair can show wear
@@ -40,7 +40,7 @@ class Worn(NamedTuple):
     largest: float  # [m]
 
 
-def find_false_claims(answer: dict, worn: Worn) -> list:
+def find_false_claims(answer: dict, worn: WearTruth) -> list:
     """List the claims of an answer that contradict the truth."""
     verdict = answer["verdict"].lower()
     text = " ".join((verdict, *answer["sentences"])).lower()
@@ -57,7 +57,7 @@ def find_false_claims(answer: dict, worn: Worn) -> list:
         "grew": not worn.grew and has_grown,
         "waves": not worn.is_changed and any(word in verdict for word in CHANGES),
         "two places": worn.is_elsewhere and shows_place,
-        "limit": limit and not worn.is_hidden and worn.mean > float(limit[1]) * UNITS[limit[2]],
+        "limit": limit and worn.can_show and worn.mean > float(limit[1]) * UNITS[limit[2]],
         "no wear": worn.can_show and "no wear" in text and worn.largest > SHOWN_DEPTH,
         "hidden": worn.is_hidden and hidden is not None and hidden < worn.mean,
     }
@@ -80,7 +80,7 @@ def interval_rows(answer: dict, truths: dict) -> list:
     return rows
 
 
-def line_of(kind: str, files: tuple, units: tuple | None, worn: Worn, truths: dict) -> dict:
+def make_line(kind: str, files: tuple, units: tuple | None, worn: WearTruth, truths: dict) -> dict:
     """Compare two files and return the line of a campaign."""
     try:
         answer = patchfem.compare(*files, units=units)
@@ -107,7 +107,7 @@ def compare_traces(seed: int, folder: Path, _) -> dict:
     is_common = (x + pair.shift >= 0) & (x + pair.shift <= pair.before[0][-1])
     lost = np.maximum(pair.worn, 0.0)[is_common]  # material that grew is no negative wear
     can_show = kind in known_pairs.RUBBED
-    worn = Worn(
+    worn = WearTruth(
         can_show=can_show,
         grew=kind in ("deposits", "exchanged"),
         is_changed=kind not in known_pairs.SAME,
@@ -122,7 +122,7 @@ def compare_traces(seed: int, folder: Path, _) -> dict:
         "worn_depth_max": (worn.largest,),
         "worn_area": (area,),
     }
-    return line_of(kind, files, None, worn, truths if can_show else {})
+    return make_line(kind, files, None, worn, truths if can_show else {})
 
 
 def compare_scans(seed: int, folder: Path, _) -> dict:
@@ -132,7 +132,7 @@ def compare_scans(seed: int, folder: Path, _) -> dict:
     files = (folder / "before.npy", folder / "after.npy")
     for file, heights in zip(files, (pair.before, pair.after), strict=True):
         np.save(file, heights * 1e6)
-    worn = Worn(
+    worn = WearTruth(
         can_show=truth.is_knowable and "worn" not in truth.sentence,
         grew="grew" not in truth.sentence,
         # a sentence on waves compares noise too, if nothing else differs
@@ -144,7 +144,7 @@ def compare_scans(seed: int, folder: Path, _) -> dict:
     )
     units = (f"{pair.spacing * 1e6:.12g} um", "um")
     truths = scan_truths(truth) if truth.is_knowable else {}
-    return line_of(pair.kind, files, units, worn, truths)
+    return make_line(pair.kind, files, units, worn, truths)
 
 
 def scan_truths(truth) -> dict:
