@@ -22,6 +22,13 @@ PUBLIC = {
         "list_named_files",
         "require_files",
     ),
+    "joint_laws": (
+        "JOINT_LAWS",
+        "KNOWLEDGE",
+        "WISHES",
+        "choose_law",
+        "compose_scene",
+    ),
     "keys.contact": (
         "Asperities",
         "Coating",

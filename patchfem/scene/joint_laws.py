@@ -261,9 +261,10 @@ def describe_choice(choice: Choice) -> list[str]:
     unused = [word for word in choice.known if word not in (*row.known, NOTHING)]
     unanswered = [word for word in choice.wanted if word not in row.wanted]
     sentences = [
+        f"you know {', '.join(choice.known)} and want {', '.join(choice.wanted)}",
         f"law: {row.law}; keys: {', '.join(['static', *row.keys])}",
         f"what it gives: {row.gives}",
-        f"what it cannot: {row.cannot}",
+        f"what it cannot do: {row.cannot}",
     ]
     if missing:
         assumed = "; ".join(f"{word} ({KNOWLEDGE[word]})" for word in missing)

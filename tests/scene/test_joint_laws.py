@@ -11,8 +11,15 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
-from patchfem.scene import load, loads
-from patchfem.scene.joint_laws import JOINT_LAWS, KNOWLEDGE, WISHES, choose_law, compose_scene
+from patchfem.scene import (
+    JOINT_LAWS,
+    KNOWLEDGE,
+    WISHES,
+    choose_law,
+    compose_scene,
+    load,
+    loads,
+)
 
 ROWS = {f"{row.law}-{row.scene.rpartition('/')[2]}": row for row in JOINT_LAWS}
 POINT = '[normal]\nload = "100 N"\n[friction]\nstatic = 0.3\n'
@@ -109,8 +116,8 @@ def test_always_the_file_has_the_scene_and_the_screen_the_sentences(tmp_path):
     words = ("new", "joint", "--know", "loop", "--want", "loss")
     answer = cli(*words, "-o", path)
     assert path.read_text("utf-8") == cli(*words).out and load(path).friction.law == "bouc-wen"
-    assert f"{path}: law: bouc-wen; keys: static, stiffness, exponent, shape" in answer.out
-    assert "what it cannot: " in answer.out and f"next: patchfem run {path}" in answer.out
+    assert "law: bouc-wen; keys: static, stiffness, exponent, shape" in answer.out
+    assert "what it cannot do: " in answer.out and f"next: patchfem run {path}" in answer.out
     assert "already exists" in cli(*words, "-o", path).err
 
 

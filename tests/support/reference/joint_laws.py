@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from patchfem.scene.joint_laws import JOINT_LAWS, KNOWLEDGE, WISHES
+from patchfem.scene import JOINT_LAWS, KNOWLEDGE, WISHES
 
 from .keys import FOLDER, grid
 
@@ -15,7 +15,7 @@ HEAD = (
     "law",
     "keys besides `static`",
     "what it gives",
-    "what it cannot",
+    "what it cannot do",
 )
 
 
