@@ -24,8 +24,8 @@ from ..core import NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..runs.patch.ladder import solve_split
-from ..runs.patch.measures import measures
+from ..runs.patch.ladder import solve_on_split_mesh
+from ..runs.patch.measures import estimate_measures
 from ..runs.plan import plan
 from ..runs.run import run as run_plan
 from .numerical_settings import (
@@ -371,7 +371,7 @@ class _FinishedRun(NamedTuple):
     The steps are None if the run has none.
     """
 
-    measures: dict
+    estimate_measures: dict
     warnings: Sequence
     steps: int | None
 
@@ -432,8 +432,8 @@ def _run_setting(
     """
     try:
         if setting.level:
-            fine, *coarser = solve_split(setting.model.patch, setting.level, can_split)
-            return _FinishedRun(measures(fine, *coarser), (), None)
+            fine, *coarser = solve_on_split_mesh(setting.model.patch, setting.level, can_split)
+            return _FinishedRun(estimate_measures(fine, *coarser), (), None)
         result = run_plan(plan(setting.model), fresh=True)
         steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
         return _FinishedRun(result.measures, result.warnings, steps)

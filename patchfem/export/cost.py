@@ -27,7 +27,7 @@ AXES = {
     "jumps": "jumps over the cycles of wear",
 }
 # Measures of the detailed table, if the setting changes them.
-MAIN = (
+MAIN_MEASURES = (
     "worn_depth_max",
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -191,7 +191,11 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     changed = changed_measures(runs) or measures_with_error(runs)
     names = measures_with_error(runs)
     worst = {worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances}
-    return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in changed] or changed
+    return [
+        name
+        for name in (*MAIN_MEASURES, *sorted(worst.difference(MAIN_MEASURES)))
+        if name in changed
+    ] or changed
 
 
 def write(folder: Path, curves: dict) -> Path:

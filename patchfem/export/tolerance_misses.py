@@ -7,7 +7,7 @@ from ..formatting import format_number, format_quantity
 from .written import measure_label
 
 # Main measures, which are named before others that miss the tolerance by more.
-FIRST = (
+FIRST_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "loop_area",
@@ -130,7 +130,7 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
         some = next(
             (
                 (name, cases)
-                for name in FIRST
+                for name in FIRST_MEASURES
                 if name in measures
                 and (cases := is_within_by_floor(measures[name], tolerance)).any()
             ),
@@ -155,7 +155,7 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
     name = (
         first
         if first in lost
-        else max([name for name in FIRST if name in lost] or lost, key=error_ratios.get)
+        else max([name for name in FIRST_MEASURES if name in lost] or lost, key=error_ratios.get)
     )
     relative_errors = np.where(lost[name], _relative_error(measures[name]), 0.0)
     count = int(lost[name].sum())

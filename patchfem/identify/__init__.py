@@ -25,7 +25,7 @@ PUBLIC = {
         "list_shape_modes",
     ),
     "space": (
-        "CubeResidual",
+        "UnitCubeResidual",
         "make_space_filling_points",
     ),
     "two_models": ("TwoModels",),

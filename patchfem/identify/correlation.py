@@ -6,7 +6,7 @@ MIN_ROWS = 20  # smallest number of rows whose correlation can be distinguished 
 # standard deviations 1/sqrt(rows) of the correlation of independent rows; a smaller correlation is attributed to chance
 CHANCE_CORRELATION_FACTOR = 2.0
 # correlation of the residuals of successive cycles, above which the cycles count as repetitions of one error
-MIN_REPEAT_CORRELATION = 0.5
+MIN_CYCLE_CORRELATION = 0.5
 
 
 def estimate_effective_rows(residual) -> float:
@@ -62,7 +62,7 @@ def _compute_repetition_factor(rho, first_lag: int) -> float:
     # at a given lag there are only n - lag products
     correlation = rho[lags] / (1 - lags / n)
     best = int(np.argmax(correlation))
-    if correlation[best] < MIN_REPEAT_CORRELATION:
+    if correlation[best] < MIN_CYCLE_CORRELATION:
         return 1.0
     n_cycles = n / lags[best]
     return 1 + (n_cycles - 1) * min(correlation[best], 1.0)

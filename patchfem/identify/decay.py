@@ -20,7 +20,7 @@ MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
 MAX_RESIDUAL_RATIO = 0.8
 MIN_MISFIT = 1e-9  # residual / record; a smaller residual is round-off
 # smallest distance of two sinusoids in spectral lines, which are 1/T apart for a record of length T
-MIN_LINE_DISTANCE = 3
+MIN_SPECTRAL_LINE_SPACING = 3
 MIN_AMPLITUDE_RATIO = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
 # decay rates, multiplied by the length of the record, from which the fit of a further sinusoid starts
 START_DECAY_RATES = (0.3, 3.0, 30.0)
@@ -141,7 +141,7 @@ def _are_distinct(time, poles) -> bool:
     """Return whether all fitted sinusoids differ in frequency and oscillate faster than they decay."""
     damped_omega = poles[0::2]
     distances = np.diff(np.sort(damped_omega))
-    are_apart = (distances >= MIN_LINE_DISTANCE * 2 * np.pi / time[-1]).all()
+    are_apart = (distances >= MIN_SPECTRAL_LINE_SPACING * 2 * np.pi / time[-1]).all()
     return bool(are_apart and (np.abs(poles[1::2]) < damped_omega).all())
 
 
@@ -200,6 +200,8 @@ def _find_starts(time, best_fit: _RefinedPoles) -> list:
     lines[:2] = 0.0
     frequency = np.arange(lines.size) / duration
     for known_frequency, rate in best_fit.poles.reshape(-1, 2) / (2 * np.pi):
-        lines[np.abs(frequency - known_frequency) < max(MIN_LINE_DISTANCE / time[-1], rate)] = 0.0
+        lines[
+            np.abs(frequency - known_frequency) < max(MIN_SPECTRAL_LINE_SPACING / time[-1], rate)
+        ] = 0.0
     omega = 2 * np.pi * int(np.argmax(lines)) / duration
     return [np.array([omega, scaled_rate / time[-1]]) for scaled_rate in START_DECAY_RATES]

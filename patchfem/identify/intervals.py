@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from ..core import frozen_array
 from .correlation import estimate_effective_rows
-from .space import CubeResidual
+from .space import UnitCubeResidual
 
 # fraction of the largest singular value of the scaled Jacobian; directions with smaller ones are undetermined
 MIN_SINGULAR_VALUE = 1e-6
@@ -65,7 +65,7 @@ class _FittedPoint(NamedTuple):
     - descend: function that minimizes the residual over some coordinates.
     """
 
-    model: CubeResidual
+    model: UnitCubeResidual
     u: np.ndarray
     cost: float
     growth: float
@@ -97,7 +97,7 @@ def make_unknown_intervals(n: int) -> FitIntervals:
 
 
 def compute_intervals(
-    model: CubeResidual, u, cost: float, descend: Callable, *, is_series: bool = False
+    model: UnitCubeResidual, u, cost: float, descend: Callable, *, is_series: bool = False
 ) -> FitIntervals:
     """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 
@@ -105,7 +105,7 @@ def compute_intervals(
 
     Parameters
     ----------
-    model : CubeResidual
+    model : UnitCubeResidual
     u : (n,) ndarray
         Least squares in the unit cube.
     cost : float
@@ -167,7 +167,7 @@ def compute_intervals(
     )
 
 
-def _convert_ends(model: CubeResidual, u, ends) -> np.ndarray:
+def _convert_ends(model: UnitCubeResidual, u, ends) -> np.ndarray:
     """Convert the ends (n, 2) of intervals in the unit cube to parameter values.
 
     Each end is taken along its coordinate from the point u (n,).
@@ -208,7 +208,7 @@ def _compute_correlation(covariance, unknown: set) -> np.ndarray:
 
 
 def _list_unknown_directions(
-    model: CubeResidual, u, free_values: list, null_vectors, column_norm
+    model: UnitCubeResidual, u, free_values: list, null_vectors, column_norm
 ) -> np.ndarray:
     """Return the directions in parameter space that the residuals do not determine.
 

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
-from .space import CubeResidual, SearchSpace, make_space, make_space_filling_points
+from .space import SearchSpace, UnitCubeResidual, make_space, make_space_filling_points
 
 COST_TOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
 QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
@@ -160,7 +160,7 @@ class Problem:
             If all starts fail.
         """
         space = self.space
-        model = CubeResidual(self.residual, space)
+        model = UnitCubeResidual(self.residual, space)
         n = space.low.size
         start = None if self.start is None else space.unit(self.start)
         starting_points = choose_starting_points(model, start, max_descents)
@@ -171,7 +171,7 @@ class Problem:
 
 
 def run_descents(
-    model: CubeResidual,
+    model: UnitCubeResidual,
     starting_points,
     *,
     stops_when_exact: bool = False,
@@ -183,7 +183,7 @@ def run_descents(
 
     Parameters
     ----------
-    model : CubeResidual
+    model : UnitCubeResidual
     starting_points : sequence of (n,) ndarray
         Points from which the descents start.
     stops_when_exact : bool
@@ -217,13 +217,13 @@ def run_descents(
 
 
 def assemble_fit(
-    model: CubeResidual, ends: list, interval_kind: str = IntervalKind.ROWS, first_descents=None
+    model: UnitCubeResidual, ends: list, interval_kind: str = IntervalKind.ROWS, first_descents=None
 ) -> Fit:
     """Assemble the result of a least-squares fit from the best of its descents.
 
     Parameters
     ----------
-    model : CubeResidual
+    model : UnitCubeResidual
     ends : list of Descent
     interval_kind : str
         As in `Problem.solve`.
@@ -260,13 +260,13 @@ def assemble_fit(
 
 
 def choose_starting_points(
-    model: CubeResidual, given_start, max_points: int, n_trials: int = 0
+    model: UnitCubeResidual, given_start, max_points: int, n_trials: int = 0
 ) -> list:
     """Choose points of the unit cube from which local searches start.
 
     Parameters
     ----------
-    model : CubeResidual
+    model : UnitCubeResidual
     given_start : (n,) ndarray or None
         Point that comes first, if it works.
     max_points : int
@@ -311,7 +311,7 @@ class _CubeSlice(NamedTuple):
     - free: indices of the coordinates (f,) that may change.
     """
 
-    model: CubeResidual
+    model: UnitCubeResidual
     u: np.ndarray
     free: list
 
@@ -330,14 +330,14 @@ class _CubeSlice(NamedTuple):
         return self.model.jacobian(self.point(free_coordinates), self.free)
 
 
-def descend(model: CubeResidual, u, free) -> Descent:
+def descend(model: UnitCubeResidual, u, free) -> Descent:
     """Minimize a residual locally from a point of the unit cube (trust-region reflective method).
 
     The end is never worse than the start.
 
     Parameters
     ----------
-    model : CubeResidual
+    model : UnitCubeResidual
     u : (n,) array_like
         Starting point.
     free : sequence of int
@@ -385,7 +385,7 @@ def descend(model: CubeResidual, u, free) -> Descent:
     return Descent(end, float(residual @ residual), is_converged, model.rows)
 
 
-def _move_onto_bounds(model: CubeResidual, u, cost: float) -> tuple:
+def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple:
     """Move parameters that are close to a bound onto it, unless the sum of squares rises.
 
     Only values are set that would decrease the sum of squares beyond the bound. The other values are

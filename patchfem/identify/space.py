@@ -8,7 +8,7 @@ import numpy as np
 from ..core import Missing, PatchfemError
 
 DIFFERENCE_STEP = 1e-5  # fraction of the range of a value; step of difference quotients
-MIN_LOG_RATIO = (
+MIN_BOUND_RATIO_FOR_LOG = (
     10  # ratio of upper to lower bound above which a parameter is searched on a log scale
 )
 PENALTY_FACTOR = 1e3  # residual that stands for a failed evaluation / largest residual so far
@@ -85,10 +85,10 @@ def make_space(low, high) -> SearchSpace:
         )
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
-    return SearchSpace(low, high, (low > 0) & (high > MIN_LOG_RATIO * low))
+    return SearchSpace(low, high, (low > 0) & (high > MIN_BOUND_RATIO_FOR_LOG * low))
 
 
-class CubeResidual:
+class UnitCubeResidual:
     """Residual as a function of a point of the unit cube, which counts its evaluations.
 
     A failure is a PatchfemError, an arithmetic error, or a residual that is not finite; `reason` is the
@@ -119,10 +119,10 @@ class CubeResidual:
     def __call__(self, u) -> np.ndarray | None:
         """Evaluate the residual (r,) at u (n,); return None if it fails."""
         if self._last_point is None or not np.array_equal(self._last_point, u):
-            self._remember(u, self._evaluate(u))
+            self._cache_residual(u, self._evaluate(u))
         return self._last_residual
 
-    def _remember(self, u, residual) -> None:
+    def _cache_residual(self, u, residual) -> None:
         """Store the residual at u (n,), because it is often evaluated there again."""
         self._last_point = np.array(u)
         self._last_residual = residual
@@ -173,7 +173,7 @@ class CubeResidual:
         columns = []
         for i in free:
             columns.append(_difference_quotient(residual_at_u, self._evaluate_neighbours(u, i)))
-        self._remember(u, residual_at_u)
+        self._cache_residual(u, residual_at_u)
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
     def _evaluate_neighbours(self, u, i: int) -> dict:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from .least_squares import choose_starting_points, descend, run_descents
-from .space import CubeResidual, SearchSpace
+from .space import SearchSpace, UnitCubeResidual
 
 MAX_CORRECTIONS = 4  # largest number of corrections of the cheap model in one search
 MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree
@@ -84,7 +84,7 @@ class TwoModels:
         NotConverged
             If the cheap model fails at all starts.
         """
-        cheap = CubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
+        cheap = UnitCubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
         n_trials = N_TRIALS_PER_VALUE * len(given_values)
         starting_points = choose_starting_points(
             cheap, self.space.unit(given_values), n_starts, n_trials
@@ -194,7 +194,7 @@ class TwoModels:
 
     def _descend(self, model: Callable, u) -> np.ndarray:
         """Return the point (n,) at which a local search with a model from u (n,) ends."""
-        cube_residual = CubeResidual(lambda values: self.residual(model(values)), self.space)
+        cube_residual = UnitCubeResidual(lambda values: self.residual(model(values)), self.space)
         return descend(cube_residual, u, range(u.size)).u
 
     def _sum_of_squares(self, data) -> float:

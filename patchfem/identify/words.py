@@ -32,7 +32,7 @@ def describe_fit(fit: Fit, names) -> list:
                 f"{name} is at its {side} bound {value:.6g}: widen the range, or try another law"
             )
     intervals = fit.intervals
-    sentences += [_describe_combination(row, names) for row in intervals.unknown]
+    sentences += [_describe_direction(row, names) for row in intervals.unknown]
     in_combination = intervals.unknown.any(axis=0)
     min_sensitivity = MIN_SENSITIVITY * max(float(np.max(intervals.sensitivity)), fit.rms)
     for i, name in enumerate(names):
@@ -61,7 +61,7 @@ def describe_fit(fit: Fit, names) -> list:
     return sentences
 
 
-def _describe_combination(row, names) -> str:
+def _describe_direction(row, names) -> str:
     """Describe a direction in parameter space along which the residual stays unchanged.
 
     `row` (n,) is the relative change of each value [%].

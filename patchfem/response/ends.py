@@ -69,7 +69,7 @@ def _change_of_end_maximum(values) -> float:
 def _change_of_drift(slide, cycles: float) -> float:
     """Return the change of the drift per cycle [m] for a window shifted by one step.
 
-    As in `loops.drift`, below 1.5 cycles the drift is the motion between the ends of the window,
+    As in `loops.mean_drift`, below 1.5 cycles the drift is the motion between the ends of the window,
     else the difference between the means of two cycles.
     """
     if cycles < 1.5:

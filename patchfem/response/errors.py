@@ -97,11 +97,11 @@ def convergence_errors(*values: dict) -> dict:
     changes = [signed_change(fine, coarse) for fine, coarse in pairwise(values)]
     out = {}
     for name in changes[0]:
-        out[name] = _ladder_error([change[name] for change in changes if name in change])
+        out[name] = _error_on_finest_mesh([change[name] for change in changes if name in change])
     return out
 
 
-def _ladder_error(changes: list) -> float:
+def _error_on_finest_mesh(changes: list) -> float:
     """Return the error of a value on the finest mesh from its changes between the meshes."""
     if len(changes) == 1:
         return convergence_error(changes[0])

@@ -162,7 +162,7 @@ def _detect_interface_events(
     return [*zip(when, [number] * k.size, kind, np.interp(when, time, slide))]
 
 
-def find_sticks(events: Events, begin: float, end: float, moves) -> list:
+def find_stick_spans(events: Events, begin: float, end: float, moves) -> list:
     """Return the intervals [(start, end)] [s] between events in which an interface sticks.
 
     If other interfaces stick during some of them only, the intervals with the combination of states

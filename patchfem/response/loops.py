@@ -232,7 +232,7 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
     }
 
 
-def drift(time, slide, rate, period: float) -> float:
+def mean_drift(time, slide, rate, period: float) -> float:
     """Return the displacement per cycle [m] by which the mean position moves in a window.
 
     It is the difference between the time means of the last and the first cycle, divided by the

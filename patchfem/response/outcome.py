@@ -409,7 +409,7 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
     ]
 
 
-def changing_note(outcome: Outcome, drive) -> list:
+def note_on_changing_drive(outcome: Outcome, drive) -> list:
     """Return a note, as a list, on measures under a drive that changes until the end.
 
     The list is empty for other drives.

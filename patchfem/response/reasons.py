@@ -17,26 +17,31 @@ from .rows import TABLE
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 # Displacement fraction of other modes [1] above which the damping ratio is not that of mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
-IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
+IN_PLANE_REASON = (
+    "the interface slides in a plane, but this measure is defined only for one direction"
+)
 CYCLE_MEASURES = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
-ALWAYS_STICKS = "the whole interface sticks throughout the last cycles"
-UNBOUNDED = "no bounded motion exists at this drive"
-OUTPUT_AT_REST = (
+ALWAYS_STICKS_REASON = "the whole interface sticks throughout the last cycles"
+UNBOUNDED_REASON = "no bounded motion exists at this drive"
+OUTPUT_AT_REST_REASON = (
     "the output does not move: "
     "the first harmonic of its acceleration is 0 within the accuracy of the computation"
 )
-APERIODIC = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
-BEATS = (
+APERIODIC_REASON = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
+BEATS_REASON = (
     "under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
     "only for a drive that repeats in every cycle"
 )
-STICKS_AT_REVERSAL = (
+STICKS_AT_REVERSAL_REASON = (
     "the interface sticks where its slide is largest: during this stick the friction force takes different values "
     "at the same slide"
 )
-CHANGE_NOT_RESOLVED = "the motion changes in such a way that the run does not show what it settles to: a longer run does"
+CHANGE_NOT_RESOLVED_REASON = (
+    "the motion changes in such a way that the run does not show what it settles to: "
+    "a longer run does"
+)
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
-UNCLOSED = (
+OPEN_LOOP_REASON = (
     "the friction loop does not close: during the last cycles the stored energy changes by more than friction "
     "dissipates; the energy dissipated in the whole run is given by energy_dissipated"
 )
@@ -87,7 +92,11 @@ def find_missing_secant(values) -> dict:
         return {}
     if stick_fraction.value <= TABLE["stick_fraction"].floor + (stick_fraction.error or 0.0):
         return {}
-    return {"secant_stiffness": replace(secant, value=None, error=None, reason=STICKS_AT_REVERSAL)}
+    return {
+        "secant_stiffness": replace(
+            secant, value=None, error=None, reason=STICKS_AT_REVERSAL_REASON
+        )
+    }
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
@@ -108,7 +117,7 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
     is_known = STEADY_AMPLITUDE in values
     if is_known or outcome is not Outcome.TRANSIENT or not is_periodic(drive):
         return {}
-    return {STEADY_AMPLITUDE: _make_missing_measure(STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED)}
+    return {STEADY_AMPLITUDE: _make_missing_measure(STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED_REASON)}
 
 
 def _make_missing_measure(name: str, reason: str) -> Measure:
@@ -126,7 +135,7 @@ def find_missing_drift(values, drive) -> dict:
     drift = values.get("drift_per_cycle")
     if drift is None or is_periodic(drive):
         return {}
-    reason = BEATS if hasattr(drive, "beat") else APERIODIC
+    reason = BEATS_REASON if hasattr(drive, "beat") else APERIODIC_REASON
     return {"drift_per_cycle": replace(drift, value=None, error=None, reason=reason)}
 
 
@@ -136,7 +145,7 @@ def find_missing_unbounded(values) -> dict:
     for name, measure in values.items():
         out[name] = replace(measure, error=None)
         if name != "normal_load":
-            out[name] = replace(out[name], value=None, reason=UNBOUNDED)
+            out[name] = replace(out[name], value=None, reason=UNBOUNDED_REASON)
     return out
 
 
@@ -174,7 +183,8 @@ def find_missing_loops(values, window, drive) -> dict:
             if area.value < -max(area.error or 0.0, area.floor):
                 open_names.append(name)
     return {
-        name: replace(values[name], value=None, error=None, reason=UNCLOSED) for name in open_names
+        name: replace(values[name], value=None, error=None, reason=OPEN_LOOP_REASON)
+        for name in open_names
     }
 
 
@@ -184,7 +194,7 @@ def _reason_for_missing_phase(values, drive) -> str:
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
-        return f"{ALWAYS_STICKS}, so no slip starts"
+        return f"{ALWAYS_STICKS_REASON}, so no slip starts"
     if stuck:
         return "slip does not start at one phase of the half cycles: it starts several times, or not in all of them"
     return "the interface never sticks in the last cycles, so slip never starts after stick"
@@ -199,13 +209,13 @@ def _reason_for_missing_cycle_value(
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:
-        return OUTPUT_AT_REST
+        return OUTPUT_AT_REST_REASON
     if name in ACCELERATIONS:
         return "the output has no acceleration"
     if lateral_history(window, "slides") is not None:
-        return IN_PLANE
+        return IN_PLANE_REASON
     if "equivalent_stiffness" not in values:
-        return f"{ALWAYS_STICKS}, so the slide does not change and the loop has no width"
+        return f"{ALWAYS_STICKS_REASON}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
         if other_modes_fraction <= MAX_OTHER_MODES_FRACTION:
             return "mode 1 is a rigid-body mode, or does not move the interface"

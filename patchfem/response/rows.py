@@ -17,9 +17,9 @@ from ..structure import drive_sizes
 from . import stationary
 from .loops import (
     Reversal,
-    drift,
     find_reversals,
     interface_loop,
+    mean_drift,
     mean_half_range,
     secant_stiffness,
 )
@@ -277,13 +277,13 @@ def compute_drift(s: LastCycles) -> float:
     """
     w = s.window
     across = s.lateral("slides")
-    drift_along = drift(w.time, w.slide, w.slide_rate, s.drive.period)
+    drift_along = mean_drift(w.time, w.slide, w.slide_rate, s.drive.period)
     if across is None:
         return drift_along
     return float(
         np.hypot(
             drift_along,
-            drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period),
+            mean_drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period),
         )
     )
 
@@ -668,7 +668,7 @@ ROWS = (
     ),
     *SINGLE_RUN_ROWS,
 )
-NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
+ROWS_NEEDING_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
 # These measures exist for every interface.
 INTERFACE_MEASURES = (

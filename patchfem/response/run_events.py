@@ -19,7 +19,7 @@ from .events import (
     Events,
     compute_slip_states,
     detect_events,
-    find_sticks,
+    find_stick_spans,
     sort_events,
 )
 from .measures import lateral_history, path_increments, slip_round_off
@@ -138,7 +138,7 @@ def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -
     max_stick_slip : float
         Change of slip up to which an interface sticks [m].
     """
-    return find_sticks(
+    return find_stick_spans(
         list_events(window, drive, log, max_stick_slip),
         window.time[0],
         window.time[-1],

@@ -36,7 +36,7 @@ PUBLIC = {
     ),
     "batch.watched": ("MotionObserver",),
     "bench.engine": (
-        "choose_smooth_bond_sum",
+        "choose_smooth_bond_summation",
         "steps_per_cycle",
     ),
     "bench.errors": ("estimate_pass_errors",),
@@ -55,13 +55,13 @@ PUBLIC = {
         "strip_elements",
     ),
     "patch.ladder": (
-        "solve_all",
-        "solve_split",
+        "solve_with_coarser",
+        "solve_on_split_mesh",
     ),
-    "patch.measures": ("measures",),
+    "patch.measures": ("estimate_measures",),
     "patch.meshes": ("geometry_key",),
-    "patch.press": ("areas",),
-    "patch.result": ("bodies",),
+    "patch.press": ("nodal_areas",),
+    "patch.result": ("make_bodies",),
     "patch.strength": (
         "Strength",
         "YIELDING_NEGLECTED",
@@ -117,5 +117,5 @@ PUBLIC = {
         "StateFile",
         "is_march",
     ),
-    "wear.evolve": ("evolve",),
+    "wear.evolve": ("compute_wear",),
 }

@@ -44,8 +44,8 @@ RINGING_PREFIX = (
     "ring_"  # prefix of the measures of ringing, which an engine without steps may lack
 )
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
-USE_ERROR = "use the value with its stated error"
-NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR}"
+USE_ERROR_ADVICE = "use the value with its stated error"
+NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}"
 ELEMENT_SIZE = "contact.element_size"
 # main measures of a run, which a warning names before all others
 MAIN_MEASURES = (
@@ -140,7 +140,7 @@ def _select_interface_measures(finding: Finding, face) -> Finding:
     return Finding(face.model, measures, face.patch)
 
 
-def _named_measures(finding: Finding, excess: dict) -> list[str]:
+def _select_named_measures(finding: Finding, excess: dict) -> list[str]:
     """Select the measures with too large errors that an accuracy warning names.
 
     These are the inaccurate main measures that are not zero within their error, else the measure with
@@ -157,7 +157,7 @@ def _named_measures(finding: Finding, excess: dict) -> list[str]:
 
 def _format_warning(finding: Finding, excess: dict, remedy: str) -> str:
     """Return an accuracy warning with errors, tolerance and remedy."""
-    names = _named_measures(finding, excess)
+    names = _select_named_measures(finding, excess)
     first, *more = (f"of {_format_error(finding.measures[name])}" for name in names)
     listed = "".join(f", {name} {words}" for name, words in zip(names[1:], more, strict=True))
     count = len(excess) - len(names)
@@ -180,7 +180,7 @@ def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
     patch_model = finding.model.patch
     peak = finding.measures.get("pressure_peak")
     is_wear_unbounded = (
-        "worn_depth_max" in _named_measures(finding, excess)
+        "worn_depth_max" in _select_named_measures(finding, excess)
         and peak is not None
         and peak.value is None
     )
@@ -232,9 +232,9 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
     patch_models = [finding.model.patch for finding, _ in places]
     cause = f"the mesh ({max(finding.patch.x.size for finding, _ in places)} interface nodes) causes this error"
     if any(patch.mesh.file is not None for patch in patch_models):
-        return faces.in_scene(model, f"{cause}; split the elements of contact.mesh")
+        return faces.use_scene_keys(model, f"{cause}; split the elements of contact.mesh")
     if not all(patch.mesh.is_automatic for patch in patch_models):
-        return faces.in_scene(model, f"{cause}; leave out {ELEMENT_SIZE}")
+        return faces.use_scene_keys(model, f"{cause}; leave out {ELEMENT_SIZE}")
     tolerances = [] if is_at_limit else [_refining_tolerance(*place) for place in places]
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
     if tolerances:
@@ -247,7 +247,7 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
             f"; the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
             "on a mesh of this scene"
         )
-    return f"{cause}; no accuracy.tolerance leads to a finer mesh; {USE_ERROR}"
+    return f"{cause}; no accuracy.tolerance leads to a finer mesh; {USE_ERROR_ADVICE}"
 
 
 def _refining_tolerance(finding: Finding, coarse) -> float | None:
@@ -280,9 +280,9 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
     """
     model = finding.model
     extra = finding.extra
-    name = max(_named_measures(finding, excess), key=excess.get)
+    name = max(_select_named_measures(finding, excess), key=excess.get)
     steps = extra.get("steps_per_cycle") or extra.get("steps")
-    cause = _main_cause(finding, name)
+    cause = _find_main_error_kind(finding, name)
     if cause == "steps" and steps is not None:
         return _step_remedy(finding, name, excess, int(steps))
     if cause == "end":
@@ -312,10 +312,10 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED_MEASURES):
         return NO_REMEDY
-    return notes.propose_harmonics(extra["harmonics"], _harmonics_of_friction(finding))
+    return notes.propose_harmonics(extra["harmonics"], _count_friction_harmonics(finding))
 
 
-def _main_cause(finding: Finding, name: str) -> str:
+def _find_main_error_kind(finding: Finding, name: str) -> str:
     """Return the kind of discretization (such as the mesh) with the largest error contribution."""
     parts = finding.extra.get("left_open")
     if parts is not None:
@@ -381,7 +381,7 @@ def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
             "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps "
             "until the displacement meets the tolerance"
         )
-    return f", so more steps may not help; {USE_ERROR}"
+    return f", so more steps may not help; {USE_ERROR_ADVICE}"
 
 
 def _end_remedy(cycles: float, steps: int) -> str:
@@ -398,7 +398,7 @@ def _end_remedy(cycles: float, steps: int) -> str:
     )
 
 
-def _harmonics_of_friction(finding: Finding) -> float:
+def _count_friction_harmonics(finding: Finding) -> float:
     """Return the number of harmonics that a speed-dependent friction force needs.
 
     The number is the largest speed over the reference speed of the law; 0 for other laws.

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 # Label of the memory that compiled code occupies. A run that must compile it also needs address space
 # for the compiler (`memory.free_bytes`).
-CODE_TO_COMPILE = "compiled code"
+COMPILED_CODE_LABEL = "compiled code"
 
 
 class MemoryPart(NamedTuple):
@@ -98,7 +98,7 @@ class EngineCode(NamedTuple):
 
     def cost(self) -> Cost:
         """Return the cost of loading the compiled code."""
-        part = MemoryPart(self.bytes, CODE_TO_COMPILE if self.compile else "code")
+        part = MemoryPart(self.bytes, COMPILED_CODE_LABEL if self.compile else "code")
         return Cost({"code": self.seconds}, (part,), compile_seconds=self.compile)
 
 

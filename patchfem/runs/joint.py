@@ -37,7 +37,7 @@ def remove_joint(model: Model, patch=None) -> Model:
         return model
     with locate_errors(model.source):
         if patch is None:
-            patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
+            patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         stiffness = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
         return replace(model, rig=model.rig.structure.without_joint(stiffness))
 

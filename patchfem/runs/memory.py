@@ -8,7 +8,7 @@ import os
 from pathlib import Path
 
 from ..core import Missing
-from .cost import CODE_TO_COMPILE
+from .cost import COMPILED_CODE_LABEL
 
 MAPPED_BYTES = 60e6  # address space [bytes] that the packages map in addition to the memory in use
 COMPILER_BYTES = 150e6  # address space [bytes] of the compiler library
@@ -148,7 +148,7 @@ def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
     The sentence names the required and the free memory, and the largest part with its key.
     """
     if free is None:
-        free = free_bytes(needs_compiler=any(part.what == CODE_TO_COMPILE for part in parts))
+        free = free_bytes(needs_compiler=any(part.what == COMPILED_CODE_LABEL for part in parts))
     total = sum(part.bytes for part in parts)
     if total <= free:
         return ""

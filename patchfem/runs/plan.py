@@ -192,7 +192,7 @@ def _make_plan(model: Model) -> Plan:
         model = replace(
             model,
             rig=of_rig.remove_expected_joint(
-                model.rig, patch_plan.chain(model.patch) | _interface_links(model)
+                model.rig, patch_plan.stiffness_chain(model.patch) | _interface_links(model)
             ),
         )
     on_motion = []
@@ -203,20 +203,20 @@ def _make_plan(model: Model) -> Plan:
         groups |= of_rig.compute_groups(model) if model.kind == "rig" else {}
         on_motion += engines.describe_unused_settings(model, engines.choose_engine(model).name)
     if model.patch is not None:
-        chain |= patch_plan.chain(model.patch)
-        groups |= patch_plan.groups(model)
-        on_patch += patch_plan.verdict(groups, model.patch)
+        chain |= patch_plan.stiffness_chain(model.patch)
+        groups |= patch_plan.compute_groups(model)
+        on_patch += patch_plan.write_verdict(groups, model.patch)
     interfaces = model.rig.friction.interfaces if model.rig is not None else ()
     for number, interface in enumerate(interfaces):
         if interface.patch is not None:
-            for name, link in patch_plan.chain(interface.patch).items():
+            for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
             on_patch += patch_plan.describe_patch(model.rig.friction.names[number], interface)
     cost = _predict_cost(model)
     on_law += cost.words
     if model.kind == "bench":
-        groups = of_bench.groups(model) | groups
+        groups = of_bench.dimensionless_groups(model) | groups
     if model.friction is not None:
         chain |= _interface_links(model)
         groups |= _law_groups(model)
@@ -254,21 +254,23 @@ def _predict_cost(model: Model) -> Cost:
     The memory parts are ordered from the largest to the smallest.
     """
     pressing = (
-        patch_plan.cost(model) if model.patch is not None or model.has_interface_patches else Cost()
+        patch_plan.predict_cost(model)
+        if model.patch is not None or model.has_interface_patches
+        else Cost()
     )
     points = pressing.sizes.get("interface_points", 1)
     motion = Cost()
     if model.rig is not None:
         motion = of_rig.predict_cost(model, points)
     elif model.kind == "bench":
-        motion = of_bench.cost(model, points)
+        motion = of_bench.predict_cost(model, points)
     total = (
         Cost({"start": cost_model.START_SECONDS}, (MemoryPart(PACKAGE_BYTES, "packages"),))
         + pressing
         + motion
     )
     if model.wear is not None and model.patch is not None:
-        total += of_wear.cost(
+        total += of_wear.predict_cost(
             model, points, motion.times["motion"] + motion.times.get("histories", 0.0)
         )
     return replace(
@@ -366,15 +368,15 @@ def _interface_links(model: Model) -> dict:
     links = {}
     if model.grooves is not None:
         links["grooves"] = model.grooves.stiffness(load)
-    links["bonds"] = _law_link(model.friction, load)
+    links["bonds"] = _law_stiffness(model.friction, load)
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
     for number, interface in enumerate(others, 2):
         interface_load = load if interface.load is None else interface.load
-        links[f"bonds_{number}"] = _law_link(interface.numbers, interface_load)
+        links[f"bonds_{number}"] = _law_stiffness(interface.numbers, interface_load)
     return links
 
 
-def _law_link(law, load: float):
+def _law_stiffness(law, load: float):
     """Return the stiffness [N/m] of a friction law in stick, or a text."""
     if law_has_trait(law.law, "creeps"):
         return "none: it creeps"

@@ -100,10 +100,10 @@ def run(
     what = what if isinstance(what, Plan) else plan(what)
     with locate_errors(what.model.source):
         refuse_large_run(what)
-        return _run(what, say, progress, kept, estimate=estimate, fresh=fresh)
+        return _run_plan(what, say, progress, kept, estimate=estimate, fresh=fresh)
 
 
-def _run(
+def _run_plan(
     what: Plan, say, progress, kept: StateFile | None, *, estimate: bool, fresh: bool
 ) -> Result:
     """Run a plan whose size was accepted."""
@@ -133,7 +133,7 @@ def _run(
         what, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate
     )
     if _is_open(meshes.patch) and model.kind != "patch":
-        result = patch_result.static(replace(inputs, warnings=[*warnings, NO_MOTION]))
+        result = patch_result.make_static_result(replace(inputs, warnings=[*warnings, NO_MOTION]))
     elif _has_no_load(model):
         result = _result_without_load(inputs)
     else:
@@ -148,7 +148,7 @@ def _run(
                 result = _run_kind(inputs)
         except NotConverged as error:
             if meshes.patch is not None and what.kind != "patch":
-                at_rest = patch_result.static(
+                at_rest = patch_result.make_static_result(
                     replace(inputs, plan=what, warnings=[*warnings, NO_MOTION_FOUND])
                 )
                 at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
@@ -167,7 +167,7 @@ def _run(
 def _press_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
     """Solve the patch of [contact] on the meshes that the run and its error estimate need."""
     tolerance = model.accuracy.tolerance
-    patch, *coarse = patch_result.solve_all(model.patch, tolerance, estimate, fresh)
+    patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate, fresh)
     static = ()
     if model.kind == "bench" and not _is_open(patch):
         static = patch_result.solve_static_ladder(model.patch, tolerance, estimate, fresh)
@@ -197,7 +197,7 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
 def _run_kind(inputs: RunInputs) -> Result:
     """Run a plan with the function for its kind of scene (patch, bench or rig)."""
     if inputs.plan.kind == "patch":
-        return patch_result.static(inputs)
+        return patch_result.make_static_result(inputs)
     if inputs.plan.kind == "bench":
         return bench_result.run_prescribed(
             inputs.plan,
@@ -233,7 +233,7 @@ def _wear_patch(inputs: RunInputs, kept: StateFile | None):
     model = inputs.plan.model
     patch = inputs.patch
     key = kept and state_key(model, patch, kept.version)
-    return evolve.evolve_and_save(kept, key, model, patch, inputs.coarse[:2], inputs.progress)
+    return evolve.compute_and_save_wear(kept, key, model, patch, inputs.coarse[:2], inputs.progress)
 
 
 def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:

@@ -227,7 +227,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
         or engines.choose_engine(model).name != engines.MARCH.name
     ):
         return None
-    if lists.choose_bond_sum(model, numerics.choose_numerics(model)).error <= tolerance:
+    if lists.choose_bond_summation(model, numerics.choose_numerics(model)).error <= tolerance:
         return None
     return Cause(f"with {' and '.join(pinned)} as given", dict.fromkeys(pinned))
 

@@ -15,7 +15,7 @@ from patchfem.core import InitialState, ModalBasis
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import models
 from patchfem.model import build
-from patchfem.runs import choose_numerics, solve_all
+from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_single_contact
 from patchfem.scene import scene
 from patchfem.structure import make_release
@@ -114,7 +114,9 @@ def problem(name: str) -> Problem:
     modes = model.rig.modes
     drive = model.rig.drive.signal
     contact = make_single_contact(
-        model, choose_numerics(model), solve_all(model.patch, model.accuracy.tolerance, False)[0]
+        model,
+        choose_numerics(model),
+        solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0],
     )
     k, y = contact.element.numbers[2:].reshape(2, -1)
     numbers = {

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 import patchfem as pf
 from patchfem.dynamics import warm_up
 from patchfem.dynamics.march.march import march
-from patchfem.runs import choose_numerics, solve_all
+from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_contact
 from patchfem.structure.drives import RecordedDrive
 
@@ -77,7 +77,9 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
     drive = drive or model.rig.drive.signal
     modes = model.rig.modes
     patch = (
-        None if model.patch is None else solve_all(model.patch, model.accuracy.tolerance, False)[0]
+        None
+        if model.patch is None
+        else solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     )
     contact = make_contact(model, choose_numerics(model), patch)
     # 1e-6: a whole number stays one

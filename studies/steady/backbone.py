@@ -25,7 +25,7 @@ from rig_texts import ONE_MODE, TEXTS
 
 from patchfem.dynamics.harmonic.branch import find_backbone
 from patchfem.model import build
-from patchfem.runs import choose_numerics, solve_all
+from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs import run as runner
 from patchfem.runs.rig.interface import make_single_contact
 from patchfem.scene import scene
@@ -87,7 +87,7 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
     model = build(scene.loads(text))
     modes = model.rig.modes
     patch = (
-        solve_all(model.patch, model.accuracy.tolerance, False)[0]
+        solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
         if model.patch is not None
         else None
     )

@@ -28,7 +28,7 @@ from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
-from patchfem.identify import CubeResidual, run_descents
+from patchfem.identify import UnitCubeResidual, run_descents
 from patchfem.identify.least_squares import NEAR_BOUND_FRACTION
 from patchfem.identify.space import make_space
 
@@ -204,7 +204,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    quick = CubeResidual(residual, box, is_quick=True)
+    quick = UnitCubeResidual(residual, box, is_quick=True)
     rng = np.random.default_rng(SEED)
     random = 0
     ends = run_descents(quick, [box.unit(one) for one in begins], before_descent=computed.forget)
@@ -223,7 +223,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
         ]
         ends += run_descents(quick, zeros, before_descent=computed.forget)
         last = run_descents(
-            CubeResidual(residual, box),
+            UnitCubeResidual(residual, box),
             [min(ends, key=lambda one: one.cost).u],
             before_descent=computed.forget,
         )[0]

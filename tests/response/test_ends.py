@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import Response
 from patchfem.response import estimate_window_error
-from patchfem.response.loops import drift
+from patchfem.response.loops import mean_drift
 from patchfem.response.run_events import slips_and_displacements
 
 PERIOD, STEPS = 1.0, 4000
@@ -24,7 +24,7 @@ def window(end, cycles):
 def read(w, cycles):
     """The measures by their definitions."""
     return {
-        "drift_per_cycle": drift(w.time, w.slide, w.slide_rate, PERIOD),
+        "drift_per_cycle": mean_drift(w.time, w.slide, w.slide_rate, PERIOD),
         "loop_area": float(np.trapezoid(w.force, w.slide)) / cycles,
         "absolute_acceleration_peak": w.acceleration.max(),
         "friction_force_peak": np.abs(w.force).max(),

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.response import events
-from patchfem.response.events import Events, compute_slip_states, detect_events, find_sticks
+from patchfem.response.events import Events, compute_slip_states, detect_events, find_stick_spans
 from patchfem.response.run_events import select_last_cycle
 
 
@@ -61,7 +61,7 @@ def test_exact_a_slip_below_the_bound_is_no_event():
 def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end):
     time, slip = stick_slip(rest=rest)
     found = detect_events(time, slip[:, None], slip[:, None], 1.0)
-    spans = find_sticks(found, begin, end, [True])
+    spans = find_stick_spans(found, begin, end, [True])
     held = sum(b - a for a, b in spans)
     middle = (time[1:] + time[:-1]) / 2
     inside = np.clip(np.minimum(time[1:], end) - np.maximum(time[:-1], begin), 0, None)
@@ -81,7 +81,7 @@ def test_exact_sticks_are_cut_where_another_interface_changes():
         (9.5, 1, events.STOP),
     ]
     found = Events(*(np.array(column) for column in zip(*rows)), np.zeros(6), 6)
-    assert find_sticks(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
+    assert find_stick_spans(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
 
 
 def test_exact_sticks_of_one_cycle_are_whole():

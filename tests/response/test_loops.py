@@ -172,8 +172,8 @@ def test_exact_drift(count, samples):
     time, phase = samples(count, 60)
     slide = 3e-6 * np.sin(phase + 0.3) + 2e-7 * phase / (2 * pi) + 1e-6
     rate = OMEGA * (3e-6 * np.cos(phase + 0.3) + 2e-7 / (2 * pi))
-    assert loops.drift(time, slide, rate, PERIOD) == pytest.approx(2e-7, rel=1e-9)
-    assert loops.drift(time, np.full(time.size, 0.3), 0 * rate, PERIOD) == 0.0
+    assert loops.mean_drift(time, slide, rate, PERIOD) == pytest.approx(2e-7, rel=1e-9)
+    assert loops.mean_drift(time, np.full(time.size, 0.3), 0 * rate, PERIOD) == 0.0
 
 
 # scenes

@@ -7,9 +7,9 @@ import pytest
 
 from patchfem import run
 from patchfem.core import DriveSegment, Measure
-from patchfem.response import STICKS_AT_REVERSAL, find_missing_loops
+from patchfem.response import STICKS_AT_REVERSAL_REASON, find_missing_loops
 from patchfem.response.events import RELEASE_UP
-from patchfem.response.reasons import APERIODIC, OUTPUT_AT_REST, UNCLOSED
+from patchfem.response.reasons import APERIODIC_REASON, OPEN_LOOP_REASON, OUTPUT_AT_REST_REASON
 
 FREE = SimpleNamespace(segments=(DriveSegment(0.0),), period=0.1)
 RELEASED = """[normal]
@@ -63,7 +63,7 @@ def test_exact_a_loop_closes_that_stores_no_more_than_it_dissipates(stored, lost
             None,
             "J",
             1e-10,
-            UNCLOSED,
+            OPEN_LOOP_REASON,
         )
 
 
@@ -95,7 +95,7 @@ def test_exact_an_interface_that_only_springs_back_has_no_loop(cycles):
     """Released within its elastic range it dissipates nothing: its work is k (x1^2 - x0^2)/2 of a decaying ring."""
     found, _ = measures(RELEASED.format(start="20 um", cycles=cycles))
     assert found["energy_dissipated"].value == pytest.approx(0.0, abs=1e-15)
-    assert found["loop_area"].value is None and found["loop_area"].reason == UNCLOSED
+    assert found["loop_area"].value is None and found["loop_area"].reason == OPEN_LOOP_REASON
 
 
 @pytest.mark.parametrize(("force", "there"), [("1e-9 N", False), ("1 N", True)])
@@ -110,7 +110,7 @@ def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
         found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion")
     )
     assert (ratio.value is not None) == there == (first.value > first.floor)
-    assert ratio.reason == ("" if there else OUTPUT_AT_REST)
+    assert ratio.reason == ("" if there else OUTPUT_AT_REST_REASON)
 
 
 @pytest.mark.parametrize(("start", "cycles"), [("20 um", 15), ("20 um", 15.3)])
@@ -118,7 +118,7 @@ def test_always_no_drift_where_no_drive_gives_a_period(start, cycles):
     """The stuck interface rings with a period of its own, so means over periods of the free mode differ by nothing that
     moves on."""
     found = run(RELEASED.format(start=start, cycles=cycles)).measures["drift_per_cycle"]
-    assert found.value is None and found.error is None and found.reason == APERIODIC
+    assert found.value is None and found.error is None and found.reason == APERIODIC_REASON
 
 
 STICK_SLIP = """[normal]
@@ -169,5 +169,5 @@ def test_exact_no_secant_where_rigid_friction_sticks_at_the_largest_slide(kineti
     assert (
         secant.value == pytest.approx(0.0, abs=1e-3)
         if there
-        else secant.reason == STICKS_AT_REVERSAL
+        else secant.reason == STICKS_AT_REVERSAL_REASON
     )

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.response import CHANGE_NOT_RESOLVED, UNSETTLED, settling
+from patchfem.response import CHANGE_NOT_RESOLVED_REASON, UNSETTLED, settling
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -241,7 +241,7 @@ def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_stea
     steady = done.measures["relative_displacement_amplitude_steady"]
     assert done.outcome == "transient"
     assert steady.value is None
-    assert steady.reason == CHANGE_NOT_RESOLVED
+    assert steady.reason == CHANGE_NOT_RESOLVED_REASON
     later = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 200.0}})
     assert later.outcome == "steady"
     assert "relative_displacement_amplitude_steady" not in later.measures

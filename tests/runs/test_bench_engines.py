@@ -8,7 +8,7 @@ import pytest
 from patchfem import SceneError, build, plan
 from patchfem.core import Missing
 from patchfem.friction import MAX_LIST_SECONDS, steady_loop
-from patchfem.runs import PassOptions, solve_all
+from patchfem.runs import PassOptions, solve_with_coarser
 from patchfem.runs.bench import bench
 from patchfem.runs.bench.ledger import N_BLOCK_SAMPLES, Slide
 from patchfem.runs.bench.stepped import slide_step_by_step
@@ -101,7 +101,7 @@ def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(
 )
 def test_exact_frames_of_a_patch_are_those_of_its_points(law):
     model = model_of(EXACT[law], "sine", where=PATCH)
-    patch = solve_all(model.patch, 1e-3, False)[0]
+    patch = solve_with_coarser(model.patch, 1e-3, False)[0]
     one, two = both(model, 40, patch, 5)
     top = np.abs(two.tau).max()
     assert (one.frames == two.frames).all() and one.tau.shape == (5, patch.x.size)

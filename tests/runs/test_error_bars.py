@@ -10,7 +10,7 @@ import pytest
 from scene_texts import PIECE
 
 from patchfem import build
-from patchfem.runs import measures, solve_all
+from patchfem.runs import estimate_measures, solve_with_coarser
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.limits import extrapolate
@@ -79,8 +79,8 @@ def settings(seed: int, kind: str) -> list:
 def compared(seed: int, kind: str) -> dict:
     """name -> (value, error, truth) of a random scene; the truth is what two splits of every cell lead to."""
     model = build(loads(BLOCKS, "a.toml", settings(seed, kind)))
-    series = solve_all(model.patch, model.accuracy.tolerance)
-    found = measures(
+    series = solve_with_coarser(model.patch, model.accuracy.tolerance)
+    found = estimate_measures(
         *series, tolerance=model.accuracy.tolerance if model.patch.mesh.is_automatic else None
     )
     grids = [series[0].pair.grid, series[0].pair.upper_grid]

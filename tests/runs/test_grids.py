@@ -5,7 +5,7 @@ import pytest
 from scene_texts import SMALL_PATCH
 
 from patchfem import build
-from patchfem.runs import solve_all
+from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch import grids, store
 from patchfem.runs.patch.plan import expected_grids
 from patchfem.scene import loads
@@ -27,7 +27,7 @@ def asked(text, *sets):
 
 def grids_of_run(patch, tolerance) -> tuple:
     """(columns, rows) of nodes of the finest grid of each piece, as a run solves them; how many levels there are."""
-    patches = solve_all(patch, tolerance)
+    patches = solve_with_coarser(patch, tolerance)
     pair = patches[0].pair
     bodies = [pair.grid] if pair.upper is pair.piece else [pair.grid, pair.upper_grid]
     return tuple((body.x.size, body.depth.size) for body in bodies), sum(
@@ -82,7 +82,7 @@ SMALL_CROWN = 'radius = "0.3 m"'
 def test_always_further_searches_for_the_contact_give_the_same_columns(ending, monkeypatch):
     columns = []
     for fraction in (grids.BAND_CHANGE_TOL, -1.0):  # a search is never settled with -1
-        store.clear()
+        store.clear_cache()
         monkeypatch.setattr(grids, "BAND_CHANGE_TOL", fraction)
         columns.append(grids.make_base_grids(asked(PIECES + ending)).bodies[0].x)
     settled, searched = columns

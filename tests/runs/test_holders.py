@@ -9,7 +9,7 @@ from scene_texts import COATING, PIECE
 from patchfem import build
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome
-from patchfem.runs import solve_all
+from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.values import values
 from patchfem.scene import scene
 
@@ -29,7 +29,7 @@ TOLERANCE = 1e-3
 
 def solved(keys=LOAD, tables=""):
     found = build(scene.loads(TEXT.format(keys, tables))).patch
-    patch = solve_all(found, TOLERANCE, False)[0]
+    patch = solve_with_coarser(found, TOLERANCE, False)[0]
     return patch, values(patch)
 
 

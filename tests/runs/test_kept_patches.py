@@ -26,14 +26,14 @@ def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
 
 @pytest.fixture(autouse=True)
 def no_saved_state_error():
-    store.clear()
+    store.clear_cache()
 
 
 def test_exact_runs_that_share_a_patch_equal_runs_that_share_nothing():
     cases = models()
     found = one_by_one.solve(cases)
     for case, model in enumerate(cases):
-        store.clear()
+        store.clear_cache()
         alone = one_by_one.solve([model])
         assert alone.outcome[0] == found.outcome[case] and alone.notes.get(0) == found.notes.get(
             case

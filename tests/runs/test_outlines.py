@@ -16,7 +16,7 @@ from patchfem.elasticity import compute_coating_traction, compute_displacement, 
 from patchfem.mesh import TensorGrid, write_mesh
 from patchfem.mesh.tensor import graded_depth, graded_rows
 from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
-from patchfem.runs import measures, solve_all
+from patchfem.runs import estimate_measures, solve_with_coarser
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.result import warn_of_strains
 from patchfem.runs.patch.values import values
@@ -192,7 +192,9 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
 )
 def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_chooses(tables):
     model = asked(BLOCK + tables)
-    rough, best = (measures(*solve_all(model, tolerance)) for tolerance in (2e-2, 4e-3))
+    rough, best = (
+        estimate_measures(*solve_with_coarser(model, tolerance)) for tolerance in (2e-2, 4e-3)
+    )
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "contact_fraction"):
         assert abs(rough[name].value - best[name].value) <= rough[name].error + best[name].error, (
             name
@@ -209,8 +211,8 @@ def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_ov
     (*_, half), edge = find_rounded_edges(model)
     true = values(graded(model, towards(half, model.pieces.length / 2, edge / 30)))
     for cells in (20, 150):
-        found = measures(
-            *solve_all(
+        found = estimate_measures(
+            *solve_with_coarser(
                 asked(BLOCK + f'element_size = "{model.pieces.length / cells!r} m"\n' + tables),
                 1e-3,
             )

@@ -16,7 +16,7 @@ from patchfem.formatting import format_length
 from patchfem.mesh import graded_grid, write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.model import make_piece_meshes
-from patchfem.runs import measures, solve_all
+from patchfem.runs import estimate_measures, solve_with_coarser
 from patchfem.runs.patch.measures import plane_state_sentences
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.values import values
@@ -303,8 +303,8 @@ def test_exact_a_rounded_mesh_is_the_flat_mesh_with_the_rounding_in_its_gap(tmp_
 def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
     """The contact is a hundredth of the patch, which no even mesh of that cost resolves."""
     found = asked('[contact.crown]\nradius = "0.2 m"\n', 'load = "40 N"')
-    series = solve_all(found, 1e-2)
-    mine = measures(*series)
+    series = solve_with_coarser(found, 1e-2)
+    mine = estimate_measures(*series)
     modulus = exact.combined_modulus(210e9, 0.3, 210e9, 0.3)
     half = exact.hertz_half_width(40 / WIDTH, 0.2, modulus)
     peak = exact.hertz_peak(40 / WIDTH, 0.2, modulus)
@@ -346,7 +346,7 @@ def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
         "roll_moment": -0.575480,
     }
     for size in (250, 127, 100):
-        found = measures(*solve_all(build(loads(text.format(size))).patch, 1e-3))
+        found = estimate_measures(*solve_with_coarser(build(loads(text.format(size))).patch, 1e-3))
         for name, value in truth.items():
             assert (
                 abs(found[name].value - value)

@@ -10,7 +10,7 @@ from scene_texts import NONLOCAL, POINT, SMALL_PATCH, TRIANGLE
 from patchfem import build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction import Bonds, FirstOrderBonds
-from patchfem.runs import solve_all
+from patchfem.runs import solve_with_coarser
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.run import run
 from patchfem.scene import load, loads
@@ -67,7 +67,7 @@ def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
 def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     """Resultants and yaw moment from the law at every node of every strip, with the pressure of that strip."""
     model = build(table(L_SHAPE, SMALL_PATCH + strips + LONGER))
-    patch = solve_all(model.patch, 1e-3, False)[0]
+    patch = solve_with_coarser(model.patch, 1e-3, False)[0]
     found = law_bench.run(model, patch, 60, 6)
     pressure = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
     offsets = patch.strips.offsets if strips else np.zeros(1)
@@ -181,5 +181,5 @@ def test_exact_level_strips_are_the_patch(side):
 
 def bench_of(text, *sets):
     model = build(loads(text + TRIANGLE, sets=sets))
-    patch = solve_all(model.patch, 1e-3, False)[0] if model.patch is not None else None
+    patch = solve_with_coarser(model.patch, 1e-3, False)[0] if model.patch is not None else None
     return law_bench.run(model, patch, 120, 4)

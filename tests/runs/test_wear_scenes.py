@@ -20,7 +20,7 @@ from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import interface_compliance, make_piece
-from patchfem.runs.patch.result import solve_all
+from patchfem.runs.patch.result import solve_with_coarser
 from patchfem.runs.wear import evolve
 from patchfem.scene import loads
 from patchfem.slip import jenkins_set
@@ -257,7 +257,7 @@ def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
     ).groups()
     assert int(nodes) == found.patch.x.size
     asked = build(loads(WORN_CROWN.format(tolerance=tolerance), "s.toml")).patch
-    assert solve_all(asked, float(tolerance))[0].x.size > int(nodes)
+    assert solve_with_coarser(asked, float(tolerance))[0].x.size > int(nodes)
 
 
 def test_refuses_what_wear_does_not_go_with():

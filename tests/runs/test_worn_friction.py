@@ -6,8 +6,8 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem import SceneError
-from patchfem.runs import evolve
-from patchfem.runs.patch.result import solve_all
+from patchfem.runs import compute_wear
+from patchfem.runs.patch.result import solve_with_coarser
 from patchfem.runs.wear.plan import estimate_jumps
 from patchfem.scene import loads
 
@@ -88,8 +88,8 @@ def test_always_jumps_do_not_pass_a_row_unseen():
     model = pf.build(
         loads(SCENE, "a.toml", [*TABLE, "wear.cycles=1e6", "contact.element_size=0.1 mm"])
     )
-    patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
-    moments = evolve(model, patch, (None, None)).moments
+    patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    moments = compute_wear(model, patch, (None, None)).moments
     assert max(one.values["static_coefficient"] for one in moments) > 1.4 * MU
     assert 1 / 1.5 < estimate_jumps(model) / (len(moments) - 1) < 1.5
     few = ran(*TABLE, "wear.cycles=2e6", "wear.jumps=2")

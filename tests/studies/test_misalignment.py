@@ -65,10 +65,10 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
 
 
 def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
-    from patchfem.runs import measures
+    from patchfem.runs import estimate_measures
 
     found = fixtures.held_pieces(1e-3, None)
-    two = measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
+    two = estimate_measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
     # an independent program with elements of order 5
     best = {
         "contact_fraction": 0.0239193,
@@ -82,11 +82,11 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
 @pytest.mark.slow
 @pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
 def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
-    from patchfem.runs import measures, solve_all
+    from patchfem.runs import estimate_measures, solve_with_coarser
 
     found = tilted.case(angle, skin)
     ours = tilted.compute_measures(found)
-    other = measures(*solve_all(found, 1e-3), tolerance=1e-3)
+    other = estimate_measures(*solve_with_coarser(found, 1e-3), tolerance=1e-3)
     for name in (
         "contact_fraction",
         "loaded_fraction",

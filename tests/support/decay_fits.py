@@ -25,7 +25,7 @@ from patchfem.campaigns import compute_backbone, fit_curve
 from patchfem.campaigns.fits.curve import read_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
-from patchfem.identify import CubeResidual
+from patchfem.identify import UnitCubeResidual
 from patchfem.identify.least_squares import descend
 from patchfem.identify.space import make_space
 from patchfem.model import build
@@ -171,7 +171,7 @@ def least(one: Made, place: Path, wanted: list) -> float:
 
     box = make_space([key.low for key in wanted], [key.high for key in wanted])
     return descend(
-        CubeResidual(residual, box, is_quick=True),
+        UnitCubeResidual(residual, box, is_quick=True),
         box.unit(list(one.truth.values())),
         range(len(wanted)),
     ).cost

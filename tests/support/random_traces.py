@@ -17,7 +17,7 @@ from synthetic import self_affine
 
 import patchfem as pf
 from patchfem.model import build
-from patchfem.runs import measures, solve_all
+from patchfem.runs import estimate_measures, solve_with_coarser
 from patchfem.runs.patch import fine
 from patchfem.scene import loads
 
@@ -125,11 +125,13 @@ def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
 def _beside(kind: str, asked, tolerance: float) -> dict:
     """Measures of a patch by name from cells alone: even ones of traces that are fine everywhere, else graded ones."""
     if kind in FINE:
-        return measures(*solve_all(asked.with_mesh(element_size=LENGTH / CELLS), tolerance))
+        return estimate_measures(
+            *solve_with_coarser(asked.with_mesh(element_size=LENGTH / CELLS), tolerance)
+        )
     can_use_points = fine.can_use_points
     fine.can_use_points = lambda patch_model: False
     try:
-        patches = [patch for patch in solve_all(asked, tolerance) if patch is not None]
-        return measures(*patches, tolerance=tolerance)
+        patches = [patch for patch in solve_with_coarser(asked, tolerance) if patch is not None]
+        return estimate_measures(*patches, tolerance=tolerance)
     finally:
         fine.can_use_points = can_use_points

@@ -301,7 +301,7 @@ def build_joint(model: Model, name: str) -> Joint:
     patch = None
     coarser: tuple = (None,)
     if model.patch is not None:
-        patch, *others = patch_result.solve_all(model.patch, model.accuracy.tolerance)
+        patch, *others = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)
         coarser = (*others, None)
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
     joint = Joint(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))

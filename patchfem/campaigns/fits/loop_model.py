@@ -12,7 +12,7 @@ from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.batch import meshes
 from ...runs.bench import bench as law_bench
-from ...runs.bench.engine import choose_smooth_bond_sum
+from ...runs.bench.engine import choose_smooth_bond_summation
 from ...runs.bench.ledger import PassOptions
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
@@ -129,7 +129,7 @@ class BenchModel:
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, path.time)
         displacement = np.interp(number, corner, path.displacement)
-        options = PassOptions(choose_smooth_bond_sum(model, displacement), self.say)
+        options = PassOptions(choose_smooth_bond_summation(model, displacement), self.say)
         run = law_bench.run(model, patch, 4, 0, (time, displacement, 0, 0.0), options)
         if not run.load[0] > 0:
             raise PatchfemError(

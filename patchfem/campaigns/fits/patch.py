@@ -192,7 +192,7 @@ def _solve_with_refined_mesh(model: Model, slides) -> _MeshedLoops:
     """Solve the patch on finer meshes until a coarser mesh hardly changes the loss."""
     tolerance = model.accuracy.tolerance
     while True:
-        patch, *coarser = ladder.solve_all(model.patch, tolerance)
+        patch, *coarser = ladder.solve_with_coarser(model.patch, tolerance)
         if not patch.pressure.load > 0:
             raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
         elements = _patch_elements(model, patch)

@@ -158,7 +158,7 @@ def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
 
 def press_patch(model: Model):
     """Solve the contact of a model without error estimates; PatchfemError without contact."""
-    patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     if patch.pressure.outcome is Outcome.NO_CONTACT:
         raise PatchfemError(patch.pressure.outcome.sentence, "")
     return patch

@@ -18,7 +18,7 @@ from scipy.interpolate import PchipInterpolator
 from ...core import Missing, NotConverged, PatchfemError
 from ...model.model import Model
 from ...runs.patch import ladder
-from ...runs.patch.press import areas
+from ...runs.patch.press import nodal_areas
 from ...runs.wear import evolve
 from ...scene.keys.quantities import parse_quantity
 from ...scene.ranges import Range
@@ -194,7 +194,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
             f"fit {KEY}: the fit must start from unworn pieces; leave out wear.start", "wear.start"
         )
     # The patch of unworn pieces is the same for all coefficients.
-    patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
+    patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
 
     def compute(coefficient: float) -> WearCurve:
         """Compute the depth over the cycles for a wear coefficient [m2/N]."""
@@ -263,10 +263,10 @@ def _compute_curve(model: Model, patch, coefficient: float, name: str, progress)
     patch: solved contact of the unworn pieces.
     """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
-    worn = evolve.evolve(model, patch, (None, None), progress)
+    worn = evolve.compute_wear(model, patch, (None, None), progress)
     if worn.stopped:
         raise PatchfemError(f"fit {KEY}: {worn.stopped}")
-    area = areas(model.patch, patch.pieces.interface).ravel()
+    area = nodal_areas(model.patch, patch.pieces.interface).ravel()
     depths = np.array([moment.depth.ravel() for moment in worn.moments])
     depth = depths.max(axis=1) if name == "worn_depth_max" else depths @ area / area.sum()
     fraction = np.array([moment.cycle for moment in worn.moments]) / model.wear.cycles

@@ -17,7 +17,7 @@ from ...identify.least_squares import (
     assemble_fit,
     run_descents,
 )
-from ...identify.space import CubeResidual
+from ...identify.space import UnitCubeResidual
 from .cells import Readings
 from .computed import ModelReadings
 
@@ -163,7 +163,7 @@ def search_random_starts(
     """
     space = problem.space
     n = space.low.size
-    quick = CubeResidual(problem.residual, space, is_quick=True)
+    quick = UnitCubeResidual(problem.residual, space, is_quick=True)
     starts = np.random.default_rng(settings.seed).random((settings.starts, n))
     ends = run_descents(
         quick,
@@ -178,7 +178,7 @@ def search_random_starts(
             f"fit: all {settings.starts} searches failed; the first failed for this reason: {quick.reason}"
         )
     best = run_descents(
-        CubeResidual(problem.residual, space),
+        UnitCubeResidual(problem.residual, space),
         [ends[int(np.nanargmin(rms))].u],
         before_descent=before_descent,
     )

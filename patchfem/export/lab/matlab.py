@@ -6,7 +6,7 @@ import numpy as np
 
 from .series import Histories, program_name
 
-LONGEST = 63  # largest number of characters of a name in MATLAB
+MAX_NAME_LENGTH = 63  # largest number of characters of a name in MATLAB
 
 
 def write_arrays(path: Path, histories: Histories) -> None:
@@ -16,8 +16,10 @@ def write_arrays(path: Path, histories: Histories) -> None:
     """
     from scipy.io import savemat
 
-    values = {name[:LONGEST]: np.asarray(array) for name, (array, _) in histories.arrays.items()}
-    units = {name[:LONGEST]: unit for name, (_, unit) in histories.arrays.items()}
+    values = {
+        name[:MAX_NAME_LENGTH]: np.asarray(array) for name, (array, _) in histories.arrays.items()
+    }
+    units = {name[:MAX_NAME_LENGTH]: unit for name, (_, unit) in histories.arrays.items()}
     with open(path, "wb") as file:
         savemat(
             file,

@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 
 from .series import program_name
-from .universal import SI, write_sets
+from .universal import SI_UNITS, write_sets
 
 # Data types of dataset 58.
 ACCELERATION = 12
 FORCE = 13
 FREQUENCY = 18
-KINDS = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
+RESPONSE_TYPES = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
 OVER = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
 # Function types of dataset 58.
-RESPONSE = 4
-COHERENCE = 6
+RESPONSE_FUNCTION = 4
+COHERENCE_FUNCTION = 6
 
 
 def structure_text(modes, source: str) -> str:
@@ -68,7 +68,7 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
     drive, response : str
         Kinds of input and output, keys of OVER and KINDS.
     """
-    (kind, unit), (drive_type, drive_unit) = KINDS[response], OVER[drive]
+    (kind, unit), (drive_type, drive_unit) = RESPONSE_TYPES[response], OVER[drive]
     common = {
         "type": 58,
         "binary": 1,
@@ -85,10 +85,10 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
         "x": np.array(estimate.frequency),
     }
     sets = [
-        SI,
+        SI_UNITS,
         common
         | {
-            "func_type": RESPONSE,
+            "func_type": RESPONSE_FUNCTION,
             "ordinate_spec_data_type": kind,
             "ordinate_axis_units_lab": unit,
             "orddenom_spec_data_type": drive_type,
@@ -100,7 +100,7 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
         sets.append(
             common
             | {
-                "func_type": COHERENCE,
+                "func_type": COHERENCE_FUNCTION,
                 "id1": f"coherence of {response} and {drive}",
                 "ordinate_spec_data_type": 0,
                 "orddenom_spec_data_type": 0,

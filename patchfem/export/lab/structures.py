@@ -218,7 +218,7 @@ def friction_elements(model: Model) -> Elements:
         )
     patch = None
     if model.patch is not None:
-        patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
+        patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
     chosen = replace(numerics.choose_numerics(model), pairs=costs.count_merges(model))

@@ -17,10 +17,10 @@ GENERAL = 1
 DISPLACEMENT = 8
 TIME = 17
 TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; all others are general
-HISTORY = 1  # function type: time response
-LOOP = 0  # function type: general
+HISTORY_FUNCTION = 1  # function type: time response
+LOOP_FUNCTION = 0  # function type: general
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
-SI = {
+SI_UNITS = {
     "type": 164,
     "units_code": 1,
     "units_description": "SI: Meter (newton)",
@@ -60,19 +60,21 @@ def write_histories(path: Path, histories: Histories) -> int:
                 column.label,
                 Column("time", "s", histories.time, 0),
                 column,
-                HISTORY,
+                HISTORY_FUNCTION,
                 histories.title,
             )
             for column in histories.columns
         ]
     )
     sets += [
-        _function_dataset(f"{force.label} over {slide.label}", slide, force, LOOP, histories.title)
+        _function_dataset(
+            f"{force.label} over {slide.label}", slide, force, LOOP_FUNCTION, histories.title
+        )
         for slide, force in histories.loops()
     ]
     if not sets:
         raise PatchfemError(f"{path}: contains neither times nor a loop to write")
-    write_sets(path, [SI, *sets])
+    write_sets(path, [SI_UNITS, *sets])
     return len(sets)
 
 

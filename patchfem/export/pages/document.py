@@ -12,7 +12,7 @@ import numpy as np
 from . import library
 
 DIGITS = 9  # digits of the numbers in a page: a figure shows four, a value under the pointer seven
-NUMBER = f"%.{DIGITS}g,"
+NUMBER_FORMAT = f"%.{DIGITS}g,"
 OLD_BROWSER_NOTE = (
     "The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
     "which browsers have had since 2023. Texts and tables are complete."
@@ -201,7 +201,7 @@ def to_json(value) -> str:
         # To encode the elements one by one would take six times as long.
         kinds = set(map(type, value))
         if kinds == {float}:
-            text = NUMBER * len(value) % tuple(value)
+            text = NUMBER_FORMAT * len(value) % tuple(value)
             return f"[{(text if all(map(math.isfinite, value)) else NOT_FINITE.sub('null', text))[:-1]}]"
         if kinds <= {str, bool, int}:
             return json.dumps(value, separators=(",", ":"))

@@ -22,7 +22,7 @@ from .thinned import reduce_mesh, select_lines
 MAX_FRAMES = 24
 MAX_CELLS = 5000  # largest number of cells of a piece
 MAX_POSITIONS = 400  # largest number of positions along the interface
-BYTES = 520_000  # bytes of all frames before they are encoded as text
+MAX_PLAYER_BYTES = 520_000  # bytes of all frames before they are encoded as text
 # Quantities of a cell, and whether they have a sign.
 STRESS_COMPONENTS = (
     ("von Mises stress", False),
@@ -107,7 +107,7 @@ def _read_frames(folder: Path) -> dict:
         ].tolist()
         x = series.points("interface")[:, 0]
         max_cells = min(
-            int((BYTES / len(numbers) - 10 * min(MAX_POSITIONS, x.size)) / 24), MAX_CELLS
+            int((MAX_PLAYER_BYTES / len(numbers) - 10 * min(MAX_POSITIONS, x.size)) / 24), MAX_CELLS
         )
         interface_data = {
             name: series.stack("interface", "PointData", name, numbers)

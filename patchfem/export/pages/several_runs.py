@@ -17,8 +17,8 @@ from ..written import NUMBER, measure_label
 from .document import Section, document_html, sentence_html, table_html
 from .sentences import format_with_error, measure_link, measure_meaning
 
-HEIGHT = 410  # height of a figure [px]
-POINTS = 4000  # points of a line in a figure
+CHART_HEIGHT = 410  # height of a figure [px]
+MAX_LINE_POINTS = 4000  # points of a line in a figure
 MIN_FACTOR = 10.0  # ratio to the first value; a larger change is written as a factor
 N_SHOWN_CYCLES = 2.0  # last cycles that are shown; result.nc stores this many completely
 # title, x: (variable, label), y: (variable, label); of variables over time only the last cycles
@@ -191,7 +191,7 @@ def _lines_by_units(x: str, y: str, runs: list, names: list) -> dict:
             a = a[late]
             b = b[late]
             a = a - a[-1] if x == "time" else a
-        step = -(-a.size // POINTS)
+        step = -(-a.size // MAX_LINE_POINTS)
         lines.setdefault((unit_a, unit_b), []).append(Line(name, a[::step], b[::step]))
     return lines
 
@@ -220,7 +220,7 @@ def _chart_figure(number: int, title: str, axes: tuple, units: tuple, lines: lis
     return {
         "anchor": f"chart{number}",
         "title": title,
-        "height": HEIGHT,
+        "height": CHART_HEIGHT,
         "x": {"label": x[1], "unit": unit_a, "log": False},
         "y": {"label": y[1], "unit": unit_b, "log": False},
         "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",

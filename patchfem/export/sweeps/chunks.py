@@ -24,7 +24,7 @@ from ...disk.atomic_write import write_bytes
 from ...runs.batch.case_results import CaseResults
 
 CHUNKS = "chunks"
-ENDING = ".h5"
+CHUNK_SUFFIX = ".h5"
 MAX_CASES_PER_FILE = 4096  # maximum number of cases of a file
 PARTS = ("values", "errors", "floors")
 
@@ -91,7 +91,7 @@ def write_chunk(
             )
         file.flush()
         image = file.id.get_file_image()
-    name = f"{min(numbers)}-{max(numbers)}-{_hash_bytes(image)}{ENDING}"
+    name = f"{min(numbers)}-{max(numbers)}-{_hash_bytes(image)}{CHUNK_SUFFIX}"
     write_bytes(folder / name, image)
     return name
 
@@ -200,7 +200,7 @@ class Chunks:
         entries = [
             entry
             for entry in os.scandir(self.folder)
-            if entry.name.endswith(ENDING) and not entry.name.startswith(".")
+            if entry.name.endswith(CHUNK_SUFFIX) and not entry.name.startswith(".")
         ]
         # If two files contain a case, the later one counts.
         entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))

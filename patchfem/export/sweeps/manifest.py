@@ -16,7 +16,7 @@ from ... import __version__
 from ...disk import atomic_write
 from ...disk.file_hashes import hash_named_files, iterate_texts
 
-NAME = "chunks/whole.json"
+MANIFEST_NAME = "chunks/whole.json"
 TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
 
 
@@ -54,14 +54,15 @@ def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) ->
 def write_manifest(folder: Path, request_hash: str) -> None:
     """Write the record of a sweep in which every case has a result."""
     atomic_write.write_text(
-        folder / NAME, json.dumps({"sign": request_hash, "files": _sweep_files(folder)}) + "\n"
+        folder / MANIFEST_NAME,
+        json.dumps({"sign": request_hash, "files": _sweep_files(folder)}) + "\n",
     )
 
 
 def read_manifest(folder: Path, request_hash: str) -> dict:
     """Return sweep.json of a folder with the complete sweep of this hash; else {}."""
     try:
-        manifest = json.loads((folder / NAME).read_bytes())
+        manifest = json.loads((folder / MANIFEST_NAME).read_bytes())
         if not request_hash or manifest != {"sign": request_hash, "files": _sweep_files(folder)}:
             return {}
         return json.loads((folder / "sweep.json").read_bytes())

@@ -30,7 +30,7 @@ CASES_PER_BLOCK = 4000  # cases whose strings are in memory at the same time
 MAX_CASES_TRIED = (
     3  # maximum number of cases to read until one is valid, for the facts that all cases share
 )
-ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
+MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 FACTS = {
     "tolerance": ("accuracy", "tolerance"),
     "patch_length": ("contact", "length"),
@@ -53,7 +53,10 @@ def sort_measures(results: CaseResults) -> list[str]:
     """Return the measures of the cases in the order of the reference."""
     return sorted(
         results.values,
-        key=lambda name: (ORDER.get(rows.remove_interface_number(name), len(ORDER)), name),
+        key=lambda name: (
+            MEASURE_ORDER.get(rows.remove_interface_number(name), len(MEASURE_ORDER)),
+            name,
+        ),
     )
 
 

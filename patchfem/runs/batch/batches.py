@@ -182,7 +182,7 @@ def solve_models(
         if isinstance(model, PatchfemError):
             results.fail(case, str(model))
             continue
-        assignment = _assign(model, study) if keep is None else Assignment()
+        assignment = _assign_model(model, study) if keep is None else Assignment()
         groups.setdefault(assignment, []).append(case)
     for assignment, cases in groups.items():
         keep_case = keep and partial(_report_case, keep, cases)
@@ -232,7 +232,7 @@ def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
     return remaining, groups
 
 
-def _assign(model: Model, study: int) -> Assignment:
+def _assign_model(model: Model, study: int) -> Assignment:
     """Assign a model of a study to a batch and a group."""
     batch = None
     try:

@@ -32,7 +32,7 @@ from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..rig.costs import MAX_MARCH_STEPS
 from ..rig.engines import MARCH, choose_engine
 from ..rig.interface import reduce_to_few_points
-from ..rig.lists import choose_bond_sum
+from ..rig.lists import choose_bond_summation
 from . import pressed
 from .case_results import CaseResults, has_unreadable_table
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
@@ -136,7 +136,7 @@ def why_no_lanes(model: Model) -> str:
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Compute the case results of a group of elastic patches with bonds."""
     few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
-    batch = pressed.PatchBatch(MARCH.name, _gather_points, _move_cases, MAX_CASES_PER_CALL)
+    batch = pressed.PatchBatch(MARCH.name, _gather_points, _compute_motions, MAX_CASES_PER_CALL)
     return pressed.solve(few, batch, say)
 
 
@@ -155,7 +155,7 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
     """Reduce a pressed patch to a few contact points; None if the case is run by itself."""
     if why_no_lanes(model) or numerics.steps % 4:
         return None
-    if choose_bond_sum(model, numerics).engine != "recursion":
+    if choose_bond_summation(model, numerics).engine != "recursion":
         return None
     tolerance = REDUCTION_TOL_FRACTION * model.accuracy.tolerance
     points = reduce_to_few_points(patch, model.bonds, tolerance, N_POINTS, N_PIECE_MODES)
@@ -172,7 +172,7 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
     return _GatheredPoints(case, error)
 
 
-def _move_cases(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray]:
+def _compute_motions(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray]:
     """Compute the motions of solved patches, and the mask (n,) of cases that need a single run."""
     results = CaseResults.blank(len(models))
     runs_singly = np.zeros(len(models), bool)
@@ -233,7 +233,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     window = numerics.window
     cycles = int(rig.drive.cycles)
 
-    def march(divisor: int, points: list, searched=None) -> _Evaluated:
+    def march(divisor: int, points: list, searched=None) -> _EvaluatedMarch:
         """Integrate and evaluate the cases with a given fraction of the time steps.
 
         searched: which cases (n,) are searched for ringing; None: all.
@@ -242,7 +242,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
         marched = lanes.march(
             rig.modes, rig.drive.signal, lane_cases, cycles, steps // divisor, window
         )
-        return _evaluate(models, cases, marched, steps // divisor, searched)
+        return _evaluate_march(models, cases, marched, steps // divisor, searched)
 
     fine_points = [case.fine for case in cases]
     fine = march(1, fine_points)
@@ -250,7 +250,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     half = march(2, fine_points, rings)
     quarter = march(4, fine_points, rings)
     coarse = march(4, [case.coarse for case in cases], rings)
-    runs, parts = _runs_with_errors(models, cases, (fine, half, quarter, coarse), steps)
+    runs, parts = _estimate_run_errors(models, cases, (fine, half, quarter, coarse), steps)
     settings = {"engine": MARCH.name, "steps_per_cycle": steps, "window_cycles": window}
     results, runs_singly, _ = assemble_results(models, runs, settings)
     runs_singly |= runs.stuck | runs.lost
@@ -286,7 +286,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     return _MarchedCases(results, runs_singly, needs_more_steps)
 
 
-class _Evaluated(NamedTuple):
+class _EvaluatedMarch(NamedTuple):
     """Measures, energies and stated errors of n cases that were integrated in one batch.
 
     - values: measures (n,) by name.
@@ -308,9 +308,9 @@ class _Evaluated(NamedTuple):
         return self.marched.reach
 
 
-def _evaluate(
+def _evaluate_march(
     models: list, cases: list, marched: lanes.MarchedCases, steps: int, searched=None
-) -> _Evaluated:
+) -> _EvaluatedMarch:
     """Compute measures, energies and ringing of the cases of a batch from their last cycles.
 
     Parameters
@@ -359,7 +359,7 @@ def _evaluate(
             values[name][case] = value
         stated_errors[case] |= errors
     is_lost = (marched.bad > 0) | ~np.isfinite(marched.book["work_in"])
-    return _Evaluated(values, energies, marched, stated_errors, is_lost)
+    return _EvaluatedMarch(values, energies, marched, stated_errors, is_lost)
 
 
 def _has_other_modes(model: Model, marched: lanes.MarchedCases) -> np.ndarray:
@@ -369,14 +369,16 @@ def _has_other_modes(model: Model, marched: lanes.MarchedCases) -> np.ndarray:
     return np.array([fraction(motion) > MAX_OTHER_MODES_FRACTION for motion in motions])
 
 
-def _runs_with_errors(models: list, cases: list, evaluated: tuple, steps: int) -> tuple[Runs, list]:
+def _estimate_run_errors(
+    models: list, cases: list, evaluated: tuple, steps: int
+) -> tuple[Runs, list]:
     """Estimate the errors of the cases from coarse runs, in total and by kind of coarse run.
 
     Parameters
     ----------
     models : list of Model
     cases : list of pressed.PressedCase
-    evaluated : tuple of _Evaluated
+    evaluated : tuple of _EvaluatedMarch
         Runs with all, half and a quarter of the steps, and with a quarter on the coarser mesh.
     steps : int
         Steps per cycle.

@@ -34,7 +34,7 @@ MIN_ALLOWED_ERROR = (
 )
 
 
-class _Nodes(NamedTuple):
+class _NodePositions(NamedTuple):
     """Positions of interface nodes [m], which replace a Patch in the text of a warning."""
 
     x: np.ndarray
@@ -78,7 +78,9 @@ def press_together(models: Sequence[Model]) -> list[Model]:
             groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
     for alike in groups.values():
         first = [models[cases[0]] for cases in alike.values()]
-        found = static.solved_patches([model.patch for model in first], first[0].accuracy.tolerance)
+        found = static.solve_alike_patches(
+            [model.patch for model in first], first[0].accuracy.tolerance
+        )
         for cases, one in zip(alike.values(), found):
             for case in cases if one is not None else ():
                 out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
@@ -124,7 +126,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
         if alike
         else static.collect_loads([model.patch for model in models])
     )
-    found = static.solve_together(asked, first.accuracy.tolerance)
+    found = static.solve_batch(asked, first.accuracy.tolerance)
     out = CaseResults.blank(len(models))
     good = found.is_solved
     wide = ~good
@@ -134,7 +136,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     unknown = np.any([estimate.error >= estimate.value for estimate in decisive], axis=0)
     floors = {
         name: np.broadcast_to(least, good.shape)
-        for name, least in of_patch.floors(first.patch, tolerance, values_by_name).items()
+        for name, least in of_patch.measure_floors(first.patch, tolerance, values_by_name).items()
     }
     for name, estimate in found.estimates.items():
         out.measure(name, TABLE[name].unit)
@@ -170,7 +172,7 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
             *of_patch.strain_warnings(
                 model.patch, float(largest_pressure[case]), float(found.approach[case])
             ),
-            *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x))),
+            *tolerance_warnings(Finding(model, measures, _NodePositions(found.levels[0].x))),
         ]
         if warned:
             out.warnings[case] = shorten_file_names(warned, model.source.path)

@@ -100,7 +100,7 @@ def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
     """Solve the patch of a case and make its contact models; None if a single run is needed."""
     try:
         with locate_errors(model.source):
-            patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance)
+            patch, *coarse = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)
             if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
                 return None
             numerics = choose_numerics(model)

@@ -95,13 +95,13 @@ def run(
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
     engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
-    histories, lateral = _solve(Slide(model, patch, time, slide, frames, engine, watch))
+    histories, lateral = _compute_histories(Slide(model, patch, time, slide, frames, engine, watch))
     loops = [(slide, histories.force)]
     if lateral:
         loops.append((lateral["lateral"], lateral["lateral_force"]))
     jumps = reversal_evaluation(model) == "jumps"
-    values = _measure(model, time, slide, histories, first)
-    values |= _measure_loop(model, time, slide, histories, first, omega) if omega else {}
+    values = _compute_measures(model, time, slide, histories, first)
+    values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
     values["work_check"] = work_difference(histories.ledger[0], loops, jumps)
     span = time[-1]  # Division by the span avoids overflow for an extremely slow motion.
     rate = np.zeros(time.size)
@@ -112,7 +112,7 @@ def run(
     )
 
 
-def _solve(task: Slide) -> tuple[SlideHistories, dict]:
+def _compute_histories(task: Slide) -> tuple[SlideHistories, dict]:
     """Compute the friction histories along a bench path, and a dict of lateral histories."""
     if task.model.slide.across is not None:
         return slide_in_plane(task)
@@ -125,7 +125,7 @@ def _solve(task: Slide) -> tuple[SlideHistories, dict]:
     return rigid.slide_rigidly(task), {}
 
 
-def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
+def _compute_measures(model, time, slide, histories: SlideHistories, first: int) -> dict:
     """Return the measures of a bench run as a dict, except those of its friction loop."""
     force = histories.force
     load = histories.load
@@ -151,7 +151,9 @@ def _measure(model, time, slide, histories: SlideHistories, first: int) -> dict:
     }
 
 
-def _measure_loop(model, time, slide, histories: SlideHistories, first: int, omega: float) -> dict:
+def _compute_loop_measures(
+    model, time, slide, histories: SlideHistories, first: int, omega: float
+) -> dict:
     """Return the measures of the friction loop of the last cycle as a dict.
 
     The last cycle starts at sample `first`.

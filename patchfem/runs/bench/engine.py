@@ -99,14 +99,14 @@ def bench_engine(
     """
     f = model.friction
     if model.slide.across is not None:
-        return BenchEngine(Method.PLANE, _stepped_seconds(model, slide, 1))
+        return BenchEngine(Method.PLANE, _predict_step_seconds(model, slide, 1))
     if model.partial_slip and (law_has_trait(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or has_changing_pressure(model)
         if model.grooves is None and (
             is_bond_list(f) or requested_engine(model) not in ("auto", "recursion")
         ):
-            choice = choice or choose_bond_sum(model, slide)
+            choice = choice or choose_bond_summation(model, slide)
             return _choose_sum_engine(model, slide, points, choice, points)
         seconds = cost_model.predict_shear_mode_step(points, modes, load_varies=varies)
         return BenchEngine(Method.POINTS, seconds)
@@ -115,12 +115,12 @@ def bench_engine(
             Method.ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
         )
     if has_changing_pressure(model) and model.grooves is None:
-        return _stepped_engine(model, slide, points)
+        return _make_stepped_engine(model, slide, points)
     if law_has_trait(f.law, "memoryless"):
         return BenchEngine(Method.CLOSED, cost_model.SAMPLE_SECONDS)
     if not law_has_trait(f.law, "bonds"):
         return BenchEngine(Method.ELEMENTS, cost_model.SAMPLE_SECONDS)
-    return _choose_sum_engine(model, slide, points, choice or choose_bond_sum(model, slide))
+    return _choose_sum_engine(model, slide, points, choice or choose_bond_summation(model, slide))
 
 
 def steps_per_cycle(model) -> int:
@@ -144,7 +144,7 @@ def has_changing_pressure(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def choose_bond_sum(model, slide) -> "bond_engines.EngineChoice":
+def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
     """Choose the method that sums the forces of the bonds of a rigidly sliding interface.
 
     It is chosen as in a rig, except that its error is relative to the reached force, which is small
@@ -177,7 +177,7 @@ def requested_engine(model) -> str:
     )
 
 
-def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
+def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | None":
     """Choose a bond summation without merging, whose force varies smoothly with parameters.
 
     It is None for laws without bonds, or if the scene prescribes the engine or the merging. With
@@ -190,7 +190,7 @@ def choose_smooth_bond_sum(model, slide) -> "bond_engines.EngineChoice | None":
         or model.accuracy.merge is not None
     ):
         return None
-    choice = choose_bond_sum(model, slide)
+    choice = choose_bond_summation(model, slide)
     if choice.engine != "merged":
         return choice
     return replace(choice, engine="truncated", merge=0.0, error=choice.tail)
@@ -215,7 +215,7 @@ def _choose_sum_engine(
     if choice.engine == "recursion":
         return BenchEngine(Method.RECURSION, cost_model.RECURSION_STEP_SECONDS, choice)
     if law.breakaway and lists == 1:  # A bond list cannot represent an elastic range.
-        return _stepped_engine(model, slide, points)
+        return _make_stepped_engine(model, slide, points)
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
     strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
@@ -232,12 +232,12 @@ def _choose_sum_engine(
     return BenchEngine(Method.LIST if lists == 1 else Method.LISTS, seconds, choice)
 
 
-def _stepped_engine(model, slide, points: int) -> BenchEngine:
+def _make_stepped_engine(model, slide, points: int) -> BenchEngine:
     """Return the bench engine that evaluates a friction law sample by sample."""
-    return BenchEngine(Method.STEPPED, _stepped_seconds(model, slide, points))
+    return BenchEngine(Method.STEPPED, _predict_step_seconds(model, slide, points))
 
 
-def _stepped_seconds(model, slide, points: int) -> float:
+def _predict_step_seconds(model, slide, points: int) -> float:
     """Predict the CPU time [s] of one step of a NumPy law.
 
     The law depends on the last increment, or is a sum over the strips of the path.
@@ -260,7 +260,7 @@ def uses_parallel_elements(model) -> bool:
     return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
 
 
-def cost(model, points: int) -> Cost:
+def predict_cost(model, points: int) -> Cost:
     """Predict the CPU time and the memory of a bench run.
 
     Parameters
@@ -301,7 +301,7 @@ def _samples_key(model) -> str:
     return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
 
 
-def groups(model) -> dict:
+def dimensionless_groups(model) -> dict:
     """Return the dimensionless ratio of displacement amplitude to bond length as a dict.
 
     The dict is empty without a bond length.

@@ -37,7 +37,7 @@ MESH_TOL = 1e-2
 FINER_MERGE_FACTOR = 0.5
 
 
-class Pass(NamedTuple):
+class CoarsePass(NamedTuple):
     """Settings of a coarser computation along a bench path, which serves an error estimate.
 
     - steps: steps per cycle.
@@ -82,7 +82,7 @@ def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -
         Callback for a line of text.
     """
 
-    def solve(variant: Pass):
+    def solve(variant: CoarsePass):
         """Run the bench with the settings of a coarse pass and return its BenchRun."""
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, patches[variant.level], variant.steps, watch=watch)
@@ -92,7 +92,7 @@ def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -
     errors, seconds = estimate_errors(solve, fine_run.values, ladder, coarse_passes)
     kinds = [coarser.of for coarser in ladder]
     if bond_sum_error(model, fine_run.engine):
-        errors = [*errors, _bond_sum_errors(model, fine_run)]
+        errors = [*errors, _estimate_bond_sum_errors(model, fine_run)]
         kinds = [*kinds, "bonds"]
     runs = [fine_run.values, *(coarse_passes[run].values for run in ladder[0].runs)]
     return PassErrors(errors, seconds, find_open_kinds(kinds, errors, runs))
@@ -115,8 +115,8 @@ def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
         Steps per cycle of the fine pass.
     """
     choice = fine_run.engine.choice
-    halved = Pass(max(4, steps // 8 * 4), 0, choice)
-    quarter = Pass(max(4, steps // 16 * 4), 0, choice)
+    halved = CoarsePass(max(4, steps // 8 * 4), 0, choice)
+    quarter = CoarsePass(max(4, steps // 16 * 4), 0, choice)
     # Parallel elements follow any path exactly, so that the sampling affects the harmonics only.
     rule = (
         convergence_errors if uses_parallel_elements(model) else partial(step_errors, steps=steps)
@@ -160,7 +160,7 @@ def bond_sum_error(model, engine) -> float:
     return 0.0
 
 
-def _bond_sum_errors(model, fine_run) -> dict:
+def _estimate_bond_sum_errors(model, fine_run) -> dict:
     """Return the errors of the bench measures due to the bond summation, as a dict."""
     work = np.abs(np.diff(fine_run.ledger[0]))
     friction = model.friction

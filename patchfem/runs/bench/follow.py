@@ -74,7 +74,7 @@ def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathRespo
     slide = task.slide
     contact = model.build()
     frames = task.frame_numbers
-    pace_changes = _pace_changes(time) if depends_on_speed else np.zeros(0, int)
+    pace_changes = _find_step_changes(time) if depends_on_speed else np.zeros(0, int)
     last = slide.size - 1
     ends = np.unique(
         np.concatenate([np.arange(0, last, N_BLOCK_SAMPLES), frames, pace_changes, [last]])
@@ -118,7 +118,7 @@ def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathRespo
     return PathResponse(forces[:, 0], forces[:, 2], ledger, frames, states, n_failed)
 
 
-def _pace_changes(time) -> np.ndarray:
+def _find_step_changes(time) -> np.ndarray:
     """Return the indices of the samples at which the time step changes its length."""
     step = np.diff(time)
     return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))

@@ -52,7 +52,7 @@ def make_ledger(work, stored, losses) -> np.ndarray:
     return np.stack([work, stored, dissipated, created])
 
 
-def created_and_dissipated(losses) -> tuple:
+def split_losses(losses) -> tuple:
     """Sum the created and the dissipated energy over m points.
 
     losses (..., m): dissipated energy of each point; a negative one is created energy.

@@ -73,11 +73,11 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     measures = add_errors(fine.values, *coarse_passes.errors, min_relative_error=1e-10)
     warnings = [
         *warnings,
-        *_law_warnings(model),
+        *_warn_of_bond_law(model),
         *_warn_of_created_energy(model, fine),
         *note_on_heating(model, patch, fine),
         *warn_of_work_check(measures, steps),
-        *_warn_if_open(model, patch, fine, steps),
+        *_warn_of_open_loop(model, patch, fine, steps),
     ]
     fields = {}
     if patch is not None:
@@ -91,7 +91,7 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     extra = {
         "engine": fine.engine.name,
         "steps": steps,
-        "notes": [*_growth_notes(model, fine), *note_on_groove_slope(model, patch)],
+        "notes": [*_note_on_growth(model, fine), *note_on_groove_slope(model, patch)],
         "left_open": coarse_passes.open_kinds,
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
@@ -110,7 +110,7 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     )
 
 
-def _law_warnings(model) -> list:
+def _warn_of_bond_law(model) -> list:
     """Return the warnings on a bond law that do not depend on the displacement path."""
     if not law_has_trait(model.friction.law, "bonds"):
         return []
@@ -140,7 +140,7 @@ def _warn_of_created_energy(model, fine) -> list:
     ]
 
 
-def _growth_notes(model, fine) -> list:
+def _note_on_growth(model, fine) -> list:
     """Return the notes on the growth of bonds with contact time."""
     friction = model.friction
     if not law_has_trait(friction.law, "bonds"):
@@ -169,7 +169,7 @@ def _loop_closing_error(fine) -> float:
     return gap
 
 
-def _warn_if_open(model, patch, fine, steps: int) -> list:
+def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
     """Return a warning, as a list, if the last friction loop is neither closed nor steady.
 
     It names the number of cycles after which the loop is steady, if MAX_EXTRA_CYCLES cycles with at most

@@ -107,7 +107,7 @@ def _make_point_model(task: Slide, load: float) -> ContactModel:
 def list_merged_cell_runs(reference_pass) -> CoarserRuns:
     """List coarser runs in which every four cells of a slider density are merged to one.
 
-    reference_pass: the Pass with which they are compared.
+    reference_pass: the CoarsePass with which they are compared.
     """
     runs = tuple(
         reference_pass._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES

@@ -215,8 +215,8 @@ def list_coarser_element_runs(count: int, reference_pass) -> CoarserRuns:
     ----------
     count : int
         Number of coarser meshes.
-    reference_pass : Pass
-        Pass with which they are compared.
+    reference_pass : CoarsePass
+        CoarsePass with which they are compared.
     """
     runs = tuple(reference_pass._replace(level=level) for level in range(1, count + 1))
     return CoarserRuns(runs, mesh_errors, reference_pass, "mesh")

@@ -16,10 +16,10 @@ from .ledger import (
     N_BLOCK_SAMPLES,
     Slide,
     SlideHistories,
-    created_and_dissipated,
     elastic_slip,
     local_slip,
     make_ledger,
+    split_losses,
 )
 
 # Largest number of strip-point products of a direct quadrature; a larger bench is refused.
@@ -80,7 +80,7 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
     law = make_numpy_law(model)
     refuse_expensive_sum(model, law, slide.size, 1, slide)
     lateral = np.interp(task.time, model.slide.corners[0], model.slide.across)
-    unit_point = _Points(np.ones(1), lambda sample: np.ones(1))
+    unit_point = _PressedPoints(np.ones(1), lambda sample: np.ones(1))
     unit = _evaluate_law(task, law, _step_law, np.stack([slide, lateral], axis=1), unit_point, {})
     sums = _pressure_sums(model, patch)
     sigma = np.array([sums.load]) if patch is None else patch.pressure.sigma_n
@@ -104,7 +104,7 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
     return histories, lateral_histories
 
 
-class _Points(NamedTuple):
+class _PressedPoints(NamedTuple):
     """Areas of the interface points and their pressure along the bench path.
 
     - weight (m,): areas [m2].
@@ -130,7 +130,7 @@ class _LawHistories(NamedTuple):
 
 
 def _evaluate_law(
-    task: Slide, law, take_step: Callable, path, points: _Points, breakaways: dict
+    task: Slide, law, take_step: Callable, path, points: _PressedPoints, breakaways: dict
 ) -> _LawHistories:
     """Evaluate a friction law along a displacement path, sample by sample.
 
@@ -170,7 +170,7 @@ def _evaluate_law(
                 sigma,
                 task.time[sample] - task.time[sample - 1],
             )
-            losses[sample] = created_and_dissipated(weight * dissipated)
+            losses[sample] = split_losses(weight * dissipated)
             work[sample] = work[sample - 1] + increment @ np.atleast_2d(mean) @ weight
         if sample in breakaways:
             traction = law.breakaway_traction(sigma, breakaways[sample])
@@ -219,22 +219,22 @@ def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
         )
 
 
-def _pressed_points(task: Slide) -> _Points:
+def _pressed_points(task: Slide) -> _PressedPoints:
     """Return the interface points with their pressure along the bench path."""
     model = task.model
     if model.load_varies:
         loads = model.point.evaluate(task.time)
-        return _Points(np.ones(1), lambda sample: loads[sample : sample + 1])
+        return _PressedPoints(np.ones(1), lambda sample: loads[sample : sample + 1])
     sigma, weight = nodal_pressure(model, task.patch)
     if task.patch is None or model.side != "lower":
-        return _Points(weight, lambda sample: sigma)
+        return _PressedPoints(weight, lambda sample: sigma)
     x = task.patch.x
 
     def shifted_pressure(sample: int) -> np.ndarray:
         """Return the pressure of the displaced lower piece at the points of the upper piece."""
         return np.interp(x + task.slide[sample], x, sigma, left=0.0, right=0.0)
 
-    return _Points(weight, shifted_pressure)
+    return _PressedPoints(weight, shifted_pressure)
 
 
 def _step_law(law, state, increment: float, before, after, duration: float) -> Step:

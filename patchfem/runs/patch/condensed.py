@@ -153,7 +153,7 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
         parts = (low.nn + high.nn, low.tt + high.tt, low.nt - high.nt)
     normal, tangential, closing = (frozen_array(part / width) for part in parts)
     interface = Interface(frozen_array(x), frozen_array(share * width), width)
-    rise = sum(_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
+    rise = sum(_rounded_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
     seconds = {"condense": perf_counter() - start}
     pieces = Compliance(interface, normal, tangential)
     return Pair(
@@ -171,22 +171,24 @@ def shared_pairs(patch_model) -> tuple:
 def shared_pair(patch_model, level: int) -> Pair:
     """Return the condensed pieces (Pair) of a model on one level of its shared meshes."""
     bodies = patch_model.mesh.shared.levels[level]
-    return store.reuse(
-        _pair_key(patch_model, patch_model.mesh.shared.name, level),
+    return store.get_or_compute(
+        _condensed_pair_key(patch_model, patch_model.mesh.shared.name, level),
         lambda: delete_factors(condense(patch_model, *bodies)),
     )
 
 
-def keep_pairs(patch_model, meshes, pairs) -> None:
+def cache_pairs(patch_model, meshes, pairs) -> None:
     """Store the condensed pieces of new shared meshes in the cache, level by level.
 
     patch_model: one of the patches that share the meshes.
     """
     for level, pair in enumerate(pairs):
-        store.keep(_pair_key(patch_model, meshes.name, level), delete_factors(pair))
+        store.store_result(
+            _condensed_pair_key(patch_model, meshes.name, level), delete_factors(pair)
+        )
 
 
-def _pair_key(patch_model, name: str, level: int) -> tuple:
+def _condensed_pair_key(patch_model, name: str, level: int) -> tuple:
     """Return the cache key of the condensed pieces on one level of a shared mesh."""
     return (
         "pair",
@@ -225,7 +227,7 @@ def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
     return condense(patch_model, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
-def _end_gap(body, x) -> np.ndarray:
+def _rounded_end_gap(body, x) -> np.ndarray:
     """Return the gap (m,) [m] at positions x (m,) [m] due to the rounded ends of a body."""
     rise = getattr(body, "interface_depths", None)
     return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)

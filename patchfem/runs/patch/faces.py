@@ -93,7 +93,7 @@ def press_on_meshes(interface, tolerance: float) -> tuple:
     files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("face", patch_model if files else store.content_key(patch_model), tolerance)
     try:
-        return store.reuse(key, lambda: result.solve_all(patch_model, tolerance))
+        return store.get_or_compute(key, lambda: result.solve_with_coarser(patch_model, tolerance))
     except PatchfemError as error:
         error.key = error.key and f"{interface.key}.{error.key}"
         raise
@@ -101,10 +101,10 @@ def press_on_meshes(interface, tolerance: float) -> tuple:
 
 def condense_again(model) -> None:
     """Condense the pieces of every interface again, without the cached stiffness."""
-    store.clear()
+    store.clear_cache()
     for interface in model.rig.friction.interfaces if model.rig is not None else ():
         if interface.patch is not None:
-            result.solve_all(interface.patch, model.accuracy.tolerance, fresh=True)
+            result.solve_with_coarser(interface.patch, model.accuracy.tolerance, fresh=True)
 
 
 def make_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
@@ -249,14 +249,14 @@ def merge_sentences(model, list_sentences: Callable) -> list:
     out: dict = {}
     for face in press_faces(model):
         for text in list_sentences(face):
-            out.setdefault(in_scene(model, text), []).append(face.name)
+            out.setdefault(use_scene_keys(model, text), []).append(face.name)
     return [
         f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}"
         for text, names in out.items()
     ]
 
 
-def in_scene(model, text: str) -> str:
+def use_scene_keys(model, text: str) -> str:
     """Replace the [contact] keys in a sentence by the keys of the interface in the scene.
 
     If the model has no patch of its own, these keys belong to [structure.interface.contact].

@@ -32,8 +32,8 @@ from .measures import (
     PEAK_MEASURES,
     Estimate,
     Resolution,
-    converge,
     estimate_common_errors,
+    extrapolate_measures,
 )
 from .press import PointSolution, Surface
 from .values import peak_pressures, static_values
@@ -154,11 +154,13 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
             ends = [_compute_free_ends(patch_model, level) for level in range(MIN_LEVELS)]
             coarse = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
             levels = coarse[-1:]
-            while solution is None or not (meets_tolerance(solution) or _is_expensive(levels[-1])):
+            while solution is None or not (
+                meets_tolerance(solution) or _is_next_level_expensive(levels[-1])
+            ):
                 force = levels[-1].force
                 levels.append(_solve_level(patch_model, ends[-1], 2 * force.size, force))
                 if len(levels) >= MIN_LEVELS:
-                    estimates = _add_series(coarse, levels)
+                    estimates = _combine_series(coarse, levels)
                     solution = PointSolution(estimates, levels[-1].surface, levels[-1].intervals)
         except (NotConverged, np.linalg.LinAlgError):
             pass
@@ -171,13 +173,13 @@ def _first_level_points(patch_model) -> int:
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
-def _is_expensive(level: PointLevel) -> bool:
+def _is_next_level_expensive(level: PointLevel) -> bool:
     """Return whether a finer level would exceed the limit of points or of work."""
     count = level.force.size
     return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
-def _add_series(coarse: list, levels: list) -> dict:
+def _combine_series(coarse: list, levels: list) -> dict:
     """Combine two refinement series to one estimate of each measure.
 
     The first series refines the cells at the ends; the second increases the number of points with
@@ -185,8 +187,8 @@ def _add_series(coarse: list, levels: list) -> dict:
     """
     finest = levels[-1]
     shared = estimate_common_errors(finest.resolution, finest.values)
-    by_points = converge([level.values for level in levels], shared, 0.0)
-    by_ends = converge([level.values for level in coarse], {}, 0.0)
+    by_points = extrapolate_measures([level.values for level in levels], shared, 0.0)
+    by_ends = extrapolate_measures([level.values for level in coarse], {}, 0.0)
     return {
         name: Estimate(
             float(estimate.value + by_ends[name].value - coarse[-1].values[name]),

@@ -115,7 +115,7 @@ def condense_on_search_grid(patch_model) -> Pair:
         patch_model.mesh.is_static,
         patch_model.gap.jumps,
     )
-    return store.reuse(
+    return store.get_or_compute(
         key, lambda: delete_factors(condense(patch_model, *make_grids(patch_model, layout)))
     )
 
@@ -139,10 +139,10 @@ def make_base_grids(patch_model) -> BaseGrids:
     """
     has_files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("base grids", patch_model if has_files else store.content_key(patch_model))
-    return store.reuse(key, lambda: _search_grids(patch_model))
+    return store.get_or_compute(key, lambda: _search_contact(patch_model))
 
 
-def _search_grids(patch_model) -> BaseGrids:
+def _search_contact(patch_model) -> BaseGrids:
     """Find the contact region on grids that are graded anew in every iteration.
 
     If a varying load moves the edges of the contact, the columns are fine wherever the edges lie
@@ -177,12 +177,12 @@ def _search_grids(patch_model) -> BaseGrids:
         )
         if cells <= 1 / (EDGE_CELLS[patch_model.mesh.is_static] - 1) and shows:
             break
-        if _is_settled(layout, last):
+        if _have_bands_converged(layout, last):
             break
     return BaseGrids(make_grids(patch_model, layout), contact)
 
 
-def _is_settled(layout: Layout, last: Layout) -> bool:
+def _have_bands_converged(layout: Layout, last: Layout) -> bool:
     """Return whether the graded bands of two successive column layouts agree."""
     if len(layout.bands) != len(last.bands):
         return False
@@ -256,7 +256,7 @@ def make_layout(patch_model, extents: list) -> Layout:
     # contact set.
     fine = thick / 4 if thick and patch_model.mesh.edge_motion != "load" else np.inf
     min_cell = max(min(width / along, fine), MIN_CELL_RATIO * length)
-    bands = _edge_bands([extent.places for extent in extents], min_cell)
+    bands = _make_edge_bands([extent.places for extent in extents], min_cell)
     # A jump of the gap lies on a node; quantities that depend on it converge at first order in the
     # cell length.
     bands += tuple((place, place, min_cell / STEP_CELL_FACTOR) for place in patch_model.gap.jumps)
@@ -298,7 +298,7 @@ def make_layout(patch_model, extents: list) -> Layout:
     )
 
 
-def _edge_bands(edge_positions: list, min_cell: float) -> tuple:
+def _make_edge_bands(edge_positions: list, min_cell: float) -> tuple:
     """Return the bands of fine columns around the contact edges.
 
     If the number of edges is the same in all contacts, a band covers the range that its edge

@@ -44,12 +44,12 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
         """Compute the Jenkins elements of a patch; Coulomb elements are scaled from mu = 1."""
         if length or not static > 0:
             return shear_modes.jenkins_set(patch.giving, static * load, length)
-        unit_elements = store.reuse(
+        unit_elements = store.get_or_compute(
             ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.giving, load)
         )
         return shear_modes.scale_limits(unit_elements, static)
 
-    return store.reuse(("elements", patch, static, length), make)
+    return store.get_or_compute(("elements", patch, static, length), make)
 
 
 def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripElements, ...]:
@@ -76,7 +76,7 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
         found = shear_modes.jenkins_set(giving, static * force, length)
         return StripElements(found.stiffness, found.yield_displacement)
 
-    return store.reuse(
+    return store.get_or_compute(
         ("strip elements", patch, static, length),
         lambda: tuple(make_strip_elements(force) for force in patch.strips.force),
     )

@@ -13,7 +13,7 @@ from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condense, shared_pairs
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import max_error_ratio, measures
+from .measures import estimate_measures, max_error_ratio
 from .press import press_patch, solve
 
 # Tolerance [1] at and above which a patch with partial slip gets the CPU time of a moving mesh. The
@@ -25,10 +25,10 @@ MAX_COLUMNS_WITHOUT_COARSER = 8
 MAX_DECADES = 6
 
 
-def solve_split(patch_model, level: int, estimate: bool) -> tuple:
+def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
     """Solve the contact on a mesh file whose edges are halved a given number of times.
 
-    The coarser patches are those of `solve_all`.
+    The coarser patches are those of `solve_with_coarser`.
     """
     bodies = make_piece_meshes(patch_model)
     for _ in range(level):
@@ -36,7 +36,9 @@ def solve_split(patch_model, level: int, estimate: bool) -> tuple:
     return _solve_with_coarser(patch_model, bodies, estimate, True)
 
 
-def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def solve_with_coarser(
+    patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
+) -> tuple:
     """Solve the contact of a patch on its mesh and on the coarser meshes of its error estimate.
 
     A patch without a prescribed element size is solved on a ladder of nested meshes until it meets
@@ -69,7 +71,7 @@ def solve_all(patch_model, tolerance: float, estimate: bool = True, fresh: bool 
     if fresh:
         pairs = [condense(patch_model, *level, fresh=True) for level in mesh.shared.levels]
         return solve_on_pairs(patch_model, pairs, estimate)
-    patches = store.reuse_in_sweep(
+    patches = store.get_or_compute_in_sweep(
         patch_model,
         ("patches", store.content_key(patch_model), estimate),
         lambda: solve_on_pairs(patch_model, shared_pairs(patch_model), estimate),
@@ -84,7 +86,7 @@ def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float
     has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
     if not has_trace or patches[1] is None:
         return False
-    return max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) > 1
+    return max_error_ratio(estimate_measures(*patches, tolerance=tolerance), tolerance) > 1
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
@@ -109,7 +111,7 @@ def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, fresh: bool)
 def make_file_meshes(patch_model) -> list:
     """Return the meshes of a patch with prescribed element size or mesh file.
 
-    The order is that of `solve_all`.
+    The order is that of `solve_with_coarser`.
     """
     bodies = make_piece_meshes(patch_model)
     return [bodies, *make_comparison_meshes(*bodies)]
@@ -179,7 +181,9 @@ def solve_on_ladder(
         seconds = predict_condensing_seconds(grids)
         if points is not None:  # The solution on points of the profile is kept for finer meshes.
             patches[0] = _attach_point_solution(patch, points)
-        is_within = max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) <= 1
+        is_within = (
+            max_error_ratio(estimate_measures(*patches, tolerance=tolerance), tolerance) <= 1
+        )
         shows_slip = _resolves_slip_work(patch_model, patches, tolerance)
         if (
             seconds > MAX_CONDENSING_SECONDS[False]
@@ -189,7 +193,9 @@ def solve_on_ladder(
             meets_tolerance = partial(_meets_tolerance, patches, tolerance)
             points = fine.solve_on_points(patch_model, meets_tolerance)
             patches[0] = _attach_point_solution(patch, points)
-            is_within = max_error_ratio(measures(*patches, tolerance=tolerance), tolerance) <= 1
+            is_within = (
+                max_error_ratio(estimate_measures(*patches, tolerance=tolerance), tolerance) <= 1
+            )
         is_done = shows_slip and (patches[0].points is not None or is_within)
         if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
             return tuple(patches)
@@ -204,7 +210,7 @@ def _attach_point_solution(patch, points):
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
     """Return whether the estimated errors of a solved patch meet the tolerance."""
-    patch_measures = measures(
+    patch_measures = estimate_measures(
         _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
     )
     return max_error_ratio(patch_measures, tolerance) <= 1
@@ -275,11 +281,11 @@ def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | No
         return None
     known = [patch for patch in patches if patch is not None]
     if patches[0].points is not None:
-        found = measures(*known, tolerance=tolerance)
+        found = estimate_measures(*known, tolerance=tolerance)
         return tolerance / 10 if max_error_ratio(found, tolerance) <= 1 else None
     for decade in range(1, MAX_DECADES + 1):
         tighter = tolerance * 10.0**-decade
-        found = measures(*known, tolerance=tighter)
+        found = estimate_measures(*known, tolerance=tighter)
         is_done = max_error_ratio(found, tighter) <= 1 and _resolves_slip_work(
             patch_model, known, tighter
         )

@@ -1,6 +1,6 @@
 """Measures of a static patch, with errors from coarser meshes.
 
-In: a `Patch` and the same on coarser meshes. Out: measures by name (`measures`). A value is that of
+In: a `Patch` and the same on coarser meshes. Out: measures by name (`estimate_measures`). A value is that of
 the finest mesh, or its limit by extrapolation (`limits`). Its error contains the remaining change
 by refinement and the errors that no change of the mesh shows (`estimate_common_errors`). The module has also
 the model errors due to the plane state and the number of strips.
@@ -81,7 +81,7 @@ class Estimate(NamedTuple):
         )
 
 
-def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
+def estimate_measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
     """Return the static measures of a patch as a dict, each with its estimated error.
 
     Parameters
@@ -98,10 +98,10 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         Measure by name; the error is None without a coarser mesh, and 0 without a load.
     """
     finest = values(fine)
-    coarse = _select_equal_part_counts(fine, [patch for patch in coarse if patch is not None])
+    coarse = _select_same_contact_regions(fine, [patch for patch in coarse if patch is not None])
     if coarse and finest["normal_load"] > 0:
         missed_peak = unresolved_rounding(fine)
-        estimates = converge(
+        estimates = extrapolate_measures(
             [*(values(patch) for patch in reversed(coarse)), finest],
             estimate_common_errors(_resolution_of_patch(fine, missed_peak), finest),
             tolerance,
@@ -126,7 +126,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     return out
 
 
-def _select_equal_part_counts(fine: Patch, coarse: list) -> list:
+def _select_same_contact_regions(fine: Patch, coarse: list) -> list:
     """Select the coarser solutions with as many contact intervals as the finest one.
 
     A contact region of a few cells next to a step may be missing on a coarse mesh. The change to
@@ -146,14 +146,14 @@ def _select_equal_part_counts(fine: Patch, coarse: list) -> list:
     """
     if not fine.model.gap.jumps:
         return coarse
-    n_parts = _count_parts(fine.active)
+    n_parts = _count_contact_regions(fine.active)
     n_alike = 0
-    while n_alike < len(coarse) and _count_parts(coarse[n_alike].active) == n_parts:
+    while n_alike < len(coarse) and _count_contact_regions(coarse[n_alike].active) == n_parts:
         n_alike += 1
     return coarse[: max(n_alike, 1)]
 
 
-def _count_parts(active) -> int:
+def _count_contact_regions(active) -> int:
     """Count the contact intervals of a contact set (m,)."""
     return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
@@ -178,7 +178,7 @@ def _include_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch)
     }
 
 
-def converge(
+def extrapolate_measures(
     series: list,
     shared: dict,
     tolerance: float | None,

@@ -17,8 +17,8 @@ from ...mesh.grading import Layout
 from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, ladder
-from .condensed import condense, keep_pairs
-from .measures import max_error_ratio, measures
+from .condensed import cache_pairs, condense
+from .measures import estimate_measures, max_error_ratio
 from .press import press_patch
 from .static import max_error_ratios, solve_patches_on_pair
 
@@ -80,7 +80,7 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
     """
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
-        return name_by_digest(ladder.make_file_meshes(patch_model))
+        return name_shared_meshes(ladder.make_file_meshes(patch_model))
     cases, every = select_distinct_patches(patches)
     swept = [
         case.with_loading(load=share * case.loading.load)
@@ -116,20 +116,20 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
             cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common
         )
         if missed_by <= 1 or not shares:
-            found = name_by_digest(
+            found = name_shared_meshes(
                 [
                     (pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
                     for pair in pairs
                 ]
             )
-            keep_pairs(cases[0], found, pairs)
+            cache_pairs(cases[0], found, pairs)
             return found
         # Factor on the cells above which no mesh meets the tolerance.
         enough = share * missed_by ** (-1 / MAX_ORDER)
         shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
-def name_by_digest(levels) -> SharedMeshes:
+def name_shared_meshes(levels) -> SharedMeshes:
     """Return shared meshes whose name is the hash of their contents."""
     digest = sha256()
     for body in chain.from_iterable(levels):
@@ -243,7 +243,7 @@ def _common_layout(
         layouts = []
         largest_ratio = 0.0
         for case, patch in zip(cases, solve_patches_on_pair(cases, pair)):
-            extent = _contact_of_case(case, pair, patch)
+            extent = _find_contact_extent(case, pair, patch)
             if extent is not None:
                 n_halvings = halvings_by_case.get(_contact_numbers(case), 0)
                 case_layout = grids.make_layout(case, [extent])
@@ -257,7 +257,7 @@ def _common_layout(
     return layout
 
 
-def _contact_of_case(patch_model, pair, patch):
+def _find_contact_extent(patch_model, pair, patch):
     """Return the contact region of a patch, if needed from a new solution; None if that fails.
 
     The single run of the case then reports the error.
@@ -361,7 +361,7 @@ def _refine_until_met(
                 (
                     by
                     for one, seen in zip(cases, known)
-                    if seen is None and (by := _error_ratio(one, pairs, tolerance)) > 1
+                    if seen is None and (by := _max_error_ratio(one, pairs, tolerance)) > 1
                 ),
                 missed_by,
             )
@@ -372,11 +372,12 @@ def _refine_until_met(
             return pairs, missed_by
 
 
-def _error_ratio(patch_model, pairs: list, tolerance: float) -> float:
+def _max_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
     """Return the ratio of the largest error of a patch to the tolerance; 0 if it is not solved."""
     try:
         return max_error_ratio(
-            measures(*ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance), tolerance
+            estimate_measures(*ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance),
+            tolerance,
         )
     except PatchfemError:
         return 0.0

@@ -1,6 +1,6 @@
 """Predicted mesh size, cost, stiffness and dimensionless groups of a patch.
 
-In: a `PatchModel` or a Model. Out: `Sizes`, `Cost`, the stiffness chain, and sentences for the
+In: a `PatchModel` or a Model. Out: `GridSizes`, `Cost`, the stiffness chain, and sentences for the
 plan.
 """
 
@@ -39,7 +39,7 @@ TIGHT_TOL = 2e-3
 MAX_FULL_CONTACT_TILT = 0.7
 
 
-class Sizes(NamedTuple):
+class GridSizes(NamedTuple):
     """Predicted numbers of nodes and CPU time of the nested grids of a patch.
 
     - points: nodes of the interface.
@@ -63,7 +63,7 @@ class Sizes(NamedTuple):
         return float(sum(columns * rows for columns, rows in self.finest))
 
 
-def expected_grids(patch_model, tolerance: float) -> Sizes:
+def expected_grids(patch_model, tolerance: float) -> GridSizes:
     """Predict the grids on which a patch will be solved at a given tolerance.
 
     The coarsest grid is that of the run. A mesh file is not read and counts as an automatic grid.
@@ -71,7 +71,7 @@ def expected_grids(patch_model, tolerance: float) -> Sizes:
     levels = _expected_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(count_nodes, bodies))
-    return Sizes(
+    return GridSizes(
         (bodies[0].base_grid or bodies[0]).x.size,
         finest,
         len(levels),
@@ -104,7 +104,7 @@ def _expected_levels(patch_model, tolerance: float) -> list:
     return levels
 
 
-def cost(model: Model) -> Cost:
+def predict_cost(model: Model) -> Cost:
     """Predict the cost of solving the contact of all patches of a model.
 
     Equal patches of interfaces are pressed once.
@@ -171,7 +171,7 @@ def pressing_cost(patch_model, tolerance: float) -> Cost:
     return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)
 
 
-def chain(patch_model) -> dict:
+def stiffness_chain(patch_model) -> dict:
     """Return the stiffnesses [N/m] of the elements of a patch that act in series, as a dict.
 
     An element that the scene does not give is "rigid".
@@ -196,7 +196,7 @@ def chain(patch_model) -> dict:
     return out
 
 
-def groups(model: Model) -> dict:
+def compute_groups(model: Model) -> dict:
     """Return dimensionless groups of a patch as a dict, and with friction its slip length [m].
 
     tilt_over_first_opening is the tilt over the tilt at which the edge of flat pieces opens, with
@@ -250,7 +250,7 @@ def assembly_sentence(patch_model) -> str:
     )
 
 
-def verdict(dimensionless_groups: dict, patch_model) -> list:
+def write_verdict(dimensionless_groups: dict, patch_model) -> list:
     """Return the sentences of a plan on tilt, asperity layer and assembly of a patch.
 
     The tilt group determines the extent of the contact of flat pieces only.

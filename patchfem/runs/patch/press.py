@@ -336,7 +336,7 @@ def make_patch(
     )
 
 
-def areas(patch_model, interface) -> np.ndarray:
+def nodal_areas(patch_model, interface) -> np.ndarray:
     """Return the nodal areas (m,) [m2] of an interface; (s, m) for a patch in strips."""
     if patch_model.interface.strips is None:
         return interface.weight

@@ -19,8 +19,8 @@ from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
-from .ladder import solve_all, solve_static_ladder
-from .measures import add_strip_errors, measures, plane_state_sentences
+from .ladder import solve_static_ladder, solve_with_coarser
+from .measures import add_strip_errors, estimate_measures, plane_state_sentences
 from .values import reaches_steep_end, values
 
 # Poisson's ratio up to which the errors of volumetrically locking elements are reliable.
@@ -29,11 +29,11 @@ MAX_POISSON = 0.499
 MAX_SMALL_STRAIN = 0.02
 
 __all__ = [
-    "bodies",
+    "make_bodies",
+    "make_static_result",
     "notes_on_neglected_effects",
-    "solve_all",
     "solve_static_ladder",
-    "static",
+    "solve_with_coarser",
     "static_measures",
     "static_measures_without_errors",
     "warn_of_strains",
@@ -51,10 +51,10 @@ MIN_COMPLETE_FRACTION = 1 - 1e-6
 def static_measures_without_errors(model) -> dict:
     """Return the static measures of the patch of a model, without error estimates."""
     with locate_errors(model.source):
-        return values(solve_all(model.patch, model.accuracy.tolerance, False)[0])
+        return values(solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0])
 
 
-def bodies(model) -> tuple:
+def make_bodies(model) -> tuple:
     """Return the meshes of the lower and the upper piece of a model.
 
     The upper one is None if the pieces are alike.
@@ -64,7 +64,7 @@ def bodies(model) -> tuple:
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
             return make_piece_meshes(model.patch)
-        pair = solve_all(model.patch, model.accuracy.tolerance)[0].pair
+        pair = solve_with_coarser(model.patch, model.accuracy.tolerance)[0].pair
         return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
 
 
@@ -83,7 +83,7 @@ def static_measures(model, patch, coarse) -> dict:
     Returns
     -------
     dict
-        Measure by name, with the floors of `floors`.
+        Measure by name, with the floors of `measure_floors`.
     """
     patch_model = model.patch
     tolerance = None
@@ -93,13 +93,13 @@ def static_measures(model, patch, coarse) -> dict:
         measures_by_name = patch_model.solved.measures
     else:
         patches = (patch, *coarse)
-        measures_by_name = store.reuse_in_sweep(
+        measures_by_name = store.get_or_compute_in_sweep(
             patch_model,
             ("measures", patches, tolerance),
-            lambda: measures(*patches, tolerance=tolerance),
+            lambda: estimate_measures(*patches, tolerance=tolerance),
         )
     values_by_name = {name: measure.value for name, measure in measures_by_name.items()}
-    min_floors = floors(patch_model, model.accuracy.tolerance, values_by_name)
+    min_floors = measure_floors(patch_model, model.accuracy.tolerance, values_by_name)
     measures_by_name = {
         name: replace(measure, floor=max(measure.floor, min_floors[name]))
         for name, measure in measures_by_name.items()
@@ -110,7 +110,7 @@ def static_measures(model, patch, coarse) -> dict:
     return add_strip_errors(patch_model, coarse[0], measures_by_name)
 
 
-def floors(patch_model, tolerance: float, values: dict) -> dict:
+def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
     """Return the error floor of each static measure as a dict, for one or for q patches.
 
     The floor of a measure that is a difference of larger terms is the tolerance times these: for
@@ -139,7 +139,7 @@ def floors(patch_model, tolerance: float, values: dict) -> dict:
     }
 
 
-def static(inputs: RunInputs) -> Result:
+def make_static_result(inputs: RunInputs) -> Result:
     """Return the Result of a static patch, which may be without contact."""
     patch = inputs.patch
     pressure = patch.pressure
@@ -200,14 +200,16 @@ def strain_warnings(
         "the peak pressure is {:.3g} of the lowest Young's modulus",
         "the approach is {:.3g} of the total height of the two pieces",
     )
-    for strain, sentence in zip(_strains(patch_model, largest_pressure, approach), sentences):
+    for strain, sentence in zip(
+        _estimate_strains(patch_model, largest_pressure, approach), sentences
+    ):
         if strain > MAX_SMALL_STRAIN:
             out.append(
                 sentence.format(strain)
                 + f", beyond the small strains that are assumed ({MAX_SMALL_STRAIN:g})"
             )
     out += other_warnings
-    poisson = max(material.poisson for material in _materials(patch_model))
+    poisson = max(material.poisson for material in _list_materials(patch_model))
     mesh = patch_model.mesh
     if patch_model.pieces.plane == "strain" and poisson > MAX_POISSON and not mesh.is_automatic:
         remedy = "leave out contact.element_size"
@@ -225,17 +227,19 @@ def exceeds_small_strains(patch_model, largest_pressure, approach):
     """Return whether the strains of one patch, or of any of many, may cause a warning."""
     if not patch_model.mesh.is_automatic:
         return np.ones(np.shape(largest_pressure), bool)
-    return np.maximum(*_strains(patch_model, largest_pressure, approach)) > MAX_SMALL_STRAIN
+    return (
+        np.maximum(*_estimate_strains(patch_model, largest_pressure, approach)) > MAX_SMALL_STRAIN
+    )
 
 
-def _strains(patch_model, largest_pressure, approach) -> tuple:
+def _estimate_strains(patch_model, largest_pressure, approach) -> tuple:
     """Return two estimates of the strain: peak pressure/modulus and approach/height."""
-    young = min(material.young for material in _materials(patch_model))
+    young = min(material.young for material in _list_materials(patch_model))
     height = patch_model.pieces.lower.height + patch_model.pieces.upper.height
     return largest_pressure / young, approach / height
 
 
-def _materials(patch_model) -> list:
+def _list_materials(patch_model) -> list:
     """Return the materials of the pieces and of their coatings."""
     out = []
     for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
@@ -297,7 +301,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         if patch_model.solved is not None:
             out += patch_model.solved.plane_sentences
         else:
-            out += store.reuse_in_sweep(
+            out += store.get_or_compute_in_sweep(
                 patch_model,
                 ("plane band", other),
                 lambda: plane_state_sentences(patch_model, other),

@@ -19,7 +19,7 @@ from ...model import peaks as traces
 from ...surface.roughness import peaks
 
 
-def skin_law(patch_model):
+def make_skin_law(patch_model):
     """Return the pressure-separation law of the asperity layer of a patch."""
     skin = patch_model.interface.skin
     if skin.law == "linear":
@@ -44,7 +44,7 @@ def mean_layer_stiffness(patch_model, pressure: float) -> float:
     """
     if patch_model.interface.skin.law == "linear":
         return patch_model.interface.skin.normal_stiffness
-    law = skin_law(patch_model)
+    law = make_skin_law(patch_model)
     if isinstance(law, asperity_laws.ExponentialAsperities):
         return pressure / law.u0
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
@@ -137,7 +137,7 @@ def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
     if loading.approach is None:
         loads = HolderLoads(loading.load, loading.moment, spring=loading.rotational_stiffness)
     layout = StripLayout(interface.x, interface.weight, np.zeros(1))
-    strips = StripModel(StripCompliance(pieces.normal), layout, skin_law(patch_model))
+    strips = StripModel(StripCompliance(pieces.normal), layout, make_skin_law(patch_model))
     angle = patch_model.gap.angle
     state = press_strips(strips, gap, loads, approach=loading.approach, rotation=angle)
     pressure = ContactState(

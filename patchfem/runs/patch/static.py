@@ -23,8 +23,8 @@ from .measures import (
     MAX_UNRESOLVED_NODES,
     MIN_ERROR,
     are_cells_halved,
-    converge,
     estimate_common_errors,
+    extrapolate_measures,
     format_plane_changes,
     max_error_ratio,
     resolution_of_patches,
@@ -75,7 +75,7 @@ class PatchLoads(NamedTuple):
         return np.broadcast_to(self.shapes[0].evaluate(x[:, None])[0].T, (self.load.size, x.size))
 
 
-class Level(NamedTuple):
+class BatchLevel(NamedTuple):
     """Contact solutions of q patches on one mesh.
 
     - values: static measures by name, (q,) each.
@@ -242,7 +242,7 @@ def solve_patches_on_pair(patch_models, pair: Pair) -> list:
     out = [None] * len(patch_models)
     if not _has_plain_grids(pair) or pair.closing.any():
         return out
-    for cases in _group_alike(patch_models):
+    for cases in _group_batches(patch_models):
         alike = [patch_models[case] for case in cases]
         with one_thread():
             level = solve_on_pair(collect_loads(alike), pair)
@@ -257,7 +257,7 @@ def _has_plain_grids(pair: Pair) -> bool:
     return isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid)
 
 
-def _group_alike(patch_models) -> list:
+def _group_batches(patch_models) -> list:
     """Group the indices of patches of equal geometry that can be solved in one batch."""
     groups = {}
     for case, patch_model in enumerate(patch_models):
@@ -267,13 +267,13 @@ def _group_alike(patch_models) -> list:
     return list(groups.values())
 
 
-def solved_patches(patch_models, tolerance: float) -> list:
+def solve_alike_patches(patch_models, tolerance: float) -> list:
     """Solve similar patches in one batch; None for each patch that the batch cannot solve.
 
-    They share their pieces and `batch_key`. tolerance: see `solve_together`.
+    They share their pieces and `batch_key`. tolerance: see `solve_batch`.
     """
     pairs = shared_pairs(patch_models[0])
-    solution = solve_together(collect_loads(patch_models), tolerance)
+    solution = solve_batch(collect_loads(patch_models), tolerance)
     out = [None] * len(patch_models)
     for case in np.flatnonzero(solution.is_solved).tolist():
         patch_model = patch_models[case]
@@ -306,18 +306,18 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     out = [None] * len(patch_models)
     if len(pairs) < 3 or not all(map(_has_plain_grids, pairs)):
         return out
-    for cases in _group_alike(patch_models):
+    for cases in _group_batches(patch_models):
         # This property is equal for all patches of a geometry.
         if patch_models[cases[0]].gap.profile is not None:
             continue
         alike = [patch_models[case] for case in cases]
-        solution = solve_together(collect_loads(alike), tolerance, pairs)
+        solution = solve_batch(collect_loads(alike), tolerance, pairs)
         for row in np.flatnonzero(solution.is_solved).tolist():
             out[cases[row]] = max_error_ratio(solution.measures(row), tolerance)
     return out
 
 
-def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = None) -> BatchSolution:
+def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) -> BatchSolution:
     """Solve the contacts of q patches in one batch on shared meshes, with error estimates.
 
     Parameters
@@ -357,7 +357,7 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
         fine.gap_range,
         first.loading.moment is not None,
     )
-    estimates = converge(
+    estimates = extrapolate_measures(
         [level.values for level in reversed(levels)],
         estimate_common_errors(resolution, fine.values),
         (first.mesh.tolerance or tolerance) if first.mesh.is_automatic else None,
@@ -368,7 +368,7 @@ def solve_together(loads: PatchLoads, tolerance: float, pairs: list | None = Non
     return BatchSolution(estimates, is_solved, plane_values, levels)
 
 
-def _make_patch(patch_model, pair: Pair, level: Level, case: int):
+def _make_patch(patch_model, pair: Pair, level: BatchLevel, case: int):
     """Convert the solution of one patch of a batch to a Patch."""
     gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
@@ -388,14 +388,14 @@ def _make_patch(patch_model, pair: Pair, level: Level, case: int):
     return make_patch(patch_model, pair, gap + pair.rise, contact, notes, seconds)
 
 
-def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) -> Level:
+def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: BatchLevel | None = None) -> BatchLevel:
     """Solve the contacts of q patches in one batch on one pair of condensed pieces.
 
     Parameters
     ----------
     loads : PatchLoads
     pair : Pair
-    coarse : Level, optional
+    coarse : BatchLevel, optional
         The same patches on coarser cells, near whose ends of contact the search starts.
 
     Returns
@@ -449,10 +449,10 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: Level | None = None) ->
     peak = peak_pressures(x, sigma, skin_fraction)
     area = bare.interface.weight.sum()
     values = static_values(np.ptp(x), area, pressure, peak, edge_values)
-    return Level(values, pressure, contacts, gap_range, x)
+    return BatchLevel(values, pressure, contacts, gap_range, x)
 
 
-def _contact_node_range(x, coarse: Level) -> tuple:
+def _contact_node_range(x, coarse: BatchLevel) -> tuple:
     """Return the range of nodes that can be in contact, from the contact on a coarser mesh.
 
     The range is the first node (q,) and the node (q,) after the last one.

@@ -15,14 +15,14 @@ MAX_ENTRIES = 64
 _RESULTS: dict = {}  # The dict is ordered from the least to the most recently used result.
 
 
-def reuse(key: tuple, make: Callable):
+def get_or_compute(key: tuple, make: Callable):
     """Return the cached value of a key; compute and store it on the first call."""
     result = _RESULTS[key] if key in _RESULTS else make()
-    keep(key, result)
+    store_result(key, result)
     return result
 
 
-def reuse_in_sweep(patch_model, key: tuple, make: Callable):
+def get_or_compute_in_sweep(patch_model, key: tuple, make: Callable):
     """Return the value of a key, which is cached only if other cases of a sweep may need it.
 
     Parameters
@@ -33,10 +33,10 @@ def reuse_in_sweep(patch_model, key: tuple, make: Callable):
     make : callable
         Function without parameters that computes the result.
     """
-    return reuse(key, make) if may_be_shared(patch_model) else make()
+    return get_or_compute(key, make) if may_be_shared(patch_model) else make()
 
 
-def keep(key: tuple, result) -> None:
+def store_result(key: tuple, result) -> None:
     """Store a value under a key as the most recently used entry of the cache.
 
     Beyond MAX_ENTRIES, the least recently used result is discarded.
@@ -47,7 +47,7 @@ def keep(key: tuple, result) -> None:
         del _RESULTS[next(iter(_RESULTS))]
 
 
-def clear() -> None:
+def clear_cache() -> None:
     """Discard all cached values of this process."""
     _RESULTS.clear()
 

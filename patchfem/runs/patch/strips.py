@@ -20,7 +20,7 @@ from ...contact.strips import (
 )
 from ...core import Compliance, ContactState, frozen_array
 from .edge_values import EdgeValues
-from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, skin_law
+from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, make_skin_law
 
 
 def press_strips_of_patch(
@@ -46,7 +46,7 @@ def press_strips_of_patch(
     """
     count, roll, offset = patch_model.interface.strips
     loading = patch_model.loading
-    skin = None if patch_model.interface.skin is None else skin_law(patch_model)
+    skin = None if patch_model.interface.skin is None else make_skin_law(patch_model)
     strip = split_into_strips(pieces, count)
     offsets = strip_offsets(patch_model.pieces.width, count)
     layout = StripLayout(pieces.interface.x, strip.weight, offsets)

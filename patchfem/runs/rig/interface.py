@@ -22,7 +22,7 @@ from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
-from .lists import choose_bond_sum
+from .lists import choose_bond_summation
 from .numerics import Numerics
 
 # largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
@@ -180,7 +180,7 @@ def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
     The bonds are summed in a list, or at the points of shear modes, of a field or of a single point.
     """
     law = model.bonds
-    choice = choose_bond_sum(model, numerics)
+    choice = choose_bond_summation(model, numerics)
     is_list = choice.engine != "recursion"
     limit = model.friction.static * load
     if model.side == "lower" and (model.partial_slip or is_list):

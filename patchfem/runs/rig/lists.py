@@ -1,6 +1,6 @@
 """Sum over the bonds of a rig, and the cost of a list of them.
 
-In: a Model and its Numerics. Out: the Choice of a method for the sum (`choose_bond_sum`), and the
+In: a Model and its Numerics. Out: the Choice of a method for the sum (`choose_bond_summation`), and the
 predicted length and CPU seconds of a list. A law without stiffness, the printed one and that of
 order 0, keeps a block from sliding by a reversal in almost every step. Each reversal adds a
 strip to the list, so that its cost grows with the square of the steps.
@@ -53,7 +53,7 @@ MAX_BOND_PHASE = 2.0  # largest phase [rad] in a step of the vibration of the bl
 
 
 @lru_cache(maxsize=8)
-def choose_bond_sum(model: Model, numerics: Numerics):
+def choose_bond_summation(model: Model, numerics: Numerics):
     """Choose the method that sums the forces of the bonds of a nonlocal law in a rig.
 
     The stroke is taken as four times the amplitude that follows from speed over frequency of the
@@ -73,7 +73,7 @@ def has_list(model: Model, numerics: Numerics) -> bool:
     return (
         f is not None
         and law_has_trait(f.law, "bonds")
-        and choose_bond_sum(model, numerics).engine != "recursion"
+        and choose_bond_summation(model, numerics).engine != "recursion"
     )
 
 
@@ -329,7 +329,7 @@ def estimate_list_cost(model: Model, numerics: Numerics) -> ListCost:
     steps = numerics.cycles * numerics.steps
     if is_list_growing(model):
         return ListCost(steps, GROWING_STEP_SECONDS * steps**2 / 2)
-    choice = choose_bond_sum(model, numerics)
+    choice = choose_bond_summation(model, numerics)
     if choice.engine != "recursion" and numerics.choice is None:
         choice = _choose_for_engine(model, numerics, _relative_stretch(model, 1.0), choice.engine)
     max_strips = 8 * steps

@@ -16,7 +16,7 @@ from ...friction.record import make_law
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import motion_inside_steps
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
-from ...response.rows import NEEDS_RUN, lateral_work
+from ...response.rows import ROWS_NEEDING_RUN, lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
     estimate_peak_speed,
@@ -27,7 +27,7 @@ from ...structure.drive_sizes import (
 from . import levels as rig_levels
 from . import strips
 from .interface import make_contact
-from .lists import ListGuard, choose_bond_sum, has_list
+from .lists import ListGuard, choose_bond_summation, has_list
 from .reading import Reader
 from .solution import CycleLoop, Solution, compute_sampled_loop, normal_load
 
@@ -104,7 +104,7 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
         rig_levels.list_level_ends(rig),
         keeps_samples=numerics.whole and not keeps_extremes,
         keeps_extremes=keeps_extremes,
-        even=bool(NEEDS_RUN),
+        even=bool(ROWS_NEEDING_RUN),
     )
     seconds = perf_counter() - begin
     done = strips.average_march(done, patch) if rig.friction.strips_slide_apart else done
@@ -125,7 +125,7 @@ class MarchReader(Reader):
 
     def solution_fields(self, run, drive) -> dict:
         """Return the drive levels, the bond summation and the errors due to the end of the run."""
-        fields = {"summed": self.choose_bond_sum(), "extra": {"late": self.late(run.window)}}
+        fields = {"summed": self.choose_bond_summation(), "extra": {"late": self.late(run.window)}}
         if self.model.rig.drive.levels.amplitudes:
             fields["levels"], fields["probe"] = self._levels(run)
         return fields
@@ -153,12 +153,12 @@ class MarchReader(Reader):
         changes = estimate_window_error(window, period, steps - round(steps))
         return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
 
-    def choose_bond_sum(self):
+    def choose_bond_summation(self):
         """Choose the bond summation of the run; None for a law without bonds."""
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return None
-        return choose_bond_sum(self.model, self.numerics)
+        return choose_bond_summation(self.model, self.numerics)
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the friction work of a run from its samples and from its energy balance."""

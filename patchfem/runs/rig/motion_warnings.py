@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_length, format_number, format_quantity
-from ...response.outcome import changing_note, warn_if_ringing
+from ...response.outcome import note_on_changing_drive, warn_if_ringing
 from ...structure.drive_sizes import find_min_decay_rate
 from ..patch import faces
 from ..results.notes import (
@@ -30,7 +30,7 @@ from .solution import normal_load
 # this fraction
 MIN_DECAY_EXCESS = 1e-3
 EQUAL_FREQUENCY_TOL = 1e-9  # relative difference up to which two frequencies are equal
-ONE_POINT_WARNING = (
+SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
     "same load; add [contact.shear] to let the patch slip part by part"
@@ -50,7 +50,7 @@ def collect_warnings(run) -> list:
         steps = run.numerics.steps
     warnings = [
         *model.rig.structure.notes,
-        *_warn_of_one_point(model, patch, run.numerics),
+        *_warn_of_single_point(model, patch, run.numerics),
         *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
@@ -73,7 +73,7 @@ def collect_warnings(run) -> list:
         )
     warnings += [
         *warn_of_work_check(measures, steps, harmonics),
-        *changing_note(run.outcome, run.drive),
+        *note_on_changing_drive(run.outcome, run.drive),
         *solution.notes,
     ]
     if not model.rig.drive.levels.amplitudes:
@@ -96,7 +96,7 @@ def collect_warnings(run) -> list:
 
 def _warn_of_face(face, response) -> list:
     """Return the warnings on the patch of one interface."""
-    warnings = [] if face.partial_slip else [ONE_POINT_WARNING]
+    warnings = [] if face.partial_slip else [SINGLE_POINT_WARNING]
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
@@ -252,7 +252,7 @@ def note_on_creep(friction) -> list:
     ]
 
 
-def _warn_of_one_point(model, patch, numerics) -> list:
+def _warn_of_single_point(model, patch, numerics) -> list:
     """Return the warning on a patch that moves exactly like a single point."""
     f = model.friction
     moves = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
@@ -265,7 +265,7 @@ def _warn_of_one_point(model, patch, numerics) -> list:
         or moves
     ):
         return []
-    return [ONE_POINT_WARNING]
+    return [SINGLE_POINT_WARNING]
 
 
 def _note_on_bond_growth(model, patch, solution) -> list:

@@ -19,7 +19,7 @@ from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import NEEDS_RUN, stick_fraction
+from ...response.rows import ROWS_NEEDING_RUN, stick_fraction
 from ...response.spectrum import distortion_ratio
 from ...structure.drive_sizes import (
     find_drive_omega,
@@ -126,7 +126,7 @@ def _run_drive(reader, frames: int, say, progress) -> Solution:
             frames * is_last,
             watch,
             *state,
-            even=bool(NEEDS_RUN),
+            even=bool(ROWS_NEEDING_RUN),
         )
         return reader.average_over_strips(done)
 

@@ -399,7 +399,7 @@ def bond_sum_sentences(model: Model, numerics) -> list:
     """Return the sentences of a plan on the bond summation or the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else describe_element_engine(model, numerics.engine)
-    choice = lists.choose_bond_sum(model, numerics)
+    choice = lists.choose_bond_summation(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
         return sentences

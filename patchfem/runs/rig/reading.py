@@ -18,7 +18,7 @@ from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_evaluation
 from ...response.measures import slip_round_off, window_amplitudes, window_end_values
 from ...response.outcome import estimate_steady
-from ...response.rows import NEEDS_RUN, LastCycles, compute_measures, find_definition
+from ...response.rows import ROWS_NEEDING_RUN, LastCycles, compute_measures, find_definition
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from .solution import Solution, find_release_amplitude, mode_stiffness, normal_load
 
@@ -174,7 +174,7 @@ class Reader:
         """
         histories = getattr(run, "response", None)
         kept = (
-            NEEDS_RUN
+            ROWS_NEEDING_RUN
             and histories is not None
             and choose_samples_per_cycle(drive, self.numerics.cycles, needs_history=True)
         )
@@ -195,7 +195,7 @@ class Reader:
         values : dict
             Measures by name.
         """
-        rows = [row for row in NEEDS_RUN if row.name in values]
+        rows = [row for row in ROWS_NEEDING_RUN if row.name in values]
         if not rows:
             return {}
         errors = dict.fromkeys([row.name for row in rows], 0.0)

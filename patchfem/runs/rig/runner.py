@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import NotConverged
 from ...response.coarser import estimate_errors
-from ...response.rows import NEEDS_RUN
+from ...response.rows import ROWS_NEEDING_RUN
 from ..patch import faces
 from ..results.result import N_FRAMES, RunInputs
 from . import motion_warnings
@@ -89,7 +89,7 @@ class Runner:
         if numerics.richer:
             model = replace(model, rig=model.rig.structure.richer_rig)
         # the decay curve and some measures need histories from the start of the run
-        needs_whole = self.model.rig.drive.kind == "free" or bool(NEEDS_RUN)
+        needs_whole = self.model.rig.drive.kind == "free" or bool(ROWS_NEEDING_RUN)
         numerics = replace(numerics, whole=needs_whole)
         return self._solve_around_peak(model, numerics, fine) or self.solve(numerics, model)
 

@@ -10,7 +10,7 @@ from time import perf_counter
 from ...core import IntegratedMeasures
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
-from ...response.rows import NEEDS_RUN, find_definition
+from ...response.rows import ROWS_NEEDING_RUN, find_definition
 from .interface import make_contact
 from .reading import FrictionWorks, Reader, thin_samples
 from .solution import Solution
@@ -52,7 +52,7 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
         frames,
         rig.start,
         progress,
-        even=bool(NEEDS_RUN),
+        even=bool(ROWS_NEEDING_RUN),
     )
     reader = SmoothReader(model, numerics, patch, contact)
     solution = reader.solution(

@@ -26,7 +26,7 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 )
 
 
-def failed_findings(result: Result) -> list:
+def list_failed_findings(result: Result) -> list:
     """Return the self-checks of a Result whose difference exceeds the threshold."""
     run = Evidence(result)
     return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
@@ -42,7 +42,7 @@ def mark_failed_checks(result: Result) -> Result:
     model = result.plan.model
     if result.outcome is Outcome.NOT_CONVERGED or not model.source.describes(model):
         return result
-    failed = failed_findings(result)
+    failed = list_failed_findings(result)
     if not failed:
         return result
     return replace(

@@ -1,6 +1,6 @@
 """Wear of a patch over many cycles: contact, motion and worn depth advance in jumps.
 
-In: a model with [wear], its pressed patch and the same on coarser meshes. Out: `Evolved`. The
+In: a model with [wear], its pressed patch and the same on coarser meshes. Out: `WornPatch`. The
 state is saved after every jump, and an interrupted run that continues from it gives the same
 bits.
 """
@@ -23,7 +23,7 @@ from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
 from ..patch.measures import with_other_strip_count
-from ..patch.press import areas, make_force_function, press_patch
+from ..patch.press import make_force_function, nodal_areas, press_patch
 from ..patch.values import values
 from ..rig import numerics
 from .slip import (
@@ -35,7 +35,14 @@ from .slip import (
 )
 
 STATE_FIELDS = tuple(WearState.__slots__)  # Fields of the wear state in a saved file.
-MOMENT_FIELDS = ("cycle", "depth", "used", "pressure", "gap", "miss")  # Arrays of a saved Moment.
+MOMENT_FIELDS = (
+    "cycle",
+    "depth",
+    "used",
+    "pressure",
+    "gap",
+    "miss",
+)  # Arrays of a saved WearMoment.
 # Fraction of the thickness of a coating that may remain where it counts as worn through.
 THIN_FRACTION = 1e-6
 # Largest number of jumps of the search for the cycle at which a coating is worn through.
@@ -45,7 +52,7 @@ MIN_ROW_DISTANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Moment:
+class WearMoment:
     """Contact, slip path and measures of a worn patch after a number of cycles.
 
     - cycle: number of cycles.
@@ -67,7 +74,7 @@ class Moment:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Evolved:
+class WornPatch:
     """Worn patch with the history of its wear, also on coarser meshes.
 
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
@@ -92,7 +99,7 @@ class Evolved:
     stopped: str
 
 
-class _Unbounded(Exception):
+class _UnboundedMotion(Exception):
     """Exception that is raised if the motion of a worn model has no periodic cycle."""
 
 
@@ -124,12 +131,12 @@ class _Motion:
             patch = press_patch(self.model.patch, self.pair, worn)
             slip = compute_cycle_slip(worn_model(self.model, patch, worn), patch, self.frames)
             if slip.outcome is not None:
-                raise _Unbounded(slip.outcome.sentence)
+                raise _UnboundedMotion(slip.outcome.sentence)
             self.last = slip
         return self.last.path
 
 
-def mean_depth(patch, depth) -> float:
+def mean_worn_depth(patch, depth) -> float:
     """Return the mean worn depth [m] of a patch, which is worn volume divided by area.
 
     depth: (m,), of strips (s, m) [m].
@@ -153,10 +160,10 @@ def worn_model(model, patch, depth):
     wear = model.wear
     new = {}
     if model.grooves is not None:
-        new["grooves"] = model.grooves.after_wear(mean_depth(patch, depth), wear.upper_share)
+        new["grooves"] = model.grooves.after_wear(mean_worn_depth(patch, depth), wear.upper_share)
     if wear.friction is not None:
         law = new["friction"] = wear.friction.compute_worn_law(
-            model.friction, mean_depth(patch, depth)
+            model.friction, mean_worn_depth(patch, depth)
         )
         if model.rig is not None:
             friction = model.rig.friction
@@ -165,9 +172,9 @@ def worn_model(model, patch, depth):
     return replace(model, **new) if new else model
 
 
-def evolve(
+def compute_wear(
     model, patch, coarse, progress=None, initial: tuple | None = None, store=None
-) -> Evolved:
+) -> WornPatch:
     """Compute the wear of a patch over all cycles of a model with [wear].
 
     Parameters
@@ -186,7 +193,7 @@ def evolve(
 
     Returns
     -------
-    Evolved
+    WornPatch
 
     Raises
     ------
@@ -204,7 +211,7 @@ def evolve(
     problem = WearProblem(
         make_force_function(model.patch, patch.pair),
         motion,
-        areas(model.patch, patch.pieces.interface),
+        nodal_areas(model.patch, patch.pieces.interface),
         model.wear.coefficient,
         model.wear.cycles,
     )
@@ -216,15 +223,15 @@ def evolve(
         else:
             state, moments = initial
             patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
-    except _Unbounded as reason:
+    except _UnboundedMotion as reason:
         worn = tuple(mesh and _with_earlier_wear(model, mesh) for mesh in coarse)
         stopped = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
-        return Evolved(patch, worn, None, (), (), None, 0.0, seconds, stopped)
+        return WornPatch(patch, worn, None, (), (), None, 0.0, seconds, stopped)
     while state.cycle < model.wear.cycles and find_worn_through_coating(model, state.depth) is None:
         try:
-            state = _jump(model, problem, state)
-        except _Unbounded as reason:
+            state = _take_next_jump(model, problem, state)
+        except _UnboundedMotion as reason:
             stopped = (
                 f"wear was computed only up to cycle {state.cycle:.6g} of {model.wear.cycles:.6g}: "
                 f"{reason}"
@@ -237,13 +244,15 @@ def evolve(
         if progress is not None:
             progress(state.cycle / model.wear.cycles)
     replayed = [
-        _replay(model.patch, model, patch, mesh, moments) for mesh in coarse if mesh is not None
+        _repeat_on_mesh(model.patch, model, patch, mesh, moments)
+        for mesh in coarse
+        if mesh is not None
     ]
     strips_model, _ = with_other_strip_count(model.patch)
     stripped = None
     if replayed and strips_model is not model.patch:
-        stripped = _replay(strips_model, model, patch, patch, moments)
-    return Evolved(
+        stripped = _repeat_on_mesh(strips_model, model, patch, patch, moments)
+    return WornPatch(
         patch,
         (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None)),
         state,
@@ -297,7 +306,7 @@ def _most_worn_coating(model, depth) -> WornCoating:
     return max(coatings)
 
 
-def _jump(model, problem: WearProblem, state: WearState) -> WearState:
+def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
     """Compute the wear after the next jump over cycles, or when a coating is worn through.
 
     The latter is found by the Illinois variant of regula falsi.
@@ -387,7 +396,7 @@ def _with_earlier_wear(model, patch):
     if start is None:
         return patch
     start.require_same_surfaces(patch.x, patch.unloaded_gap)
-    area = areas(model.patch, patch.pieces.interface)
+    area = nodal_areas(model.patch, patch.pieces.interface)
     depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
     if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
@@ -407,10 +416,10 @@ def _start_state(model, patch, problem: WearProblem, motion: _Motion) -> tuple:
     return state, (_record_moment(patch, state, motion),)
 
 
-def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
-    """Return the contact, slip path and measures of a worn patch as a Moment."""
+def _record_moment(patch, state: WearState, motion: _Motion) -> WearMoment:
+    """Return the contact, slip path and measures of a worn patch as a WearMoment."""
     model = motion.model
-    area = areas(model.patch, patch.pieces.interface)
+    area = nodal_areas(model.patch, patch.pieces.interface)
     worn = worn_model(model, patch, state.depth)
     measures = values(patch) | motion.last.values
     measures["worn_volume"] = float(np.vdot(state.depth, area))
@@ -421,7 +430,7 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
         measures["static_coefficient"] = worn.friction.static
         if worn.friction.bond_length is not None:
             measures["bond_length"] = worn.friction.bond_length
-    return Moment(
+    return WearMoment(
         state.cycle,
         state.depth,
         state.jump_path,
@@ -432,7 +441,7 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> Moment:
     )
 
 
-def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
+def _repeat_on_mesh(patch_model, model, patch, other_patch, moments) -> tuple:
     """Repeat on another mesh the wear of a run, with its jumps and slip paths.
 
     The other patch may also have another number of strips. Return its worn patch and its worn depth
@@ -445,9 +454,9 @@ def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
     model : Model
     patch, other_patch : Patch
         Patch of the moments, and the unworn patch that is worn.
-    moments : sequence of Moment
+    moments : sequence of WearMoment
     """
-    area = areas(patch_model, other_patch.pieces.interface)
+    area = nodal_areas(patch_model, other_patch.pieces.interface)
 
     def interpolate(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of another patch."""
@@ -472,7 +481,7 @@ def _replay(patch_model, model, patch, other_patch, moments) -> tuple:
     return press_patch(patch_model, other_patch.pair, frozen_array(depth)), depth
 
 
-def evolve_and_save(storage, key: str, model, patch, coarse, progress=None) -> Evolved:
+def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None) -> WornPatch:
     """Compute the wear of a patch, saving its state after every jump over cycles.
 
     Parameters
@@ -482,12 +491,14 @@ def evolve_and_save(storage, key: str, model, patch, coarse, progress=None) -> E
     key : str
         Identifies what the state belongs to.
     model, patch, coarse, progress
-        See `evolve`.
+        See `compute_wear`.
     """
     if storage is None:
-        return evolve(model, patch, coarse, progress)
+        return compute_wear(model, patch, coarse, progress)
     begin = load_state(storage.path, key) if storage.resume else None
-    return evolve(model, patch, coarse, progress, begin, partial(save_state, storage.path, key))
+    return compute_wear(
+        model, patch, coarse, progress, begin, partial(save_state, storage.path, key)
+    )
 
 
 def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
@@ -499,7 +510,7 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
     key : str
         Identifies what the state belongs to.
     state : WearState
-    moments : tuple of Moment
+    moments : tuple of WearMoment
     """
     arrays = {f"state_{name}": np.asarray(getattr(state, name)) for name in STATE_FIELDS}
     for name in MOMENT_FIELDS:
@@ -545,7 +556,7 @@ def load_state(path: Path, key: str) -> tuple:
         state = WearState(**fields)
         columns = [arrays[f"moment_{name}"] for name in MOMENT_FIELDS]
         moments = tuple(
-            Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
+            WearMoment(float(row[0]), *row[1:-1], float(row[-1]), values)
             for *row, values in zip(*columns, json.loads(str(arrays["values"])), strict=True)
         )
     except FileNotFoundError:

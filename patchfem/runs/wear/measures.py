@@ -1,6 +1,6 @@
 """Measures of wear with their errors, and the history of wear over the cycles.
 
-In: the Result of a run on the worn patch, and its `Evolved`. Out: the Result with the measures,
+In: the Result of a run on the worn patch, and its `WornPatch`. Out: the Result with the measures,
 fields, warnings and notes of wear.
 """
 
@@ -13,10 +13,10 @@ from ...core import Measure, Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors, error_of_change
 from ..patch.measures import with_other_strip_count
-from ..patch.press import areas, press_patch
+from ..patch.press import nodal_areas, press_patch
 from ..patch.values import values
 from ..results.patch_rows import TABLE, WORN_SOURCE
-from .evolve import THIN_FRACTION, find_worn_through_coating, mean_depth
+from .evolve import THIN_FRACTION, find_worn_through_coating, mean_worn_depth
 from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
 
 N_FRAMES = 24  # Number of frames of the interface during the wear.
@@ -35,7 +35,7 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     Parameters
     ----------
     result : Result
-    evolved : Evolved or None
+    evolved : WornPatch or None
         None for a single point.
     estimate : bool
         Whether errors are computed.
@@ -65,7 +65,11 @@ def add_wear_measures(result, evolved, estimate: bool = True):
             result = replace(result, outcome=Outcome.WORN_THROUGH)
     return replace(
         result,
-        warnings=[*warnings, *_warn_of_depth(model, evolved), *_warn_of_table(model, evolved)],
+        warnings=[
+            *warnings,
+            *_warn_of_worn_depth(model, evolved),
+            *_warn_of_friction_table(model, evolved),
+        ],
         extra=result.extra | {"wear": _list_wear_history(evolved), "notes": notes},
     )
 
@@ -133,7 +137,7 @@ def _widen_by_jumps(result, evolved):
     Parameters
     ----------
     result : Result
-    evolved : Evolved
+    evolved : WornPatch
     """
     patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
@@ -162,7 +166,7 @@ def find_period(model, result) -> float:
     return model.slide.period or float(result.response.time[-1])
 
 
-def _warn_of_depth(model, evolved) -> list:
+def _warn_of_worn_depth(model, evolved) -> list:
     """Return warnings on a worn depth that is large compared with a piece or its coating."""
     depth = float(evolved.state.depth.max(initial=0.0))
     pieces = model.patch.pieces
@@ -181,7 +185,7 @@ def _warn_of_depth(model, evolved) -> list:
     return warnings
 
 
-def _slip_error(measures: dict) -> float:
+def _relative_slip_error(measures: dict) -> float:
     """Return the relative error of the slip amplitude of a run.
 
     It is that of the measured slip amplitude, or else of the displacement.
@@ -199,15 +203,17 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     Parameters
     ----------
     model : Model
-    evolved : Evolved
+    evolved : WornPatch
     motion : dict
         Measures of the run on the worn patch by name.
     estimate : bool
         Whether errors are computed.
     """
     state = evolved.state
-    area = areas(model.patch, evolved.patch.pieces.interface)
-    slip_error = evolved.frame_error + _slip_error(motion) + _slip_difference(evolved, motion)
+    area = nodal_areas(model.patch, evolved.patch.pieces.interface)
+    slip_error = (
+        evolved.frame_error + _relative_slip_error(motion) + _slip_difference(evolved, motion)
+    )
     fine_values = _measure_depths(model.patch, evolved.patch, state.depth)
     coarse = [
         _measure_depths(model.patch, patch, depth)
@@ -258,7 +264,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     Parameters
     ----------
     model : Model
-    evolved : Evolved
+    evolved : WornPatch
     motion : dict
         Measures of the run on the worn patch by name.
     error : float or None
@@ -267,7 +273,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     table = model.wear.friction
     area = float(evolved.patch.pieces.interface.weight.sum())
     last_moments = evolved.moments[-3:]
-    depths = [mean_depth(evolved.patch, moment.depth) for moment in last_moments]
+    depths = [mean_worn_depth(evolved.patch, moment.depth) for moment in last_moments]
     depth = depths[-1]
     depth_error = None if error is None else error / area
     bounds = [] if error is None else [depth - depth_error, depth + depth_error]
@@ -298,12 +304,12 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     return measures
 
 
-def _warn_of_table(model, evolved) -> list:
+def _warn_of_friction_table(model, evolved) -> list:
     """Return warnings on wear beyond the friction table, and on jumps over its rows."""
     table = model.wear.friction
     if table is None:
         return []
-    depths = [mean_depth(evolved.patch, moment.depth) for moment in evolved.moments]
+    depths = [mean_worn_depth(evolved.patch, moment.depth) for moment in evolved.moments]
     warnings = []
     if depths[-1] > table.depth[-1]:
         warnings.append(
@@ -326,7 +332,7 @@ def _warn_of_table(model, evolved) -> list:
 def _measure_depths(patch_model, patch, depth) -> dict:
     """Return the worn volume [m3] and the largest worn depth [m] of a patch as a dict."""
     return {
-        "worn_volume": float(np.vdot(depth, areas(patch_model, patch.pieces.interface))),
+        "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
 
@@ -360,7 +366,7 @@ def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
     volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = None
     if estimate:
-        error = (path_error + _slip_error(result.measures) + ROUND_OFF) * volume
+        error = (path_error + _relative_slip_error(result.measures) + ROUND_OFF) * volume
     return {"worn_volume": _make_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 

@@ -155,7 +155,7 @@ def _changes_motion(model) -> bool:
     )
 
 
-def cost(model, points: int, motion: float) -> Cost:
+def predict_cost(model, points: int, motion: float) -> Cost:
     """Predict the cost of all jumps of a run with wear.
 
     Parameters

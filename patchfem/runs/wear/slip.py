@@ -13,7 +13,7 @@ from ...response.outcome import judge_outcome
 from ..bench import bench
 from ..bench.closed import integrate_steps
 from ..bench.engine import steps_per_cycle
-from ..patch.press import areas
+from ..patch.press import nodal_areas
 from ..results.travel import judge_outcome_on_piece
 from ..rig import fields, numerics, solve
 
@@ -83,7 +83,7 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     return _compute_rig_slip(model, patch, frames)
 
 
-class _Cycle(NamedTuple):
+class _CycleHistories(NamedTuple):
     """Displacement, slip, forces and load of one cycle at k samples.
 
     - slide, slip: [m].
@@ -131,7 +131,7 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
             tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
     if model.grooves is not None:
         load = np.full(slide.size, patch.pressure.load)
-        local, tau = slip_path(model, patch, slide, load, local, tau)
+        local, tau = flank_slip_path(model, patch, slide, load, local, tau)
     slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=False))
     return slip._replace(values=run.values, outcome=outcome)
 
@@ -172,13 +172,15 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
                 response.time,
                 response.extra.get("normal_load", constant),
             )
-            local, tau = slip_path(model, patch, frame_fields["holder_slide"], load, local, tau)
+            local, tau = flank_slip_path(
+                model, patch, frame_fields["holder_slide"], load, local, tau
+            )
         slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=True))
     error = slip.error + _beat_error(solution.values, cycle)
     return slip._replace(error=error, values=solution.values, outcome=outcome)
 
 
-def _beat_error(values: dict, cycle: _Cycle) -> float:
+def _beat_error(values: dict, cycle: _CycleHistories) -> float:
     """Return the relative difference of the slip amplitudes in the last cycle and in the window.
 
     A mode that still beats causes this difference.
@@ -214,13 +216,13 @@ def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
     return float(slip.path[0]), slip.error + beat_error
 
 
-def _last_bench_cycle(run) -> _Cycle:
+def _last_bench_cycle(run) -> _CycleHistories:
     """Return displacement, slip and forces of the last cycle of a bench."""
     histories = (run.slide, run.slip, run.force, run.load)
-    return _Cycle(*(history[run.first :] for history in histories))
+    return _CycleHistories(*(history[run.first :] for history in histories))
 
 
-def _last_rig_cycle(model, window, load: float) -> _Cycle:
+def _last_rig_cycle(model, window, load: float) -> _CycleHistories:
     """Return displacement, slip and forces of the last cycle of a rig.
 
     load: constant load [N]; over grooves it is the vertical force.
@@ -228,7 +230,7 @@ def _last_rig_cycle(model, window, load: float) -> _Cycle:
     is_last = _is_in_last_cycle(model, window)
     loads = window.extra.get("normal_load", np.full(window.time.size, load))
     histories = (window.slide, window.slip, window.force, loads)
-    return _Cycle(*(history[is_last] for history in histories))
+    return _CycleHistories(*(history[is_last] for history in histories))
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
@@ -253,15 +255,19 @@ def _compute_strip_slip(model, patch, window) -> CycleSlip:
     def path(samples) -> np.ndarray:
         """Return the slip path (s,) [m] of the strips from selected samples."""
         columns = zip(slips[samples].T, weight[samples].T)
-        return np.array([_integrate(slip, strip_weight) for slip, strip_weight in columns])
+        return np.array(
+            [_integrate_over_path(slip, strip_weight) for slip, strip_weight in columns]
+        )
 
     paths = path(np.arange(len(slips)))
-    error = _thinned_error(path, len(slips), paths, loads)
+    error = _estimate_reversal_error(path, len(slips), paths, loads)
     nearest = _nearest_contact_nodes(patch.strips.offsets, loads > 0)
     return CycleSlip(np.repeat(paths[nearest, None], patch.x.size, axis=1), error)
 
 
-def _thinned_error(compute_path, count: int, fine_path, weight, is_closed: bool = False) -> float:
+def _estimate_reversal_error(
+    compute_path, count: int, fine_path, weight, is_closed: bool = False
+) -> float:
     """Estimate the relative error of a slip path whose reversals lie between samples.
 
     A reversal between two samples hides f(d) of the path, d <= 1/2 of their distance. Every third
@@ -290,7 +296,7 @@ def _thinned_error(compute_path, count: int, fine_path, weight, is_closed: bool 
     return THINNING_FACTOR * float(np.mean(changes)) / total
 
 
-def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
+def _uniform_slip(model, patch, cycle: _CycleHistories, load: float) -> CycleSlip:
     """Return the slip path of a cycle in which all points slip by the same distance."""
     slip = cycle.slip
     # Friction opposes the slip, also in a step with a reversal.
@@ -298,14 +304,14 @@ def _uniform_slip(model, patch, cycle: _Cycle, load: float) -> CycleSlip:
     error = 0.0
     if model.grooves is not None:
         weight = wearing_force_on_flanks(model, cycle.slide, cycle.force, cycle.load)
-    path = _integrate(slip, weight) / load if load > 0 else 0.0
+    path = _integrate_over_path(slip, weight) / load if load > 0 else 0.0
     if model.grooves is not None and path > 0:
-        error = abs(path - _integrate(slip[::2], weight[::2]) / load) / path
-    shape = 1 if patch is None else areas(model.patch, patch.pieces.interface).shape
+        error = abs(path - _integrate_over_path(slip[::2], weight[::2]) / load) / path
+    shape = 1 if patch is None else nodal_areas(model.patch, patch.pieces.interface).shape
     return CycleSlip(np.full(shape, path), error)
 
 
-def _integrate(slip, weight) -> float:
+def _integrate_over_path(slip, weight) -> float:
     """Integrate a weight over the slip path |ds| by the trapezoidal rule."""
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
@@ -330,7 +336,7 @@ def wearing_force_on_flanks(model, slide, force, load) -> np.ndarray:
     return np.maximum(load + force * t, 0.0)
 
 
-def slip_path(model, patch, slide, vertical, local, tau) -> tuple:
+def flank_slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     """Return the slip along groove flanks [m] and the stress that wears them [Pa], (f, m) each.
 
     The slip is s - e, with the path s along the flank and its elastic part e. A point of pressure
@@ -374,7 +380,7 @@ def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
 
     paths = path(np.arange(count))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    return CycleSlip(paths, _thinned_error(path, count, paths, force, frames.is_closed))
+    return CycleSlip(paths, _estimate_reversal_error(path, count, paths, force, frames.is_closed))
 
 
 def _integrate_path(model, patch, frames: Frames, indices) -> np.ndarray:

@@ -148,7 +148,9 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
         expected = (
             {
                 "absolute_acceleration_peak": measures.compute_acceleration_peak(here),
-                "drift_per_cycle": loops.drift(w.time, here.slide, here.slide_rate, drive.period),
+                "drift_per_cycle": loops.mean_drift(
+                    w.time, here.slide, here.slide_rate, drive.period
+                ),
                 "secant_stiffness": loops.secant_stiffness(turns),
             }
             | measures.compute_slip_measures(here, drive, STEPS)

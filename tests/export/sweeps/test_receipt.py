@@ -101,7 +101,7 @@ def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
         ).code
         == 3
     )
-    assert not (tmp_path / "out" / manifest.NAME).exists()
+    assert not (tmp_path / "out" / manifest.MANIFEST_NAME).exists()
 
 
 BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
@@ -142,7 +142,7 @@ def test_always_a_file_that_a_sweep_names_anywhere_counts(
     first = last()
     (tmp_path / "two.csv").write_text(rows.format(20), encoding="utf-8")
     if not whole:
-        (tmp_path / "out" / manifest.NAME).unlink()
+        (tmp_path / "out" / manifest.MANIFEST_NAME).unlink()
     if "--set" in words:  # of all cases: the folder is that of another scene
         told = cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out", "--resume")
         assert told.code == 2 and "contains a sweep of another scene" in told.err

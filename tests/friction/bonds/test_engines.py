@@ -16,7 +16,7 @@ from patchfem.friction import Bonds, Quadrature, RequestedEngine, choose_engine,
 from patchfem.friction.bonds.engines import ENGINES
 from patchfem.runs import choose_numerics as settings_of
 from patchfem.runs.rig.interface import make_single_contact
-from patchfem.runs.rig.lists import choose_bond_sum
+from patchfem.runs.rig.lists import choose_bond_summation
 from patchfem.runs.rig.motion_warnings import warn_of_created_energy
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy
@@ -213,7 +213,7 @@ def test_exact_engine_of_a_scene(tmp_path):
             make_single_contact(found, numerics, None).contact
             == f"dynamics.interfaces.{kind}_kernels"
         )
-        used = choose_bond_sum(found, numerics).engine
+        used = choose_bond_summation(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"method of the sum over bonds: {used}" in line for line in plan(found).verdict)
 

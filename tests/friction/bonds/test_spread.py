@@ -52,9 +52,9 @@ def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
 def patch_of(text):
     if text != SMALL_PATCH:
         return None
-    from patchfem.runs import solve_all
+    from patchfem.runs import solve_with_coarser
 
-    return solve_all(build(loads(SMALL_PATCH + LONGER + TRIANGLE)).patch, 1e-3, False)[0]
+    return solve_with_coarser(build(loads(SMALL_PATCH + LONGER + TRIANGLE)).patch, 1e-3, False)[0]
 
 
 def test_exact_strips_share_the_whole_width():

@@ -15,7 +15,7 @@ from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction import Bonds, Coulomb, FirstOrderBonds, Quadrature
 from patchfem.friction.laws.convolution import Convolution, average_pressure, sliding_limits
-from patchfem.runs import solve_all
+from patchfem.runs import solve_with_coarser
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -187,7 +187,7 @@ def test_exact_the_limits_of_an_uneven_pressure_differ_by_what_the_trailing_edge
 
 def bench_of(text, *sets, steps=64):
     model = build(loads(text, sets=sets))
-    patch = solve_all(model.patch, 1e-3, False)[0] if model.patch is not None else None
+    patch = solve_with_coarser(model.patch, 1e-3, False)[0] if model.patch is not None else None
     return patch, bench.run(model, patch, steps, 4)
 
 

@@ -56,7 +56,7 @@ def cases(kind: str, seed: int, count: int) -> list:
 
 def alone(model):
     """Answers of a run that finds nothing kept."""
-    store.clear()
+    store.clear_cache()
     return one_by_one.solve([model])
 
 

@@ -10,7 +10,7 @@ from patchfem import build
 from patchfem.campaigns import Cases, SweepScene
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.export import compute_in_memory
-from patchfem.runs import solve_all, with_shared_meshes
+from patchfem.runs import solve_with_coarser, with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one, patches
 from patchfem.runs.patch.grids import contact_extent
 from patchfem.scene import make_axis, scene
@@ -81,7 +81,7 @@ def test_exact_together_as_one_by_one(tables, values):
     assert all(patches.refuses(model) == "" for model in models)
     assert all(
         one is not None
-        for one in patches.static.solved_patches([model.patch for model in models], 1e-2)
+        for one in patches.static.solve_alike_patches([model.patch for model in models], 1e-2)
     )
     same(models)
 
@@ -133,7 +133,7 @@ def test_exact_patches_solved_together_are_those_of_their_own(tables):
     models = family(tables, -1e-4, 1e-5, 3e-4)
     for model, other in zip(models, patches.press_together(models)):
         assert model.patch.solved is None and other.patch.solved is not None
-        for mine, own in zip(other.patch.solved.patches, solve_all(model.patch, 1e-2)):
+        for mine, own in zip(other.patch.solved.patches, solve_with_coarser(model.patch, 1e-2)):
             top = own.pressure.sigma_n.max()
             assert np.abs(mine.pressure.sigma_n - own.pressure.sigma_n).max() < 1e-11 * top
             np.testing.assert_array_equal(mine.active, own.active)

@@ -26,10 +26,10 @@ from ....response.outcome import (
     warn_of_ringing,
 )
 from ....response.reasons import (
-    CHANGE_NOT_RESOLVED,
+    CHANGE_NOT_RESOLVED_REASON,
     CYCLE_MEASURES,
     STEADY_AMPLITUDE,
-    STICKS_AT_REVERSAL,
+    STICKS_AT_REVERSAL_REASON,
     find_missing,
 )
 from ....response.rows import TABLE, error_floor, larger_term
@@ -164,7 +164,7 @@ def assemble_results(
     """
     n = len(models)
     sizes = collect_scales(models)
-    values, errors = _values_and_errors(runs)
+    values, errors = _compute_values_and_errors(runs)
     outcomes, steady, steady_error = _judge_outcomes(
         sizes,
         runs,
@@ -203,7 +203,7 @@ def assemble_results(
         results.measure(STEADY_AMPLITUDE, TABLE[STEADY_AMPLITUDE].unit)
         results.floors[STEADY_AMPLITUDE][is_unknown] = TABLE[STEADY_AMPLITUDE].floor
         results.reasons.setdefault(STEADY_AMPLITUDE, {}).update(
-            dict.fromkeys(np.flatnonzero(is_unknown).tolist(), CHANGE_NOT_RESOLVED)
+            dict.fromkeys(np.flatnonzero(is_unknown).tolist(), CHANGE_NOT_RESOLVED_REASON)
         )
     if law_has_trait(models[0].friction.law, "set-valued") and not (
         models[0].partial_slip or models[0].rig.friction.has_partial_slip
@@ -218,7 +218,7 @@ def assemble_results(
     return AssembledRuns(results, runs_singly, is_resolved)
 
 
-def _values_and_errors(runs: Runs) -> tuple[dict, dict]:
+def _compute_values_and_errors(runs: Runs) -> tuple[dict, dict]:
     """Return the measures of n runs and their errors, as dicts of columns (n,)."""
     values = dict(runs.values)
     values.setdefault(MAIN_MEASURE, runs.amplitudes)
@@ -278,7 +278,7 @@ def _insert_warnings(
     first = models[0]
     if not isinstance(models, SimilarModels):
         cases = range(len(models))
-    elif _model_warnings(first, engine):
+    elif _list_model_warnings(first, engine):
         cases = range(len(models))
     else:
         is_warned = is_wide | _may_need_law_warnings(models, results)
@@ -286,7 +286,7 @@ def _insert_warnings(
         cases = np.flatnonzero(is_warned).tolist()
     for case in cases:
         model = models[case]
-        warnings = _model_warnings(model, engine)
+        warnings = _list_model_warnings(model, engine)
         if is_wide[case] or law_has_trait(model.friction.law, "bonds"):
             measures = results.known_measures(case)
             drift = {name: measures[name] for name in ("drift_per_cycle",) if name in measures}
@@ -299,7 +299,7 @@ def _insert_warnings(
             results.warnings[case] = shorten_file_names(warnings, model.source.path)
 
 
-def _model_warnings(model, engine: str) -> list:
+def _list_model_warnings(model, engine: str) -> list:
     """Return the warnings that follow from the model of a case without its motion."""
     return [
         *model.source.remarks,
@@ -385,7 +385,7 @@ def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
         for columns in (results.values, results.errors):
             columns[name] = np.where(sticks, np.nan, columns[name])
         results.reasons.setdefault(name, {}).update(
-            dict.fromkeys(np.flatnonzero(sticks).tolist(), STICKS_AT_REVERSAL)
+            dict.fromkeys(np.flatnonzero(sticks).tolist(), STICKS_AT_REVERSAL_REASON)
         )
 
 

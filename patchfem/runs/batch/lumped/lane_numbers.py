@@ -26,7 +26,9 @@ LANE_LAWS = {
     "lugre": "friction.laws.lugre_kernels",
     "nonlocal": "friction.laws.stretch_kernels",
 }
-HELD_FRACTION = 1e-3  # slip over the stretch at the friction limit, below which an interface sticks
+MAX_STICK_SLIP_FRACTION = (
+    1e-3  # slip over the stretch at the friction limit, below which an interface sticks
+)
 
 
 class Scales(NamedTuple):
@@ -201,7 +203,7 @@ def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Sca
         omega=omega,
         energy=rig.mass * (omega / slide) ** 2,
         ratio=rig.output / slide,
-        held=HELD_FRACTION * np.divide(static, spring, out=0 * omega, where=spring > 0),
+        held=MAX_STICK_SLIP_FRACTION * np.divide(static, spring, out=0 * omega, where=spring > 0),
         stiffness=rig.stiffness,
         load=load,
         acceleration=rig.max_acceleration,

@@ -55,11 +55,11 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Compute the case results of a group of patches with partial slip."""
-    batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
+    batch = pressed.PatchBatch(PIECES.name, YieldingElements, compute_motions, MAX_CASES_PER_CALL)
     return pressed.solve(models, batch, say)
 
 
-def move_cases(
+def compute_motions(
     models: Sequence[Model], pressed_cases: list, say=None
 ) -> tuple[CaseResults, np.ndarray]:
     """Compute the motions of solved patches, and the mask (n,) of cases that need a single run.

@@ -36,16 +36,16 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None) -> CaseResults:
     """Compute the case results of a group of patches with partial slip by a vectorized march."""
-    batch = pressed.PatchBatch(PIECES.name, YieldingElements, move_cases, MAX_CASES_PER_CALL)
+    batch = pressed.PatchBatch(PIECES.name, YieldingElements, compute_motions, MAX_CASES_PER_CALL)
     return pressed.solve(models, batch, say)
 
 
-def move_cases(
+def compute_motions(
     models: Sequence[Model], pressed_cases: list, say=None
 ) -> tuple[CaseResults, np.ndarray]:
     """Compute the motions of solved patches in lanes, and find cases that need a single run.
 
-    The parameters are those of `sheared.move_cases`.
+    The parameters are those of `sheared.compute_motions`.
     """
     fine = [case.fine.groups[0] for case in pressed_cases]
     coarse = [case.coarse.groups[0] for case in pressed_cases]
@@ -62,7 +62,7 @@ def move_cases(
     def solve_exactly(cases: list, is_check: bool = False) -> CaseResults:
         """Compute some cases by the event-driven batch or by single runs."""
         some_models = [models[case] for case in cases]
-        part, runs_singly = sheared.move_cases(
+        part, runs_singly = sheared.compute_motions(
             some_models, [pressed_cases[case] for case in cases], say
         )
         one_by_one.solve_singly(part, some_models, runs_singly, say)

@@ -99,7 +99,7 @@ def describe_instability(multipliers) -> str:
     )
 
 
-def curve_point(drive, raw, near=None) -> CurvePoint:
+def make_curve_point(drive, raw, near=None) -> CurvePoint:
     """Convert the Solution of a steady motion to a curve point.
 
     Parameters
@@ -296,7 +296,7 @@ def solve_levels(finder, drive):
             points.append(make_missing_point(sine))
             failures.append(failure)
             continue
-        points.append(curve_point(sine, replace_output_by_gauge(finder.model, solution), near))
+        points.append(make_curve_point(sine, replace_output_by_gauge(finder.model, solution), near))
         if best is None or find_largest_point(points) == len(points) - 1:
             best = solution, sine
         failures += [solution.message] if solution.message else []

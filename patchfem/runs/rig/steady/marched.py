@@ -19,7 +19,7 @@ from ....response.measures import peak_sampling_errors
 from ..interface import make_contact
 from ..march import MarchReader
 from ..solution import Solution
-from .curves import CurvePoint, TracedCurve, curve_point, describe_instability, trace_curve
+from .curves import CurvePoint, TracedCurve, describe_instability, make_curve_point, trace_curve
 
 START_STEPS = 256  # steps per cycle of the first march of a law that is not set-valued
 MAX_STEPS = 4096  # largest number of steps per cycle to which a march is refined
@@ -233,11 +233,11 @@ class MarchFinder(TracedCurve):
     def curve_point(self, drive, near=None) -> CurvePoint:
         """Find the steady motion at one curve point, from a nearby motion or else from rest."""
         try:
-            return curve_point(drive, *self.point(drive, near))
+            return make_curve_point(drive, *self.point(drive, near))
         except NotConverged:
             if near is None:
                 raise
-        return curve_point(drive, *self.point(drive))
+        return make_curve_point(drive, *self.point(drive))
 
     def curve(self, drive) -> tuple:
         """Trace the steady motions over frequency along a curve without folds.
