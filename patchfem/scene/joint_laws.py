@@ -97,7 +97,7 @@ JOINT_LAWS = (
         ("loss", "force-limit"),
         "coulomb",
         ("[contact.shear]",),
-        "slip that begins at the edges, and its damping, from the stiffness of the pieces",
+        "slip that begins at the edges, from the stiffness of the pieces",
         "the faces are smooth, so the joint is too stiff where they are rough; the pieces are plane, and nothing beyond "
         "them gives way",
         "joint",
@@ -165,7 +165,7 @@ JOINT_LAWS = (
         ("smooth",),
         "tanh",
         ("reference_speed",),
-        "the force static*load*tanh(speed/reference_speed)",
+        "the force is the friction limit times tanh(speed/reference_speed)",
         "never sticks: creeps under any force; no stiffness before slip; friction does not fall with the speed",
         "joint_laws/tanh",
     ),

@@ -9,14 +9,7 @@ from .keys import FOLDER, grid
 FILE: Path = FOLDER / "guide" / "friction.md"
 BEGIN = "<!-- joint laws -->\n"
 END = "<!-- end -->"
-HEAD = (
-    "know",
-    "want",
-    "law",
-    "keys besides `static`",
-    "what it gives",
-    "what it cannot do",
-)
+HEAD = ("you know", "you want", "law and its keys", "what it gives, and its limits")
 
 
 def text() -> str:
@@ -42,6 +35,8 @@ def _list_rows() -> list[tuple]:
     """Return the rows of the table, as texts."""
     rows = []
     for row in JOINT_LAWS:
-        known, wanted, keys = map(_format_words, (row.known, row.wanted, row.keys))
-        rows.append((known, wanted, f"`{row.law}`", keys, row.gives, row.cannot))
+        keys = _format_words(("static", *row.keys))
+        limits = f"{row.gives}. *Limits:* {row.cannot}"
+        known, wanted = ", ".join(row.known), ", ".join(row.wanted)
+        rows.append((known, wanted, f"**{row.law}**: {keys}", limits))
     return rows
