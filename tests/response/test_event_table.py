@@ -10,10 +10,10 @@ from patchfem.response.events import Events, compute_slip_states, detect_events,
 from patchfem.response.run_events import select_last_cycle
 
 
-def stick_slip(period=1.0, cycles=3, steps=800, rest=0.25):
-    """(time, slip): a cosine way to and fro with a rest of `rest` of the period at either end."""
-    time = np.linspace(0, cycles * period, cycles * steps + 1)
-    phase = time / period % 1.0
+def stick_slip(rest=0.25):
+    """(time, slip): three cosine ways to and fro in 1 s, with a rest of `rest` of it at either end."""
+    time = np.linspace(0, 3, 3 * 800 + 1)
+    phase = time % 1.0
     half = 0.5 - rest
     rise = 0.5 - 0.5 * np.cos(np.pi * np.clip(phase / half, 0, 1))
     fall = 0.5 - 0.5 * np.cos(np.pi * np.clip((phase - 0.5) / half, 0, 1))

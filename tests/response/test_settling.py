@@ -94,9 +94,9 @@ def test_exact_short_and_odd_runs():
 CYCLES = np.arange(120)
 
 
-def swinging(beat: float, decay: float, count: int = 120, size: float = 0.3) -> np.ndarray:
-    """Extremes (c, 2) of 1 + size exp(-decay c) cos(beat c) per cycle."""
-    high = 1 + size * np.exp(-decay * CYCLES[:count]) * np.cos(beat * CYCLES[:count])
+def swinging(beat: float, decay: float, count: int = 120) -> np.ndarray:
+    """Extremes (c, 2) of 1 + 0.3 exp(-decay c) cos(beat c) per cycle."""
+    high = 1 + 0.3 * np.exp(-decay * CYCLES[:count]) * np.cos(beat * CYCLES[:count])
     return np.column_stack([-high, high])
 
 

@@ -63,9 +63,9 @@ def steps_of(model) -> int:
     )
 
 
-def sliding(text, *sets, patch=None, steps=None):
+def sliding(text, *sets, steps=None):
     model = build(loads(text, sets=sets))
-    return bench.run(model, patch, steps or steps_of(model))
+    return bench.run(model, None, steps or steps_of(model))
 
 
 @pytest.fixture

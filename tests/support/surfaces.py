@@ -82,7 +82,7 @@ def x3p(
     return zipped(members)
 
 
-def x3p_of(z, data="D", increment=1.0, offset=0.0, steps=(0.5e-6, 0.75e-6), **more) -> bytes:
+def x3p_of(z, data="D", increment=1.0, offset=0.0, **more) -> bytes:
     """Heights (m, n) [m] as a binary X3P, stored as (z - offset)/increment."""
     raw = (z - offset) / increment
     raw = (np.rint(np.nan_to_num(raw)) if data in "IL" else raw).astype(TYPES[data]).tobytes()
@@ -90,49 +90,31 @@ def x3p_of(z, data="D", increment=1.0, offset=0.0, steps=(0.5e-6, 0.75e-6), **mo
     if data in "IL" and np.isnan(z).any():
         valid = np.packbits(np.isfinite(z).ravel(), bitorder="little").tobytes()
     axes = (
-        axis("CX", increment=steps[0])
-        + axis("CY", increment=steps[1])
+        axis("CX", increment=0.5e-6)
+        + axis("CY", increment=0.75e-6)
         + axis("CZ", "A", data, increment if increment != 1 else None, offset or None)
     )
     xml = main_xml(axes, matrix(z.shape[1], z.shape[0]) + link(raw, valid), **more)
     return x3p(xml, raw, valid)
 
 
-def sdf_binary(z, kind=7, scale=1e-9, steps=(0.5e-6, 0.75e-6), magic=b"bISO-1.0") -> bytes:
-    """Heights (m, n) [m] as a binary SDF of a data type."""
-    dtype = ("<u1", "<u2", "<u4", "<f4", "<i1", "<i2", "<i4", "<f8")[kind]
-    head = struct.pack(
-        "<8s10s12s12sHHddddBBB",
-        magic,
-        b"tests",
-        b"010120260000",
-        b"010120260000",
-        z.shape[1],
-        z.shape[0],
-        *steps,
-        scale,
-        0.0,
-        0,
-        kind,
-        0,
-    )
-    raw = z / scale
-    missing = np.isnan(raw)
-    if np.dtype(dtype).kind in "iu":
-        ends = np.iinfo(dtype)
-        raw = np.where(missing, ends.min if np.dtype(dtype).kind == "i" else ends.max, np.rint(raw))
-    return head + raw.astype(dtype).tobytes()
+def sdf_binary(z) -> bytes:
+    """Heights (m, n) [m] as a binary SDF of numbers of eight bytes in nanometres."""
+    names = b"bISO-1.0", b"tests", b"010120260000", b"010120260000"
+    scales = 0.5e-6, 0.75e-6, 1e-9, 0.0
+    head = struct.pack("<8s10s12s12sHHddddBBB", *names, z.shape[1], z.shape[0], *scales, 0, 7, 0)
+    return head + (z / 1e-9).astype("<f8").tobytes()
 
 
-def sdf_ascii(z, scale=1e-6, steps=(0.5e-6, 0.75e-6)) -> bytes:
-    """Heights (m, n) [m] as an ASCII SDF."""
+def sdf_ascii(z) -> bytes:
+    """Heights (m, n) [m] as an ASCII SDF in micrometres."""
     head = (
-        f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = {steps[0]}\n"
-        f"Yscale = {steps[1]}\nZscale = {scale}\nZresolution = -1\nCompression = 0\nDataType = 7\n"
+        f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = 5e-07\n"
+        "Yscale = 7.5e-07\nZscale = 1e-06\nZresolution = -1\nCompression = 0\nDataType = 7\n"
         "CheckType = 0\n*\n"
     )
     rows = "\n".join(
-        " ".join("BAD" if np.isnan(v) else repr(float(v / scale)) for v in row) for row in z
+        " ".join("BAD" if np.isnan(v) else repr(float(v / 1e-6)) for v in row) for row in z
     )
     return f"{head}{rows}\n*\n< PartName > test < /PartName >\n*".encode()
 

@@ -29,10 +29,11 @@ def made(angle: float, length: float, ridges=(0.0, 0.0), middle=(5e-6, -8e-6)) -
     return depth, float(beside @ middle)
 
 
-def tracked(depth, noise: float = 2e-9, seed: int = 0):
-    """The track in a map of depths."""
+def tracked(depth):
+    """The track in a map of depths with a noise of 2 nm."""
     axis = CELL * np.arange(COUNT)
-    depth = depth + noise * np.random.default_rng(seed).normal(size=depth.shape)
+    noise = 2e-9
+    depth = depth + noise * np.random.default_rng(0).normal(size=depth.shape)
     return measure_scan_track(aligned(depth, noise), depth, depth > 5 * noise, (axis, axis), 0.2e-9)
 
 
