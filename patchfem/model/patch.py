@@ -227,7 +227,7 @@ class PatchModel:
     """Two pieces that are pressed together.
 
     - solved: solution that was computed together with other patches
-      (`runs.patch.static.SolvedPatch`); it is dropped if another value changes.
+      (`runs.patch.static_batch.SolvedPatch`); it is dropped if another value changes.
     """
 
     pieces: PatchPieces

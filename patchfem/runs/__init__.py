@@ -59,7 +59,7 @@ PUBLIC = {
         "solve_on_split_mesh",
     ),
     "patch.measures": ("estimate_measures",),
-    "patch.meshes": ("geometry_key",),
+    "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
     "patch.result": ("make_bodies",),
     "patch.strength": (

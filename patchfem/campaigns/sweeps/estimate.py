@@ -132,7 +132,7 @@ def _split_shared_seconds(plans: list) -> tuple[float, list]:
     patches = [case_plan.model.patch for case_plan in plans]
     if None not in patches:
         # This module is imported here, because sweeps of a point need no mesh.
-        from ...runs.patch.meshes import geometry_key
+        from ...runs.patch.sweep_meshes import geometry_key
 
         if len({geometry_key(patch) for patch in patches}) == 1:
             left_out.add("condensing")

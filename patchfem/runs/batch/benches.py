@@ -6,7 +6,7 @@ In: models of a group. Out: `CaseResults`.
 from collections.abc import Hashable, Sequence
 
 from ...model.model import Model
-from ..patch import static
+from ..patch import static_batch
 from . import one_by_one, patches
 from .case_results import CaseResults
 
@@ -22,7 +22,7 @@ def refuses(model: Model) -> str:
         or model.patch.mesh.edge_motion
     ):
         return "the case has no patch, or its patch or load changes during the slide"
-    return static.reason_not_batched(model.patch)
+    return static_batch.reason_not_batched(model.patch)
 
 
 def group(model: Model) -> Hashable:

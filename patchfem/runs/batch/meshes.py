@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from ...core import PatchfemError
 from ...model.model import Model
-from ..patch import meshes as patch_meshes
+from ..patch import sweep_meshes
 
 
 class SharedMeshes:
@@ -31,7 +31,7 @@ class SharedMeshes:
                 continue
 
             try:
-                self.meshes[key] = patch_meshes.shared_meshes(patches, key[1], all_)
+                self.meshes[key] = sweep_meshes.shared_meshes(patches, key[1], all_)
             except PatchfemError:  # each case is run by itself, and reports its own error
                 continue
 
@@ -61,4 +61,4 @@ def _may_share_meshes(model: Model | PatchfemError) -> bool:
 
 def _mesh_key(model: Model) -> tuple:
     """Return a hashable key of the patch geometry and the tolerance of a model."""
-    return patch_meshes.geometry_key(model.patch), model.accuracy.tolerance
+    return sweep_meshes.geometry_key(model.patch), model.accuracy.tolerance

@@ -18,9 +18,9 @@ from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
-from ..patch import static, store
-from ..patch.meshes import geometry_key
+from ..patch import static_batch, store
 from ..patch.strength import yielding_faces
+from ..patch.sweep_meshes import geometry_key
 from ..results.patch_rows import POSITIVE_MESH_MEASURES, TABLE
 from ..results.result import file_name_shortener, shorten_file_names
 from . import one_by_one
@@ -43,7 +43,7 @@ class _NodePositions(NamedTuple):
 def refuses(model: Model) -> str:
     """Return the reason why a static patch cannot be solved in a batch with others, or ""."""
     return (
-        static.reason_not_batched(model.patch)
+        static_batch.reason_not_batched(model.patch)
         if model.kind == "patch"
         else "the case is no static patch"
     )
@@ -51,7 +51,7 @@ def refuses(model: Model) -> str:
 
 def group(model: Model) -> Hashable:
     """Return a hashable key that is equal for models whose patches can be solved in one batch."""
-    return geometry_key(model.patch), static.batch_key(model.patch), model.accuracy.tolerance
+    return geometry_key(model.patch), static_batch.batch_key(model.patch), model.accuracy.tolerance
 
 
 def parts(models: Sequence[Model]) -> dict:
@@ -73,15 +73,15 @@ def press_together(models: Sequence[Model]) -> list[Model]:
     out = list(models)
     groups = {}
     for case, model in enumerate(models):
-        if not static.reason_not_batched(model.patch):
-            asked = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
-            groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
+        if not static_batch.reason_not_batched(model.patch):
+            content = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
+            groups.setdefault(group(model), {}).setdefault(content, []).append(case)
     for alike in groups.values():
         first = [models[cases[0]] for cases in alike.values()]
-        found = static.solve_alike_patches(
+        solutions = static_batch.solve_alike_patches(
             [model.patch for model in first], first[0].accuracy.tolerance
         )
-        for cases, one in zip(alike.values(), found):
+        for cases, one in zip(alike.values(), solutions):
             for case in cases if one is not None else ():
                 out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
     return out
@@ -122,11 +122,11 @@ def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
     first = models[0]
     alike = isinstance(models, SimilarModels)
     asked = (
-        static.loads_from_columns(models.columns().patch, len(models))
+        static_batch.loads_from_columns(models.columns().patch, len(models))
         if alike
-        else static.collect_loads([model.patch for model in models])
+        else static_batch.collect_loads([model.patch for model in models])
     )
-    found = static.solve_batch(asked, first.accuracy.tolerance)
+    found = static_batch.solve_batch(asked, first.accuracy.tolerance)
     out = CaseResults.blank(len(models))
     good = found.is_solved
     wide = ~good

@@ -1,7 +1,7 @@
 """Cases whose patches are pressed together, and whose interfaces then move together.
 
 In: models of a group, and the functions of a batch that make contacts of patches and move them.
-Out: `CaseResults`. Patches that share their pieces are pressed together (`runs.patch.static`),
+Out: `CaseResults`. Patches that share their pieces are pressed together (`runs.patch.static_batch`),
 others as in single runs. A case that a batch cannot finish is run by itself.
 """
 

@@ -310,11 +310,11 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
     The method is that of `loops.find_reversals` with "slide"; the force is NaN if the slide is largest
     at an end of the cycle.
     """
-    top = slide.argmax(axis=0)
-    best = slide[top, rows]
-    at = top.copy()
-    share = np.zeros(len(rows))
-    for k in (top - 1, top):
+    peak_index = slide.argmax(axis=0)
+    largest_slide = slide[peak_index, rows]
+    best_step = peak_index.copy()
+    best_fraction = np.zeros(len(rows))
+    for k in (peak_index - 1, peak_index):
         here = np.clip(k, 0, len(slide) - 2)
         a = slide[here, rows]
         p = speed[here, rows] * h
@@ -325,38 +325,42 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
         root = np.sqrt(np.maximum(mid**2 - 3 * big * p, 0.0))
         s = np.divide(p, root - mid, out=np.zeros(len(rows)), where=root > mid)
         value = a + s * (p + s * (mid + s * big))
-        good = (k == here) & (p > 0) & (q < 0) & (s >= 0) & (s <= 1) & (value > best)
-        best = np.where(good, value, best)
-        at = np.where(good, here, at)
-        share = np.where(good, s, share)
-    up = np.minimum(at + 1, len(slide) - 1)
-    last = at + ((share > 0) & (slide[up, rows] > slide[at, rows]))
-    before = np.maximum(at - 1, 0)
-    rise = np.where((share > 0) & (at > 0), slide[last, rows] - slide[before, rows], 0.0)
-    pull = force[last, rows]
-    slope = np.divide(pull - force[before, rows], rise, out=np.zeros(len(rows)), where=rise > 0)
-    pull = pull + slope * (best - slide[last, rows])
-    ends = (share == 0.0) & ((at == 0) | (at == len(slide) - 1))
-    return np.array([best, np.where(ends, np.nan, pull)])
+        good = (k == here) & (p > 0) & (q < 0) & (s >= 0) & (s <= 1) & (value > largest_slide)
+        largest_slide = np.where(good, value, largest_slide)
+        best_step = np.where(good, here, best_step)
+        best_fraction = np.where(good, s, best_fraction)
+    up = np.minimum(best_step + 1, len(slide) - 1)
+    last = best_step + ((best_fraction > 0) & (slide[up, rows] > slide[best_step, rows]))
+    before = np.maximum(best_step - 1, 0)
+    rise = np.where(
+        (best_fraction > 0) & (best_step > 0), slide[last, rows] - slide[before, rows], 0.0
+    )
+    largest_force = force[last, rows]
+    slope = np.divide(
+        largest_force - force[before, rows], rise, out=np.zeros(len(rows)), where=rise > 0
+    )
+    largest_force = largest_force + slope * (largest_slide - slide[last, rows])
+    ends = (best_fraction == 0.0) & ((best_step == 0) | (best_step == len(slide) - 1))
+    return np.array([largest_slide, np.where(ends, np.nan, largest_force)])
 
 
-def find_peaks(size) -> tuple:
+def find_peaks(magnitude) -> tuple:
     """Return the largest |value| (n,) of samples (s, n), and bounds on the missed peaks.
 
     The method is that of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
     """
-    rows = np.arange(size.shape[1])
-    top = size.argmax(axis=0)
-    inside = (top > 0) & (top < len(size) - 1)
-    near = np.clip(top + np.arange(-2, 3)[:, None], 0, len(size) - 1)
-    five = size[near, rows]
-    bends = -(five[2:] - 2 * five[1:-1] + five[:-2])
+    rows = np.arange(magnitude.shape[1])
+    peak_index = magnitude.argmax(axis=0)
+    inside = (peak_index > 0) & (peak_index < len(magnitude) - 1)
+    near = np.clip(peak_index + np.arange(-2, 3)[:, None], 0, len(magnitude) - 1)
+    neighbourhood = magnitude[near, rows]
+    bends = -(neighbourhood[2:] - 2 * neighbourhood[1:-1] + neighbourhood[:-2])
     bends[0], bends[2] = (
-        np.where(top >= 2, bends[0], bends[1]),
-        np.where(top <= len(size) - 3, bends[2], bends[1]),
+        np.where(peak_index >= 2, bends[0], bends[1]),
+        np.where(peak_index <= len(magnitude) - 3, bends[2], bends[1]),
     )
     smooth = bends.min(axis=0) * MAX_SMOOTH_RATIO >= bends.max(axis=0)
-    left, mid, right = five[1:4]
+    left, mid, right = neighbourhood[1:4]
     bend = -bends[1]
     with np.errstate(all="ignore"):
         rise = np.where(bend < 0, -((right - left) ** 2) / (8 * bend), 0.0)

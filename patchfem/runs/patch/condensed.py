@@ -103,9 +103,9 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
     else:
         key = cache.mesh_key(body, piece.layers)
     shapes = dict.fromkeys(InterfaceCompliance._fields, 2 * (body.x.size,))
-    kept = None if fresh else cache.load_arrays(key, shapes)
-    if kept is not None:
-        return InterfaceCompliance(**kept)
+    cached_arrays = None if fresh else cache.load_arrays(key, shapes)
+    if cached_arrays is not None:
+        return InterfaceCompliance(**cached_arrays)
     compliance = interface_compliance(piece)
     if not piece.round_off_error:
         cache.store_arrays(key, compliance._asdict())
@@ -135,29 +135,44 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
         upper = finite_elements(
             upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper)
         )
-    low = load_compliance(grid, piece, fresh)
-    high = low if upper is piece else load_compliance(upper_grid, upper, fresh)
+    lower_compliance = load_compliance(grid, piece, fresh)
+    upper_compliance = (
+        lower_compliance if upper is piece else load_compliance(upper_grid, upper, fresh)
+    )
     joint = None
     x = grid.x
-    share = grid.tributary_lengths()
+    tributary_lengths = grid.tributary_lengths()
     if upper_grid is not None and not _nodes_match(x, upper_grid.x):
         joint = mortar.join_pieces(
-            mortar.PieceInterface(x, low), mortar.PieceInterface(upper_grid.x, high)
+            mortar.PieceInterface(x, lower_compliance),
+            mortar.PieceInterface(upper_grid.x, upper_compliance),
         )
         x = joint.x
-        share = joint.tributary_lengths
-        parts = joint.compliance
+        tributary_lengths = joint.tributary_lengths
+        compliances = joint.compliance
     # Equal shear forces raise the interface of the upper piece as much as they lower that of an
     # equal lower piece, so that the coupling nt cancels.
     else:
-        parts = (low.nn + high.nn, low.tt + high.tt, low.nt - high.nt)
-    normal, tangential, closing = (frozen_array(part / width) for part in parts)
-    interface = Interface(frozen_array(x), frozen_array(share * width), width)
-    rise = sum(_rounded_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
+        compliances = (
+            lower_compliance.nn + upper_compliance.nn,
+            lower_compliance.tt + upper_compliance.tt,
+            lower_compliance.nt - upper_compliance.nt,
+        )
+    normal, tangential, closing = (frozen_array(part / width) for part in compliances)
+    interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
+    end_gap = sum(_rounded_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
     seconds = {"condense": perf_counter() - start}
     pieces = Compliance(interface, normal, tangential)
     return Pair(
-        grid, upper_grid or grid, piece, upper, pieces, closing, joint, frozen_array(rise), seconds
+        grid,
+        upper_grid or grid,
+        piece,
+        upper,
+        pieces,
+        closing,
+        joint,
+        frozen_array(end_gap),
+        seconds,
     )
 
 
@@ -229,10 +244,12 @@ def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
 
 def _rounded_end_gap(body, x) -> np.ndarray:
     """Return the gap (m,) [m] at positions x (m,) [m] due to the rounded ends of a body."""
-    rise = getattr(body, "interface_depths", None)
-    return np.zeros(x.size) if rise is None else np.interp(x, body.x, rise)
+    depths = getattr(body, "interface_depths", None)
+    return np.zeros(x.size) if depths is None else np.interp(x, body.x, depths)
 
 
-def _nodes_match(x, other) -> bool:
+def _nodes_match(lower_x, upper_x) -> bool:
     """Return whether the interface nodes of the two pieces coincide."""
-    return other.size == x.size and np.abs(other - x).max() <= 1e-9 * np.ptp(x)
+    return upper_x.size == lower_x.size and np.abs(upper_x - lower_x).max() <= 1e-9 * np.ptp(
+        lower_x
+    )

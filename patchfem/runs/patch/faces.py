@@ -65,15 +65,15 @@ class Face(NamedTuple):
 
 
 def press_faces(model) -> Iterator[Face]:
-    """Solve the contact of every interface that has a patch, one after another (iterator)."""
+    """Yield every interface of a model that has a patch, with its contact solved."""
     rig = model.rig
     for number, interface in enumerate(rig.friction.interfaces if rig is not None else ()):
         if interface.patch is not None:
-            own = replace(model, patch=interface.patch, friction=interface.numbers)
+            interface_model = replace(model, patch=interface.patch, friction=interface.numbers)
             yield Face(
                 number,
                 rig.friction.names[number],
-                own,
+                interface_model,
                 press_on_meshes(interface, model.accuracy.tolerance),
             )
 

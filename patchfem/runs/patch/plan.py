@@ -87,8 +87,8 @@ def _expected_levels(patch_model, tolerance: float) -> list:
     if patch_model.mesh.shared is not None:
         return list(patch_model.mesh.shared.levels)
     if not patch_model.mesh.is_automatic:
-        low, high = make_piece_meshes(patch_model.with_mesh(file=None))
-        return [(low, high), *make_comparison_meshes(low, high)]
+        lower_mesh, upper_mesh = make_piece_meshes(patch_model.with_mesh(file=None))
+        return [(lower_mesh, upper_mesh), *make_comparison_meshes(lower_mesh, upper_mesh)]
     bodies, contact = make_base_grids(patch_model)
     has_edges = bool(patch_model.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
@@ -110,12 +110,12 @@ def predict_cost(model: Model) -> Cost:
     Equal patches of interfaces are pressed once.
     """
     tolerance = model.accuracy.tolerance
-    total = (
+    total_cost = (
         Cost()
         if model.patch is None
         else pressing_cost(model.patch, model.patch.mesh.tolerance or tolerance)
     )
-    faces = (
+    interface_patches = (
         {}
         if model.rig is None
         else {
@@ -124,24 +124,24 @@ def predict_cost(model: Model) -> Cost:
             if interface.patch is not None
         }
     )
-    for patch in faces.values():
-        total += pressing_cost(patch, tolerance)
-    patches = [*faces.values()] if model.patch is None else [model.patch]
+    for patch in interface_patches.values():
+        total_cost += pressing_cost(patch, tolerance)
+    patches = [*interface_patches.values()] if model.patch is None else [model.patch]
     if not patches:
-        return total
-    points = total.sizes["interface_points"]
+        return total_cost
+    points = total_cost.sizes["interface_points"]
     layers = [patch.interface.strips for patch in patches]
     strips = max(1 if layer is None else layer.count for layer in layers)
     key = "contact.mesh" if any(patch.mesh.file for patch in patches) else "contact.element_size"
     parts = (
-        MemoryPart(total.bytes, f"{points} nodes of the interface", key),
+        MemoryPart(total_cost.bytes, f"{points} nodes of the interface", key),
         MemoryPart(
             BYTES_PER_STRIP_NODE * strips * points,
             f"{strips} strips of them",
             "contact.strips.count",
         ),
     )
-    return replace(total, parts=parts)
+    return replace(total_cost, parts=parts)
 
 
 def pressing_cost(patch_model, tolerance: float) -> Cost:
@@ -150,25 +150,25 @@ def pressing_cost(patch_model, tolerance: float) -> Cost:
     The work of condensing follows from the sizes of its grids; the time per unit of work, and that
     of the fields and files of the finest grid, was measured over random patches.
     """
-    found = expected_grids(patch_model, tolerance)
-    per_second = (
-        cost_model.OUTLINE_CONDENSING_FACTOR if found.outlined else cost_model.CONDENSING_FACTOR
+    grids = expected_grids(patch_model, tolerance)
+    condensing_factor = (
+        cost_model.OUTLINE_CONDENSING_FACTOR if grids.outlined else cost_model.CONDENSING_FACTOR
     )
     times = {
         "pressing": cost_model.PATCH_SECONDS - cost_model.FIELDS_SECONDS,
-        "condensing": per_second * found.seconds,
+        "condensing": condensing_factor * grids.seconds,
         "fields": cost_model.FIELDS_SECONDS,
     }
-    size = PACKAGE_BYTES + (
-        BYTES_PER_OVERHANG_NODE * found.nodes
-        if found.outlined
-        else CONDENSING_BYTES_RATIO * found.bytes
+    n_bytes = PACKAGE_BYTES + (
+        BYTES_PER_OVERHANG_NODE * grids.nodes
+        if grids.outlined
+        else CONDENSING_BYTES_RATIO * grids.bytes
     )
     if not patch_model.mesh.is_static:
-        times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * found.nodes
-        size += FRAME_BYTES_PER_NODE * found.nodes
-    sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
-    return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)
+        times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * grids.nodes
+        n_bytes += FRAME_BYTES_PER_NODE * grids.nodes
+    sizes = {"interface_points": grids.points, "elastic_unknowns_about": int(2 * grids.nodes)}
+    return Cost(times, (MemoryPart(n_bytes, "pieces"),), sizes=sizes)
 
 
 def stiffness_chain(patch_model) -> dict:
@@ -176,7 +176,7 @@ def stiffness_chain(patch_model) -> dict:
 
     An element that the scene does not give is "rigid".
     """
-    out = {
+    stiffnesses = {
         "holder": patch_model.loading.tangential_stiffness or "rigid",
         "pieces_shear": patch_model.pieces.shear_stiffness
         if patch_model.interface.has_shear
@@ -188,12 +188,12 @@ def stiffness_chain(patch_model) -> dict:
         and patch_model.interface.skin.tangential_ratio is not None
     ):
         area = patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs
-        out["asperities"] = (
+        stiffnesses["asperities"] = (
             patch_model.interface.skin.tangential_ratio
             * skin.mean_layer_stiffness(patch_model, patch_model.nominal_load / area)
             * area
         )
-    return out
+    return stiffnesses
 
 
 def compute_groups(model: Model) -> dict:
@@ -202,19 +202,21 @@ def compute_groups(model: Model) -> dict:
     tilt_over_first_opening is the tilt over the tilt at which the edge of flat pieces opens, with
     the pieces as bars.
     """
-    out = {}
+    dimensionless_groups = {}
     patch_model = model.patch
     load = patch_model.nominal_load
     if model.friction is not None:
-        out["slip_length"] = model.friction.static * load / patch_model.pieces.shear_stiffness
+        dimensionless_groups["slip_length"] = (
+            model.friction.static * load / patch_model.pieces.shear_stiffness
+        )
     if patch_model.gap.tilt is not None and load > 0:
         approach = load * patch_model.pieces.series_compliance(
             lambda m: (1 - m.poisson**2) / m.young
         )
-        out["tilt_over_first_opening"] = (
+        dimensionless_groups["tilt_over_first_opening"] = (
             patch_model.gap.tilt * patch_model.pieces.length / (2 * approach)
         )
-    return out
+    return dimensionless_groups
 
 
 def describe_patch(name: str, interface) -> list:
@@ -222,11 +224,11 @@ def describe_patch(name: str, interface) -> list:
 
     name: nodes of the interface.
     """
-    shears = format_length(
+    shear_displacement = format_length(
         interface.numbers.static * interface.load / interface.patch.pieces.shear_stiffness, 3
     )
     sentence = (
-        f"the pieces shear elastically by {shears} or more before the whole patch slips"
+        f"the pieces shear elastically by {shear_displacement} or more before the whole patch slips"
         if interface.partial_slip
         else (
             "the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "

@@ -385,14 +385,14 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
     return [_describe_sliding(d)]
 
 
-def _describe_sliding(d: float) -> str:
+def _describe_sliding(friction_ratio: float) -> str:
     """Describe whether friction bounds the resonance of a block that slips.
 
-    d: D of equation (2.3), below 1.
+    friction_ratio: D of equation (2.3), below 1.
     """
-    if d > pi / 4:
-        return f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
-    return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
+    if friction_ratio > pi / 4:
+        return f"D = {friction_ratio:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
+    return f"D = {friction_ratio:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
 def bond_sum_sentences(model: Model, numerics) -> list:

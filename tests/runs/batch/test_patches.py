@@ -81,7 +81,7 @@ def test_exact_together_as_one_by_one(tables, values):
     assert all(patches.refuses(model) == "" for model in models)
     assert all(
         one is not None
-        for one in patches.static.solve_alike_patches([model.patch for model in models], 1e-2)
+        for one in patches.static_batch.solve_alike_patches([model.patch for model in models], 1e-2)
     )
     same(models)
 

@@ -12,7 +12,7 @@ from ..engines import PIECES, choose_steady_method
 from ..solution import Solution
 from . import balance, maps, marched
 from .curves import solve_levels
-from .top import solve_peak
+from .peak import solve_peak
 
 
 def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:

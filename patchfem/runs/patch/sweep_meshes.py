@@ -20,7 +20,7 @@ from . import grids, ladder
 from .condensed import cache_pairs, condense
 from .measures import estimate_measures, max_error_ratio
 from .press import press_patch
-from .static import max_error_ratios, solve_patches_on_pair
+from .static_batch import max_error_ratios, solve_patches_on_pair
 
 # Largest number of cases that determine the mesh; of more, the most different ones are taken.
 MAX_CASES = 48
@@ -81,52 +81,52 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
         return name_shared_meshes(ladder.make_file_meshes(patch_model))
-    cases, every = select_distinct_patches(patches)
-    swept = [
-        case.with_loading(load=share * case.loading.load)
+    cases, are_all_patches = select_distinct_patches(patches)
+    load_variants = [
+        case.with_loading(load=cell_factor * case.loading.load)
         for case in cases
         if case.mesh.edge_motion == "load" and case.loading.load is not None
-        for share in grids.LOAD_RANGE_FACTORS
+        for cell_factor in grids.LOAD_RANGE_FACTORS
     ]
     slips = any(patch.interface.partial_slip for patch in patches)
     halvings = _count_halvings(cases, tolerance) if slips else {}
     # The halvings that all cases have in common are levels of the ladder.
     common = min(halvings.values(), default=0)
     layout = _common_layout(
-        [*cases, *swept],
-        not (every and is_complete),
+        [*cases, *load_variants],
+        not (are_all_patches and is_complete),
         {key: one - common for key, one in halvings.items()},
     )
     # The initial contact of a case that later moves or slips partially does not determine its
     # measures.
-    shares = CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or slips else CELL_FACTORS
-    own = None
+    cell_factors = CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or slips else CELL_FACTORS
+    unscaled_bodies = None
     if layout is None:
         return None
     while True:
-        share = shares[0]
-        shares = shares[1:]
-        bodies = grids.make_grids(patch_model, layout.scale_cells(share))
-        if shares:
-            own = own or grids.make_grids(patch_model, layout)
+        cell_factor = cell_factors[0]
+        cell_factors = cell_factors[1:]
+        bodies = grids.make_grids(patch_model, layout.scale_cells(cell_factor))
+        if cell_factors:
+            unscaled_bodies = unscaled_bodies or grids.make_grids(patch_model, layout)
             # Both layouts already have the largest number of columns.
-            if bodies[0].x.size >= own[0].x.size:
+            if bodies[0].x.size >= unscaled_bodies[0].x.size:
                 continue
         pairs, missed_by = _refine_until_met(
-            cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common
+            cases, bodies, tolerance, bool(cell_factors), grids.MIN_LEVELS + common
         )
-        if missed_by <= 1 or not shares:
-            found = name_shared_meshes(
+        if missed_by <= 1 or not cell_factors:
+            meshes = name_shared_meshes(
                 [
                     (pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
                     for pair in pairs
                 ]
             )
-            cache_pairs(cases[0], found, pairs)
-            return found
+            cache_pairs(cases[0], meshes, pairs)
+            return meshes
         # Factor on the cells above which no mesh meets the tolerance.
-        enough = share * missed_by ** (-1 / MAX_ORDER)
-        shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
+        enough = cell_factor * missed_by ** (-1 / MAX_ORDER)
+        cell_factors = tuple(one for one in cell_factors if one <= max(enough, CELL_FACTORS[-1]))
 
 
 def name_shared_meshes(levels) -> SharedMeshes:
@@ -163,14 +163,18 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
     keys = sorted(rows)
     if len(keys) <= max_patches:
         return [rows[key] for key in keys], True
-    sizes = np.array(keys)
-    scale = np.abs(sizes).min(axis=0, where=sizes != 0, initial=np.inf)
-    at = np.arcsinh(np.divide(sizes, scale, out=np.zeros_like(sizes), where=np.isfinite(scale)))
-    at = at / np.maximum(np.ptp(at, axis=0), 1e-300)
-    selected = [int(np.argmin(at.sum(axis=1)))]
+    numbers = np.array(keys)
+    scale = np.abs(numbers).min(axis=0, where=numbers != 0, initial=np.inf)
+    coordinates = np.arcsinh(
+        np.divide(numbers, scale, out=np.zeros_like(numbers), where=np.isfinite(scale))
+    )
+    coordinates = coordinates / np.maximum(np.ptp(coordinates, axis=0), 1e-300)
+    selected = [int(np.argmin(coordinates.sum(axis=1)))]
     distances = np.full(len(keys), np.inf)
     while len(selected) < max_patches:
-        distances = np.minimum(distances, np.abs(at - at[selected[-1]]).max(axis=1))
+        distances = np.minimum(
+            distances, np.abs(coordinates - coordinates[selected[-1]]).max(axis=1)
+        )
         selected.append(int(np.argmax(distances)))
     return [rows[keys[k]] for k in sorted(selected)], False
 
@@ -206,16 +210,16 @@ def _count_halvings(cases: list, tolerance: float) -> dict:
 
     The keys are `_contact_numbers`. N_LADDER_CASES cases are tried.
     """
-    out = {}
+    halvings = {}
     for case in select_distinct_patches(cases, N_LADDER_CASES)[0]:
         try:
-            out[_contact_numbers(case)] = (
+            halvings[_contact_numbers(case)] = (
                 len(ladder.solve_on_ladder(case, case.mesh.tolerance or tolerance))
                 - grids.MIN_LEVELS
             )
         except PatchfemError:  # the single run of this case reports the error
             continue
-    return out
+    return halvings
 
 
 def _common_layout(
@@ -279,7 +283,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
         bands |= set(_interpolate_bands(layouts))
     first = layouts[0]
     bands = sorted(bands, key=lambda band: (band[2], band))
-    out = Layout(
+    merged = Layout(
         first.start,
         first.stop,
         (),
@@ -288,41 +292,43 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
         min(layout.slope for layout in layouts),
     )
     low, high, _ = np.array(bands).T
-    places = np.linspace(low, high, 5, axis=1)
+    positions = np.linspace(low, high, 5, axis=1)
     # Only the bands that shorten some cell are kept, because most are redundant.
-    size = out.cell_lengths(places)
+    cell_lengths = merged.cell_lengths(positions)
     needed_bands = []
     for k, band in enumerate(bands):
-        if (size[k] > band[2] * (1 + 1e-9)).any():
+        if (cell_lengths[k] > band[2] * (1 + 1e-9)).any():
             needed_bands.append(band)
-            size = np.minimum(size, replace(out, bands=(band,)).cell_lengths(places))
-    return replace(out, bands=tuple(needed_bands))
+            cell_lengths = np.minimum(
+                cell_lengths, replace(merged, bands=(band,)).cell_lengths(positions)
+            )
+    return replace(merged, bands=tuple(needed_bands))
 
 
 def _interpolate_bands(layouts: list) -> list:
     """Return bands of fine columns between the contact edges of neighbouring cases."""
-    out = []
-    half = max(layout.stop for layout in layouts)
+    bands = []
+    half_length = max(layout.stop for layout in layouts)
     for side in (-1, 1):
-        ends = sorted(
+        contact_ends = sorted(
             {
                 (low, min_cell)
                 for layout in layouts
                 for low, high, min_cell in layout.bands
-                if low == high and low * side >= 0 and abs(low) < half
+                if low == high and low * side >= 0 and abs(low) < half_length
             }
         )
-        for (low, a), (high, b) in pairwise(ends):
+        for (low, a), (high, b) in pairwise(contact_ends):
             count = (
                 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
             )
-            places = np.linspace(low, high, count + 1)
-            sizes = np.geomspace(a, b, count + 1)
-            out += [
+            positions = np.linspace(low, high, count + 1)
+            cell_lengths = np.geomspace(a, b, count + 1)
+            bands += [
                 (*map(float, stretch), float(max(pair)))
-                for stretch, pair in zip(pairwise(places), pairwise(sizes), strict=True)
+                for stretch, pair in zip(pairwise(positions), pairwise(cell_lengths), strict=True)
             ]
-    return out
+    return bands
 
 
 def _refine_until_met(
@@ -354,22 +360,23 @@ def _refine_until_met(
         bodies = [body.refine() for body in bodies]
         if len(pairs) < min_levels:
             continue
-        known = max_error_ratios(cases, pairs, tolerance)
-        missed_by = max((by for by in known if by is not None), default=0.0)
-        if missed_by <= 1:
-            missed_by = next(
+        batch_ratios = max_error_ratios(cases, pairs, tolerance)
+        largest_ratio = max((ratio for ratio in batch_ratios if ratio is not None), default=0.0)
+        if largest_ratio <= 1:
+            largest_ratio = next(
                 (
-                    by
-                    for one, seen in zip(cases, known)
-                    if seen is None and (by := _max_error_ratio(one, pairs, tolerance)) > 1
+                    ratio
+                    for case, batch_ratio in zip(cases, batch_ratios)
+                    if batch_ratio is None
+                    and (ratio := _max_error_ratio(case, pairs, tolerance)) > 1
                 ),
-                missed_by,
+                largest_ratio,
             )
-        dear = bodies[0].x.size > MAX_NODES or grids.predict_condensing_seconds(
+        is_too_expensive = bodies[0].x.size > MAX_NODES or grids.predict_condensing_seconds(
             bodies
         ) > ladder.max_condensing_seconds(cases[0], tolerance)
-        if missed_by <= 1 or is_level_count_fixed or dear:
-            return pairs, missed_by
+        if largest_ratio <= 1 or is_level_count_fixed or is_too_expensive:
+            return pairs, largest_ratio
 
 
 def _max_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
