@@ -127,7 +127,7 @@ JOINT_LAWS = (
         ("ageing", "loss", "force-limit"),
         "nonlocal",
         ("bond_length", "kinetic", "rest_growth", "rest_speed", "slip_growth"),
-        "bonds that grow during a rest, exponentially with the time constant rest_speed/rest_growth",
+        "bonds that grow during a rest, exponentially with the time constant rest_speed / rest_growth",
         "no ageing with the logarithm of time; the peak of the force shows only 28 to 92 % of the growth; without "
         "`kinetic` nothing ages",
         "joint_laws/ageing",
@@ -165,7 +165,7 @@ JOINT_LAWS = (
         ("smooth",),
         "tanh",
         ("reference_speed",),
-        "the force is the friction limit times tanh(speed/reference_speed)",
+        "the force is the friction limit times tanh(speed / reference_speed)",
         "never sticks: creeps under any force; no stiffness before slip; friction does not fall with the speed",
         "joint_laws/tanh",
     ),
