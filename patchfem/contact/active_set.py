@@ -20,7 +20,9 @@ import numpy as np
 
 from ..core import NotConverged
 
-OPENING_NOISE = 1e-14  # rounding error of an opening over the sum of the magnitudes of its terms
+OPENING_NOISE = (
+    1e-14  # rounding error of an opening relative to the sum of the magnitudes of its terms
+)
 N_REFINEMENTS = 2  # steps of iterative refinement; a third one changes nothing
 
 

@@ -31,7 +31,7 @@ MAX_LOG_FORCE = 600.0
 # ratio of a slope to the largest slope below which a Newton step leaves the force unchanged
 MIN_RELATIVE_SLOPE = 1e-18
 NEWTON_TOL = 1e-12  # relative imbalance and relative change of pressure of a solution
-# pressure over the mean pressure to which an unloaded node may rise in one step
+# ratio to the mean pressure up to which the pressure of an unloaded node may rise in one step
 MAX_PRESSURE_RISE = 0.01
 
 

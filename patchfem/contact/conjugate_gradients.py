@@ -12,8 +12,10 @@ import numpy as np
 
 from .active_set import OPENING_NOISE, ContactProblem
 
-ENERGY_NOISE = 1e-13  # rounding error of the energy over the sum of the magnitudes of its terms
-# error of a resultant over the load, above which the forces are projected once more
+ENERGY_NOISE = (
+    1e-13  # rounding error of the energy relative to the sum of the magnitudes of its terms
+)
+# ratio of the error of a resultant to the load, above which the forces are projected once more
 RESULTANT_TOL = 1e-12
 
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-# node pressure over the largest pressure, above which a node with a smooth asperity law counts as in contact
+# ratio of nodal to largest pressure, above which a node with a smooth asperity law counts as in contact
 MIN_RELATIVE_PRESSURE = 1e-13
-# height of the first row of cells over the length of a cell, up to which `edge_offset_fraction` was measured
+# largest ratio of first-row height to cell length for which `edge_offset_fraction` was measured
 MAX_ASPECT = 4.0
 
 

@@ -14,7 +14,7 @@ from ..compiled.jit import njit
 from .set_arrays import MAX_POLYGON_SIDES, REFERENCE_OPENING
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-ROUND_OFF = 1e-13  # rounding error of a force or gap over the largest of its terms
+ROUND_OFF = 1e-13  # rounding error of a force or gap relative to the largest of its terms
 # half width of the box in which polygons are computed, in the units of `polygon_units`
 BOX_HALF_WIDTH = 100.0
 

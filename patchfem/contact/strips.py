@@ -41,7 +41,7 @@ from .unilateral import (
 STRIP_RESIDUAL_TOL = 1e-9
 # the smallest force [N] that counts, so that quotients of an unloaded interface stay finite
 MIN_TOTAL_FORCE = 1e-150
-# force of a loaded node over the largest force; smaller ones are rounding errors
+# ratio of the force of a loaded node to the largest force; smaller ones are rounding errors
 MIN_RELATIVE_FORCE = 1e-12
 NEGLECTED_SHEAR_NOTE = (
     "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "

@@ -20,7 +20,7 @@ from .grid_fronts import GridFactor, eliminate_inner_nodes
 from .lapack import cho_inverse, dpotrf, dtrsm, one_thread
 from .tensor_stiffness import apply_stencil
 
-# Residual over the largest load above which a solution is refined once.
+# Ratio of the residual to the largest load above which a solution is refined once.
 RESIDUAL_TOL = 1e-8
 # Relative change of the displacements by one step of refinement above which factors are refused.
 MAX_REFINEMENT_CHANGE = 1e-2

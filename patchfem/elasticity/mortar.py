@@ -37,7 +37,7 @@ from .elasticity import InterfaceCompliance
 MAX_SOFTNESS_RATIO = 20.0
 # Half width of the contact to which `estimate_ripples` refers, in cells of the coarser piece.
 N_REFERENCE_CELLS = 16
-MAX_RIPPLE = 1e-2  # expected ripple over peak pressure above which other grids are tried
+MAX_RIPPLE = 1e-2  # ratio of expected ripple to peak pressure above which other grids are tried
 MIN_REFUSED_RIPPLE = 0.1  # expected ripple of the best grid above which the pair is refused
 
 

@@ -20,7 +20,7 @@ PLANE_ELEMENT = re.compile(
 )
 LINE_ELEMENT = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
-# Largest number of members of a set over the number of nodes and elements. A set may repeat the
+# Largest ratio of the members of a set to the number of nodes and elements. A set may repeat the
 # members of other sets, so a short deck could otherwise name any number of members.
 MAX_SET_SIZE_RATIO = 4
 

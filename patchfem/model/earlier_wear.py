@@ -29,7 +29,7 @@ SURFACE_KEYS = (
     "profile",
     "mesh",
 )
-# largest difference between the gaps of one patch on two meshes, over the range of the gap
+# largest difference between the gaps of one patch on two meshes, relative to the range of the gap
 GAP_DIFFERENCE_FRACTION = 1e-2
 MIN_GAP_DIFFERENCE = 1e-12  # m; a smaller difference between gaps is round-off
 MAX_LENGTH_DIFFERENCE = 1e-6  # relative; the lengths of one interface on two meshes differ by less

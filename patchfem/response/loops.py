@@ -15,8 +15,8 @@ from ..effects import law_has_trait
 from .measures import COORDINATE_ROUND_OFF
 
 EVENT_TIME_TOL = 1e-9  # Fraction of a period below which two samples are the two sides of an event.
-REST_RATE_TOL = 1e-9  # Rate over the largest rate below which the interface is at rest.
-# Step over the largest displacement step above which a rest ends, because round-off is smaller.
+REST_RATE_TOL = 1e-9  # Ratio of the rate to the largest rate below which the interface is at rest.
+# Ratio of a displacement step to the largest one above which a rest ends, because round-off is smaller.
 MIN_REST_END_STEP = 1e-3
 
 

@@ -199,7 +199,7 @@ def compute_slip_measures(
     before = above[:-1]
     after = above[1:]
     rise = np.abs(after - before)
-    # This is the fraction of the time between two midpoints in which the interpolant is below 0.
+    # Fraction of the time between two midpoints in which the interpolant is below 0.
     low = np.minimum(before, after)
     high = np.maximum(before, after)
     below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))

@@ -33,7 +33,7 @@ OPEN_LOOP = "the friction loop of the last cycle does not close"
 # Safety factor on the cycles that the decay needs, because the last amplitudes may beat.
 CYCLES_SAFETY_FACTOR = 1.5
 MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
-# Change of the amplitude over the displacement a/omega^2 of the drive below which it is round-off.
+# Ratio of the change of the amplitude to the displacement a/omega^2 of the drive below which it is round-off.
 AMPLITUDE_ROUND_OFF = 1e-12
 
 

@@ -22,11 +22,11 @@ MAX_SAMPLES = 600  # Largest number of samples of a fit; more take longer and ch
 MAX_STICKS = 20  # Largest number of stick intervals that are fitted; the longest ones are used.
 MAX_SINUSOIDS = 3  # Largest number of decaying sinusoids of a fit.
 SAMPLES_PER_PERIOD = 24  # Number of samples per ringing period that are sufficient for a fit.
-# Sinusoid over the largest value of the signal below which there is no ringing.
+# Ratio of the sinusoid to the largest value of the signal below which there is no ringing.
 MIN_SINUSOID = 1e-6
-MAX_RESIDUAL = 0.1  # Largest root mean square of the residual over that of the ringing [1].
+MAX_RESIDUAL = 0.1  # Largest ratio of the rms residual to the rms ringing [1].
 MAX_DAMPING_RATIO = 0.5  # Largest damping ratio that counts as ringing [1].
-# Residual of a fit over the signal without the forced sinusoid below which no other start is tried.
+# Ratio of the residual to the signal without the forced sinusoid below which no other start is tried.
 EXACT_RESIDUAL = 1e-9
 FLOAT_EPSILON = float(np.finfo(float).eps)
 # CPU time [s] of a fit evaluation in Python per sample and squared number of columns.

@@ -13,11 +13,11 @@ from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 EPS = 2.0**-52
-# Norm of a column after projection over its norm; below it the column depends on the others.
+# Ratio of the norm of a column after projection to its norm; below it the column depends on the others.
 MIN_INDEPENDENT_NORM = 1e-12
 INITIAL_DAMPING = 1e-3  # Initial Levenberg-Marquardt damping of a fit, divided by ten.
 MAX_DAMPING = 1e9  # Levenberg-Marquardt damping above which a fit ends.
-# Step over the scale of the poles that ends a fit, if the step lowered the residual.
+# Step, relative to the scale of the poles, that ends a fit if the step lowered the residual.
 SUCCESS_STEP_TOL = 1e-13
 FAILURE_STEP_TOL = 1e-15  # Same ratio for a step that did not lower the residual.
 

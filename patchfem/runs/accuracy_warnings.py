@@ -47,7 +47,7 @@ STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}"
 ELEMENT_SIZE = "contact.element_size"
-# main measures of a run, which a warning names before all others
+# main measures of a run, which an accuracy warning names first
 MAIN_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",

@@ -24,12 +24,12 @@ N_PEAKS_PER_SPECTRUM = 2  # largest peaks of each residual spectrum at which a f
 # mean cosine of neighbouring residuals at a peak: 1 for a mode, 0 for noise
 MIN_RESIDUAL_CORRELATION = 0.5
 N_NEIGHBOURS = 8  # frequencies on each side of a peak or mode over which means are taken
-# decrease of the sum of squares by a further mode over the decrease expected in white noise
+# ratio of the decrease of the sum of squares by a further mode to that expected in white noise
 MIN_NOISE_RATIO = 15.0
 # fraction of the residual sum of squares that a further mode must explain
 MIN_RESIDUAL_DECREASE = 0.02
 MIN_CONTRIBUTION = 1e-3  # fraction of the responses near its frequency that a mode must contribute
-# minimum contribution of a mode near its frequency over the residual there
+# minimum ratio of the contribution of a mode near its frequency to the residual there
 MIN_RESIDUAL_RATIO = 5.0
 MIN_MISFIT = 1e-9  # relative residual; a smaller one is round-off
 # fraction of the largest residue; a mode with less does not move the driven point

@@ -27,7 +27,7 @@ from .exponential_kernels import exp_minus
 
 # units of `numbers`, for batches that scale time and force
 NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
-# velocity over v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
+# ratio of the velocity to v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
 MAX_STRIBECK_RATIO = 6.0
 MIN_LIMIT_RATIO = 1e-9  # smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0
 

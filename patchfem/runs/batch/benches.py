@@ -10,7 +10,7 @@ from ..patch import static_batch
 from . import one_by_one, patches
 from .case_results import CaseResults
 
-MAX_CASES_PER_CALL = 256  # largest number of patches that are pressed in one call
+MAX_CASES_PER_CALL = 256  # largest number of patches that are solved in one call
 
 
 def refuses(model: Model) -> str:

@@ -39,14 +39,14 @@ from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
 from .lumped.pieces import select_known_values
 from .samples import Samples, find_peaks
 
-MAX_CASES_PER_CALL = 256  # largest number of patches that are pressed in one call
+MAX_CASES_PER_CALL = 256  # largest number of patches that are solved in one call
 # largest number of kept samples of all cases in one call, which need 200 MB with their evaluation
 MAX_SAMPLES = 1_200_000
 MAX_TOTAL_STEPS = 1e7  # largest number of time steps of a run to which the steps are doubled
 # largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
 # few points
 REDUCTION_TOL_FRACTION = 3e-2
-# ratio of the error of a friction loop to that of the backbone curve, which the loop passes twice
+# ratio of the error of a friction loop to the error of the backbone curve, of which a loop has two branches
 LOOP_ERROR_FACTOR = 2.0
 MAX_STICKING_SLIP = 1e-3  # slip amplitude in bond lengths, up to which a case sticks
 RING_MEASURES = "ring_frequency", "ring_damping"

@@ -129,7 +129,7 @@ def _compute_measures(model, time, slide, histories: SlideHistories, first: int)
     """Return the measures of a bench run as a dict, except those of its friction loop."""
     force = histories.force
     load = histories.load
-    # The ratio refers to the applied load: friction is lost where the piece slides off the
+    # The friction ratio refers to the applied load: friction is lost where the piece slides off the
     # pressure.
     applied = load if model.load_varies else np.full_like(load, load[0])
     is_loaded = applied > 1e-3 * applied.max(initial=0.0)

@@ -23,7 +23,7 @@ from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
 BYTES_PER_SAMPLE = 250.0  # Memory of a sample of the histories [bytes].
-# List passes per step over those in a rig. A prescribed displacement needs no search for the
+# Ratio of the passes through a bond list per step to those in a rig. A prescribed displacement needs no search for the
 # increment of the displacement.
 LIST_PASS_RATIO = 1 / 3
 

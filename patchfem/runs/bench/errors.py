@@ -33,7 +33,7 @@ from .ledger import PassOptions
 # Tolerance that sets the steps of passes on coarser meshes. Parallel elements follow any path
 # exactly, so that it is not the tolerance of the run.
 MESH_TOL = 1e-2
-# Merge width of the pass that shows the merging error over that of the fine pass.
+# Ratio of the merge width of the pass that shows the merging error to that of the fine pass.
 FINER_MERGE_FACTOR = 0.5
 
 

@@ -14,7 +14,7 @@ from ...effects import law_has_trait
 # Number of samples between two progress reports. With so many, the cost of calling compiled code is
 # negligible.
 N_BLOCK_SAMPLES = 4096
-# Created energy over dissipated energy below which the created energy is round-off.
+# Ratio of created to dissipated energy below which the created energy is round-off.
 ROUND_OFF_FRACTION = 1e-13
 
 

@@ -19,10 +19,10 @@ MAX_REGULAR_RATIO = 6.0
 MIN_RATIO = 1.6  # Smallest ratio of successive changes from which the remainder is computed.
 # Smallest ratio of successive changes of a series that counts as converging.
 MIN_CONVERGING_RATIO = 1.3
-# Error over remainder of a series with a steady ratio. With it the interval fails in less than 2 of
+# Ratio of error to remainder for a series with a steady ratio. With it the interval fails in less than 2 of
 # 100 random scenes.
 STEADY_FACTOR = 1.8
-UNSTEADY_FACTOR = 2.0  # Error over the largest change, for a series without a steady ratio.
+UNSTEADY_FACTOR = 2.0  # Ratio of error to largest change for a series without a steady ratio.
 
 
 class Limit(NamedTuple):

@@ -24,19 +24,19 @@ from .limits import extrapolate
 from .press import Patch, press_patch
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
-# Width over height of a piece that is clearly in plane strain; the inverse holds for plane stress.
+# Ratio of width to height of a piece that is clearly in plane strain; the inverse holds for plane stress.
 MIN_PLANE_STRAIN_RATIO = 8.0
 MIN_RESOLVED_NODES = 12  # Number of contact nodes below which the measures depend on this number.
 MAX_UNRESOLVED_NODES = 3  # Largest number of nodes of a contact that counts as not resolved.
 ROUND_OFF_FRACTION = 5e-12  # Relative round-off error of the solved contact equations.
 MIN_ERROR = 1e-9  # Smallest relative error that is stated, because no use needs a smaller one.
 MIN_EDGE_OFFSET = 0.012  # Smallest error of the position of an edge between nodes, in cell lengths.
-# Further increase of the pressure at a corner under refinement over its last change.
+# Ratio of the further increase of a corner pressure under refinement to its last change.
 CORNER_RISE_FACTOR = 4.0
 # Fraction of the pressure at the corner of a coating that is missed by cells longer than its
 # thickness.
 CORNER_LAYER_FRACTION = 0.15
-# Hidden error of an extrapolated value over that of the finest mesh: 4/3 + 1/3, rounded up.
+# Ratio of the hidden error of an extrapolated value to that of the finest mesh: 4/3 + 1/3, rounded up.
 EXTRAPOLATED_ERROR_RATIO = 2.0
 # Factor on the errors of meshes too coarse for a rounding, because none of them shows its effect.
 UNRESOLVED_ROUNDING_FACTOR = 2.0

@@ -34,7 +34,7 @@ FRAME_BYTES_PER_NODE = 3.5e3  # Memory of the frames of a motion per node [bytes
 BYTES_PER_STRIP_NODE = 3000.0  # Memory per strip and interface node [bytes].
 # Tolerance below which a contact that ends inside the interface or over a jump needs another level.
 TIGHT_TOL = 2e-3
-# Largest tilt, over the tilt at which bars open, with certain full contact. Elastic pieces with
+# Largest ratio of the tilt to the opening tilt of bars at which full contact is certain. Elastic pieces with
 # height/length 0.08 to 4 open from 0.77.
 MAX_FULL_CONTACT_TILT = 0.7
 

@@ -39,9 +39,9 @@ __all__ = [
     "warn_of_strains",
 ]
 MIN_COUPLING_RATIO = (
-    0.02  # smallest normal closing due to shear over the tangential compliance that a note states
+    0.02  # smallest ratio of normal to tangential displacement under shear that a note states
 )
-# Smallest load over the buckling load of a tall piece that a note states; its sideways motion lacks
+# Smallest ratio of load to buckling load of a tall piece that a note states; its sideways motion lacks
 # about this fraction.
 MIN_BUCKLING_RATIO = 0.02
 # Fraction of a far face that counts as the complete face, because a mesh file has few digits.

@@ -307,7 +307,7 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     if len(pairs) < 3 or not all(map(_has_plain_grids, pairs)):
         return out
     for cases in _group_batches(patch_models):
-        # This property is equal for all patches of a geometry.
+        # Whether the grids are plain is equal for all patches of a geometry.
         if patch_models[cases[0]].gap.profile is not None:
             continue
         alike = [patch_models[case] for case in cases]

@@ -32,8 +32,8 @@ MAX_SEARCHES = 4
 MAX_NODES = 400
 # Highest convergence order of static measures; meshes too coarse even at this order are not tried.
 MAX_ORDER = 3.0
-# Coarsest cell over the cell that a case needs, in the order of trial: the longest cells cost
-# least. Factors that the last trial shows to be too large are skipped.
+# Ratio of the coarsest cell to the cell that a case needs, in the order of trial: the longest cells
+# cost least. Factors that the last trial shows to be too large are skipped.
 CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
 # Largest cell ratio of neighbouring cases that are joined by a single band.
 MAX_CELL_RATIO = 2.0

@@ -14,7 +14,7 @@ from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
 
-# Largest curvature of a parabola over that of its neighbour on a smooth pressure curve.
+# Largest ratio of the curvatures of neighbouring parabolas on a smooth pressure curve.
 MAX_CURVATURE_RATIO = 2.0
 # Smallest number of contact cells on a rounding for which its pressure peak converges.
 MIN_ROUNDING_CELLS = 4
@@ -92,7 +92,7 @@ def _extrapolate_to_ends(x, sigma) -> np.ndarray:
     The averaged curve is a parabola through three loaded nodes, or a line through two.
     """
     peaks = sigma[:, 0].copy()
-    # This is the number of loaded nodes from the end of the interface to the first open one.
+    # The result is the number of loaded nodes from the end of the interface to the first open one.
     n_loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
     n_used = np.minimum(n_loaded, min(3, x.size - 1))
     for count in (2, 3):

@@ -14,7 +14,9 @@ from ...scene.keys import materials
 
 # relative difference [1] of the friction work from samples and from energies, above which a run warns
 MAX_WORK_CHECK = 1e-3
-MAX_FORMING_RATIO = 0.3  # slip while a bond forms over the bond length, above which a run warns
+MAX_FORMING_RATIO = (
+    0.3  # ratio of slip while a bond forms to the bond length, above which a run warns
+)
 MIN_EXCESS_RATIO = (
     1e-3  # excess of the friction force over mu_s N, relative to it, above which a run notes it
 )

@@ -25,7 +25,7 @@ from . import strips, varying_load
 from .lists import choose_bond_summation
 from .numerics import Numerics
 
-# largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
+# largest ratio of the backbone error to the tolerance, for the reduction to few modes and for that to
 # few points
 REDUCTION_TOL_FRACTION = 1e-3
 

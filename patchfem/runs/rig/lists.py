@@ -46,7 +46,7 @@ MAX_STRIPS_PER_STEP = 0.1
 MIN_LONG_LIST = 500
 MIN_SLIP_LENGTHS = 1e-3  # slip in bond lengths, below which the motion of a block is elastic
 MAX_HALVINGS = 2  # largest number of halvings of the step (0 to 3 were observed)
-# cost of a patch with shear compliance over that of one list: its lists, times the larger number of
+# ratio of the cost of a patch with shear compliance to that of one list: its lists, times the larger number of
 # iterations of Newton's method
 SHEAR_COST_FACTOR = 256.0
 MAX_BOND_PHASE = 2.0  # largest phase [rad] in a step of the vibration of the block on its bonds

@@ -229,7 +229,7 @@ class MarchReader(Reader):
         rig = self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        # strips that yaw do more work than their mean slide
+        # the friction of strips that yaw does more work than the mean slide shows
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
         # the work of this interface excludes other interfaces and impacts at stops
         if len(rig.friction.names) > 1 or together:

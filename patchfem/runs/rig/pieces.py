@@ -42,7 +42,7 @@ MOTION_MEASURES = (
     "absolute_acceleration_fundamental",
     "acceleration_distortion",
 )
-MAX_CHANGE_RATIO = 1e-2  # largest relative change of a settled motion over the tolerance
+MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a settled motion to the tolerance
 N_CHANGE_WINDOWS = 3  # number of last windows whose extremes show the change of the motion
 MIN_DECAY = (
     1e-6  # lower bound [1] of the decay of a free motion in the last windows, for lack of damping

@@ -47,7 +47,7 @@ MOMENT_FIELDS = (
 THIN_FRACTION = 1e-6
 # Largest number of jumps of the search for the cycle at which a coating is worn through.
 MAX_SEARCH_JUMPS = 60
-# Distance to the next row of the friction table over the row distance; a nearer row is passed.
+# Distance to the next row of the friction table, relative to the row spacing; a nearer row is passed.
 MIN_ROW_DISTANCE = 0.1
 
 

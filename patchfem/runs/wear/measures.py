@@ -22,7 +22,7 @@ from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
 N_FRAMES = 24  # Number of frames of the interface during the wear.
 EDGE_PEAK = "pressure_peak_at_edge"  # Name of the pressure peak at a contact edge in the history.
 N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edge.
-# Worn depth over the thickness of a coating, or over the height of a piece, above which the
+# Ratio of worn depth to the thickness of a coating, or to the height of a piece, above which the
 # stiffness of the unworn piece is not valid.
 MAX_WORN_FRACTION = 0.2
 ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.

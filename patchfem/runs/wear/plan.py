@@ -15,7 +15,7 @@ from .evolve import next_row_cycle
 SOLVES_PER_JUMP = 20  # Number of contact solutions per jump, with its corrections.
 # Number of contact solutions per jump and strip, fewer because each starts from the previous one.
 SOLVES_PER_STRIP = 7
-# Cost of the fine run over that of a motion with its coarse runs. It includes the larger number of
+# Ratio of the cost of the fine run to that of a motion with its coarse runs. It includes the larger number of
 # active nodes due to wear.
 FINE_RUN_FRACTION = 0.7
 # CPU time [s] of a contact solution over the squared number of interface points, including
@@ -24,9 +24,9 @@ SOLVE_SECONDS = 1.2e-8
 JUMP_SECONDS = 5e-3  # CPU time [s] of a jump besides its contact solutions.
 N_SPRINGS = 192  # Number of springs of the spring row with which jumps are counted.
 MAX_SPRINGS = 1000  # Largest number of springs of this row for a prescribed mesh.
-# Spring thickness inside a patch over the length in contact.
+# Ratio of the spring thickness inside a patch to the length in contact.
 INNER_THICKNESS_RATIO = 0.3
-# Spring thickness at an end of a patch over the root of contact length times piece height.
+# Ratio of the spring thickness at an end of a patch to the root of contact length times piece height.
 END_THICKNESS_RATIO = 0.44
 N_SMOOTH_JUMPS = 8  # Number of wear jumps for an asperity layer with pressure everywhere.
 MAX_COUNTED_JUMPS = 1500  # Largest number of jumps that are counted.

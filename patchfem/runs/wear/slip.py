@@ -25,7 +25,7 @@ UNBOUNDED_OUTCOMES = (
 )
 MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_FRAMES = 800  # Largest number of interface frames per cycle.
-# Error by reversals between samples over the mean change without two of three samples.
+# Ratio of the error due to reversals between samples to the mean change without two of three samples.
 THINNING_FACTOR = 1.5
 
 
@@ -358,7 +358,7 @@ def flank_slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     grooves = model.grooves
     sigma = patch.pressure.sigma_n
     slope = grooves.slope(slide)[:, None]
-    # This is the length of the flank over the relative displacement.
+    # The factor is the ratio of the flank length to the relative displacement.
     stretch = np.sqrt(1 + slope**2)
     carried = (vertical / patch.pressure.load)[:, None] * sigma
     steps = integrate_steps(slide, lambda places: np.hypot(1, grooves.slope(places)))

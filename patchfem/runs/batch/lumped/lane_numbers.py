@@ -27,7 +27,7 @@ LANE_LAWS = {
     "nonlocal": "friction.laws.stretch_kernels",
 }
 MAX_STICK_SLIP_FRACTION = (
-    1e-3  # slip over the stretch at the friction limit, below which an interface sticks
+    1e-3  # ratio of slip to the stretch at the friction limit, below which an interface sticks
 )
 
 

@@ -22,7 +22,7 @@ from .lane_runs import MeasuredMarch, march_and_measure
 from .lane_settling import SETTLING_LAWS
 from .lane_steps import POINT_STEPS, STRETCH_STEPS
 
-# loop area over (largest force times slide), below which a case sticks
+# ratio of loop area to (largest force times slide), below which a case sticks
 MIN_LOOP_AREA = 1e-6
 # Largest relative error of each measure due to the mesh, above which the mesh error is computed again with
 # more steps; the loop of a small slip may be completely uncertain.

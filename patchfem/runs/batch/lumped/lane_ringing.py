@@ -27,8 +27,8 @@ FIT_ERROR_FACTOR = 5.0
 MIN_STICK_PHASE = 0.9 * 3 * np.pi
 # smallest phase [rad] of a vibration that counts as ringing in closed form, three half periods
 MIN_FREE_PHASE = 3 * np.pi
-# damping ratio, and distance from a harmonic of the drive over its frequency, below which a vibration
-# counts as forced
+# damping ratio, and relative distance from a harmonic of the drive, below which a vibration counts as
+# forced
 FORCED_DAMPING = 1e-3
 FORCED_DISTANCE = 1e-2
 

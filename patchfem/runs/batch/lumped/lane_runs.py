@@ -27,7 +27,7 @@ from .lane_settling import SETTLING_LAWS, march_until_settled
 # smallest relative error of a measure, a hundredth of the smallest tolerance, because both marches may
 # miss the same event
 MIN_RELATIVE_ERROR = 1e-6
-# largest gap of a friction loop, over the loop, that is dropped for lack of memory of loops
+# largest relative size of a loop that the limited memory of a lane has dropped; larger ones need an exact run
 DROPPED_LOOP_RATIO = 1e-2
 
 

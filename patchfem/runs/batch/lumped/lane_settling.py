@@ -20,13 +20,13 @@ SETTLING_LAWS = (
 MIN_TOLERANCE = 1e-4  # smallest tolerance that lanes can meet
 # largest ratio of the cycles of a continued march to those of the case
 MAX_EXTENSION = 10
-# Lengths of the continued marches over that of the case, after each of which the settling is tested; they
-# begin with short ones, so that cases that settle soon cost little.
+# Lengths of the continuation marches relative to the first march. The motion is tested after each of them;
+# the first ones are short, so that cases that settle early cost little.
 EXTENSION_FRACTIONS = (0.25, 0.25, 0.5, *(MAX_EXTENSION - 1) * (1.0,))
 SETTLED_TOL = 1e-5  # largest relative change of a steady motion over the cycles of the case [1]
 LATE_TOL_FACTOR = 100  # factor on SETTLED_TOL at the end of the march
-# Ratio of the error of an extrapolated range to the error that the extrapolation states, and smallest error
-# over the range: 1 of 571 random cases erred more.
+# Ratio of the error of an extrapolated range to the error that the extrapolation states, and smallest
+# relative error of the range: 1 of 571 random cases erred more.
 EXTRAPOLATION_ERROR_FACTOR = 2.5
 MIN_EXTRAPOLATION_ERROR = 7e-6
 

@@ -18,8 +18,8 @@ MAX_STEP_PHASE = 0.5  # largest phase of the fastest rate of a stretch law in a 
 # Fraction of the relaxation rate at the speeds around 0, where tanh regularises the friction, that the steps
 # have to resolve.
 LAYER_RATE_FRACTION = 0.5
-# Rate of the force peak of LuGre over (acceleration / Stribeck speed), i.e. over the inverse of the time in
-# which a reversal passes this speed.
+# Ratio of the rate of the force peak of LuGre to (acceleration / Stribeck speed), which is the inverse of
+# the time in which a reversal passes this speed.
 STRIBECK_RATE_FACTOR = 0.75
 # largest ratio of the fastest rate of a single point to that of the drive, and the steps per cycle for it
 POINT_STEPS = ((5.0, 96), (10.0, 192), (20.0, 384))

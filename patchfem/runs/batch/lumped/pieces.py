@@ -37,7 +37,7 @@ N_STICK_CYCLES = (
 )
 MIN_CYCLES = 20  # smallest number of cycles of a run
 MAX_CYCLES = 4000  # largest number of cycles of a run, whose extremes are all kept
-# error of the drift of rigid elements over the largest slide, the round-off of two means
+# relative error of the drift of rigid elements, which is the round-off of two means
 DRIFT_ROUND_OFF = 1e-14
 
 

@@ -30,9 +30,7 @@ N_SWEEP_POINTS = 121  # number of points of a curve over frequency before its re
 # The neighbourhood of a peak ends where the curve falls below this fraction of the peak; no other peak may
 # exceed this fraction.
 PEAK_END_RATIO = 0.8
-MAX_PEAK_FRACTION = (
-    0.75  # largest width of a neighbourhood over that of the sweep; a wider one is not used
-)
+MAX_PEAK_FRACTION = 0.75  # largest ratio of the width of a neighbourhood to that of the sweep; a wider one is not used
 N_START_POINTS = 7  # number of points of the curve in a neighbourhood before its refinement
 INTERPOLATION_TOL = (
     0.01  # largest relative error of the linear interpolation between the points of a curve

@@ -31,7 +31,7 @@ N_CYCLES_IN_GROOVES = (
 )
 STEP_END_ERROR = 1e-9  # relative error of the measures due to round-off at the ends of steps
 PERIODIC_TOL = (
-    1e-6  # largest change from cycle to cycle over the amplitude, up to which a motion is periodic
+    1e-6  # largest change from cycle to cycle, relative to the amplitude, of a periodic motion
 )
 # Error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a
 # multiplier exceeds 1 by more.
