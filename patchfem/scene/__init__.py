@@ -37,11 +37,7 @@ PUBLIC = {
         "compute_outermost_strip_distance",
     ),
     "keys.lookup": ("find_key",),
-    "keys.materials": (
-        "MATERIALS",
-        "THERMAL_PROPERTIES",
-        "YIELD_STRENGTHS",
-    ),
+    "keys.materials": ("MATERIALS",),
     "keys.memoize": ("memoize",),
     "keys.quantities": (
         "NUMBER_PATTERN",

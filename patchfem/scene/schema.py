@@ -6,7 +6,7 @@ A schema cannot express which keys go together and which files exist; `patchfem 
 import re
 
 from .keys.contact import Material
-from .keys.materials import MATERIALS
+from .keys.materials import MATERIALS, SEPARATORS, list_spellings
 from .keys.quantities import NUMBER_PATTERN, UNIT_FACTORS, find_si_unit
 from .keys.tables import Tables
 from .keys.types import (
@@ -135,8 +135,26 @@ def _describe_material(table: dict) -> dict:
     """Return the schema of a material, which is a name or a table."""
     return {
         "description": "the name of a listed material, or elastic constants and density",
-        "anyOf": [{"type": "string", "enum": list(MATERIALS)}, table],
+        "anyOf": [
+            {"type": "string", "enum": list(MATERIALS)},
+            {"type": "string", "pattern": _make_material_pattern()},
+            table,
+        ],
     }
+
+
+def _make_material_pattern() -> str:
+    """Return the regular expression of every spelling of every name of a material."""
+    spellings = []
+    for spelling in list_spellings():
+        letters = (_make_letter_pattern(letter) for letter in spelling)
+        spellings.append(f"{SEPARATORS}*".join(letters))
+    return rf"^{SEPARATORS}*(?:{'|'.join(spellings)}){SEPARATORS}*$"
+
+
+def _make_letter_pattern(letter: str) -> str:
+    """Return the regular expression of a letter in upper and lower case, or of another character."""
+    return f"[{letter}{letter.upper()}]" if letter.isalpha() else re.escape(letter)
 
 
 def _describe_sweep() -> dict:

@@ -6,7 +6,7 @@ In: a `PatchModel` and a pressure. Out: notes on the faces that yield.
 from math import sqrt
 from typing import NamedTuple
 
-from ...scene.keys.materials import MATERIALS, YIELD_STRENGTHS
+from ...scene.keys.materials import MATERIALS
 
 YIELDING_NEGLECTED = "the run is elastic and neglects yielding"
 
@@ -38,13 +38,12 @@ def yield_strength(material) -> Strength | None:
         return None
     if material.yield_ is not None:
         return Strength(material.name or "material", material.yield_, "given in the scene")
-    if (
-        material.name not in YIELD_STRENGTHS
-        or (material.young, material.poisson) != MATERIALS[material.name][:2]
-    ):
+    known = MATERIALS.get(material.name)
+    if known is None or known.strength is None:
+        return None
+    if (material.young, material.poisson) != (known.young, known.poisson):
         return None  # A known name with other elastic constants is a different material.
-    known = YIELD_STRENGTHS[material.name]
-    return Strength(material.name, known.strength, known.source[:-1])
+    return Strength(material.name, known.strength.strength, known.strength.source[:-1])
 
 
 def min_stress_ratio(poisson: float, plane: str) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from ...core import Outcome
 from ...formatting import format_length
 from ...friction.bonds import parameters, temperature
-from ...scene.keys import materials
+from ...scene.keys.materials import MATERIALS
 
 # relative difference [1] of the friction work from samples and from energies, above which a run warns
 MAX_WORK_CHECK = 1e-3
@@ -219,13 +219,13 @@ def describe_heating(model, patch, work: float, duration: float) -> list:
     if patch is None:
         return ["frictional heating is not estimated: a contact given by [normal] has no area"]
     kind = model.patch.pieces.substrate
-    known = (
-        materials.THERMAL_PROPERTIES.get(kind.name) if kind.name in materials.MATERIALS else None
-    )
+    record = MATERIALS.get(kind.name)
+    known = None if record is None else record.heat
     if known is None:
+        names = [name for name, record in MATERIALS.items() if record.heat is not None]
         return [
             "frictional heating is not estimated: the conductivity of contact.substrate is not "
-            f"known; choose one of the materials {', '.join(materials.THERMAL_PROPERTIES)}"
+            f"known; choose one of the materials {', '.join(names)}"
         ]
 
     area = float(patch.pieces.interface.weight[patch.active].sum())

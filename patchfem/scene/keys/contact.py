@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field
 
-from .materials import MATERIALS
+from .materials import MATERIALS, advise_on_material, find_material_name
 from .types import (
     Force,
     Length,
@@ -18,7 +18,6 @@ from .types import (
     Positive,
     Table,
     Text,
-    advise_on_name,
     attributes_by_key,
     find_inner_table,
     key,
@@ -54,13 +53,16 @@ def find_material(value: object) -> object:
     """Return the Material of a name; ValueError for an unknown name and for other values."""
     if isinstance(value, Material):
         return value
+    if isinstance(value, int | float) and find_material_name(str(value)) is not None:
+        value = str(value)  # the number of a steel or alloy, such as 718 or 1.4404
     if not isinstance(value, str):
         raise ValueError(MATERIAL_REQUIREMENT)
-    if value not in MATERIALS:
-        raise ValueError(f"unknown material '{value}'; {advise_on_name(value, MATERIALS)}")
-    known = MATERIALS[value]
+    name = find_material_name(value)
+    if name is None:
+        raise ValueError(f"unknown material '{value}'; {advise_on_material(value)}")
+    known = MATERIALS[name]
     return Material.model_construct(
-        name=value, young=known.young, poisson=known.poisson, density=known.density
+        name=name, young=known.young, poisson=known.poisson, density=known.density
     )
 
 

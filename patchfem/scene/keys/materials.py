@@ -1,65 +1,23 @@
-"""Materials known by name, with the sources of Young's modulus and the other properties."""
+"""Materials known by name: one table of elastic constants, density and yield strength, with sources.
+
+A scene may write a name in any spelling: case, blanks, hyphens and underscores do not count.
+
+>>> find_material_name("ti64"), find_material_name("inconel-718"), find_material_name("1.4404")
+('Ti-6Al-4V', 'Inconel 718', '316L')
+"""
 
 from __future__ import annotations
 
+import re
+from difflib import get_close_matches
+from functools import cache
 from typing import NamedTuple
 
-
-class ElasticProperties(NamedTuple):
-    """Isotropic elastic constants and density of one material, with the source of the numbers."""
-
-    young: float
-    poisson: float
-    density: float
-    source: str
-
-
-MATERIALS: dict[str, ElasticProperties] = {
-    "Ti-8Al-1Mo-1V": ElasticProperties(
-        121e9, 0.32, 4370.0, "Handbook values of the mill-annealed near-alpha alloy at 20 degC."
-    ),
-    "WC-Co": ElasticProperties(
-        250e9,
-        0.24,
-        14500.0,
-        "Assumed value for a sprayed coating: pores and splat boundaries reduce Young's modulus "
-        "from 600 GPa (sintered) to 200-350 GPa.",
-    ),
-    "WC-Co sintered": ElasticProperties(
-        600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."
-    ),
-    "steel": ElasticProperties(
-        210e9, 0.30, 7850.0, "Handbook values of plain carbon steel at 20 degC."
-    ),
-    "stainless steel": ElasticProperties(
-        193e9, 0.29, 8000.0, "Handbook values of austenitic steel 304 at 20 degC."
-    ),
-    "cast iron": ElasticProperties(
-        110e9,
-        0.26,
-        7200.0,
-        "Handbook values of grey cast iron; Young's modulus is near the middle "
-        "of the range 66-140 GPa of the grades.",
-    ),
-    "aluminium": ElasticProperties(69e9, 0.33, 2700.0, "Handbook values of alloy 6061 at 20 degC."),
-    "bronze": ElasticProperties(
-        110e9,
-        0.34,
-        8800.0,
-        "Handbook values of tin bronze; Young's modulus is about 100-115 GPa, "
-        "depending on the alloy.",
-    ),
-    "alumina": ElasticProperties(
-        370e9, 0.22, 3900.0, "Handbook values of dense sintered ceramic with 99.5 % Al2O3."
-    ),
-    "PTFE": ElasticProperties(
-        0.5e9,
-        0.46,
-        2200.0,
-        "Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
-        "0.4-0.6 GPa; this material creeps.",
-    ),
-}
+SEPARATORS = r"[\s_-]"  # characters that do not count in the name of a material
+MAX_NEAR_NAMES = 3  # materials that are proposed for an unknown name
+MIN_PREFIX_LENGTH = 3  # characters from which the beginning of a name counts as near
+# similarity (difflib) from which a material is proposed; below it the numbers of steels look alike
+MIN_SIMILARITY = 0.7
 
 
 class YieldStrength(NamedTuple):
@@ -67,24 +25,6 @@ class YieldStrength(NamedTuple):
 
     strength: float
     source: str
-
-
-YIELD_STRENGTHS: dict[str, YieldStrength] = {
-    "Ti-8Al-1Mo-1V": YieldStrength(
-        930e6,
-        "MatWeb MTA816: value after annealing for 8 h at 790 degC; the specified minimum "
-        "is 828 MPa.",
-    ),
-    "steel": YieldStrength(
-        235e6,
-        "EN 10025-2: minimum yield strength of S235 (up to 16 mm thick), the common grade with "
-        "the lowest strength.",
-    ),
-    "stainless steel": YieldStrength(
-        205e6, "ASTM A240: minimum yield strength of annealed 304; a typical value is 310 MPa."
-    ),
-    "aluminium": YieldStrength(240e6, "ASTM B209: minimum yield strength of 6061-T6."),
-}
 
 
 class ThermalProperties(NamedTuple):
@@ -95,9 +35,318 @@ class ThermalProperties(NamedTuple):
     source: str
 
 
-THERMAL_PROPERTIES: dict[str, ThermalProperties] = {
-    "Ti-8Al-1Mo-1V": ThermalProperties(
-        7.0, 526.0, "Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K."
+class MaterialRecord(NamedTuple):
+    """Isotropic elastic constants and other properties of one material at 20 degC.
+
+    - young, poisson, density: Young's modulus [Pa], Poisson's ratio [1] and density [kg m-3].
+    - source: source of these three numbers.
+    - other_names: names that mean the same material.
+    - strength: yield strength; None for a material that breaks before it yields, or whose yield
+      strength is not known.
+    - heat: thermal properties; None if they are not known.
+    """
+
+    young: float
+    poisson: float
+    density: float
+    source: str
+    other_names: tuple[str, ...] = ()
+    strength: YieldStrength | None = None
+    heat: ThermalProperties | None = None
+
+
+MATERIALS: dict[str, MaterialRecord] = {
+    "Ti-8Al-1Mo-1V": MaterialRecord(
+        121e9,
+        0.32,
+        4370.0,
+        "Handbook values of the mill-annealed near-alpha alloy at 20 degC.",
+        ("Ti-8-1-1",),
+        YieldStrength(
+            930e6,
+            "MatWeb MTA816: value after annealing for 8 h at 790 degC; the specified minimum "
+            "is 828 MPa.",
+        ),
+        ThermalProperties(
+            7.0,
+            526.0,
+            "Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K.",
+        ),
     ),
-    "steel": ThermalProperties(50.0, 490.0, "Handbook values of plain carbon steel."),
+    "WC-Co": MaterialRecord(
+        250e9,
+        0.24,
+        14500.0,
+        "Assumed value for a sprayed coating: pores and splat boundaries reduce Young's modulus "
+        "from 600 GPa (sintered) to 200-350 GPa.",
+    ),
+    "WC-Co sintered": MaterialRecord(
+        600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."
+    ),
+    "steel": MaterialRecord(
+        210e9,
+        0.30,
+        7850.0,
+        "Handbook values of plain carbon steel at 20 degC.",
+        ("carbon steel", "S235", "S235JR", "1.0038"),
+        YieldStrength(
+            235e6,
+            "EN 10025-2: minimum yield strength of S235 (up to 16 mm thick), the common grade with "
+            "the lowest strength.",
+        ),
+        ThermalProperties(50.0, 490.0, "Handbook values of plain carbon steel."),
+    ),
+    "stainless steel": MaterialRecord(
+        193e9,
+        0.29,
+        8000.0,
+        "Handbook values of austenitic steel 304 at 20 degC.",
+        ("304", "AISI 304", "1.4301", "X5CrNi18-10"),
+        YieldStrength(
+            205e6, "ASTM A240: minimum yield strength of annealed 304; a typical value is 310 MPa."
+        ),
+    ),
+    "cast iron": MaterialRecord(
+        110e9,
+        0.26,
+        7200.0,
+        "Handbook values of grey cast iron; Young's modulus is near the middle "
+        "of the range 66-140 GPa of the grades.",
+        ("grey cast iron", "gray cast iron"),
+    ),
+    "aluminium": MaterialRecord(
+        69e9,
+        0.33,
+        2700.0,
+        "Handbook values of alloy 6061 at 20 degC.",
+        ("aluminum", "6061", "6061-T6", "Al 6061", "Al 6061-T6", "EN AW-6061"),
+        YieldStrength(240e6, "ASTM B209: minimum yield strength of 6061-T6."),
+    ),
+    "bronze": MaterialRecord(
+        110e9,
+        0.34,
+        8800.0,
+        "Handbook values of tin bronze; Young's modulus is about 100-115 GPa, "
+        "depending on the alloy.",
+        ("tin bronze",),
+    ),
+    "alumina": MaterialRecord(
+        370e9,
+        0.22,
+        3900.0,
+        "Handbook values of dense sintered ceramic with 99.5 % Al2O3.",
+        ("Al2O3", "aluminium oxide", "aluminum oxide"),
+    ),
+    "PTFE": MaterialRecord(
+        0.5e9,
+        0.46,
+        2200.0,
+        "Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
+        "0.4-0.6 GPa; this material creeps.",
+        ("Teflon",),
+    ),
+    "Ti-6Al-4V": MaterialRecord(
+        114e9,
+        0.31,
+        4430.0,
+        "Data sheets of annealed grade 5 (AMS 4928); MIL-HDBK-5J, table 5.4.1.0, gives 110 GPa "
+        "for sheet and 117 GPa for bar.",
+        ("Ti64", "Ti grade 5", "titanium grade 5", "3.7165", "3.7164", "TA6V"),
+        YieldStrength(
+            828e6, "AMS 4928 and ASTM B348: minimum of annealed bar; a typical value is 910 MPa."
+        ),
+    ),
+    "Inconel 718": MaterialRecord(
+        200e9,
+        0.29,
+        8190.0,
+        "Special Metals, publication SMC-045 (2007), tables 2 and 3: 29.0e6 psi and 0.296 lb/in3 "
+        "at 21 degC.",
+        ("IN718", "718", "alloy 718", "UNS N07718", "2.4668", "NiCr19Fe19Nb5Mo3"),
+        YieldStrength(
+            1034e6,
+            "AMS 5662 and AMS 5663: minimum of bar that is solution annealed and aged.",
+        ),
+    ),
+    "316L": MaterialRecord(
+        200e9,
+        0.30,
+        8000.0,
+        "EN 10088-1, 1.4404: Young's modulus and density at 20 degC; EN 1993-1-4: Poisson's "
+        "ratio. American handbooks give 193 GPa.",
+        ("AISI 316L", "SS 316L", "stainless steel 316L", "1.4404", "X2CrNiMo17-12-2", "UNS S31603"),
+        YieldStrength(
+            170e6,
+            "ASTM A240: minimum of annealed 316L; EN 10088-2 asks for 220 to 240 MPa of 1.4404.",
+        ),
+    ),
+    "17-4PH": MaterialRecord(
+        196e9,
+        0.27,
+        7800.0,
+        "MMPDS-04, section 2.6.9: 28.5e6 psi and 0.282 lb/in3.",
+        ("AISI 630", "630", "1.4542", "X5CrNiCuNb16-4", "UNS S17400"),
+        YieldStrength(
+            725e6,
+            "ASTM A564, type 630: minimum in condition H1150; H1150-M has 520 MPa, H1025 1000 MPa "
+            "and H900 1170 MPa.",
+        ),
+    ),
+    "42CrMo4": MaterialRecord(
+        200e9,
+        0.32,
+        7830.0,
+        "MIL-HDBK-5J, section 2.3.1, low-alloy steels such as AISI 4140: 29.0e6 psi and "
+        "0.283 lb/in3; European data sheets give 190 to 210 GPa.",
+        ("4140", "AISI 4140", "SAE 4140", "1.7225", "42CrMoS4", "SCM440"),
+        YieldStrength(
+            650e6,
+            "EN 10083-3, quenched and tempered: minimum at a diameter of 40 to 100 mm; it is "
+            "900 MPa up to 16 mm and 500 MPa up to 250 mm.",
+        ),
+    ),
+    "100Cr6": MaterialRecord(
+        210e9,
+        0.30,
+        7810.0,
+        "Data of rolling bearing makers for hardened steel of ISO 683-17; data sheets of "
+        "AISI 52100 give 190 to 210 GPa and 0.27 to 0.30.",
+        ("52100", "AISI 52100", "SAE 52100", "1.3505", "SUJ2", "bearing steel"),
+        YieldStrength(
+            2030e6,
+            "Data sheets of AISI 52100 balls, hardened to 60 HRC: 295 ksi; soft annealed steel has "
+            "350 to 590 MPa.",
+        ),
+    ),
+    "Al 7075-T6": MaterialRecord(
+        71e9,
+        0.33,
+        2800.0,
+        "MIL-HDBK-5J, section 3.7: 10.3e6 psi and 0.101 lb/in3.",
+        ("7075", "7075-T6", "7075-T651", "Al 7075", "EN AW-7075", "AA 7075", "3.4365"),
+        YieldStrength(
+            460e6,
+            "EN 485-2: minimum of plates of 6 to 12.5 mm; thick plates have less; a typical value "
+            "is 503 MPa.",
+        ),
+    ),
+    "Al 6082-T6": MaterialRecord(
+        70e9,
+        0.30,
+        2700.0,
+        "EN 1999-1-1, section 3.2.5: design values of structural aluminium.",
+        ("6082", "6082-T6", "6082-T651", "Al 6082", "EN AW-6082", "AA 6082", "3.2315"),
+        YieldStrength(
+            240e6, "EN 485-2: minimum of plates of 12.5 to 100 mm; sheets up to 6 mm have 260 MPa."
+        ),
+    ),
+    "CuZn39Pb3": MaterialRecord(
+        97e9,
+        0.31,
+        8470.0,
+        "Data sheets of CW614N; Poisson's ratio is that of C36000. Brasses have 95 to 110 GPa.",
+        (
+            "brass",
+            "free-cutting brass",
+            "CW614N",
+            "CZ121",
+            "C38500",
+            "C36000",
+            "360 brass",
+            "brass 360",
+        ),
+        YieldStrength(
+            220e6,
+            "EN 12167: lowest proof strength of drawn bar of 3 to 20 mm; brass as extruded may "
+            "have 110 MPa.",
+        ),
+    ),
+    "CuBe": MaterialRecord(
+        131e9,
+        0.30,
+        8360.0,
+        "Materion, Guide to High Performance Alloys, alloy 25 after age hardening: 19e6 psi and "
+        "0.302 lb/in3.",
+        ("C17200", "CuBe2", "alloy 25", "beryllium copper", "copper beryllium", "BeCu", "CW101C"),
+        YieldStrength(
+            960e6,
+            "Materion, alloy 25 strip in temper TF00 (age hardened without cold work): minimum; "
+            "solution annealed strip has about 200 MPa.",
+        ),
+    ),
+    "silicon nitride": MaterialRecord(
+        310e9,
+        0.27,
+        3200.0,
+        "SKF, materials of super-precision bearings: dense balls; makers give 300 to 320 GPa and "
+        "0.25 to 0.29.",
+        ("Si3N4",),
+    ),
+    "PEEK": MaterialRecord(
+        4.0e9,
+        0.40,
+        1300.0,
+        "Victrex PEEK 450G, data sheet (ISO 527, 23 degC); older editions give 3.5 to 3.7 GPa; "
+        "this material creeps.",
+        ("PEEK 450G", "Victrex PEEK"),
+        YieldStrength(98e6, "Victrex PEEK 450G, data sheet: tensile strength at yield, ISO 527."),
+    ),
+    "DLC": MaterialRecord(
+        259e9,
+        0.25,
+        2070.0,
+        "Nature Communications (2021), doi 10.1038/s41467-021-24766-6, table 1: a-C:H with 20 % "
+        "hydrogen; there ta-C has 490 to 630 GPa; softer a-C:H has 100 GPa. Poisson's ratio assumed.",
+        ("a-C:H", "diamond-like carbon"),
+    ),
+    "Cr": MaterialRecord(
+        235e9,
+        0.21,
+        7150.0,
+        "Assumed value for electroplated hard chromium, between 191 GPa (Coatings 12 (2022) 354, "
+        "trivalent bath) and 279 GPa of the dense metal, whose density and Poisson's ratio are used.",
+        ("chromium", "hard chromium", "hard chrome", "chrome"),
+    ),
+    "TiN": MaterialRecord(
+        450e9,
+        0.25,
+        5210.0,
+        "Assumed value for a dense PVD coating; reported values of Young's modulus are 250 to "
+        "590 GPa. Density: CRC Handbook.",
+        ("titanium nitride",),
+    ),
 }
+
+
+def normalise_material_name(name: str) -> str:
+    """Return the name of a material without what does not count in its spelling."""
+    return re.sub(SEPARATORS, "", name.casefold())
+
+
+@cache
+def list_spellings() -> dict[str, str]:
+    """Return the name in MATERIALS of every known name, whose key is its normalised spelling."""
+    spellings = {}
+    for name, record in MATERIALS.items():
+        for spelling in (name, *record.other_names):
+            spellings[normalise_material_name(spelling)] = name
+    return spellings
+
+
+def find_material_name(written_name: str) -> str | None:
+    """Return the name in MATERIALS that is meant by a written one; None if it is unknown."""
+    return list_spellings().get(normalise_material_name(written_name))
+
+
+def advise_on_material(written_name: str) -> str:
+    """Return the advice for an unknown material: the nearest ones, and all names."""
+    spellings = list_spellings()
+    written = normalise_material_name(written_name)
+    near_spellings = get_close_matches(written, spellings, len(spellings), MIN_SIMILARITY)
+    if len(written) >= MIN_PREFIX_LENGTH:
+        longer = [spelling for spelling in spellings if spelling.startswith(written)]
+        near_spellings = [*longer, *near_spellings]
+    near_names = list(dict.fromkeys(spellings[spelling] for spelling in near_spellings))
+    quoted_names = " or ".join(f"'{name}'" for name in near_names[:MAX_NEAR_NAMES])
+    question = f"did you mean {quoted_names}? " if near_names else ""
+    return f"{question}use one of {', '.join(MATERIALS)}"

@@ -2,7 +2,7 @@
 
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scene import MATERIALS, THERMAL_PROPERTIES, YIELD_STRENGTHS
+from patchfem.scene import MATERIALS
 
 from .keys import FOLDER, grid
 
@@ -81,25 +81,42 @@ The value of `contact.substrate`, or of `material` in a coating, is one of these
 know it. For one alloy, the elastic constants differ by a few
 per cent between handbooks; for a sprayed coating they differ by far more. If your result depends on one of these
 constants, measure it on your material.
+
+Case, blanks, hyphens and underscores do not matter in a name: `ti64`, `Ti6Al4V` and `ti-6al-4v` mean `Ti-6Al-4V`. The
+error for an unknown name proposes the nearest materials.
 """
 
     @classmethod
     def text(cls) -> str:
         """The whole page."""
-        rows = [
-            (f"`{name}`", *(f"{value:g}" for value in (m.young / 1e9, *m[1:3])), m.source)
-            for name, m in MATERIALS.items()
-        ]
-        warm = [
-            (f"`{name}`", f"{t.conductivity:g}", f"{t.heat_capacity:g}", t.source)
-            for name, t in THERMAL_PROPERTIES.items()
-        ]
-        firm = [
-            (f"`{name}`", f"{one.strength / 1e6:g}", one.source)
-            for name, one in YIELD_STRENGTHS.items()
-        ]
+        rows = []
+        warm = []
+        firm = []
+        for name, record in MATERIALS.items():
+            quoted = f"`{name}`"
+            numbers = (record.young / 1e9, record.poisson, record.density)
+            strength = "-"
+            if record.strength is not None:
+                strength = f"{record.strength.strength / 1e6:g}"
+                firm.append((quoted, strength, record.strength.source))
+            if record.heat is not None:
+                heat = record.heat
+                warm.append(
+                    (quoted, f"{heat.conductivity:g}", f"{heat.heat_capacity:g}", heat.source)
+                )
+            others = ", ".join(record.other_names)
+            values = (f"{number:g}" for number in numbers)
+            rows.append((quoted, *values, strength, others, record.source))
         heads = (
-            ("name", "young [GPa]", "poisson", "density [kg/m^3]", "source"),
+            (
+                "name",
+                "young [GPa]",
+                "poisson",
+                "density [kg/m^3]",
+                "yield [MPa]",
+                "other names",
+                "source",
+            ),
             ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
             ("name", "yield strength [MPa]", "source"),
         )
@@ -117,8 +134,11 @@ constants, measure it on your material.
                     "The pieces are assumed to be elastic. A note appears if the von Mises stress in a piece "
                     "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
                     "that of the mesh, without the fifth of the height of the piece next to its fixed far "
-                    "face, or its lower bound that follows from the pressure peak. Coatings of WC-Co and "
-                    "alumina break before they yield, so they have no strength here.",
+                    "face, or its lower bound that follows from the pressure peak. Hard coatings and "
+                    "ceramics break before they yield, so they have no strength here; cast iron, bronze "
+                    "and PTFE have none because it depends on the grade. A strength is the specified "
+                    "minimum of the condition that the source names, unless the source says otherwise; for "
+                    "another condition, give `yield` in the scene.",
                     grid(heads[2], firm),
                 ]
             )

@@ -1,0 +1,116 @@
+"""Materials by name: spellings, values with their sources, and the advice for an unknown name."""
+
+import tomllib
+
+import pytest
+from jsonschema import Draft202012Validator
+
+import patchfem as pf
+from patchfem.scene import MATERIALS, loads, make_schema, read_template
+
+PATCH = read_template("patch")
+# name that an engineer writes -> name in the table
+SPELLINGS = {
+    "ti64": "Ti-6Al-4V",
+    "Ti6Al4V": "Ti-6Al-4V",
+    "ti-6al-4v": "Ti-6Al-4V",
+    "Ti 6Al 4V": "Ti-6Al-4V",
+    "in718": "Inconel 718",
+    "INCONEL_718": "Inconel 718",
+    "718": "Inconel 718",
+    "aisi 316L": "316L",
+    "316-l": "316L",
+    "1.4404": "316L",
+    "17-4 PH": "17-4PH",
+    "4140": "42CrMo4",
+    "52100": "100Cr6",
+    "7075": "Al 7075-T6",
+    "EN AW-6082": "Al 6082-T6",
+    "brass": "CuZn39Pb3",
+    "c17200": "CuBe",
+    "Al2O3": "alumina",
+    "Si3N4": "silicon nitride",
+    "teflon": "PTFE",
+    "peek": "PEEK",
+    "dlc": "DLC",
+    "hard chrome": "Cr",
+    "tin": "TiN",
+    "aluminum": "aluminium",
+    " Steel ": "steel",
+}
+# unknown name -> materials that the error proposes
+NEAREST = {
+    "Ti-6Al-4": "'Ti-6Al-4V'",
+    "Ti-8Al": "'Ti-8Al-1Mo-1V'",
+    "inconell718": "'Inconel 718'",
+    "316": "'316L'",
+    "stainles": "'stainless steel'",
+}
+# values of release 0.4, which scenes rely on
+OLD_VALUES = {
+    "Ti-8Al-1Mo-1V": (121e9, 0.32, 4370.0, 930e6),
+    "WC-Co": (250e9, 0.24, 14500.0, None),
+    "WC-Co sintered": (600e9, 0.22, 14900.0, None),
+    "steel": (210e9, 0.30, 7850.0, 235e6),
+    "stainless steel": (193e9, 0.29, 8000.0, 205e6),
+    "cast iron": (110e9, 0.26, 7200.0, None),
+    "aluminium": (69e9, 0.33, 2700.0, 240e6),
+    "bronze": (110e9, 0.34, 8800.0, None),
+    "alumina": (370e9, 0.22, 3900.0, None),
+    "PTFE": (0.5e9, 0.46, 2200.0, None),
+}
+
+
+def with_substrate(name: str) -> str:
+    """Return the scene of a patch whose pieces are of a material."""
+    lines = PATCH.splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("substrate"))
+    return "\n".join([*lines[:at], f'substrate = "{name}"', *lines[at + 1 :]])
+
+
+@pytest.mark.parametrize("written, name", SPELLINGS.items())
+def test_exact_a_material_is_found_in_any_spelling(written, name):
+    by_set = loads(PATCH, sets=[f"contact.substrate={written}"]).contact.substrate
+    in_file = loads(with_substrate(written)).contact.substrate
+    assert by_set == in_file == loads(with_substrate(name)).contact.substrate
+    assert in_file.name == name and in_file.young == MATERIALS[name].young
+
+
+def test_always_the_schema_knows_the_same_spellings():
+    check = Draft202012Validator(make_schema())
+    for written in SPELLINGS:
+        assert check.is_valid(tomllib.loads(with_substrate(written))), written
+    for written in NEAREST:
+        assert not check.is_valid(tomllib.loads(with_substrate(written))), written
+
+
+@pytest.mark.parametrize("written, proposed", NEAREST.items())
+def test_refuses_an_unknown_material_and_names_the_nearest(written, proposed):
+    with pytest.raises(pf.SceneError, match=f"did you mean {proposed}") as caught:
+        loads(with_substrate(written))
+    assert f"use one of {', '.join(MATERIALS)}" in str(caught.value)
+
+
+def test_always_records_are_plausible_and_name_their_sources():
+    names = [
+        spelling for name, record in MATERIALS.items() for spelling in (name, *record.other_names)
+    ]
+    assert len({name.casefold() for name in names}) == len(names)
+    for name, record in MATERIALS.items():
+        for other in record.other_names:
+            assert loads(PATCH, sets=[f"contact.substrate={other}"]).contact.substrate.name == name
+        assert 1e8 < record.young < 1e12 and 0.2 < record.poisson < 0.5
+        assert 900 < record.density < 2e4 and record.source.endswith(".")
+        if record.strength is not None:
+            assert 1e-4 < record.strength.strength / record.young < 3e-2
+            assert record.strength.source.endswith(".")
+    # these break before they yield
+    for name in ("WC-Co", "WC-Co sintered", "alumina", "silicon nitride", "DLC", "TiN", "Cr"):
+        assert MATERIALS[name].strength is None
+
+
+def test_exact_old_materials_keep_their_values():
+    for name, (*elastic, strength) in OLD_VALUES.items():
+        record = MATERIALS[name]
+        assert [record.young, record.poisson, record.density] == elastic
+        assert (record.strength and record.strength.strength) == strength
