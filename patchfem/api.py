@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from functools import wraps
+from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
@@ -36,6 +37,7 @@ from .export import reports as comparison_page
 from .export import summary as summaries
 from .export.drawing import pictures
 from .export.drawing import swept as sweep_charts
+from .export.fields import multiblock
 from .export.fits import request as fits
 from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
@@ -1415,6 +1417,13 @@ class Plots:
         )
         return self._draw(ax, ("levels", "curve"), self._explain_missing_motion() or no_levels)
 
+    def accuracy(self, ax: Axes | None = None) -> Axes:
+        """Plot the worst error of the motion against CPU seconds, also of fewer and of more time steps."""
+        reason = (
+            self._explain_missing_motion() or "the number of time steps does not limit its accuracy"
+        )
+        return self._draw(ax, ("accuracy",), reason)
+
     def stress(self, ax: Axes | None = None) -> Axes:
         """Plot the von Mises stress in both pieces under load, and an enlarged view of the contact.
 
@@ -1490,7 +1499,7 @@ class Result(run_result.Result):
 
     @property
     def plot(self) -> Plots:
-        """Plots of the run: pressure(), stress(), loop(), history(), levels()."""
+        """Plots of the run: pressure(), stress(), loop(), history(), levels(), accuracy()."""
         return Plots(self)
 
     def table(self) -> Any:
@@ -1514,6 +1523,59 @@ class Result(run_result.Result):
     def to_xarray(self) -> Dataset:
         """Return the histories and fields of the run, with units and the scene, as in result.nc."""
         return histories.result_contents(self).to_xarray()
+
+    def to_pyvista(self, frame: int | None = -1) -> Any:
+        """Return both pieces and their interface as grids of PyVista, with the fields of fields.vtkhdf.
+
+        The blocks are named `lower`, `upper` and `interface`, and `strips` for a patch that wears in strips. The
+        pieces have `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`;
+        the interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip`
+        and `status`. Stresses are in MPa, lengths in m; the field array `units` of every grid names the unit of each
+        array, `TimeValue` the time [s].
+
+        Parameters
+        ----------
+        frame : int, optional
+            Number of the frame, which is that of a row of `fields`; negative numbers count from the end. Default: the
+            last frame. None: all frames.
+
+        Returns
+        -------
+        pyvista.MultiBlock or list of pyvista.MultiBlock
+            A list for `frame=None`. Each call computes all frames, so take a list for a film.
+
+        Raises
+        ------
+        PatchfemError
+            If there is no such frame, or if the run has no pieces.
+
+        Examples
+        --------
+        >>> import patchfem as pf
+        >>> fields = pf.run(pf.new("patch")).to_pyvista()
+        >>> fields.keys(), fields["upper"]["stress"].shape[1]
+        (['lower', 'upper', 'interface'], 6)
+        """
+        if self.patch is None:
+            raise PatchfemError(f"to_pyvista: {self._explain_missing_pieces()}")
+        count = len(self.fields["time"])
+        if frame is None:
+            return multiblock.read_multiblocks(self, range(count))
+        if not isinstance(frame, Integral) or not -count <= frame < count:
+            raise PatchfemError(
+                f"to_pyvista: there is no frame {frame}; the run has frames 0 to {count - 1}"
+            )
+        return multiblock.read_multiblocks(self, [frame])[0]
+
+    def _explain_missing_pieces(self) -> str:
+        """Return the reason why a run has no single pair of pieces, and what to use instead."""
+        faces = self.extra.get("faces", ())
+        if not faces:
+            return "the scene has no [contact], so there are no pieces; see to_xarray()"
+        return (
+            "every interface has pieces of its own; save the run with save(DIR) and read "
+            f"DIR/interfaces/{faces[0].folder}/fields.vtkhdf with pyvista.read"
+        )
 
     def save(self, folder: str | Path) -> Path:
         """Write the results folder of the run, as `patchfem run -o` does.

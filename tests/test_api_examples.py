@@ -15,7 +15,7 @@ FUNCTIONS = {
     name: getattr(api, name) for name in api.__all__ if inspect.isfunction(getattr(api, name))
 } | {f"plot.{name}": getattr(pf.plot, name) for name in ("sweep", "backbone")}
 CLASSES = {name: getattr(api, name) for name in ("Measures", "Plots", "Result")}
-METHODS = {"Result.save": api.Result.save}
+METHODS = {"Result.save": api.Result.save, "Result.to_pyvista": api.Result.to_pyvista}
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

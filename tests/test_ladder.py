@@ -36,7 +36,7 @@ SCENE_ALSO = (
 )
 OUTSIDE = {
     "numba": ("*kernels", "compiled", "compiled.*"),
-    "pyvista": ("export.drawing.view",),
+    "pyvista": ("export.drawing.view", "export.fields.multiblock"),
     "meshio": ("mesh.files", "export.*"),
 }
 # must be read in this order

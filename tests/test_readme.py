@@ -247,6 +247,20 @@ def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
     assert len(names["axes"].lines) == 2 and (tmp_path / "out" / "mine" / "summary.json").is_file()
 
 
+def test_exact_the_page_on_results_gives_the_arrays_that_it_names():
+    """Its first block runs; the load is the sum over the nodes, and the grids have the numbers of the arrays."""
+    names = {}
+    page = text("patchfem/scene/guide/results.md")
+    exec(re.search(r"```python\n(.*?)```", page, re.S)[1], names)
+    sigma_n = names["sigma_n"]
+    assert names["load"] == pytest.approx(names["result"].plan.model.nominal_load, rel=1e-9)
+    assert names["frames"].shape == (len(names["times"]), len(names["x"]))
+    assert len(names["cycle"]) == len(names["times"])
+    on_line = names["pieces"]["interface"]["normal_stress"]
+    assert 1e6 * on_line == pytest.approx(names["frames"][-1], rel=1e-6, abs=1e-6 * sigma_n.max())
+    assert len(names["von_mises"]) == names["pieces"]["upper"].n_cells
+
+
 @pytest.fixture
 def recipes(tmp_path, monkeypatch):
     """question -> what its recipe prints as it stands, in a folder with the files of a bare clone that it names."""

@@ -9,7 +9,7 @@ In: a `Result`. Out: files. A module imports only entries of this list that come
 5. `netcdf`: result.nc
 6. `histories`: content of result.nc from a run
 7. `tolerance_misses`: cases of a sweep that miss their tolerance
-8. `fields`: fields of the pieces as VTKHDF, VTU and PVD
+8. `fields`: fields of the pieces as VTKHDF, VTU and PVD, and as objects of PyVista
 9. `lab`: histories and loops in the formats of laboratories
 10. `drawing`: drawings as SVG, films, a script for ParaView
 11. `pages`: pages whose figures the browser draws

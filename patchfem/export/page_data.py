@@ -9,6 +9,7 @@ import numpy as np
 from ..core import PatchfemError, SineDrive
 from ..inputs import loops, measured
 from ..response import spectrum
+from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
 from ..structure.drive_sizes import find_max_acceleration
 from .histories import largest_multiplier
@@ -148,6 +149,7 @@ class Evaluations:
     spectra: object = None
     levels: list | None = None
     wear: Wear | None = None
+    accuracy: object = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -275,7 +277,14 @@ def _evaluations(result: Result) -> Evaluations:
         count = extra["wear_shown"]["states"]
         states = {name: rows[: count + 1] for name, rows in result.fields.items()}
         wear = Wear(extra["wear"], states, extra["wear_shown"]["period"])
-    return Evaluations(extra.get("curve"), extra.get("decay"), extra.get("spectra"), levels, wear)
+    return Evaluations(
+        extra.get("curve"),
+        extra.get("decay"),
+        extra.get("spectra"),
+        levels,
+        wear,
+        compute_accuracy_curve(result),
+    )
 
 
 def _bench_motion(result: Result, tables: dict) -> Motion:

@@ -10,7 +10,7 @@ import numpy as np
 from .. import formatting
 from ..effects import list_displayed_absent_effects
 from ..runs.results.result import Result
-from .drawing import charts, pictures
+from .drawing import accuracy, charts, pictures
 from .page_data import RunData, collect_run_data
 from .pages import player
 from .pages.document import Section, document_html, sentence_html, table_html, warning_box
@@ -491,6 +491,14 @@ def _measured_picture(data: RunData) -> Picture | None:
 
 
 # The keys are in the order of the page.
+def _accuracy_picture(data: RunData) -> Picture | None:
+    """Return the picture of accuracy against computing time."""
+    curve = data.evaluations.accuracy
+    if curve is None:
+        return None
+    return Picture(accuracy.accuracy_charts, (curve,), accuracy.accuracy_caption(curve))
+
+
 PICTURES = {
     "wear": _wear_picture,
     "worn": _worn_map_picture,
@@ -504,6 +512,7 @@ PICTURES = {
     "loop": _loop_picture,
     "history": _histories_picture,
     "measured": _measured_picture,
+    "accuracy": _accuracy_picture,
 }
 
 
@@ -691,12 +700,19 @@ def _cost_section(data: RunData) -> Section:
         if summary["kind"] == "rig"
         else ""
     )
+    missing_curve = ""
+    if data.evaluations.accuracy is None:
+        missing_curve = (
+            "<p class=soft>There is no picture of accuracy against time, because the number of time steps does "
+            "not limit the accuracy of this run; <code>patchfem cost SCENE</code> measures time and errors at "
+            "several tolerances.</p>"
+        )
     absent = list_displayed_absent_effects(
         summary["not_in_scene"], summary.get("numerics", {}).get("engine")
     )
     text = (
         table_html(("effect", "equations", ">seconds"), rows)
-        + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
+        + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>{missing_curve}"
         "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
         f"<p class=soft>{escape(', '.join(absent))}.</p></details>"
     )

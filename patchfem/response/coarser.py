@@ -31,6 +31,19 @@ class CoarserRuns(NamedTuple):
     of: str = "own"
 
 
+class StepRun(NamedTuple):
+    """Run of a motion at some number of time steps.
+
+    - steps: steps per cycle.
+    - seconds: CPU seconds.
+    - values: measures by name.
+    """
+
+    steps: int
+    seconds: float
+    values: dict
+
+
 def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | None = None) -> tuple:
     """Solve coarser runs, and estimate from them the errors of the measures by kind of run.
 

@@ -11,16 +11,18 @@ would run, `run` runs it. A module imports only its own entry of this list and e
 6.  `rig`  a driven structure with friction
 7.  `wear`  a patch worn by a bench or a rig over many cycles
 8.  `accuracy_warnings`  measures whose errors exceed the tolerance, and the setting that helps
-9.  `memory`  the memory that a run may use
-10. `tolerance_forecast`  whether a tolerance will be missed, before anything runs
-11. `plan`  what would run: engine, sizes, cost
-12. `self_checks`  two computations of one number, by which a run detects faults
-13. `run`  from a plan to its result
-14. `batch`  many models at once
+9.  `accuracy_curve`  accuracy of a motion against its computing time
+10. `memory`  the memory that a run may use
+11. `tolerance_forecast`  whether a tolerance will be missed, before anything runs
+12. `plan`  what would run: engine, sizes, cost
+13. `self_checks`  two computations of one number, by which a run detects faults
+14. `run`  from a plan to its result
+15. `batch`  many models at once
 """
 
 # names that other folders use, by module
 PUBLIC = {
+    "accuracy_curve": ("compute_accuracy_curve",),
     "batch.batches": (
         "batch_compile_seconds",
         "choose_batch",

@@ -1,6 +1,6 @@
 """Draw the pressed pieces in a window or a picture: von Mises stress, motion, interface stress.
 
-Pictures are drawn by matplotlib (`flat`), the window by pyvista, which no other module uses. A
+Pictures are drawn by matplotlib (`flat`), the window by pyvista. A
 child process checks whether OpenGL can draw the window, because VTK 9.7 crashes without a working
 driver.
 """

@@ -6,6 +6,7 @@ In: the fine pass and patches on nested meshes. Out: errors by measure name for 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from time import process_time
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from ...effects import is_bond_list, law_has_trait
 from ...response.coarser import (
     CoarserRuns,
+    StepRun,
     estimate_errors,
     find_open_kinds,
     make_spatial_coarsening,
@@ -59,11 +61,13 @@ class PassErrors(NamedTuple):
     - errors: errors by measure name, one dict per kind.
     - seconds: CPU seconds.
     - open_kinds: see `coarser.find_open_kinds`.
+    - step_runs: StepRuns of the bench and of its coarser computations in time, fine to coarse.
     """
 
     errors: list
     seconds: float
     open_kinds: dict
+    step_runs: list
 
 
 def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -> PassErrors:
@@ -85,8 +89,12 @@ def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -
     def solve(variant: CoarsePass):
         """Run the bench with the settings of a coarse pass and return its BenchRun."""
         watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
-        return bench.run(model, patches[variant.level], variant.steps, watch=watch)
+        begin = process_time()
+        coarse_run = bench.run(model, patches[variant.level], variant.steps, watch=watch)
+        cpu_seconds[variant] = process_time() - begin
+        return coarse_run
 
+    cpu_seconds = {}
     ladder = list_coarse_passes(model, patches, fine_run, steps)
     coarse_passes = {}
     errors, seconds = estimate_errors(solve, fine_run.values, ladder, coarse_passes)
@@ -94,8 +102,12 @@ def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -
     if bond_sum_error(model, fine_run.engine):
         errors = [*errors, _estimate_bond_sum_errors(model, fine_run)]
         kinds = [*kinds, "bonds"]
-    runs = [fine_run.values, *(coarse_passes[run].values for run in ladder[0].runs)]
-    return PassErrors(errors, seconds, find_open_kinds(kinds, errors, runs))
+    step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
+    for coarse_pass in ladder[0].runs:
+        values = coarse_passes[coarse_pass].values
+        step_runs.append(StepRun(coarse_pass.steps, cpu_seconds[coarse_pass], values))
+    open_kinds = find_open_kinds(kinds, errors, [run.values for run in step_runs])
+    return PassErrors(errors, seconds, open_kinds, step_runs)
 
 
 def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:

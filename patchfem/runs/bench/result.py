@@ -65,7 +65,7 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     frames = N_FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
     seconds["bench"] = fine.seconds
-    coarse_passes = PassErrors([], 0.0, None)
+    coarse_passes = PassErrors([], 0.0, None, [])
     if estimate:
         patches = [patch, *(mesh for mesh in coarse if mesh is not None)]
         coarse_passes = estimate_pass_errors(model, patches, fine, steps, say)
@@ -93,6 +93,7 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
         "steps": steps,
         "notes": [*_note_on_growth(model, fine), *note_on_groove_slope(model, patch)],
         "left_open": coarse_passes.open_kinds,
+        "step_runs": coarse_passes.step_runs,
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count

@@ -159,7 +159,8 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         inputs.seconds["error"] = runner.error_seconds
     extra = solution.extra
     left_open = _split_errors_by_cause(solution, coarser_runs, errors, runner.solutions)
-    solution = replace(solution, extra=extra | {"left_open": left_open})
+    step_runs = runner.list_step_runs(numerics, solution, coarser_runs)
+    solution = replace(solution, extra=extra | {"left_open": left_open, "step_runs": step_runs})
     measures |= compute_curve_measures(extra, runner.solutions.values())
     return RefinedRun(numerics, solution, measures)
 

@@ -5,11 +5,12 @@ which is solved once.
 """
 
 from dataclasses import replace
+from time import process_time
 
 import numpy as np
 
 from ...core import NotConverged
-from ...response.coarser import estimate_errors
+from ...response.coarser import StepRun, estimate_errors
 from ...response.rows import ROWS_NEEDING_RUN
 from ..patch import faces
 from ..results.result import N_FRAMES, RunInputs
@@ -40,6 +41,8 @@ class Runner:
         Solution of each coarser run by its Numerics.
     error_seconds : float
         CPU seconds of the coarser runs.
+    cpu_seconds : dict
+        CPU seconds of each run by its Numerics.
     """
 
     def __init__(self, inputs: RunInputs, numerics: Numerics):
@@ -47,6 +50,7 @@ class Runner:
         self.model = inputs.plan.model
         self.solutions: dict = {}
         self.error_seconds = 0.0
+        self.cpu_seconds: dict = {}
         self.progress = RunProgress(inputs.progress, _expected_steps(inputs, numerics))
 
     def solve(self, numerics: Numerics, coarser_model=None) -> Solution:
@@ -68,7 +72,9 @@ class Runner:
                 frames = N_FRAMES
         patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
         report = self.progress.make_callback(numerics.steps)
+        begin = process_time()
         solution = solve(model, numerics, patch, frames, say, report)
+        self.cpu_seconds[replace(numerics, whole=False)] = process_time() - begin
         self.progress.done += numerics.steps
         return solution
 
@@ -82,6 +88,34 @@ class Runner:
         )
         self.error_seconds += seconds
         return errors
+
+    def list_step_runs(self, numerics: Numerics, solution: Solution, coarser_runs: list) -> list:
+        """Return the StepRuns of a run and of its coarser runs in time, fine to coarse.
+
+        The list has only the run itself if none is coarser in its steps.
+
+        Parameters
+        ----------
+        numerics : Numerics
+            Settings of the run.
+        solution : Solution
+        coarser_runs : list of CoarserRuns
+            Those of the run, which are solved already; runs that are coarser in time come first.
+
+        Returns
+        -------
+        list of StepRun
+        """
+        pairs = [(numerics, solution)]
+        if coarser_runs and coarser_runs[0].of == "steps":
+            pairs += [(run, self.solutions[run]) for run in coarser_runs[0].runs]
+        step_runs = []
+        for settings, run in pairs:
+            seconds = self.cpu_seconds.get(replace(settings, whole=False), run.seconds)
+            step_runs.append(StepRun(settings.steps, seconds, run.values))
+        steps = [run.steps for run in step_runs]
+        # a method with a step tolerance has the same number of steps in all runs
+        return step_runs if steps == sorted(set(steps), reverse=True) else step_runs[:1]
 
     def _solve_coarser(self, numerics: Numerics, fine: Solution) -> Solution:
         """Solve the rig with coarser settings."""

@@ -1,0 +1,129 @@
+"""Accuracy of a motion against its computing time, from runs that were made for its errors.
+
+In: a Result whose `extra["step_runs"]` has the run and its coarser runs in time. Out: an
+`AccuracyCurve`, which takes no further run. `campaigns.cost` measures whole runs instead.
+"""
+
+from typing import NamedTuple
+
+from ..response.errors import ERROR_MEASURES, MIN_ORDER, absolute_change
+from .accuracy_warnings import MAIN_MEASURES
+
+STEPS_KEY = "accuracy.steps_per_cycle"
+ROUND_OFF = 1e-9  # relative error below which an error is that of round-off in long sums
+# ratio of the errors of two numbers of steps above which the steps do not matter
+NO_EFFECT_RATIO = 0.9
+
+
+class StepSetting(NamedTuple):
+    """A number of time steps, the time that its motion takes, and its accuracy.
+
+    - steps: steps per cycle.
+    - seconds: CPU seconds of the motion: the steps times the smallest time per step of all runs.
+    - error: worst error of the main measures, as the smallest tolerance that allows it [1].
+    - measure: name of the worst measure.
+    """
+
+    steps: int
+    seconds: float
+    error: float
+    measure: str
+
+
+class AccuracyCurve(NamedTuple):
+    """Accuracy of a motion at several numbers of steps per cycle.
+
+    - coarser: StepSettings of the coarser runs, fine to coarse.
+    - present: StepSetting of the run.
+    - finer: StepSetting expected of twice the steps; None if these would not make the run more accurate.
+    - cause: kind of coarsening to which the present error is mostly due, as in `CoarserRuns.of`.
+    - tolerance: tolerance of the scene.
+    """
+
+    coarser: list
+    present: StepSetting
+    finer: StepSetting | None
+    cause: str
+    tolerance: float
+
+
+def compute_accuracy_curve(result) -> AccuracyCurve | None:
+    """Return the accuracy of a motion against its CPU time.
+
+    The error of a coarser run is its distance from the run plus the error of the run. That of twice
+    the steps is expected from the observed order of convergence.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    AccuracyCurve or None
+        None without coarser runs in time, if no measure has an error above round-off, or if the
+        steps do not limit the accuracy.
+    """
+    step_runs = result.extra.get("step_runs", ())
+    if len(step_runs) < 2:
+        return None
+    present_run, *coarser_runs = step_runs
+    measures = _select_measures(result.measures, step_runs)
+    tolerance = result.plan.model.accuracy.tolerance
+    errors = {name: measure.error for name, measure in measures.items()}
+
+    # the first run also loads compiled code, so that the run that was fastest per step counts
+    step_seconds = min(run.seconds / run.steps for run in step_runs)
+
+    def make_setting(steps: int, errors_by_name: dict) -> StepSetting:
+        """Return a StepSetting with its worst measure."""
+        fractions = {}
+        for name, measure in measures.items():
+            size = abs(measure.value) + measure.floor / tolerance
+            fractions[name] = float(errors_by_name[name] / size) if size else 0.0
+        worst = max(fractions, key=fractions.get)
+        return StepSetting(steps, steps * step_seconds, fractions[worst], worst)
+
+    if not measures:
+        return None
+    present = make_setting(present_run.steps, errors)
+    if present.error < ROUND_OFF:
+        return None
+    coarser = []
+    distances = errors
+    for run in coarser_runs:
+        change = absolute_change(present_run.values, run.values)
+        # a coarse run that is accurate by chance counts as no better than the finer one
+        distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
+        coarser.append(make_setting(run.steps, distances))
+    if coarser[-1].error * NO_EFFECT_RATIO < present.error:
+        return None
+    open_kinds = result.extra["left_open"]
+    expected = _expect_errors(errors, open_kinds)
+    finer = make_setting(2 * present.steps, expected)
+    if finer.error > NO_EFFECT_RATIO * present.error:
+        finer = None
+    parts = open_kinds["parts"]
+    cause = max(parts, key=lambda kind: parts[kind].get(present.measure, 0.0))
+    return AccuracyCurve(coarser, present, finer, cause, tolerance)
+
+
+def _select_measures(measures: dict, step_runs) -> dict:
+    """Return the main measures with an error that all runs have; all such measures without a main one."""
+    shared = {}
+    for name, measure in measures.items():
+        is_known = measure.value is not None and measure.error is not None
+        is_shared = all(name in run.values for run in step_runs)
+        if is_known and is_shared and name not in ERROR_MEASURES:
+            shared[name] = measure
+    main = {name: measure for name, measure in shared.items() if name in MAIN_MEASURES}
+    return main or shared
+
+
+def _expect_errors(errors: dict, open_kinds: dict) -> dict:
+    """Return the errors that are expected of twice the steps, by measure name."""
+    step_errors = open_kinds["parts"].get("steps", {})
+    expected = {}
+    for name, error in errors.items():
+        reduction = 1 - 2.0 ** -open_kinds["orders"].get(name, MIN_ORDER)
+        expected[name] = error - min(step_errors.get(name, 0.0), error) * reduction
+    return expected

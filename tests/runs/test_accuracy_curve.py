@@ -1,0 +1,87 @@
+"""Accuracy against computing time: the curve of a marched run, beside the exact solution of its scene."""
+
+import re
+from itertools import pairwise
+
+import pytest
+
+import patchfem as pf
+from patchfem.runs import compute_accuracy_curve
+
+BLOCK = """
+[normal]
+load = "26 lbf"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "1 um"
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 60
+"""
+MARCH = {"accuracy.method": "march"}
+MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
+
+
+@pytest.fixture(scope="module")
+def marched():
+    return pf.run(BLOCK, **MARCH)
+
+
+def worst_true_error(steps: int, exact) -> float:
+    """Return the worst true relative error of the main measures with some steps per cycle."""
+    measures = pf.run(BLOCK, **MARCH, **{"accuracy.steps_per_cycle": steps}).measures
+    return max(abs(measures[name].value / exact[name].value - 1) for name in MAIN)
+
+
+def test_always_the_errors_of_the_curve_hold_the_true_ones(marched):
+    exact = pf.run(BLOCK, **{"accuracy.method": "exact"}).measures
+    curve = compute_accuracy_curve(marched)
+    settings = [*curve.coarser[::-1], curve.present, curve.finer]
+    assert [setting.steps for setting in settings] == [400, 800, 1600, 3200]
+    for setting in settings:
+        true_error = worst_true_error(setting.steps, exact)
+        assert true_error <= setting.error <= 10 * true_error, setting
+    for cheaper, better in pairwise(settings):
+        assert better.error < cheaper.error and better.seconds == 2 * cheaper.seconds
+
+
+def test_exact_the_present_point_is_the_stated_error_and_takes_a_part_of_the_time(marched):
+    present = compute_accuracy_curve(marched).present
+    measures = marched.measures
+    tolerance = marched.plan.model.accuracy.tolerance
+    worst = max(
+        measures[name].error / (abs(measures[name].value) + measures[name].floor / tolerance)
+        for name in MAIN
+    )
+    assert present.error == pytest.approx(worst, rel=1e-12) and present.measure in MAIN
+    assert 0 < present.seconds < marched.seconds["total"]
+
+
+def test_exact_the_page_has_one_picture_that_names_the_neighbours(marched, tmp_path):
+    text = (marched.save(tmp_path / "run") / "report.html").read_text("utf-8")
+    assert len(re.findall('aria-label="What accuracy costs"', text)) == 1
+    assert "This run: 1600 steps per cycle" in text
+    assert "Next cheaper: accuracy.steps_per_cycle = 800" in text
+    assert "Next better: accuracy.steps_per_cycle = 3200" in text
+    names = marched.plot.accuracy().get_legend_handles_labels()[1]
+    assert {"this run", "fewer steps per cycle"} < set(names)
+
+
+@pytest.mark.parametrize(
+    "scene", [BLOCK, pf.new("bench"), pf.new("patch")], ids=["exact", "bench", "patch"]
+)
+def test_refuses_a_curve_where_steps_do_not_limit_the_accuracy(scene):
+    result = pf.run(scene)
+    assert compute_accuracy_curve(result) is None
+    with pytest.raises(pf.PatchfemError, match=r"plot\.accuracy: nothing to draw"):
+        result.plot.accuracy()
