@@ -114,9 +114,9 @@ __all__ = [
     "sweep",
     "view",
 ]
-TEXT_NAME = "<text>"  # name of a scene that was given as a string
+INLINE_SCENE_NAME = "<text>"  # name of a scene that was given as a string
 DICT_NAME = "<dict>"  # name of a scene that was given as a dict
-# prefix that locates a mistake in an option --set or in the text made from a dict; a Python caller wrote neither
+# prefix that locates a mistake in an option --set or in a scene text; Python callers wrote neither, so it is cut off
 LOCATION_PATTERN = re.compile(rf"^(--set: |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
 
 
@@ -130,7 +130,7 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
         return LOCATION_PATTERN.sub("", message) if isinstance(message, str) else message
 
     @wraps(function)
-    def call_and_strip_errors(*args: Any, **keywords: Any) -> Any:
+    def call_with_short_errors(*args: Any, **keywords: Any) -> Any:
         try:
             return function(*args, **keywords)
         except PatchfemError as error:
@@ -139,7 +139,7 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
                 error.mistakes = list(map(strip_file_and_line, error.mistakes))
             raise
 
-    return call_and_strip_errors
+    return call_with_short_errors
 
 
 def _reject_removed_options(function: Callable) -> Callable:
@@ -196,7 +196,7 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
             return scene
         return require_units(get_base_scene(scene).override(assignments), sets)
     if _is_scene_text(scene):
-        return require_units(require_files(loads(scene, TEXT_NAME, assignments)), sets)
+        return require_units(require_files(loads(scene, INLINE_SCENE_NAME, assignments)), sets)
     return require_units(load_file(_require_path(scene, "a scene"), assignments), sets)
 
 
@@ -335,7 +335,7 @@ def run(
         _reject_changed_keys(sets, "Plan")
     scene_plan = scene if isinstance(scene, Plan) else plan(scene, **sets)
     result = run_plan(scene_plan, _print_to_stderr if say is None else say, progress)
-    # the result of the engines becomes the public class, which has plots, tables and measures as attributes
+    # the result of the engines is wrapped in the public class, which adds plots, tables and attributes
     values = {field.name: getattr(result, field.name) for field in fields(result)}
     return Result(**values | {"measures": Measures(result.measures)})
 
@@ -816,7 +816,7 @@ def fit(
         raise PatchfemError(
             f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
         )
-    ranges = [f"{key}={_format_ends(key, ends)}" for key, ends in (free or {}).items()]
+    ranges = [f"{key}={_format_bounds(key, ends)}" for key, ends in (free or {}).items()]
     options = _check_fit_options(FitOptions() if options is None else options, changes)
     data = keywords.get("to", data)
     measured = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
@@ -827,7 +827,7 @@ def fit(
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:
-    """Return the options of a fit with some fields replaced, in the form of the command line.
+    """Return the options of a fit as command-line arguments, with some fields replaced.
 
     `changes` holds the new values by the name of the field. Raises PatchfemError for values of another type.
     """
@@ -844,8 +844,8 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
     )
 
 
-def _format_ends(key: str, ends: Any) -> str:
-    """Return the range of a free key as a string "low..high".
+def _format_bounds(key: str, ends: Any) -> str:
+    """Return the lower and upper bound of a free key as a string "low..high".
 
     `ends` are two values, or a string that is returned unchanged.
 
@@ -1247,7 +1247,7 @@ def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.Sw
         text = scene.text
         sets = scene.sets
     elif _is_scene_text(scene):
-        path = Path(TEXT_NAME)
+        path = Path(INLINE_SCENE_NAME)
         text = scene
     else:
         path = _require_path(scene, "a scene")
@@ -1395,19 +1395,19 @@ class Plots:
         """
         has_patch = self._result.patch is not None or self._result.extra.get("faces")
         reason = "the pieces do not touch" if has_patch else "the scene has no [contact]"
-        return self._draw(ax, ("pressure", "faces"), reason)
+        return self._draw_first_chart(ax, ("pressure", "faces"), reason)
 
     def loop(self, ax: Axes | None = None) -> Axes:
         """Plot the friction force against the relative displacement of the interface."""
         reason = self._explain_missing_motion() or "no friction acted, or nothing slid"
-        return self._draw(ax, ("loop",), reason)
+        return self._draw_first_chart(ax, ("loop",), reason)
 
     def history(self, ax: Axes | None = None) -> Axes:
         """Plot the displacement over the whole run, and the last cycles or the friction force.
 
         With `ax`, only the displacement is drawn.
         """
-        return self._draw(ax, ("history",), self._explain_missing_motion())
+        return self._draw_first_chart(ax, ("history",), self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:
         """Plot amplitude per level, or steady-state amplitude against level or frequency."""
@@ -1415,7 +1415,9 @@ class Plots:
             'the drive has no levels; use drive.waveform = "levels", or a sweep with '
             'accuracy.method = "harmonic"'
         )
-        return self._draw(ax, ("levels", "curve"), self._explain_missing_motion() or no_levels)
+        return self._draw_first_chart(
+            ax, ("levels", "curve"), self._explain_missing_motion() or no_levels
+        )
 
     def accuracy(self, ax: Axes | None = None) -> Axes:
         """Plot the worst error of the motion against CPU seconds, also of fewer and of more time steps."""
@@ -1437,7 +1439,7 @@ class Plots:
             path = Path(temporary_folder) / "fields.vtkhdf"
             fields_of_bodies = bodies.write_fields(self._result, path)
         reason = "the pieces do not touch, or their mesh is not a grid"
-        return self._draw(ax, ("bodies",), reason, fields_of_bodies)
+        return self._draw_first_chart(ax, ("bodies",), reason, fields_of_bodies)
 
     def _explain_missing_motion(self) -> str:
         """Return the reason why a run has no motion; "" if it has motion."""
@@ -1447,7 +1449,7 @@ class Plots:
             return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
         return "no motion was computed"
 
-    def _draw(
+    def _draw_first_chart(
         self, ax: Axes | None, chart_names: tuple, reason: str, bodies: dict | None = None
     ) -> Axes:
         """Plot the first of several named charts for which the run has data.

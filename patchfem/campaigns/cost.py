@@ -49,10 +49,10 @@ MAX_TRIAL_SECONDS = 10.0
 # that can be tried here.
 _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED_SETTING = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
-MIN_ELAPSED_RATIO = 1.5  # Elapsed time over CPU time above which both times are reported.
+MIN_ELAPSED_TO_CPU_RATIO = 1.5  # Ratio of elapsed to CPU time above which both times are reported.
 EQUAL_COST_RATIO = 1.1  # Ratio of CPU times up to which two runs count as equally expensive.
 TIMING_SCATTER = 2e-3  # Difference of the CPU times of repeated runs of a short scene [s].
-NO_EFFECT_RATIO = 0.9  # Smallest over largest error above which a setting does not help.
+NO_EFFECT_RATIO = 0.9  # Ratio of smallest to largest error above which a setting does not help.
 UNCHANGED_TOL = 1e-11  # Relative change of a measure below which a setting does not affect it.
 ROUND_OFF_FRACTION = (
     1e-6  # fraction of the floor of a measure below which a change of it is round-off
@@ -121,7 +121,7 @@ class Cost:
 
     def has_waited(self) -> bool:
         """Return whether the elapsed time exceeds the CPU time so much that both are reported."""
-        return self.wall_seconds > MIN_ELAPSED_RATIO * self.seconds
+        return self.wall_seconds > MIN_ELAPSED_TO_CPU_RATIO * self.seconds
 
     def is_same_run(self, other) -> bool:
         """Return whether two numerical settings gave the same results bit for bit."""

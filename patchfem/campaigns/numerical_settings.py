@@ -19,7 +19,7 @@ SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
 MAX_CELLS = 1600  # Number of columns of the finest uniform mesh.
 MAX_STEPS = 12800
 # Middle value of a setting if the scene does not set its key.
-DEFAULT_MIDDLES = {"shear_modes": 8, "jumps": 8}
+DEFAULT_SETTING_VALUES = {"shear_modes": 8, "jumps": 8}
 
 
 class Setting(NamedTuple):
@@ -121,7 +121,7 @@ def with_setting(model: Model, key: str, value: float) -> Model:
 
 
 def _list_tolerance_meshes(model: Model) -> list:
-    """Return settings for the meshes that several tolerances choose."""
+    """Return settings with the meshes that are chosen for several tolerances."""
     scene_tolerance = model.accuracy.tolerance
     settings = []
     for value in sorted({*TOLERANCES, scene_tolerance}, reverse=True):
@@ -185,7 +185,7 @@ def _scene_value(model: Model, knob: str) -> int | None:
 def _middle_value(model: Model, knob: str) -> int:
     """Return the middle of the values of a numerical setting."""
     if knob != "steps_per_cycle":
-        return _scene_value(model, knob) or DEFAULT_MIDDLES[knob]
+        return _scene_value(model, knob) or DEFAULT_SETTING_VALUES[knob]
     if model.kind == "bench":
         return engine.steps_per_cycle(model)
     return numerics.choose_numerics(model).steps

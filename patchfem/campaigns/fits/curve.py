@@ -256,7 +256,7 @@ class CurveModel:
 def fit_curve(
     scene: Scene, to: Path, free: Sequence, say=None, starts: int = DEFAULT_STARTS
 ) -> FittedCurve:
-    """Fit keys of a rig to a measured curve of frequency and damping against amplitude.
+    """Fit parameters of a rig to measured frequency and damping against amplitude.
 
     Each row is weighted by its error. Values at which the mode does not oscillate are failed
     evaluations. For a reduced structure the intervals contain the error of the missing modes.

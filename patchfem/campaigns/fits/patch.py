@@ -157,7 +157,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     return FittedPatch(scene, loops, laws, best, warnings, perf_counter() - begin)
 
 
-class _MeshedLoops(NamedTuple):
+class _LoopsByMesh(NamedTuple):
     """Friction loops of a patch on a mesh, and their change by a coarser mesh.
 
     Attributes
@@ -188,7 +188,7 @@ class _MeshedLoops(NamedTuple):
         )
 
 
-def _solve_with_refined_mesh(model: Model, slides) -> _MeshedLoops:
+def _solve_with_refined_mesh(model: Model, slides) -> _LoopsByMesh:
     """Solve the patch on finer meshes until a coarser mesh hardly changes the loss."""
     tolerance = model.accuracy.tolerance
     while True:
@@ -203,7 +203,7 @@ def _solve_with_refined_mesh(model: Model, slides) -> _MeshedLoops:
         if coarse is not None:
             coarse_curves = _patch_elements(model, coarse).compute_curves(amplitudes)
             change = coarse_curves.relative_deviations(curves, amplitudes)
-        meshed = _MeshedLoops(patch, tuple(coarser), elements, amplitudes, curves, change)
+        meshed = _LoopsByMesh(patch, tuple(coarser), elements, amplitudes, curves, change)
         can_refine = model.patch.mesh.is_automatic and tolerance >= MIN_TOLERANCE
         if meshed.loss_change <= MAX_LOSS_CHANGE or not can_refine:
             return meshed
@@ -224,7 +224,7 @@ def _default_slides(elements: Elements) -> np.ndarray:
     return np.geomspace(low, high, max(MIN_AMPLITUDES, count))
 
 
-def _warn_of_mesh(model: Model, meshed: _MeshedLoops) -> tuple:
+def _warn_of_mesh(model: Model, meshed: _LoopsByMesh) -> tuple:
     """Return a warning if a coarser mesh changes the loss of a patch too much."""
     if meshed.loss_change <= MAX_LOSS_CHANGE:
         return ()

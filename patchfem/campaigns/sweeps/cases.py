@@ -15,7 +15,7 @@ import numpy as np
 from ...scene.axes import Axis
 from .case_models import SweepScene
 
-# These keys, by their beginnings, change the pieces or their mesh.
+# Keys with these prefixes change the pieces or their mesh.
 PIECE_KEYS = (
     "contact.length",
     "contact.width",

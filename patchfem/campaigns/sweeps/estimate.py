@@ -22,7 +22,7 @@ CASE_SECONDS = 8e-3  # CPU time [s] of a case outside a batch, in addition to th
 RANKING_SECONDS = 0.8  # CPU time [s] to rank the keys by their influence, from random cases.
 # Largest number of groups of the planned cases that is assumed to hold for all cases.
 MAX_GROUPS = 3
-# CPU time [s] to compute the columns of a case in a batch from its values (0.8 to 1.5 ms of 2000
+# CPU time [s] to compute the columns of a case in a batch from its values (0.8 to 1.5 ms, measured on 2000
 # lumped cases).
 BATCHED_CASE_SECONDS = 1.2e-3
 MAX_CASES_WITH_SUMMARY = (

@@ -99,7 +99,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
 
 
 def _group_by_known_cases(changing: dict) -> list:
-    """Group measures by the mask (n,) of cases that have a value of them."""
+    """Group measures by the mask (n,) of the cases in which they have a value."""
     groups: dict = {}
     for name, values in changing.items():
         known = np.isfinite(values)

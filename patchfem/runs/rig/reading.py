@@ -153,7 +153,16 @@ class Reader:
         """Estimate the errors of the measures of an exact motion due to sampling.
 
         The errors follow from the change with every second sample. Measures that the engine integrated
-        have no such error. The parameters are those of `stated_errors`.
+        have no such error.
+
+        Parameters
+        ----------
+        run
+            Run of the engine.
+        drive
+            Drive of the run.
+        values : dict
+            Measures by name.
         """
         if not self.integrated_measures(run, drive).loops and not hasattr(drive, "band"):
             return {}

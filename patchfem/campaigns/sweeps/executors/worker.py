@@ -25,7 +25,7 @@ def main() -> None:
         while True:
             message = pipe.recv()
             if isinstance(message, sweep.Work):
-                # This is the same work with the meshes that all cases share.
+                # Here the data of all cases arrives again, now with the meshes that they share.
                 work = message
             else:
                 pipe.send(sweep.compute_timed(work, message, say))
