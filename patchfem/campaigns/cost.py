@@ -371,7 +371,7 @@ class _FinishedRun(NamedTuple):
     The steps are None if the run has none.
     """
 
-    estimate_measures: dict
+    measures: dict
     warnings: Sequence
     steps: int | None
 
