@@ -345,6 +345,13 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
             [one.seconds for one, _ in points], [error for _, error in points], "accent", width=1.0
         )
     ]
+    scene_points = [point for point in points if point.run.tolerance == tolerance]
+    if knob == TOLERANCE and scene_points:
+        first = scene_points[0]
+        ring = charts.make_dots(
+            [first.run.seconds], [first.share], "warm", "the scene as it is", size=13, hollow=True
+        )
+        marks.append(ring)
     for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
         same_points = [
             point
