@@ -16,8 +16,8 @@ N_LOSS_COEFFICIENTS = (
 )
 N_SAMPLE = 2 * N_RIG_MODES + 2  # number of values in a sample: coordinates, rates, force, slip
 
-# number of rows of each quantity of a case in the workspace
-WORKSPACE_ROWS = {
+# quantities of a case in the workspace that have several rows, with the number of these
+MULTIPLE_ROWS = {
     # state
     "RIG_POSITION": N_RIG_MODES,  # modal coordinates of the rig
     "RIG_RATE": N_RIG_MODES,  # rates of the modal coordinates of the rig
@@ -29,50 +29,57 @@ WORKSPACE_ROWS = {
     "LAST_INCREMENTS": N_UNKNOWNS,  # increments of the last step [m]
     "INCREMENTS_BEFORE": N_UNKNOWNS,  # increments of the step before the last [m]
     "NEWTON_STEP": N_UNKNOWNS,  # last Newton step [m]
-    "DESCENT": 1,  # decrease of the potential that the Newton step predicts
-    "IS_SOLVED": 1,  # 1 if the step is solved
-    "FREE_SLIDE": 1,  # increment of the slide without friction [m]
-    # sample
-    "FRICTION": 1,  # friction force [N]
-    "INTERFACE_ENERGY": 1,  # energy of bonds and pieces [J]
-    "SLIP": 1,  # mean slip of the points [m]
-    "OUTPUT": 1,  # displacement of the output [m]
-    "OUTPUT_RATE": 1,  # rate of the output [m/s]
-    "LAST_OUTPUT": 1,  # output at the start of the step [m], followed by its rate
-    "LAST_OUTPUT_RATE": 1,
-    "RIG_SLIDE": 1,  # slide of the rig [m]
-    "MEAN_FORCE": 1,  # mean friction force of the step [N]
-    "DRIVE_WORK": 1,  # work of the drive in the step [J]
-    "VISCOUS_LOSS": 1,  # viscous loss in the step [J]
-    "RATE_SQUARES": 1,  # sum of v^2 + omega^2 z^2 of the modes
     # numbers of the case
-    "DRIVE": 1,  # amplitude of the drive of the case over that of the table
-    "BOND_LENGTH": 1,  # bond length [m]
-    "LIMIT": 1,  # friction limit [N]
     "POINT_LIMITS": N_POINTS,  # friction limits of the points [N]
     "SHAPES": N_PIECE_MODES * N_POINTS,  # slides of the points per coordinate of the pieces
     "STIFFNESSES": N_PIECE_MODES,  # stiffness of the coordinates of the pieces [N/m]
     "MAX_SHAPES": N_PIECE_MODES,  # largest absolute slide of a point per coordinate
     "MEAN_SHAPES": N_PIECE_MODES,  # mean slide of the points per coordinate
-    # sums of the run [J]
-    "WORK_IN": 1,
-    "VISCOUS_SUM": 1,
-    "DRIVE_WORK_SIZE": 1,
-    "FRICTION_LOSS": 1,
-    "MAX_STORED": 1,
-    "FRICTION_WORK": 1,
-    "SAMPLED_WORK": 1,
-    "FRICTION_WORK_SIZE": 1,
-    "INTERFACE_LOSS": 1,
-    "INTERFACE_GAIN": 1,
-    # extremes and phasor of the output in a cycle [m]
-    "MIN_OUTPUT": 1,
-    "MAX_OUTPUT": 1,
-    "COS_SUM": 1,
-    "SIN_SUM": 1,
-    "N_UNSOLVED": 1,  # number of steps without a solution
-    "MAX_SLIDE": 1,  # largest slide of the run [m]
 }
+# quantities with one row
+SINGLE_ROWS = (
+    # solution of a step
+    "DESCENT",  # decrease of the potential that the Newton step predicts
+    "IS_SOLVED",  # 1 if the step is solved
+    "FREE_SLIDE",  # increment of the slide without friction [m]
+    # sample
+    "FRICTION",  # friction force [N]
+    "INTERFACE_ENERGY",  # energy of bonds and pieces [J]
+    "SLIP",  # mean slip of the points [m]
+    "OUTPUT",  # displacement of the output [m]
+    "OUTPUT_RATE",  # rate of the output [m/s]
+    "LAST_OUTPUT",  # output at the start of the step [m]
+    "LAST_OUTPUT_RATE",  # its rate [m/s]
+    "RIG_SLIDE",  # slide of the rig [m]
+    "MEAN_FORCE",  # mean friction force of the step [N]
+    "DRIVE_WORK",  # work of the drive in the step [J]
+    "VISCOUS_LOSS",  # viscous loss in the step [J]
+    "RATE_SQUARES",  # sum of v^2 + omega^2 z^2 of the modes
+    # numbers of the case
+    "DRIVE",  # amplitude of the drive of the case over that of the table
+    "BOND_LENGTH",  # bond length [m]
+    "LIMIT",  # friction limit [N]
+    # sums of the run [J]
+    "WORK_IN",
+    "VISCOUS_SUM",
+    "DRIVE_WORK_SIZE",
+    "FRICTION_LOSS",
+    "MAX_STORED",
+    "FRICTION_WORK",
+    "SAMPLED_WORK",
+    "FRICTION_WORK_SIZE",
+    "INTERFACE_LOSS",
+    "INTERFACE_GAIN",
+    # extremes and phasor of the output in a cycle [m]
+    "MIN_OUTPUT",
+    "MAX_OUTPUT",
+    "COS_SUM",
+    "SIN_SUM",
+    "N_UNSOLVED",  # number of steps without a solution
+    "MAX_SLIDE",  # largest slide of the run [m]
+)
+# number of rows of each quantity, in their order; the first are those that `lanes_kernels.store_samples` copies
+WORKSPACE_ROWS = MULTIPLE_ROWS | dict.fromkeys(SINGLE_ROWS, 1)
 N_WORKSPACE_ROWS = sum(WORKSPACE_ROWS.values())
 
 

@@ -84,51 +84,41 @@ def evaluate_force_shapes(x, is_long):
 
 
 @njit(**NJIT_INLINE)
-def add_point_derivatives(s, workspace, lane, j, y, inverse_length, is_long):
-    """Add the contribution of a bond point to residual and Hessian of a step.
+def find_point_slide(workspace, lane, j):
+    """Return the slide increment [m] of a bond point in the step."""
+    a = workspace[At.SHAPES + j * LANES + lane]
+    b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
+    return (
+        workspace[At.INCREMENTS + lane]
+        - a * workspace[At.INCREMENTS + LANES + lane]
+        - b * workspace[At.INCREMENTS + 2 * LANES + lane]
+    )
+
+
+@njit(**NJIT_INLINE)
+def evaluate_point(workspace, lane, j, is_long):
+    """Return the mean force [N] of a bond point in the step, and its slope [N/m].
 
     Parameters
     ----------
-    s : tuple of float
-        Residual (3,), then rows of the lower half of the Hessian (6,).
     workspace : array
         Workspace of all lanes, see `lane_rows`.
     lane : int
     j : int
         Number of the point.
-    y : tuple of float
-        Increments of the slide and of the coordinates of the pieces [m].
-    inverse_length : float
-        1 over the bond length [1/m].
     is_long : bool
         Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
-
-    Returns
-    -------
-    tuple of float
     """
-    g0, g1, g2, h00, h01, h02, h11, h12, h22 = s
-    a = workspace[At.SHAPES + j * LANES + lane]
-    b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
     limit = workspace[At.POINT_LIMITS + j * LANES + lane]
     stretch = workspace[At.STRETCHES + j * LANES + lane]
-    xi = y[0] - a * y[1] - b * y[2]
+    inverse_length = 1 / workspace[At.BOND_LENGTH + lane]
+    xi = find_point_slide(workspace, lane, j)
     direction = 1.0 if xi > 0.0 else -1.0
     x = abs(xi) * inverse_length
     f1, f2, _ = evaluate_force_shapes(x, is_long)
     force = limit * (stretch * f1 + direction * x * f2)
     slope = limit * inverse_length * (f1 - f2) * max(1 - direction * stretch, 0.0)
-    return (
-        g0 + force,
-        g1 - a * force,
-        g2 - b * force,
-        h00 + slope,
-        h01 - a * slope,
-        h02 - b * slope,
-        h11 + a * a * slope,
-        h12 + a * b * slope,
-        h22 + b * b * slope,
-    )
+    return force, slope
 
 
 @njit(**NJIT_INLINE)
@@ -154,30 +144,32 @@ def take_newton_step(workspace, lane, beta, is_long):
     length = workspace[At.BOND_LENGTH + lane]
     fall = workspace[At.DESCENT + lane]
     done = workspace[At.IS_SOLVED + lane]
-    inverse_length = 1 / length
-    one = 0.5 * workspace[At.STIFFNESSES + lane]
-    two = 0.5 * workspace[At.STIFFNESSES + LANES + lane]
-    y = (y0, y1, y2)
-    s = (
-        (y0 - workspace[At.FREE_SLIDE + lane]) / beta,
-        one * (2 * workspace[At.PIECE_POSITION + lane] + y1),
-        two * (2 * workspace[At.PIECE_POSITION + LANES + lane] + y2),
-        1 / beta,
-        0.0,
-        0.0,
-        one,
-        0.0,
-        two,
-    )
-    # unrolled, because the compiler does not vectorise a loop over them across the lanes
-    s = add_point_derivatives(s, workspace, lane, 0, y, inverse_length, is_long)
-    s = add_point_derivatives(s, workspace, lane, 1, y, inverse_length, is_long)
-    s = add_point_derivatives(s, workspace, lane, 2, y, inverse_length, is_long)
-    s = add_point_derivatives(s, workspace, lane, 3, y, inverse_length, is_long)
-    s = add_point_derivatives(s, workspace, lane, 4, y, inverse_length, is_long)
-    g0, g1, g2, h00, h01, h02, h11, h12, h22 = add_point_derivatives(
-        s, workspace, lane, 5, y, inverse_length, is_long
-    )
+    half_stiffness1 = 0.5 * workspace[At.STIFFNESSES + lane]
+    half_stiffness2 = 0.5 * workspace[At.STIFFNESSES + LANES + lane]
+    # residual g and lower half of the Hessian h of the potential of the step
+    g0 = (y0 - workspace[At.FREE_SLIDE + lane]) / beta
+    g1 = half_stiffness1 * (2 * workspace[At.PIECE_POSITION + lane] + y1)
+    g2 = half_stiffness2 * (2 * workspace[At.PIECE_POSITION + LANES + lane] + y2)
+    h00 = 1 / beta
+    h01 = 0.0
+    h02 = 0.0
+    h11 = half_stiffness1
+    h12 = 0.0
+    h22 = half_stiffness2
+    # the compiler unrolls the loop over the points, and vectorises the one over the lanes around it
+    for j in range(N_POINTS):
+        a = workspace[At.SHAPES + j * LANES + lane]
+        b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
+        force, slope = evaluate_point(workspace, lane, j, is_long)
+        g0 += force
+        g1 -= a * force
+        g2 -= b * force
+        h00 += slope
+        h01 -= a * slope
+        h02 -= b * slope
+        h11 += a * a * slope
+        h12 += a * b * slope
+        h22 += b * b * slope
     back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
     r00 = 1 / h00
     l1 = h01 * r00
@@ -189,11 +181,11 @@ def take_newton_step(workspace, lane, beta, is_long):
     n2 = -(g2 - l2 * g0 - l3 * r1) / (h22 - l2 * h02 - l3 * m)
     n1 = -r1 * r11 - l3 * n2
     n0 = -g0 * r00 - l1 * n1 - l2 * n2
-    one = workspace[At.MAX_SHAPES + lane]
-    two = workspace[At.MAX_SHAPES + LANES + lane]
+    max_shape1 = workspace[At.MAX_SHAPES + lane]
+    max_shape2 = workspace[At.MAX_SHAPES + LANES + lane]
     slopes = h00 - 1 / beta
-    size = abs(n0) + one * abs(n1) + two * abs(n2)
-    least = abs(y0) - one * abs(y1) - two * abs(y2)
+    size = abs(n0) + max_shape1 * abs(n1) + max_shape2 * abs(n2)
+    least = abs(y0) - max_shape1 * abs(y1) - max_shape2 * abs(y2)
     # where no point reverses in this step, the curvature of the forces over it follows from their slopes, which are 0
     # as long as all points slip
     near = size <= NEWTON_TOL * length or (
@@ -211,58 +203,47 @@ def take_newton_step(workspace, lane, beta, is_long):
 
 
 @njit(**NJIT_INLINE)
-def update_point(s, workspace, lane, j, y, inverse_length, is_long):
-    """Update a bond point after a solved step, and add its force and energies to the sums.
+def update_point(workspace, lane, j, is_long):
+    """Update the stretch and the square of a bond point after a solved step; return its energies.
 
     Parameters
     ----------
-    s : tuple of float
-        Sums (4,): work over the limit, increase of the squares, force and squares of the points.
     workspace : array
         Workspace of all lanes, see `lane_rows`.
     lane : int
     j : int
         Number of the point.
-    y : tuple of float
-        Increments of the slide and of the coordinates of the pieces [m].
-    inverse_length : float
-        1 over the bond length [1/m].
     is_long : bool
         Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
 
     Returns
     -------
-    tuple of float
+    work : float
+        Work of the mean force [J].
+    square_increase : float
+        Increase of the square over the step.
     """
-    worked, energy_increase, force, square = s
-    a = workspace[At.SHAPES + j * LANES + lane]
-    b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
     limit = workspace[At.POINT_LIMITS + j * LANES + lane]
     stretch = workspace[At.STRETCHES + j * LANES + lane]
-    old = workspace[At.SQUARES + j * LANES + lane]
-    xi = y[0] - a * y[1] - b * y[2]
+    square = workspace[At.SQUARES + j * LANES + lane]
+    inverse_length = 1 / workspace[At.BOND_LENGTH + lane]
+    xi = find_point_slide(workspace, lane, j)
     direction = 1.0 if xi > 0.0 else -1.0
     x = abs(xi) * inverse_length
     f1, f2, e = evaluate_force_shapes(x, is_long)
     far_x = min(x, MAX_EXPONENTIAL_SLIDE)
-    new = e * (old + 2 * direction * stretch * x + x * x) + (
+    end_square = e * (square + 2 * direction * stretch * x + x * x) + (
         2 - e * (far_x * far_x + 2 * far_x + 2)
     )
-    new = new if x < MAX_EXPONENTIAL_SLIDE else 2.0
-    one = stretch * e + direction * (1 - e)
-    workspace[At.STRETCHES + j * LANES + lane] = one
-    workspace[At.SQUARES + j * LANES + lane] = new
-    return (
-        worked + limit * (stretch * f1 + direction * x * f2) * xi,
-        energy_increase + limit * (new - old),
-        force + limit * one,
-        square + limit * new,
-    )
+    end_square = end_square if x < MAX_EXPONENTIAL_SLIDE else 2.0
+    workspace[At.STRETCHES + j * LANES + lane] = stretch * e + direction * (1 - e)
+    workspace[At.SQUARES + j * LANES + lane] = end_square
+    return limit * (stretch * f1 + direction * x * f2) * xi, end_square - square
 
 
 @njit(**NJIT_INLINE)
 def commit_step(workspace, lane, beta, is_long):
-    """Update the bond points and pieces of a lane after its solved step.
+    """Update the bond points, pieces and energies of a lane after its solved step.
 
     Parameters
     ----------
@@ -275,38 +256,40 @@ def commit_step(workspace, lane, beta, is_long):
         Whether a slide may exceed MAX_SERIES_SLIDE; a compile-time constant.
     """
     y0 = workspace[At.INCREMENTS + lane]
-    y1 = workspace[At.INCREMENTS + LANES + lane]
-    y2 = workspace[At.INCREMENTS + 2 * LANES + lane]
     length = workspace[At.BOND_LENGTH + lane]
-    used = (workspace[At.FREE_SLIDE + lane] - y0) / beta
-    inverse_length = 1 / length
-    y = (y0, y1, y2)
-    b1 = workspace[At.PIECE_POSITION + lane] + y1
-    b2 = workspace[At.PIECE_POSITION + LANES + lane] + y2
-    s = update_point((0.0, 0.0, 0.0, 0.0), workspace, lane, 0, y, inverse_length, is_long)
-    s = update_point(s, workspace, lane, 1, y, inverse_length, is_long)
-    s = update_point(s, workspace, lane, 2, y, inverse_length, is_long)
-    s = update_point(s, workspace, lane, 3, y, inverse_length, is_long)
-    s = update_point(s, workspace, lane, 4, y, inverse_length, is_long)
-    worked, rise, force, square = update_point(s, workspace, lane, 5, y, inverse_length, is_long)
+    mean_force = (workspace[At.FREE_SLIDE + lane] - y0) / beta
+    b1 = workspace[At.PIECE_POSITION + lane] + workspace[At.INCREMENTS + LANES + lane]
+    b2 = workspace[At.PIECE_POSITION + LANES + lane] + workspace[At.INCREMENTS + 2 * LANES + lane]
+    point_work = 0.0
+    square_increase = 0.0
+    force = 0.0
+    square_sum = 0.0
+    for j in range(N_POINTS):
+        limit = workspace[At.POINT_LIMITS + j * LANES + lane]
+        work, increase = update_point(workspace, lane, j, is_long)
+        point_work += work
+        square_increase += limit * increase
+        force += limit * workspace[At.STRETCHES + j * LANES + lane]
+        square_sum += limit * workspace[At.SQUARES + j * LANES + lane]
     energy = 0.5 * (
-        length * square
+        length * square_sum
         + workspace[At.STIFFNESSES + lane] * b1 * b1
         + workspace[At.STIFFNESSES + LANES + lane] * b2 * b2
     )
-    work = used * y0
-    q = workspace[At.RIG_SLIDE + lane]
-    gone = work - (energy - workspace[At.INTERFACE_ENERGY + lane])
-    noise = workspace[At.LIMIT + lane] * (1e-12 * abs(y0) + 1e-15 * abs(q))
+    work = mean_force * y0
+    dissipated = work - (energy - workspace[At.INTERFACE_ENERGY + lane])
+    noise = workspace[At.LIMIT + lane] * (
+        1e-12 * abs(y0) + 1e-15 * abs(workspace[At.RIG_SLIDE + lane])
+    )
     workspace[At.PIECE_POSITION + lane] = b1
     workspace[At.PIECE_POSITION + LANES + lane] = b2
-    workspace[At.MEAN_FORCE + lane] = used
-    workspace[At.FRICTION_LOSS + lane] += worked - 0.5 * length * rise
+    workspace[At.MEAN_FORCE + lane] = mean_force
+    workspace[At.FRICTION_LOSS + lane] += point_work - 0.5 * length * square_increase
     workspace[At.FRICTION_WORK + lane] += work
     workspace[At.FRICTION_WORK_SIZE + lane] += abs(work)
     workspace[At.SAMPLED_WORK + lane] += 0.5 * (workspace[At.FRICTION + lane] + force) * y0
-    workspace[At.INTERFACE_LOSS + lane] += gone if gone > -noise else 0.0
-    workspace[At.INTERFACE_GAIN + lane] -= gone if gone < -noise else 0.0
+    workspace[At.INTERFACE_LOSS + lane] += dissipated if dissipated > -noise else 0.0
+    workspace[At.INTERFACE_GAIN + lane] -= dissipated if dissipated < -noise else 0.0
     workspace[At.FRICTION + lane] = force
     workspace[At.INTERFACE_ENERGY + lane] = energy
     # the initial guess of the next step is a quadratic extrapolation of the last three steps

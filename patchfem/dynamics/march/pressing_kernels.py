@@ -14,11 +14,11 @@ import numpy as np
 
 from ...compiled.jit import njit
 from ...contact.press_kernels import compute_energy, find_set, press_state
-from ...contact.press_path_kernels import path_mean
+from ...contact.press_path_kernels import HolderMotion, path_mean
 from ...contact.set_arrays import REFERENCE_LOAD, REFERENCE_MOMENT, REFERENCE_STIFFNESS
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ..interfaces import element_kernels as contact
-from ..interfaces.arrays import LoadIndex, SolvedStep
+from ..interfaces.arrays import LoadIndex, SolvedStep, StepStart
 from ..modal_kernels import free_increment, free_rate, project_modes
 from . import faces_kernels as coupling
 from . import parts_kernels as parts
@@ -37,13 +37,85 @@ HAS_STOPS = parts.HAS_STOPS
 HAS_POINTS = parts.HAS_POINTS
 # Tolerance of the friction force in the coupled solution of friction and normal contact, over that of friction alone.
 COUPLING_TOL_FACTOR = 0.01
-# Largest number of secant steps for this force; the bracket closes within 60.
+# Largest number of guesses of this force in a search; the bracket closes within 60.
 MAX_GUESSES = 80
 BISECTION_INTERVAL = 8  # number of secant steps after which one is replaced by a bisection
 BRACKET_TOL = 4e-16  # relative width below which a bracket is closed
-MAX_ITERATIONS = 100  # largest number of Newton steps for heave and pitch
+MAX_ITERATIONS = 100  # largest number of residuals of heave and pitch in a step
+MIN_DECREASE = 0.1  # smallest relative decrease of the residual by a full Newton step
 MIN_STEP_FRACTION = 1e-9  # smallest fraction of a Newton step in the line search
 ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
+STALL_FACTOR = (
+    64  # residual over its round-off error, below which a step without decrease is the last
+)
+SHORT_STALL_FACTOR = 1e3  # the same for a step fraction below SHORT_STEP_FRACTION
+SHORT_STEP_FRACTION = 0.2
+
+
+class PressResidual(NamedTuple):
+    """Residual of the normal contact for increments of heave and pitch in a step.
+
+    - increments: increments of heave and pitch
+    - residual: difference from the increments without contact forces less the compliance times the mean forces
+    - size: size of the residual as a displacement [m]
+    - round_off: round-off error of the size [m]
+    - end_set: number of the contact set at the end of the step, negative if none fits
+    """
+
+    increments: HolderMotion
+    residual: HolderMotion
+    size: float
+    round_off: float
+    end_set: int
+
+
+class PressStep(NamedTuple):
+    """Solution of the normal contact for heave and pitch in a step.
+
+    - end_set: number of the contact set at the end of the step, negative if none fits
+    - iterations: number of iterations
+    - residual: residual as a force [N]
+    """
+
+    end_set: int
+    iterations: int
+    residual: float
+
+
+class StepData(NamedTuple):
+    """Quantities of a step that do not depend on its forces.
+
+    - start: slide and speed at the start, and length of the step
+    - table_row: row of the drive table
+    - free: increments of heave and pitch without interface forces
+    - load: normal load at the start [N]
+    - end_load: prescribed normal load at the end; without one the load at the start [N]
+    """
+
+    start: StepStart
+    table_row: int
+    free: HolderMotion
+    load: float
+    end_load: float
+
+
+class Trial(NamedTuple):
+    """Solution of a step whose normal contact bears an assumed friction force.
+
+    - force: mean friction force that results [N]
+    - increment: increment of the slide [m]
+    - end_load: normal load at the end [N]
+    - end_set: number of the contact set at the end of the step, negative if none fits
+    - iterations: number of iterations
+    - is_solved: whether both friction and contact converged
+    """
+
+    force: float
+    increment: float
+    end_load: float
+    end_set: int
+    iterations: int
+    is_solved: bool
 
 
 class Secant(NamedTuple):
@@ -60,17 +132,19 @@ class Secant(NamedTuple):
     residual: float
 
 
-class PressStep(NamedTuple):
-    """Solution of the normal contact for heave and pitch in a step.
+class ForceSearch(NamedTuple):
+    """Result of the search for the consistent friction force of a step.
 
-    - end_set: number of the contact set at the end of the step, negative if none fits
-    - iterations: number of iterations
-    - residual: residual as a force [N]
+    - guess: last assumed friction force [N]
+    - trial: solution of the step under it
+    - is_consistent: whether the force that results is the assumed one
+    - iterations: number of iterations of all trials
     """
 
-    end_set: int
+    guess: float
+    trial: Trial
+    is_consistent: bool
     iterations: int
-    residual: float
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -81,7 +155,7 @@ def start_march(press):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_press_step(press, free_heave, free_pitch):
+def solve_press_step(press, free):
     """Solve the heave and pitch of a step by Newton's method with a line search.
 
     The increments are those without contact forces minus beta times the mean forces. The forces have a convex
@@ -91,79 +165,134 @@ def solve_press_step(press, free_heave, free_pitch):
     Parameters
     ----------
     press : interfaces.arrays.VaryingLoad
-    free_heave : float
-        Increment of the heave without contact forces [m].
-    free_pitch : float
-        Increment of the pitch without contact forces [rad].
+    free : contact.press_path_kernels.HolderMotion
+        Increments without contact forces.
 
     Returns
     -------
     PressStep
     """
+    increments = HolderMotion(press.few[LoadIndex.GUESS], press.few[LoadIndex.GUESS + 1])
+    step = HolderMotion(0.0, 0.0)
+    best = PressResidual(increments, step, np.inf, 0.0, press.slot[0])
+    point = best
+    step_fraction = 1.0
+    n_iterations = 0
+    is_stalled = False
+    is_finished = False
+    while not is_finished:
+        point = find_press_residual(press, free, increments)
+        n_iterations += not is_stalled
+        is_finished = is_stalled or not can_improve(point)
+        if best.size == np.inf or point.size < best.size * (1 - MIN_DECREASE * step_fraction):
+            best = point
+            step = find_newton_step(press, point.residual)
+            step_fraction = 1.0
+        else:
+            step_fraction *= 0.5
+            is_stalled = is_at_round_off(point, best.size, step_fraction)
+        is_stalled = is_stalled or n_iterations == MAX_ITERATIONS
+        # after a stall the arrays are those of the best point
+        fraction = 0.0 if is_stalled else step_fraction
+        increments = HolderMotion(
+            best.increments.heave - fraction * step.heave,
+            best.increments.rotation - fraction * step.rotation,
+        )
+    if not can_improve(point):
+        return PressStep(point.end_set, n_iterations, 0.0)
+    arm = press.arm[0]
+    compliance = (
+        press.beta[1, 1]
+        + press.beta[2, 2] / (arm * arm)
+        + 2 / press.sets.reference[REFERENCE_STIFFNESS]
+    )
+    return PressStep(point.end_set, n_iterations, point.size / compliance)
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def find_press_residual(press, free, increments):
+    """Compute the residual of increments of heave and pitch in a step.
+
+    The increments, their mean forces and the derivatives of these are written to press.few.
+
+    Parameters
+    ----------
+    press : interfaces.arrays.VaryingLoad
+    free : contact.press_path_kernels.HolderMotion
+        Increments without contact forces.
+    increments : contact.press_path_kernels.HolderMotion
+
+    Returns
+    -------
+    PressResidual
+    """
+    heave = increments.heave
+    pitch = increments.rotation
     start = press.few[LoadIndex.START : LoadIndex.START + 5]
-    increments = press.few[LoadIndex.GUESS : LoadIndex.GUESS + 2]
     out = press.few[LoadIndex.OUT : LoadIndex.OUT + 9]
     arm = press.arm[0]
+    press.few[LoadIndex.GUESS] = heave
+    press.few[LoadIndex.GUESS + 1] = pitch
+    end_set = path_mean(press.sets, press.slot[0], start[0], start[1], heave, pitch, out)
+    heave_change = press.beta[1, 1] * out[0] + press.beta[1, 2] * out[1]
+    pitch_change = press.beta[2, 1] * out[0] + press.beta[2, 2] * out[1]
+    residual = HolderMotion(heave - free.heave + heave_change, pitch - free.rotation + pitch_change)
+    size = abs(residual.heave) + arm * abs(residual.rotation)
+    round_off = ROUND_OFF * (
+        abs(heave)
+        + abs(free.heave)
+        + abs(heave_change)
+        + arm * (abs(pitch) + abs(free.rotation) + abs(pitch_change))
+    )
+    return PressResidual(increments, residual, size, round_off, end_set)
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def can_improve(point):
+    """Return whether a `PressResidual` exceeds its round-off error and has a contact set."""
+    return point.end_set >= 0 and not point.size <= point.round_off
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def find_newton_step(press, residual):
+    """Return the Newton step (HolderMotion) of a residual with the derivatives in press.few."""
+    out = press.few[LoadIndex.OUT : LoadIndex.OUT + 9]
     b11 = press.beta[1, 1]
     b12 = press.beta[1, 2]
     b21 = press.beta[2, 1]
     b22 = press.beta[2, 2]
-    heave = increments[0]
-    pitch = increments[1]
-    best_heave = heave
-    best_pitch = pitch
-    heave_step = 0.0
-    pitch_step = 0.0
-    step_fraction = 1.0
-    smallest = np.inf
-    end_set = press.slot[0]
-    n_iterations = MAX_ITERATIONS
-    for count in range(1, MAX_ITERATIONS):
-        end_set = path_mean(press.sets, press.slot[0], start[0], start[1], heave, pitch, out)
-        if end_set < 0:
-            return PressStep(end_set, count, np.inf)
-        heave_change = b11 * out[0] + b12 * out[1]
-        pitch_change = b21 * out[0] + b22 * out[1]
-        r1 = heave - free_heave + heave_change
-        r2 = pitch - free_pitch + pitch_change
-        residual = abs(r1) + arm * abs(r2)
-        noise = ROUND_OFF * (
-            abs(heave)
-            + abs(free_heave)
-            + abs(heave_change)
-            + arm * (abs(pitch) + abs(free_pitch) + abs(pitch_change))
-        )
-        increments[0] = heave
-        increments[1] = pitch
-        if residual <= noise:
-            return PressStep(end_set, count, 0.0)
-        if residual < smallest * (1 - 0.1 * step_fraction) or smallest == np.inf:
-            smallest = residual
-            step_fraction = 1.0
-            best_heave = heave
-            best_pitch = pitch
-            j11 = 1 + b11 * out[5] + b12 * out[7]
-            j12 = b11 * out[6] + b12 * out[8]
-            j21 = b21 * out[5] + b22 * out[7]
-            j22 = 1 + b21 * out[6] + b22 * out[8]
-            det = j11 * j22 - j12 * j21
-            heave_step = (j22 * r1 - j12 * r2) / det
-            pitch_step = (j11 * r2 - j21 * r1) / det
-        else:
-            step_fraction *= 0.5
-            is_stalled = step_fraction < 0.2 and smallest <= 1e3 * noise
-            if step_fraction < MIN_STEP_FRACTION or residual <= 64 * noise or is_stalled:
-                increments[0] = best_heave
-                increments[1] = best_pitch
-                end_set = path_mean(
-                    press.sets, press.slot[0], start[0], start[1], best_heave, best_pitch, out
-                )
-                n_iterations = count
-                break
-        heave = best_heave - step_fraction * heave_step
-        pitch = best_pitch - step_fraction * pitch_step
-    compliance = b11 + b22 / (arm * arm) + 2 / press.sets.reference[REFERENCE_STIFFNESS]
-    return PressStep(end_set, n_iterations, smallest / compliance)
+    j11 = 1 + b11 * out[5] + b12 * out[7]
+    j12 = b11 * out[6] + b12 * out[8]
+    j21 = b21 * out[5] + b22 * out[7]
+    j22 = 1 + b21 * out[6] + b22 * out[8]
+    det = j11 * j22 - j12 * j21
+    heave_step = (j22 * residual.heave - j12 * residual.rotation) / det
+    pitch_step = (j11 * residual.rotation - j21 * residual.heave) / det
+    return HolderMotion(heave_step, pitch_step)
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def is_at_round_off(point, best_size, step_fraction):
+    """Return whether a residual that does not decrease is due to round-off.
+
+    Parameters
+    ----------
+    point : PressResidual
+    best_size : float
+        Size of the smallest residual [m].
+    step_fraction : float
+        Next fraction of the Newton step.
+
+    Returns
+    -------
+    bool
+    """
+    is_short = step_fraction < SHORT_STEP_FRACTION
+    return (
+        step_fraction < MIN_STEP_FRACTION
+        or point.size <= STALL_FACTOR * point.round_off
+        or (is_short and best_size <= SHORT_STALL_FACTOR * point.round_off)
+    )
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -291,18 +420,16 @@ def add_press_accelerations(press, mass, accel):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_friction_step(start, force, ignores_events, table_row, system):
+def solve_friction_step(data, force, ignores_events, system):
     """Solve the friction of a step under prescribed mean forces on heave and pitch.
 
     Parameters
     ----------
-    start : interfaces.arrays.StepStart
+    data : StepData
     force : (2,) array
         Mean force on the heave [N] and moment on the pitch [N m].
     ignores_events : bool
         Whether stops and releases inside the step are ignored.
-    table_row : int
-        Row of the drive table for this step.
     system : element_arrays.MarchArrays
 
     Returns
@@ -314,7 +441,7 @@ def solve_friction_step(start, force, ignores_events, table_row, system):
     elements = system.elements
     beta = press.beta
     free = (
-        free_increment(system.motion, modal_system, 0, system.table, table_row)
+        free_increment(system.motion, modal_system, 0, system.table, data.table_row)
         - beta[0, 1] * force[0]
         - beta[0, 2] * force[1]
     )
@@ -325,15 +452,15 @@ def solve_friction_step(start, force, ignores_events, table_row, system):
         if beta[0, 0] == 0.0:  # no mode moves the interface tangentially
             return SolvedStep(coupling.slide_freely(0.0, elements), 0.0, 1)
         elements.port[PortRow.FREE_SPEED, 0] = (
-            free_rate(system.motion, modal_system.slide, modal_system, system.table, table_row)
+            free_rate(system.motion, modal_system.slide, modal_system, system.table, data.table_row)
             - elements.compliances[ComplianceRow.SPEED, 0, 1] * force[0]
             - elements.compliances[ComplianceRow.SPEED, 0, 2] * force[1]
         )
         if ignores_events:
-            _, n_iterations = coupling.solve_coupled_forces(start, system)
+            _, n_iterations = coupling.solve_coupled_forces(data.start, system)
             elements.contact[ContactIndex.STOPS_KNOWN] = 0.0
         else:
-            n_iterations = coupling.solve_step(start, table_row, system).iterations
+            n_iterations = coupling.solve_step(data.start, data.table_row, system).iterations
         return SolvedStep(
             elements.state[ElementRow.INCREMENT, 0],
             elements.state[ElementRow.FORCE, 0],
@@ -341,19 +468,19 @@ def solve_friction_step(start, force, ignores_events, table_row, system):
         )
     else:
         tolerance = COUPLING_TOL_FACTOR * press.goal[0]
-        return contact.solve_step(free, beta[0, 0], start, system.interface, tolerance)
+        return contact.solve_step(free, beta[0, 0], data.start, system.interface, tolerance)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_press_under_friction(heave, pitch, friction, press):
+def solve_press_under_friction(free, friction, press):
     """Solve the heave and pitch of a step under a prescribed mean friction force.
 
     Their mean forces are written to press.few.
 
     Parameters
     ----------
-    heave, pitch : float
-        Increments without interface forces [m], [rad].
+    free : contact.press_path_kernels.HolderMotion
+        Increments without interface forces.
     friction : float
         Mean friction force [N].
     press : interfaces.arrays.VaryingLoad
@@ -363,9 +490,10 @@ def solve_press_under_friction(heave, pitch, friction, press):
     PressStep
     """
     few = press.few
-    free_heave = heave - press.beta[1, 0] * friction
-    free_pitch = pitch - press.beta[2, 0] * friction
-    step = solve_press_step(press, free_heave, free_pitch)
+    free_under_friction = HolderMotion(
+        free.heave - press.beta[1, 0] * friction, free.rotation - press.beta[2, 0] * friction
+    )
+    step = solve_press_step(press, free_under_friction)
     if step.end_set >= 0:
         few[LoadIndex.MEAN_PRESS] = few[LoadIndex.OUT]
         few[LoadIndex.MEAN_PRESS + 1] = few[LoadIndex.OUT + 1]
@@ -422,14 +550,103 @@ def take_secant_step(secant, guess, force, n_guesses):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
+def can_move(press):
+    """Return whether the normal contact moves the modes; it does not under a prescribed load."""
+    return press.loads.size == 0 and (press.beta[1, 1] != 0 or press.beta[2, 2] != 0)
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_trial(guess, ignores_events, data, system):
+    """Solve the normal contact under an assumed mean friction force, and then the friction.
+
+    Parameters
+    ----------
+    guess : float
+        Assumed friction force [N].
+    ignores_events : bool
+        Whether stops and releases inside the step are ignored.
+    data : StepData
+    system : element_arrays.MarchArrays
+
+    Returns
+    -------
+    Trial
+    """
+    press = system.press
+    few = press.few
+    end_load = data.end_load
+    press_step = PressStep(press.slot[0], 0, 0.0)
+    if can_move(press):
+        press_step = solve_press_under_friction(data.free, guess, press)
+        if press_step.end_set < 0:
+            return Trial(guess, 0.0, end_load, press_step.end_set, press_step.iterations, False)
+        preload = press.sets.reference[REFERENCE_LOAD]
+        end_load = 2 * max(preload - few[LoadIndex.OUT], 0.0) - data.load
+    set_loads(data.load, end_load, system)
+    press_force = few[LoadIndex.MEAN_PRESS : LoadIndex.MEAN_PRESS + 2]
+    step = solve_friction_step(data, press_force, ignores_events, system)
+    return Trial(
+        step.mean_force,
+        step.increment,
+        end_load,
+        press_step.end_set,
+        press_step.iterations + abs(step.iterations),
+        step.iterations >= 0 and press_step.residual <= press.goal[0],
+    )
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def find_consistent_force(guess, ignores_events, data, system):
+    """Find the friction force that results from a step whose normal contact bears it.
+
+    If friction moves heave or pitch, a safeguarded secant method finds it. Otherwise every assumed force gives the same
+    result.
+
+    Parameters
+    ----------
+    guess : float
+        First assumed friction force [N].
+    ignores_events : bool
+        Whether stops and releases inside the step are ignored.
+    data : StepData
+    system : element_arrays.MarchArrays
+
+    Returns
+    -------
+    ForceSearch
+    """
+    press = system.press
+    is_coupled = can_move(press) and (press.beta[0, 1] != 0 or press.beta[0, 2] != 0)
+    tolerance = COUPLING_TOL_FACTOR * press.goal[0]
+    secant = Secant(-np.inf, np.inf, 0.0, np.inf)
+    n_guesses = 0
+    n_iterations = 0
+    while True:
+        trial = solve_trial(guess, ignores_events, data, system)
+        n_guesses += 1
+        n_iterations += trial.iterations
+        is_consistent = not is_coupled or abs(trial.force - guess) <= tolerance
+        if is_consistent or n_guesses == MAX_GUESSES or is_bracket_closed(secant):
+            return ForceSearch(guess, trial, is_consistent, n_iterations)
+        secant, guess = take_secant_step(secant, guess, trial.force, n_guesses)
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def is_between_frictions(force, data, end_load, press):
+    """Return whether a mean friction force lies between kinetic and static friction."""
+    mean_load = 0.5 * (data.load + max(end_load, 0.0))
+    return press.force[1] * mean_load <= abs(force) <= press.force[0] * mean_load
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_coupled_forces(i, start, table_row, system):
     """Solve the coupled friction and normal contact over a step.
 
-    Each is solved under the mean force of the other. If friction also moves heave or pitch, a safeguarded secant method
-    finds the consistent force. The
-    force jumps where a stop inside the step appears or disappears with the guess. If no force is consistent then,
-    the mean force over the entire step is found instead, which does not jump between stick and slip at one
-    coefficient. The mean forces on heave and pitch are in press.few then.
+    Each is solved under the mean force of the other, until the assumed friction force is the one that results. This
+    force jumps where a stop inside the step appears or disappears with the assumed force. If no force is consistent
+    then, one between kinetic and static friction means that slip begins in the step; otherwise the mean force over the
+    entire step is found, which does not jump between stick and slip at one coefficient. The mean forces on heave and
+    pitch are in press.few then.
 
     Parameters
     ----------
@@ -446,72 +663,65 @@ def solve_coupled_forces(i, start, table_row, system):
         The iterations are negative if friction and contact do not agree.
     """
     press = system.press
-    few = press.few
-    beta = press.beta
-    load = few[LoadIndex.LOAD]
-    preload = press.sets.reference[REFERENCE_LOAD]
-    goal = press.goal[0]
-    is_prescribed = press.loads.size > 0
-    moves = not is_prescribed and (beta[1, 1] != 0 or beta[2, 2] != 0)
-    is_coupled = moves and (beta[0, 1] != 0 or beta[0, 2] != 0)
+    data = read_step_data(i, start, table_row, system)
+    guess = press.mean[0]
+    n_iterations = 0
+    slips_freely = False
+    for ignores_events in (False, True):
+        search = find_consistent_force(guess, ignores_events, data, system)
+        guess = search.guess
+        n_iterations += search.iterations
+        if search.is_consistent or not HAS_STOPS:
+            break
+        slips_freely = is_between_frictions(guess, data, search.trial.end_load, press)
+        if slips_freely:
+            break
+    trial = search.trial
+    force = trial.force
+    increment = trial.increment
+    is_solved = trial.is_solved
+    if HAS_STOPS:
+        if slips_freely:
+            force = guess
+            increment = coupling.slide_freely(force, system.elements)
+    if not search.is_consistent and not slips_freely:
+        is_solved = is_solved and abs(force - guess) <= press.goal[0]
+    press.mean[0] = force
+    press.slot[0] = trial.end_set
+    if can_move(press):
+        preload = press.sets.reference[REFERENCE_LOAD]
+        press.few[LoadIndex.LOAD] = max(preload - press.few[LoadIndex.OUT + 3], 0.0)
+    return SolvedStep(increment, force, n_iterations if is_solved else -n_iterations)
+
+
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def read_step_data(i, start, table_row, system):
+    """Return the quantities of a step that do not depend on its forces (`StepData`).
+
+    The nodal loads at the start of the step are those at the end of the last one.
+
+    Parameters
+    ----------
+    i : int
+        Number of the sample at which the step starts.
+    start : interfaces.arrays.StepStart
+    table_row : int
+        Row of the drive table for this step.
+    system : element_arrays.MarchArrays
+
+    Returns
+    -------
+    StepData
+    """
+    press = system.press
     heave = free_increment(system.motion, system.modal_system, 1, system.table, table_row)
     pitch = free_increment(system.motion, system.modal_system, 2, system.table, table_row)
+    load = press.few[LoadIndex.LOAD]
     end_load = load
-    if is_prescribed:
+    if press.loads.size > 0:
         end_load = press.loads[i + 1]
         press.now[0] = end_load
     if HAS_POINTS:
         for k in range(press.now.size):
             system.interface.pressed[0, k] = system.interface.pressed[1, k]
-    guess = press.mean[0]
-    secant = Secant(-np.inf, np.inf, 0.0, np.inf)
-    end_set = press.slot[0]
-    n_iterations = 0
-    press_residual = 0.0
-    increment = 0.0
-    force = 0.0
-    is_bad = False
-    is_whole = False
-    last_turn = MAX_GUESSES
-    for n_guesses in range(1, 2 * MAX_GUESSES + 1):
-        if moves:
-            press_step = solve_press_under_friction(heave, pitch, guess, press)
-            end_set = press_step.end_set
-            if end_set < 0:
-                press.slot[0] = end_set
-                return SolvedStep(increment, force, n_iterations)
-            press_residual = press_step.residual
-            n_iterations += press_step.iterations
-            end_load = 2 * max(preload - few[LoadIndex.OUT], 0.0) - load
-        set_loads(load, end_load, system)
-        press_force = few[LoadIndex.MEAN_PRESS : LoadIndex.MEAN_PRESS + 2]
-        step = solve_friction_step(start, press_force, is_whole, table_row, system)
-        increment = step.increment
-        force = step.mean_force
-        n_iterations += abs(step.iterations)
-        is_bad = step.iterations < 0 or press_residual > goal
-        residual = force - guess
-        if not is_coupled or abs(residual) <= COUPLING_TOL_FACTOR * goal:
-            break
-        if n_guesses < last_turn and not is_bracket_closed(secant):
-            secant, guess = take_secant_step(secant, guess, force, n_guesses)
-            continue
-        if HAS_STOPS:
-            mean_load = 0.5 * (load + max(end_load, 0.0))
-            if press.force[1] * mean_load <= abs(guess) <= press.force[0] * mean_load:
-                # The force lies between kinetic and static friction, so slip begins in this step.
-                force = guess
-                increment = coupling.slide_freely(force, system.elements)
-                break
-            if not is_whole:
-                is_whole = True
-                last_turn = n_guesses + MAX_GUESSES
-                secant = Secant(-np.inf, np.inf, 0.0, np.inf)
-                continue
-        is_bad = is_bad or abs(residual) > goal
-        break
-    press.mean[0] = force
-    press.slot[0] = end_set
-    if moves:
-        few[LoadIndex.LOAD] = max(preload - few[LoadIndex.OUT + 3], 0.0)
-    return SolvedStep(increment, force, -n_iterations if is_bad else n_iterations)
+    return StepData(start, table_row, HolderMotion(heave, pitch), load, end_load)
