@@ -62,7 +62,7 @@ PUBLIC = {
         "Reading",
         "join_readings",
     ),
-    "events.steady": ("find_steady_state_from",),
+    "events.steady": ("continue_to_steady_state",),
     "grooves.climbing": ("with_shear_modes",),
     "harmonic.backbone": ("FreeBalance",),
     "harmonic.balance": (

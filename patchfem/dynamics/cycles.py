@@ -7,15 +7,50 @@ import numpy as np
 
 from ..core import STICK_SPEED_RATIO
 
-ROOT_SIGNS = np.array(
-    [[1.0], [-1.0]]
-)  # signs of the square root in both solutions of a quadratic equation
 # product of two successive rates over the square of the largest rate, below which it is round-off, as at rest
 REST_RATIO = 1e-12
 # round-off level of speeds over the largest speed, and of slip increments over the largest output
 ROUND_OFF_RATIO = 1e-13
 # largest number of samples that are kept of a cycle before the last cycles, which bounds the memory
 MAX_SAMPLES_PER_CYCLE = 100
+# number of samples of each of the last cycles, for engines that choose the length of their steps
+SAMPLES_PER_CYCLE = 400
+# smallest number of samples of the last cycles, for a run that is shorter than a cycle
+MIN_SAMPLES = 101
+
+
+def sample_last_cycles(begin: float, end: float, period: float) -> np.ndarray:
+    """Return the times at which the last cycles of a run are sampled.
+
+    Parameters
+    ----------
+    begin, end, period : float
+        Start and end of the cycles, and duration of a cycle [s].
+
+    Returns
+    -------
+    ndarray
+        (k,) [s].
+    """
+    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
+    return np.linspace(begin, end, max(MIN_SAMPLES, count))
+
+
+def sample_earlier_cycles(begin: float, end: float, period: float) -> np.ndarray:
+    """Return the times at which the cycles before the last ones are sampled as densely.
+
+    Parameters
+    ----------
+    begin, end, period : float
+        Start and end of the cycles, and duration of a cycle [s].
+
+    Returns
+    -------
+    ndarray
+        (k,) [s].
+    """
+    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
+    return np.linspace(begin, end, max(2, count))
 
 
 def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
@@ -156,7 +191,7 @@ def find_hermite_extremes(values, rates, dt) -> Extremes:
         cubic = 2 * (a - b) + p + q
         quadratic = 3 * (b - a) - 2 * p - q
         root = np.sqrt(np.maximum(quadratic**2 - 3 * cubic * p, 0))
-        denominator = quadratic + ROOT_SIGNS * root
+        denominator = np.stack([quadratic + root, quadratic - root])
         is_regular = denominator != 0
         s = np.where(is_regular, -p / np.where(is_regular, denominator, 1), -1.0)
         value = a + p * s + quadratic * s**2 + cubic * s**3

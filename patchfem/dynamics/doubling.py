@@ -85,14 +85,16 @@ def double_step(step: StepMap, halves) -> StepMap:
     second_state[:size, :size] += step.change
     second_state[:size, size : size + n] = step.push
     second_state[:size, size + n :] = first_drive
+    work, lost = (
+        first_state.T @ form @ first_state + second_state.T @ form @ second_state
+        for form in (step.work, step.lost)
+    )
     return StepMap(
         2 * step.change + step.change @ step.change,
         2 * step.push + step.change @ step.push,
         first_drive + step.change @ first_drive + step.drive @ second,
-        *(
-            first_state.T @ form @ first_state + second_state.T @ form @ second_state
-            for form in (step.work, step.lost)
-        ),
+        work,
+        lost,
     )
 
 

@@ -109,11 +109,10 @@ def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: fl
     list of LimitCycle
         In increasing amplitude.
     """
-    return sorted(
-        mode_relay_cycle
-        for mode in find_unstable_modes(modes)
-        for mode_relay_cycle in _find_mode_relay_cycles(modes, row, (slip_force, stick_force), mode)
-    )
+    cycles = []
+    for mode in find_unstable_modes(modes):
+        cycles += _find_mode_relay_cycles(modes, row, (slip_force, stick_force), mode)
+    return sorted(cycles)
 
 
 def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
@@ -170,11 +169,8 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
             damping=modes.damping_matrix
             - (modal_rate + np.exp(log_rate)) * np.eye(modes.omega.size),
         )
-        cycles = [
-            mode_relay_cycle
-            for mode_relay_cycle in _find_mode_relay_cycles(undamped_modes, row, forces, mode)
-            if mode_relay_cycle.amplitude > 0
-        ]
+        cycles = _find_mode_relay_cycles(undamped_modes, row, forces, mode)
+        cycles = [candidate for candidate in cycles if candidate.amplitude > 0]
         return min(
             cycles, key=lambda candidate: abs(candidate.omega - modes.omega[mode]), default=None
         )
@@ -188,15 +184,13 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     )
     rates = rate_at_1_m / np.asarray(amplitudes, float)
     max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
-    return [
-        _solve_damping_at(cycle, float(a), modal_rate, float(rate))
-        if 0 < rate <= max_rate
-        else None
-        for a, rate in zip(amplitudes, rates)
-    ]
+    dampings = [None] * len(rates)
+    for k in np.flatnonzero((rates > 0) & (rates <= max_rate)):
+        dampings[k] = _solve_damping(cycle, float(amplitudes[k]), modal_rate, float(rates[k]))
+    return dampings
 
 
-def _solve_damping_at(
+def _solve_damping(
     cycle, amplitude: float, modal_rate: float, friction_rate: float
 ) -> tuple | None:
     """Return the limit cycle and damping ratio of an amplitude [m] by the secant method.
@@ -375,10 +369,9 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
     )
     for amplitudes, start, min_amplitude in paths:
         try:
-            coarse_cycles, fine_cycles = (
-                _find_undamped_motions(modes, group, mode, (amplitudes, start), harmonics)
-                for harmonics in (N_HARMONICS, 2 * N_HARMONICS + 1)
-            )
+            path = amplitudes, start
+            coarse_cycles = _find_undamped_motions(modes, group, mode, path, N_HARMONICS)
+            fine_cycles = _find_undamped_motions(modes, group, mode, path, 2 * N_HARMONICS + 1)
         except NotConverged:
             continue
         if len(coarse_cycles) != len(fine_cycles):
@@ -386,13 +379,11 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
                 f"{len(coarse_cycles)} limit cycles were found with {N_HARMONICS} harmonics but {len(fine_cycles)} limit "
                 f"cycles with {2 * N_HARMONICS + 1} harmonics"
             )
-        return [
-            fine_cycle._replace(
-                error=2 * abs(coarse_cycle.amplitude - fine_cycle.amplitude)
-                + AMPLITUDE_TOL * fine_cycle.amplitude
-            )
-            for coarse_cycle, fine_cycle in zip(coarse_cycles, fine_cycles)
-        ], min_amplitude
+        cycles = []
+        for coarse, fine in zip(coarse_cycles, fine_cycles):
+            change = abs(coarse.amplitude - fine.amplitude)
+            cycles.append(fine._replace(error=2 * change + AMPLITUDE_TOL * fine.amplitude))
+        return cycles, min_amplitude
     raise NotConverged(NOT_FOLLOWED_MESSAGE)
 
 

@@ -135,11 +135,11 @@ class Shooting:
         """
         raise NotImplementedError
 
-    def step_from(self, mapped_point: MappedPoint, step):
+    def move_by_newton_step(self, mapped_point: MappedPoint, step):
         """Return the state that lies a Newton step (m,) away from a mapped point."""
         raise NotImplementedError
 
-    def run_from(self, mapped_point: MappedPoint, n_periods: int):
+    def march_periods(self, mapped_point: MappedPoint, n_periods: int):
         """Return the state after integrating some periods from the image of a mapped point."""
         raise NotImplementedError
 
@@ -155,7 +155,7 @@ class Shooting:
             return False
         sizes = [mapped_point.size]
         for _ in range(2):
-            mapped_point = self.map_point(self.run_from(mapped_point, N_GROWTH_PERIODS))
+            mapped_point = self.map_point(self.march_periods(mapped_point, N_GROWTH_PERIODS))
             sizes.append(mapped_point.size)
         first, second = np.diff(sizes)
         return bool(first > 1e-6 * sizes[0] and second > 0.99 * first)
@@ -201,7 +201,7 @@ class Shooting:
             if better is not None:
                 mapped_point = better
                 continue
-            mapped_point = self.map_point(self.run_from(mapped_point, n_periods[0]))
+            mapped_point = self.map_point(self.march_periods(mapped_point, n_periods[0]))
             n_periods = (min(2 * n_periods[0], n_periods[1]), n_periods[1])
             if self.is_growing(mapped_point):
                 raise MotionGrows(mapped_point, n_steps + 1)
@@ -221,7 +221,7 @@ class Shooting:
         step = mapped_point.newton_step()
         for fraction in fractions:
             try:
-                trial = self.map_point(self.step_from(mapped_point, fraction * step))
+                trial = self.map_point(self.move_by_newton_step(mapped_point, fraction * step))
             except NotConverged:
                 continue
             # the relative residual of an unbounded motion decreases as the step grows, so the

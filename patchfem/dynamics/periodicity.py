@@ -14,8 +14,8 @@ import numpy as np
 FIRST_CHECK = 4
 
 
-def is_checked_after(n_cycles: int) -> bool:
-    """Return whether the motion is checked for periodicity after a number of cycles."""
+def is_check_cycle(n_cycles: int) -> bool:
+    """Return whether the motion is checked for periodicity at the end of this cycle."""
     return n_cycles >= FIRST_CHECK and n_cycles & (n_cycles - 1) == 0
 
 

@@ -17,6 +17,7 @@ from ...core import (
 )
 from ...cost_model import PYTHON_READ_TIME_RATIO
 from ...structure.drive_sizes import choose_samples_per_cycle
+from ..cycles import SAMPLES_PER_CYCLE, sample_earlier_cycles, sample_last_cycles
 from .cost import estimate_cycle_time, estimate_sample_time
 from .elements import (
     element_stretches,
@@ -52,10 +53,6 @@ from .positions_kernels import (
 from .reading import Reading, find_stick_vibration
 
 PACKAGE = "dynamics.events"
-# Samples per cycle in the histories of the window.
-SAMPLES_PER_CYCLE = 400
-# Minimum number of samples of the window, for a run that is shorter than a cycle.
-MIN_SAMPLES = 101
 # Number of time intervals that one call of the march records.
 ROWS_PER_CALL = 4096
 # Maximum number of reversals and slip events from before the window whose rows are kept.
@@ -63,7 +60,7 @@ MAX_REVERSAL_ROWS = 400_000
 # Maximum number of repeating cycles for which the reversals are stored.
 MAX_REPEATED_CYCLES = 1000
 # Fraction of the sum of the magnitudes of its terms below which a velocity is round-off.
-REST_TOL = 64 * 2.0**-52
+REST_TOL = 64 * np.finfo(float).eps
 # Fraction of the friction limit; an interface slips where more than this fraction of it slips.
 SLIP_FRACTION = 0.5
 # Minimum number of cycles that are measured of a repeating motion; three contain every stick of a cycle completely.
@@ -837,11 +834,8 @@ class _EventRun:
         end_time = rows[-1, Row.TIME]
         reversal_rows = np.concatenate([no_rows, *self.early_rows])
         early_rows = np.concatenate([no_rows, *early_rows])
-        n_samples_in_window = max(
-            MIN_SAMPLES, round((end_time - start_time) / self.period * SAMPLES_PER_CYCLE) + 1
-        )
         window = self.sample_rows(
-            window_rows, np.linspace(start_time, end_time, n_samples_in_window)
+            window_rows, sample_last_cycles(start_time, end_time, self.period)
         )
         if len(reversal_rows):
             at_start = np.zeros(len(reversal_rows))
@@ -854,8 +848,9 @@ class _EventRun:
             parts = [_select_samples(part, part.time < end) for part in self.equal_samples]
         if len(early_rows):
             first = early_rows[0, Row.TIME]
-            n_samples = round((start_time - first) / self.period * SAMPLES_PER_CYCLE) + 1
-            early_samples = self.sample_rows(early_rows, np.linspace(first, start_time, n_samples))
+            early_samples = self.sample_rows(
+                early_rows, sample_earlier_cycles(first, start_time, self.period)
+            )
             parts.append(_select_samples(early_samples, early_samples.time < start_time))
         return replace(
             self._summarise(rows),

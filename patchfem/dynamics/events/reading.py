@@ -61,10 +61,9 @@ class Reading:
         See `mean_slip_phase`.
         """
         return mean_slip_phase(
-            *(
-                self.run[..., place]
-                for place in (RunMeasure.N_RELEASES, RunMeasure.RELEASE_COS, RunMeasure.RELEASE_SIN)
-            )
+            self.run[..., RunMeasure.N_RELEASES],
+            self.run[..., RunMeasure.RELEASE_COS],
+            self.run[..., RunMeasure.RELEASE_SIN],
         )
 
     @property

@@ -94,7 +94,7 @@ def solve_steady(
     return _make_steady(period_map, *find_antisymmetric_motion(period_map, drive, near), True)
 
 
-def find_steady_state_from(
+def continue_to_steady_state(
     modes: ModalBasis, drive, groups, start: InitialState, memory: Memory
 ) -> SteadyState:
     """Find the periodic motion that a run from a given state approaches.
@@ -196,11 +196,11 @@ class YieldShooting(Shooting):
             mapping.kept,
         )
 
-    def step_from(self, mapped_point: MappedPoint, step) -> PoincarePoint:
+    def move_by_newton_step(self, mapped_point: MappedPoint, step) -> PoincarePoint:
         """Return the state after a Newton step, with the element groups at the end of the map."""
         return mapped_point.image.end.with_unknowns(mapped_point.point.unknowns + step)
 
-    def run_from(self, mapped_point: MappedPoint, n_periods: int) -> PoincarePoint:
+    def march_periods(self, mapped_point: MappedPoint, n_periods: int) -> PoincarePoint:
         """Return the state after some periods that start at the end of a map."""
         return self.run(self._make_next_start(mapped_point.image), n_periods)
 

@@ -364,14 +364,14 @@ class CoulombShooting(Shooting):
             mapping.sizes[0] / self.moved_by,
         )
 
-    def step_from(self, mapped_point: MappedPoint, step):
+    def move_by_newton_step(self, mapped_point: MappedPoint, step):
         """Return the state after a Newton step, in which the sticking interfaces stay at rest."""
         n = self.modes.omega.size
         state = mapped_point.point + step
         state[n:] = mapped_point.image.first_projector @ state[n:]
         return state
 
-    def run_from(self, mapped_point: MappedPoint, n_periods: int):
+    def march_periods(self, mapped_point: MappedPoint, n_periods: int):
         """Return the state after some periods that begin at a mapped state."""
         return self.run(mapped_point.point, n_periods)
 

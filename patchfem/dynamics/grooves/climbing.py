@@ -13,7 +13,7 @@ from ..interfaces.arrays import ClimbingPoints
 from ..ledger import Ledger
 from ..march.run import Run
 from ..march.varying_load import (
-    PLASTIC,
+    LawKind,
     VaryingLoadLaw,
     make_elastic_plastic_law,
     make_pressed_fields,
@@ -234,7 +234,7 @@ class ClimbingModel(FlankModel):
             return {}
         top = contact.memory[0]
         bottom = contact.memory[1]
-        if self.law.kind == PLASTIC:
+        if self.law.kind == LawKind.PLASTIC:
             force = self.law.static * top
             stretch = self.law.length * np.divide(
                 top, bottom, where=bottom > 0, out=np.zeros_like(top)

@@ -15,6 +15,7 @@ from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
 from ..ledger import Ledger
 from ..march.models import coulomb_model
+from ..march.run import MarchStatus
 from ..smooth import run as smooth
 from ..smooth.arrays import Counter, Scalar, Work
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
@@ -34,7 +35,10 @@ LEDGER_SUMS = [
     Ledger.FRICTION_WORK,
 ]
 # status of the march for each outcome of the integrated motion
-STATUS_OF_OUTCOME = {Outcome.LEAVES_GROOVES: 5, Outcome.NOT_CONVERGED: 3}
+STATUS_OF_OUTCOME = {
+    Outcome.LEAVES_GROOVES: MarchStatus.LEAVES_GROOVES,
+    Outcome.NOT_CONVERGED: MarchStatus.NOT_FINITE,
+}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -183,14 +187,13 @@ class SampledRun(GroovesRun):
             samples = np.concatenate([samples, motion.read_state()[0][None]])
         output = samples[:, 1 : 1 + n] @ self.modes.output
         exceeding = np.flatnonzero(np.abs(output) > self.travel)
-        last, status = (
-            (int(exceeding[0]), 1)
-            if exceeding.size
-            else (len(samples) - 1, STATUS_OF_OUTCOME.get(motion.outcome, 0))
-        )
-        if (
-            0 < last < len(samples) - 1
-        ):  # the motion is repeated up to the last sample, so that sums and state belong to it
+        last = len(samples) - 1
+        status = STATUS_OF_OUTCOME.get(motion.outcome, MarchStatus.FINISHED)
+        if exceeding.size:
+            last = int(exceeding[0])
+            status = MarchStatus.EXCEEDS_TRAVEL
+        # the motion is repeated up to the last sample, so that sums and state belong to it
+        if 0 < last < len(samples) - 1:
             motion = self.smooth_motion = start_motion
             motion.run_to(times[last], times[: last + 1])
         samples = samples[: last + 1]
@@ -231,7 +234,7 @@ class SampledRun(GroovesRun):
 
     def set_outcome(self, status: int) -> None:
         super().set_outcome(status)
-        if status == 5:
+        if status == MarchStatus.LEAVES_GROOVES:
             self._set_grooves_left()
 
     def check_steps(self) -> None:

@@ -74,11 +74,10 @@ def find_monodromy(
     """
     n = modes.omega.size
     count = slope.shape[1]
-    memory_coefficients = [
-        np.broadcast_to(part, count)
-        for memory in fading
-        for part in (memory.gain, memory.loss, memory.limit)
-    ]
+    memory_coefficients = []
+    for memory in fading:
+        coefficients = (memory.gain, memory.loss, memory.limit)
+        memory_coefficients += [np.broadcast_to(part, count) for part in coefficients]
     first = _find_equal_cells(
         [slope, by_rate, *(reversal.hold for reversal in reversals), *memory_coefficients],
         reversals,

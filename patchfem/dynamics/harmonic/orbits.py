@@ -129,11 +129,9 @@ def estimate_multipliers(run) -> np.ndarray:
         return np.zeros(state.size)
     starts, ends = (np.concatenate(part, axis=1) for part in zip(*pairs))
     values = np.linalg.eigvals(ends @ np.linalg.pinv(starts, rcond=MIN_SINGULAR_RATIO))
-    growth = (
-        (sizes[last - 1] / sizes[first]) ** (1 / max(last - 1 - first, 1))
-        if sizes[first] > 0
-        else 0.0
-    )
+    growth = 0.0
+    if sizes[first] > 0:
+        growth = (sizes[last - 1] / sizes[first]) ** (1 / max(last - 1 - first, 1))
     values /= np.maximum(np.abs(values) / max(growth, 1.0), 1.0)
     return values[np.argsort(-np.abs(values))]
 

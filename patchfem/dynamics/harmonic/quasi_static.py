@@ -8,6 +8,7 @@ a law follows Masing's rule the loop is its curve of first loading, twice as lar
 curve gives both (Festjens, Chevallier and Dion 2013; Lacayo and Allen 2019).
 """
 
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -67,12 +68,13 @@ def find_loops(laws, u: float, samples: int) -> StaticLoops:
     -------
     StaticLoops
     """
-    loops = [
-        StaticLoops(*map(float, masing_loop(law.stiffness, law.limit_slide, u)))
-        if isinstance(law, Jenkins)
-        else _sample_loops(law, u, samples)
-        for law in laws
-    ]
+    loops = []
+    for law in laws:
+        if isinstance(law, Jenkins):
+            tip, area = masing_loop(law.stiffness, law.limit_slide, u)
+            loops.append(StaticLoops(float(tip), float(area)))
+        else:
+            loops.append(_sample_loops(law, u, samples))
     return StaticLoops(sum(loop.tip for loop in loops), sum(loop.area for loop in loops))
 
 
@@ -93,13 +95,12 @@ def depends_on_speed(group: LawGroup, u: float) -> bool:
     u: amplitude of the slide [m] at which the laws are sampled.
 
     """
-    for law in (
-        group_law for laws in group.laws for group_law in laws if not isinstance(group_law, Jenkins)
-    ):
-        slow, fast = (
-            law.sample(SampledSlide(np.array([0.0, u], complex), rate, 512)).force
-            for rate in (1.0, TEST_RATE_RATIO)
-        )
+    for law in chain.from_iterable(group.laws):
+        if isinstance(law, Jenkins):
+            continue
+        slide = np.array([0.0, u], complex)
+        slow = law.sample(SampledSlide(slide, 1.0, 512)).force
+        fast = law.sample(SampledSlide(slide, TEST_RATE_RATIO, 512)).force
         if np.abs(fast - slow).max() > FORCE_TOL * np.abs(slow).max(initial=1e-300):
             return True
     return False
@@ -156,10 +157,9 @@ def find_static_motions(
             continue
         z = guess[:-1] * amplitude
         alpha = float(guess[-1]) * omega**2 * amplitude
-        loss = sum(
-            find_loops(laws, abs(slide), samples).area
-            for slide, laws in zip(group.rows @ z, group.laws)
-        )
+        slides = np.abs(group.rows @ z)
+        areas = [find_loops(laws, u, samples).area for u, laws in zip(slides, group.laws)]
+        loss = sum(areas)
         motions.append(_make_static_motion(modes, shape, (z, alpha, loss)))
     return motions
 
@@ -212,13 +212,9 @@ def _solve_equilibrium(
     modal_stiffness = np.diag(modes.omega**2) / omega**2
 
     def find_residual(x):
-        u = group.rows @ x[:n] * amplitude
-        force = np.array(
-            [
-                np.sign(slide) * find_loops(laws, abs(slide), samples).tip
-                for slide, laws in zip(u, group.laws)
-            ]
-        )
+        slides = group.rows @ x[:n] * amplitude
+        tips = [find_loops(laws, abs(u), samples).tip for u, laws in zip(slides, group.laws)]
+        force = np.sign(slides) * np.array(tips)
         return np.append(
             modal_stiffness @ x[:n]
             + group.rows.T @ force / (m * omega**2 * amplitude)

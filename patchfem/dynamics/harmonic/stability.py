@@ -83,11 +83,9 @@ def _weigh_samples(track, sampled):
     if sampled.slope is None:
         return 0.5
     if sampled.by_rate is not None:
-        return (
-            0.5
-            if sampled.hold is None
-            else _set_reversal_weights(track, np.full(track.samples, 0.5))
-        )
+        if sampled.hold is None:
+            return 0.5
+        return _set_reversal_weights(track, np.full(track.samples, 0.5))
     after = np.roll(sampled.slope, -1)
     slide_increment = np.roll(track.q, -1) - track.q
     jump = after - sampled.slope

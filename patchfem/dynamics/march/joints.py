@@ -93,9 +93,8 @@ class JointsModel:
     @property
     def limit(self) -> float:
         """Sum of the friction limits of patch and joints [N]."""
-        return (self.patch.limit if self.patch is not None else 0.0) + sum(
-            joint.element.limit for joint in self.joints if joint.mate >= 0
-        )
+        patch_limit = self.patch.limit if self.patch is not None else 0.0
+        return patch_limit + sum(joint.element.limit for joint in self.joints if joint.mate >= 0)
 
     @property
     def length(self) -> float:

@@ -85,7 +85,20 @@ def evaluate_force_shapes(x, is_long):
 
 @njit(**NJIT_INLINE)
 def find_point_slide(workspace, lane, j):
-    """Return the slide increment [m] of a bond point in the step."""
+    """Return the slide increment [m] of a bond point in the step.
+
+    Parameters
+    ----------
+    workspace : array
+        Workspace of all lanes, see `lane_rows`.
+    lane : int
+    j : int
+        Number of the point.
+
+    Returns
+    -------
+    float
+    """
     a = workspace[At.SHAPES + j * LANES + lane]
     b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
     return (

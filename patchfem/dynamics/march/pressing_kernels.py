@@ -40,7 +40,6 @@ COUPLING_TOL_FACTOR = 0.01
 # Largest number of guesses of this force in a search; the bracket closes within 60.
 MAX_GUESSES = 80
 BISECTION_INTERVAL = 8  # number of secant steps after which one is replaced by a bisection
-BRACKET_TOL = 4e-16  # relative width below which a bracket is closed
 MAX_ITERATIONS = 100  # largest number of residuals of heave and pitch in a step
 MIN_DECREASE = 0.1  # smallest relative decrease of the residual by a full Newton step
 MIN_STEP_FRACTION = 1e-9  # smallest fraction of a Newton step in the line search
@@ -510,7 +509,7 @@ def is_bracket_closed(secant):
     low = secant.low
     high = secant.high
     is_bracket = high < np.inf and low > -np.inf
-    return is_bracket and high - low <= BRACKET_TOL * (abs(low) + abs(high))
+    return is_bracket and high - low <= ROUND_OFF * (abs(low) + abs(high))
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -633,7 +632,21 @@ def find_consistent_force(guess, ignores_events, data, system):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def is_between_frictions(force, data, end_load, press):
-    """Return whether a mean friction force lies between kinetic and static friction."""
+    """Return whether a mean friction force lies between kinetic and static friction.
+
+    Parameters
+    ----------
+    force : float
+        [N].
+    data : StepData
+    end_load : float
+        Normal load at the end of the step [N].
+    press : interfaces.arrays.VaryingLoad
+
+    Returns
+    -------
+    bool
+    """
     mean_load = 0.5 * (data.load + max(end_load, 0.0))
     return press.force[1] * mean_load <= abs(force) <= press.force[0] * mean_load
 

@@ -3,6 +3,7 @@
 from collections import deque
 from copy import copy
 from dataclasses import replace
+from enum import IntEnum
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -20,7 +21,7 @@ from ..periodicity import (
     FIRST_CHECK,
     bound_remaining_change,
     cycles_to_next_check,
-    is_checked_after,
+    is_check_cycle,
 )
 from ..propagator import make_propagator
 from .capacity import copy_state, enlarge_list
@@ -34,12 +35,6 @@ from .faces import STEP_TOL, make_element_arrays
 from .models import frictionless_model
 from .recording import FIRST_SUM, N_SUMS, Mark, make_mark, read_output_extremes
 
-# Status of `loop_kernels.march`: the output exceeds the travel, a list of bonds is full, the motion is not finite, or
-# no contact set fits the motion.
-EXCEEDS_TRAVEL = 1
-MEMORY_FULL = 2
-NOT_FINITE = 3
-NO_CONTACT_SET = 4
 # Displacement over the travel above which the motion has diverged within a step.
 DIVERGENCE_RATIO = 10.0
 MAX_STEPS_AT_ONCE = (
@@ -57,6 +52,25 @@ SUM_POSITIONS = [
     Ledger.N_UNCONVERGED,
     Ledger.FRICTION_WORK,
 ]
+
+
+class MarchStatus(IntEnum):
+    """Status of a march, as its compiled loop returns it.
+
+    - FINISHED: all steps are done, or the motion ended otherwise
+    - EXCEEDS_TRAVEL: the output exceeds the travel
+    - MEMORY_FULL: a list of bonds is full
+    - NOT_FINITE: the motion is not finite
+    - NO_CONTACT_SET: no contact set fits the motion
+    - LEAVES_GROOVES: the flanks lose contact
+    """
+
+    FINISHED = 0
+    EXCEEDS_TRAVEL = 1
+    MEMORY_FULL = 2
+    NOT_FINITE = 3
+    NO_CONTACT_SET = 4
+    LEAVES_GROOVES = 5
 
 
 def _make_response(rows, number, dt, modes, drive) -> Response:
@@ -209,12 +223,12 @@ class Run:
         if (
             not size
             or self.periodic is None
-            or not (is_checked_after(n_cycles) or is_checked_after(n_cycles + 1))
+            or not (is_check_cycle(n_cycles) or is_check_cycle(n_cycles + 1))
         ):
             return False
         rows = self._carried_state()
         state = np.concatenate(rows)
-        if not is_checked_after(n_cycles):
+        if not is_check_cycle(n_cycles):
             self.looks[1] = state
             self.books = self._collect_sums()
             return False
@@ -451,7 +465,7 @@ class Run:
             saved_state = copy_state(self.contact, *self._changing_arrays())
             saved_arrays = self._copy_for_softening_springs()
             n_steps, status = self._march_steps(int(part_steps), rows)
-            while status == MEMORY_FULL:
+            while status == MarchStatus.MEMORY_FULL:
                 location = f"at step {self.done + n_steps}"
                 self.contact = enlarge_list(
                     self.contact, saved_state, location, *self._changing_arrays()
@@ -463,7 +477,7 @@ class Run:
                 ):
                     array[...] = saved_array
                 n_steps, _ = self._march_steps(n_steps - 1, rows)
-                status = EXCEEDS_TRAVEL
+                status = MarchStatus.EXCEEDS_TRAVEL
                 distance = format_length(self._find_output_distance(rows[n_steps]), 3)
                 self.message = (
                     f"beyond a displacement of {distance} the motion grows without limit, because the "
@@ -602,15 +616,15 @@ class Run:
 
     def set_outcome(self, status: int) -> None:
         """Set the outcome and message of the march from the status of the compiled loop."""
-        if status == EXCEEDS_TRAVEL:
+        if status == MarchStatus.EXCEEDS_TRAVEL:
             self.outcome = Outcome.EXCEEDS_TRAVEL
-        if status == NOT_FINITE:
+        if status == MarchStatus.NOT_FINITE:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
                 f"at step {self.done} the computed motion is not a finite number; raise "
                 "accuracy.steps_per_cycle"
             )
-        if status == NO_CONTACT_SET:
+        if status == MarchStatus.NO_CONTACT_SET:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
                 f"at step {self.done} the method could not determine which points are in contact; raise "

@@ -7,6 +7,7 @@ spring of the holder is in series with the pitch, as a compliance x_i x_j/K in a
 """
 
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 
@@ -30,12 +31,6 @@ from .march import march as run
 from .models import IDLE_KIND, Joint, element_model, nodal_load_fields, point_lists_model
 from .run import Run
 
-# Kinds of friction laws: rigid Coulomb, elastic-plastic points, bond points, bond lists, velocity-dependent.
-COULOMB = 0
-PLASTIC = 1
-POINTS = 2
-LISTS = 3
-RATE = 4
 LIST_TOL_FACTOR = (
     1e4  # attainable residual of sums over lists of bonds, over the tolerance of other laws
 )
@@ -44,11 +39,31 @@ MIN_PRESSURE_FRACTION = 1.0
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
 
+class LawKind(IntEnum):
+    """Kind of a friction law under a varying load.
+
+    - COULOMB: rigid Coulomb friction
+    - PLASTIC, POINTS: elastic-plastic points and bond points, as in `shear_points_kernels`
+    - LISTS: lists of bonds
+    - RATE: velocity-dependent friction
+    """
+
+    COULOMB = 0
+    PLASTIC = 1
+    POINTS = 2
+    LISTS = 3
+    RATE = 4
+
+
+# kinds of laws that act at each point under its own load
+POINT_LAWS = LawKind.PLASTIC, LawKind.POINTS, LawKind.LISTS
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class VaryingLoadLaw:
     """Friction law of a contact under a varying load.
 
-    - `kind`: COULOMB, PLASTIC, POINTS, LISTS or RATE.
+    - `kind`: see `LawKind`.
     - `static`: mu_s, which times the preload is the scale of the residuals.
     - `force`: first numbers of `interfaces.arrays.PressedPoints`, with v_0 of a rate law in place of mu_k.
     - `growth`: parameters of the growth of bonds.
@@ -56,7 +71,7 @@ class VaryingLoadLaw:
     - `list_options`: the Bonds of a list with its cut-off and its merge width, as `models.bond_list_model` takes them.
     """
 
-    kind: int
+    kind: LawKind
     static: float
     force: tuple
     growth: tuple = (-1.0, 1.0, 1.0, 1.0, 1.0, 0.0)
@@ -67,7 +82,7 @@ class VaryingLoadLaw:
 def make_coulomb_law(static: float, kinetic: float | None = None) -> VaryingLoadLaw:
     """Return the set-valued Coulomb law under the resultant load."""
     return VaryingLoadLaw(
-        COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0)
+        LawKind.COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0)
     )
 
 
@@ -77,12 +92,12 @@ def make_tanh_law(static: float, speed: float) -> VaryingLoadLaw:
     speed: v_0 [m/s].
 
     """
-    return VaryingLoadLaw(RATE, static, (static, speed, 0.0, 1.0))
+    return VaryingLoadLaw(LawKind.RATE, static, (static, speed, 0.0, 1.0))
 
 
 def make_elastic_plastic_law(static: float, length: float) -> VaryingLoadLaw:
     """Return the elastic-plastic law of eq. 3.12 at each point under its own load."""
-    return VaryingLoadLaw(PLASTIC, static, (static, static, length, 1.0), length=length)
+    return VaryingLoadLaw(LawKind.PLASTIC, static, (static, static, length, 1.0), length=length)
 
 
 def make_bonds_law(law) -> VaryingLoadLaw:
@@ -100,7 +115,7 @@ def make_bonds_law(law) -> VaryingLoadLaw:
         )
 
     return VaryingLoadLaw(
-        POINTS,
+        LawKind.POINTS,
         law.static,
         (law.static, law.static, law.length, law.initial),
         tuple(growth_numbers(law)),
@@ -133,7 +148,7 @@ def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
             )
         )
     return VaryingLoadLaw(
-        LISTS,
+        LawKind.LISTS,
         law.static,
         (law.static, law.static, law.length, law.initial),
         tuple(growth_numbers(law)),
@@ -196,7 +211,7 @@ def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tup
     """
     memory = np.zeros((3, normal.size))
     size = normal.size
-    plastic = law.kind == PLASTIC
+    plastic = law.kind == LawKind.PLASTIC
     memory[1 if plastic else 0] = (
         normal if plastic else normal * law.force[PressedIndex.INITIAL_DENSITY]
     )
@@ -252,7 +267,7 @@ class VaryingLoadModel:
     @property
     def set_valued(self) -> bool:
         """Whether the law sticks without any stretch (rigid Coulomb friction)."""
-        return self.law.kind == COULOMB
+        return self.law.kind == LawKind.COULOMB
 
     @property
     def runner(self):
@@ -262,7 +277,7 @@ class VaryingLoadModel:
     @property
     def has_point_loads(self) -> bool:
         """Whether each point carries its own fraction of the load."""
-        return self.law.kind in (PLASTIC, POINTS, LISTS)
+        return self.law.kind in POINT_LAWS
 
     @property
     def loading(self) -> str:
@@ -285,7 +300,7 @@ class VaryingLoadModel:
     @property
     def kind(self) -> tuple:
         """Modules of contact and law without the elements, for which the loop is compiled."""
-        if self.law.kind == LISTS:
+        if self.law.kind == LawKind.LISTS:
             return SHEARED_LISTS_MODULE, ""
         if self.has_point_loads:
             return "dynamics.interfaces.pressed_points_kernels", ""
@@ -300,14 +315,14 @@ class VaryingLoadModel:
             )
         return element_model(
             TanhLaw(
-                law.static, law.force[PressedIndex.MU_KINETIC] if law.kind == RATE else 1.0
+                law.static, law.force[PressedIndex.MU_KINETIC] if law.kind == LawKind.RATE else 1.0
             ).element(self.preload)
         ).build()
 
     def points(self, force):
         """Allocate the contact points under the nodal forces (m,) [N] of the preload."""
         law = self.law
-        if law.kind != LISTS:
+        if law.kind != LawKind.LISTS:
             return arrays.PressedPoints(*make_pressed_fields(law, force, self.shear, self.limit))
         measure = force + MIN_PRESSURE_FRACTION * force.mean()
         return point_lists_model(
@@ -391,7 +406,7 @@ def make_model(
         PatchfemError for shear modes beside a law other than elastic-plastic or bonds, and for a point
         with heave or pitch.
     """
-    if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
+    if shear is not None and law.kind not in POINT_LAWS:
         raise PatchfemError(
             describe_unsupported(
                 "friction.law: this law together with [contact.shear] and a normal load that "
@@ -437,7 +452,9 @@ class VaryingLoadRun(Run):
             press.press_state(self.sets, slot, -heave, pitch, nodal_forces)
         if model.has_point_loads:
             self.contact = model.points(nodal_forces)
-        goal = STEP_TOL * model.limit * (LIST_TOL_FACTOR if model.law.kind == LISTS else 1.0)
+        goal = STEP_TOL * model.limit
+        if model.law.kind == LawKind.LISTS:
+            goal *= LIST_TOL_FACTOR
         return arrays.VaryingLoad(
             (),
             np.ascontiguousarray(model.rows, float),
@@ -497,7 +514,8 @@ class VaryingLoadRun(Run):
         nodal = self.load.now.copy()
         contact_state = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
-        if self.model.law.kind == LISTS:  # all bonds of a point are plotted with their mean stretch
+        # all bonds of a point are plotted with their mean stretch
+        if self.model.law.kind == LawKind.LISTS:
             force = self.model.law.static * c.points[PointRow.LOAD] * c.statuses[:, STATUS.force]
             law = self.model.law
             contact_state = {

@@ -13,6 +13,7 @@ from ...core import IntegratedMeasures, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import choose_samples_per_cycle
+from ..cycles import sample_earlier_cycles, sample_last_cycles
 from ..events.modal_system import drive_segments
 from ..events.positions_kernels import SEGMENT_KIND, Segment
 from ..integrated import make_histories
@@ -21,10 +22,6 @@ from ..periodicity import FIRST_CHECK, bound_remaining_change
 from .arrays import N_NODES, STATUS, Counter, MotionArrays, MotionRecord, Scalar, Work
 from .reader import measure_parts
 
-# samples of a cycle in the window
-SAMPLES_PER_CYCLE = 400
-# samples of the window of a run that is shorter than a cycle
-MIN_SAMPLES = 101
 # rows for reversals that one call of the loop fills
 REVERSALS_PER_CALL = 4096
 # rows for parts of steps that one call of the loop fills
@@ -517,8 +514,7 @@ class Motion:
             LAST_TOLERANCE_RATIO  # the extension of a step errs more than the step does
         )
         self.arrays.scalars[Scalar.STEP] *= LAST_TOLERANCE_RATIO**0.125
-        count = max(MIN_SAMPLES, round((end - begin) / self.drive.period * SAMPLES_PER_CYCLE) + 1)
-        times = np.linspace(begin, end, count)
+        times = sample_last_cycles(begin, end, self.drive.period)
         rows = []
         last_shot = -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:
@@ -663,8 +659,7 @@ def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
         rows.append(run.run_to(begin, np.arange(0, begin, period / n_equidistant)))
     if window < last_cycles:
         run.run_ahead_to(end - last_cycles)
-        count = max(2, round((last_cycles - window) / period * SAMPLES_PER_CYCLE) + 1)
-        times = np.linspace(end - last_cycles, end - window, count)
+        times = sample_earlier_cycles(end - last_cycles, end - window, period)
         rows.append(run.run_to(end - window, times)[:-1])
     return rows
 

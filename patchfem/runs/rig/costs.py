@@ -76,7 +76,7 @@ RESAMPLING_ENGINES = (
     "piecewise",
     "smooth",
 )
-SAMPLES_PER_CYCLE = 400  # number of samples of a kept cycle, as in `dynamics.events.histories` and `dynamics.smooth`
+SAMPLES_PER_CYCLE = 400  # number of samples of a kept cycle, as in `dynamics.cycles`
 REVERSALS_PER_CYCLE = (
     4.0  # expected reversals per cycle, which are kept from before the last cycles
 )

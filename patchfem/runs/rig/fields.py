@@ -118,11 +118,11 @@ def _collect_varying_load_frames(patch, raw) -> dict:
 def _compute_nodal_friction(law, shot, nodal) -> tuple:
     """Return friction forces (m,) [N] and elastic stretches (m,) [m] at the interface nodes."""
     top, bottom, _ = shot["memory"]
-    if law.kind == varying_load.PLASTIC:
+    if law.kind == varying_load.LawKind.PLASTIC:
         return law.static * top, law.length * np.divide(
             top, bottom, out=np.zeros_like(top), where=bottom > 0
         )
-    if law.kind == varying_load.POINTS:
+    if law.kind == varying_load.LawKind.POINTS:
         return law.static / law.length * bottom, np.divide(
             bottom, top, out=np.zeros_like(top), where=top > 0
         )

@@ -397,7 +397,7 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
         return None
     sine = SineDrive(last.amplitude, last.omega, drive.moving)
     try:
-        motion = steady_events.find_steady_state_from(modes, sine, groups, *done.end)
+        motion = steady_events.continue_to_steady_state(modes, sine, groups, *done.end)
     except NotConverged:
         return None
     amplitude, error = find_stable_amplitude(motion.amplitude, motion.residual, motion.multipliers)

@@ -9,7 +9,7 @@ from scipy.optimize import fsolve
 from test_elastic_plastic import ONE, basis, random_rig
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics import find_steady_state_from as settled
+from patchfem.dynamics import continue_to_steady_state as settled
 from patchfem.dynamics import make_elements
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.period import PeriodMap
