@@ -214,7 +214,7 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
         Solution on the set `active`; it is returned unless its openings show rounding errors.
     active : (n,) bool ndarray
     """
-    # the limit is a tenth of the overlap at which a node enters the set
+    # the solution is refined only if openings exceed a tenth of the overlap at which a node enters the set
     error = np.abs(solution.opening[active])
     if not (error > OPENING_NOISE / 10 * solution.scale[active]).any():
         return solution

@@ -118,7 +118,7 @@ class ContactSets:
         )
 
     def make_arrays(self, max_bytes: float = MAX_STORED_BYTES) -> SetArrays:
-        """Return the arrays of the compiled search, which starts from the reference contact set.
+        """Return the arrays with which compiled code searches contact sets, from the preloaded one.
 
         max_bytes: size of the contact sets that can be stored [bytes].
         """

@@ -313,7 +313,9 @@ def _add_updates(shape: RegionShape, updates) -> StiffnessBlocks:
             for row, column in product(row_runs, column_runs):
                 rectangle = update[:, row.source, column.source]
                 if half is halves[0]:
-                    block[:, row.target, column.target] = rectangle  # the block is still zero
+                    block[:, row.target, column.target] = (
+                        rectangle  # the first contribution to a zero block is copied, which is faster than adding
+                    )
                 else:
                     block[:, row.target, column.target] += rectangle
     return blocks

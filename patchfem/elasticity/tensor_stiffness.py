@@ -55,7 +55,9 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
             couplings = (column_factors @ terms).reshape(n_columns, n_free, 4)
             stencil[column : column + n_columns, row:, neighbour] += couplings
     stencil = stencil.reshape(n_columns + 1, n_rows, 3, 3, 2, 2)
-    stencil[:, -1, :, 2] = 0.0  # couplings with the fixed row
+    stencil[:, -1, :, 2] = (
+        0.0  # nodes of the fixed row do not move, so that their couplings are dropped
+    )
     return stencil
 
 

@@ -309,7 +309,7 @@ def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
     try:
         read = loops.read_loop(folder / slide["file"])
     except PatchfemError:
-        # The file is only a path; its mistakes were found when it was read as such.
+        # The file has no loop; mistakes in its path were reported when the path was read.
         return None
     if read.time is None:
         return None

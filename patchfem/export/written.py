@@ -4,7 +4,7 @@ import re
 
 from ..formatting import format_number
 
-NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
+NUMBER_PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
 MIN_LONG_NUMBER = 9  # characters of a number from which it comes from a range, not from a person
 MAX_DIGITS = 6  # largest number of digits of a shortened number
 # Distance to the nearest other value, of which this fraction is the largest error of a shortened
@@ -43,7 +43,9 @@ def shorten_to_spacing(text: str, value: float, spacing: float) -> str:
         shortened = _round_long_number(text, digits)
         if shortened == text:
             break
-        number, rounded_number = (float(NUMBER.match(written)[1]) for written in (text, shortened))
+        number, rounded_number = (
+            float(NUMBER_PATTERN.match(written)[1]) for written in (text, shortened)
+        )
         if abs((rounded_number - number) * value) <= abs(MAX_ERROR_FRACTION * spacing * number):
             return shortened
     return shorten_number(text)
@@ -57,7 +59,7 @@ def drop_repeated_unit(text: str, next_text: str) -> str:
 
 def _round_long_number(text: str, digits: int) -> str:
     """Shorten a number with many digits."""
-    match = NUMBER.match(text)
+    match = NUMBER_PATTERN.match(text)
     if match is None or len(match[1]) < MIN_LONG_NUMBER:
         return text
     return f"{format_number(float(match[1]), digits)} {match[2] or ''}".strip()

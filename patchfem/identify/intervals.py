@@ -27,9 +27,9 @@ MAX_NONLINEARITY = 0.2
 MIN_INTERVAL = 1e-9
 # distance to the bound / first step of a profile, for a value without a linear interval
 N_FIRST_STEPS = 64
-# relative error, at the end of a profile, of the square root of the growth of the sum of squares
+# relative error of the end of an interval, measured as the root of the growth of the sum of squares
 PROFILE_TOL = 1e-3
-QUICK_PROFILE_TOL = 1e-2  # PROFILE_TOL of a residual that is expensive to evaluate
+QUICK_PROFILE_TOL = 1e-2  # the same tolerance for a residual that is expensive to evaluate
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -215,7 +215,7 @@ class _MatFile(NamedTuple):
         return arrays
 
     def list_fields(self, data, offset: int) -> Iterator[tuple]:
-        """Yield the name and content of each field of a structure.
+        """Yield the name and the contents of each field of a MATLAB structure.
 
         The structure begins with the number of bytes of each field name, then all names, then the contents.
         """

@@ -123,7 +123,7 @@ def _is_record(dataset: dict) -> bool:
 
 
 def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes: list) -> Channel:
-    """Make a channel of a record; factors: unit conversion of dataset 164, or None."""
+    """Make a channel of a record from a dataset of a universal file."""
     location = f"{path}: record {number}"
     values = np.asarray(dataset["data"])
     time = np.asarray(dataset["x"], float)

@@ -120,7 +120,7 @@ def _select_measures(measures: dict, step_runs) -> dict:
 
 
 def _expect_errors(errors: dict, open_kinds: dict) -> dict:
-    """Return the errors that are expected of twice the steps, by measure name."""
+    """Predict the errors of all measures for a run with twice as many steps."""
     step_errors = open_kinds["parts"].get("steps", {})
     expected = {}
     for name, error in errors.items():

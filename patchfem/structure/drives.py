@@ -28,7 +28,7 @@ import numpy as np
 from ..core import DriveSegment, PatchfemError
 from .drive_sizes import DriveKeys, count_cycles_per_level
 
-# rate times duration is at least this, so a Taylor series covers at most 1/20 of a sweep
+# smallest product of the rate and the duration of a sweep, so that a Taylor series covers at most 1/20 of it
 MIN_TAYLOR_RATE = 40
 
 

@@ -22,7 +22,7 @@ MAX_ASYMMETRY = 1e-8
 MIN_DAMPING_EIGENVALUE = -1e-9
 # relative; closer modes count as modes of equal frequency, whose shapes may be rotated
 EQUAL_FREQUENCY_TOL = 1e-11
-# relative; a smaller motion of the output is round-off, because the output is a node of the mode
+# relative motion of the output in a mode; a smaller one is round-off, because the output lies at a node of the mode
 MIN_OUTPUT_MOTION = 1e-9
 
 

@@ -7,7 +7,7 @@ from .profile import CHUNK, robust_deviation
 
 THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; a high one parts a spike from a slope
 MAX_SPIKE_POINTS = 12  # larger groups of points are features of the surface
-N_SAMPLED = 100_000  # heights from which the scatter about the medians is estimated
+N_SAMPLED_HEIGHTS = 100_000  # heights from which the scatter about the medians is estimated
 WINDOW = 5  # points along each side of a median
 
 
@@ -69,7 +69,7 @@ def _scatter_about_medians(z, known) -> float:
     Heights that are the median, as most are on a smooth slope, say nothing about the scatter.
     """
     places = np.flatnonzero(known)
-    distance = _median_distances(z, places[:: max(places.size // N_SAMPLED, 1)])
+    distance = _median_distances(z, places[:: max(places.size // N_SAMPLED_HEIGHTS, 1)])
     return robust_deviation(distance[distance > 0]) if distance.any() else 0.0
 
 

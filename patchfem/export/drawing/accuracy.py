@@ -80,7 +80,7 @@ def _make_dots(settings: list, colour: str, name: str, shape: str) -> dict:
 
 
 def _coordinates(settings: list) -> tuple:
-    """Return the seconds and the errors of settings."""
+    """Return the CPU times [s] and the errors of runs with several settings."""
     seconds = [setting.seconds for setting in settings]
     errors = [setting.error for setting in settings]
     return seconds, errors

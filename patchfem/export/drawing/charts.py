@@ -20,7 +20,7 @@ MIN_LINE_POINTS = 200  # A reduced line keeps at least this number of points.
 MAX_FRAMES = 24  # number of frames of the shear stress that are drawn faintly
 FAINT_FRAME_POINTS = 400  # number of points of a frame that is drawn faintly
 GRID = 6000  # cells of a piece in a picture
-NUMBER = 13  # characters of a number in a page
+CHARACTERS_PER_NUMBER = 13  # characters of a number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
@@ -153,14 +153,14 @@ def sample_indices(x, y, max_points: int) -> np.ndarray:
 def limit_characters(all_charts: list, max_characters: int) -> list:
     """Reduce the points of lines and bands until the charts take a given number of characters.
 
-    A number takes NUMBER characters.
+    A number takes CHARACTERS_PER_NUMBER characters.
     """
     sizes = [
         sum(np.size(value) for value in mark.values() if not isinstance(value, str | dict))
         for chart in all_charts
         for mark in chart["marks"]
     ]
-    if (total := NUMBER * sum(sizes)) <= max_characters:
+    if (total := CHARACTERS_PER_NUMBER * sum(sizes)) <= max_characters:
         return all_charts
     return [
         chart | {"marks": [_reduce_mark(mark, max_characters / total) for mark in chart["marks"]]}

@@ -13,7 +13,7 @@ from .document import to_json
 # Bytes of the data that are drawn; packed with the library, a page then stays below 1.5 MB.
 MAX_BYTES = 1_200_000
 MIN_CASES = 64  # At least this number of cases is drawn.
-N_SAMPLED = 32  # number of cases from which the bytes per case are measured
+N_SAMPLED_CASES = 32  # number of cases from which the bytes per case are measured
 # Significant digits in a page that does not draw all cases.
 VALUE_DIGITS = 7
 ERROR_DIGITS = 3
@@ -40,7 +40,7 @@ def select_cases(table: dict, data) -> DrawnCases:
         data(cases, whole) returns what the scripts would draw of some cases, with all digits or not.
     """
     number = len(table["outcome"])
-    sample = _evenly_spaced(number, N_SAMPLED)
+    sample = _evenly_spaced(number, N_SAMPLED_CASES)
     if number * len(to_json(data(sample, True))) <= MAX_BYTES * sample.size:
         return DrawnCases(np.arange(number))
     max_cases = max(MIN_CASES, int(MAX_BYTES * sample.size / len(to_json(data(sample, False)))))

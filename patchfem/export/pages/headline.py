@@ -10,7 +10,7 @@ from ...core import Outcome
 from ...formatting import format_number
 from ...runs.batch.case_results import FAILED_OUTCOME
 from .. import tolerance_misses
-from ..written import NUMBER, measure_label, shorten_number
+from ..written import NUMBER_PATTERN, measure_label, shorten_number
 from . import limits, peaks, ranked
 from .key_lines import is_varied
 from .limits import Limits
@@ -163,7 +163,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         for name, measure in measures.items()
     }
     keys = [
-        key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])}
+        key | {"words": not any(NUMBER_PATTERN.match(str(text)) for text in key["texts"])}
         for key in table["keys"]
     ]
     key_limits = Limits()

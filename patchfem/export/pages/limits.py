@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formatting import UNIT_LADDERS, choose_unit, format_number
-from ..written import NUMBER, drop_repeated_unit, measure_label
+from ..written import NUMBER_PATTERN, drop_repeated_unit, measure_label
 from . import document
 from .key_lines import group_cases_along_key, key_formatter
 from .sentences import format_measure, format_zero, measure_link
@@ -444,7 +444,7 @@ def _choose_unit(limits: Limits) -> tuple:
         default=None,
     )
     value, case = (float(limits.sizes().max()), 0) if first is None else (first.value, first.inside)
-    number_with_unit = NUMBER.match(str(key["texts"][case]))
+    number_with_unit = NUMBER_PATTERN.match(str(key["texts"][case]))
     size = float(limits.sizes()[case])
     unit, scale = (
         (number_with_unit[2] or "", float(number_with_unit[1]) / size)

@@ -8,7 +8,7 @@ import numpy as np
 from ...campaigns.sweeps.ranking import compute_sobol_indices
 from ...core import Outcome
 from ...formatting import choose_display_unit, format_number
-from ..written import NUMBER, measure_label
+from ..written import NUMBER_PATTERN, measure_label
 from . import document
 from .key_lines import is_varied, key_formatter
 from .sentences import format_measure, format_pair, is_share, join_sentences, measure_link
@@ -203,7 +203,7 @@ def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
 
 def has_word_values(key: dict) -> bool:
     """Return whether the values of a key are words."""
-    return not any(NUMBER.match(str(text)) for text in key["texts"])
+    return not any(NUMBER_PATTERN.match(str(text)) for text in key["texts"])
 
 
 def _trend_sentence(

@@ -13,7 +13,7 @@ from ...formatting import UNIT_LADDERS, choose_axis_unit
 from ..drawing.charts import COLOURS, make_mark
 from ..read_results import is_real, read_variables, reading_errors, require_valid
 from ..summary import read_summary
-from ..written import NUMBER, measure_label
+from ..written import NUMBER_PATTERN, measure_label
 from .document import Section, document_html, sentence_html, table_html
 from .sentences import format_with_error, measure_link, measure_meaning
 
@@ -246,7 +246,7 @@ def _axis_unit(arrays: list, unit: str) -> tuple:
 
 def drive_period(run: FinishedRun) -> float | None:
     """Return the period [s] of the sine that drives a run; None if there is none."""
-    number_with_unit = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
+    number_with_unit = NUMBER_PATTERN.match(str(run.resolved.get("drive", {}).get("frequency", "")))
     return (
         1 / float(number_with_unit[1])
         if number_with_unit and float(number_with_unit[1]) > 0

@@ -10,7 +10,7 @@ from ...core import Outcome
 from ...formatting import UNIT_LADDERS, choose_axis_unit, round_to_error
 from ...runs.results.patch_rows import minimum_value
 from ..tolerance_misses import is_over_tolerance
-from ..written import NUMBER, measure_label, shorten_number
+from ..written import NUMBER_PATTERN, measure_label, shorten_number
 from . import document, limits, peaks, ranked
 from .document import Section, sentence_html, with_line_breaks
 from .drawn import ERROR_DIGITS, VALUE_DIGITS, round_to_digits, select_cases
@@ -132,7 +132,7 @@ def _key_data(key: dict, cases) -> dict:
     `words`: (number, text) of its values if they are words.
     """
     texts = [str(key["texts"][i]) for i in cases]
-    matches = [NUMBER.match(text) for text in texts]
+    matches = [NUMBER_PATTERN.match(text) for text in texts]
     units = {(match[2] or "").strip() if match else None for match in matches}
     if len(units) == 1 and None not in units:
         unit = units.pop()
@@ -349,7 +349,7 @@ def _cases_table(table: dict) -> str:
 
 def _keep_unit_together(text: str) -> str:
     """Format a key value as HTML without a line break before its unit."""
-    return escape(text).replace(" ", "&nbsp;") if NUMBER.match(text) else escape(text)
+    return escape(text).replace(" ", "&nbsp;") if NUMBER_PATTERN.match(text) else escape(text)
 
 
 def _is_varied(values) -> bool:

@@ -113,7 +113,7 @@ class PatchRun(NamedTuple):
         return measure if measure is not None and measure["value"] is not None else None
 
     def describe_position(self, number: int) -> str:
-        """Describe the position of a node by its index in the flattened depth."""
+        """Describe where on the patch a node lies, given its number."""
         x = self.surface.x
         y = self.surface.y
         strip, node = divmod(int(number), x.size)

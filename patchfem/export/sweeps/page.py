@@ -23,7 +23,7 @@ from ...runs.results.result import describe_measure
 from ..pages import sweep
 from ..pages.headline import SweepHeadline
 from ..read_results import MAX_NUMBER, require_valid
-from ..written import NUMBER
+from ..written import NUMBER_PATTERN
 from .tables import FACTS, shared_facts, sort_measures
 
 REPEAT_WORDS = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
@@ -360,7 +360,9 @@ def join_tables(tables: list, names: list) -> dict:
     for key in keys[0]:
         own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
         texts = [text for one in own for text in one["texts"]]
-        words = not any(map(NUMBER.match, texts))  # each table numbers the words in another order
+        words = not any(
+            map(NUMBER_PATTERN.match, texts)
+        )  # each table numbers the words in another order
         columns.append(
             {
                 "name": key,

@@ -586,7 +586,7 @@ def _move_reference(bonds, status, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _append_strip(formation, bond_list):
-    """Append the strips of an increment, the oldest first; return False if the list is full."""
+    """Append the strips of bonds that an increment forms; return False if the list is full."""
     increment, before, after, pressure, _ = formation
     bonds = bond_list.bondlist
     status = bond_list.status

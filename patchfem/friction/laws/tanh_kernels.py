@@ -70,7 +70,7 @@ def rate_equation(numbers, stretch, velocity, direction):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
-    """Return the force at the mean velocity of a step with dt > 0.
+    """Return the friction force at the mean velocity of a time step.
 
     Returns
     -------

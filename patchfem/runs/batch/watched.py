@@ -217,15 +217,15 @@ class MotionObserver:
         if done.outcome in UNBOUNDED_OUTCOMES:
             return None
         values = march.MarchReader(model, few, self.patch, contact).values(done)
-        return _observe(done.window, values)
+        return _measure_motion(done.window, values)
 
 
 def _observe_solution(raw) -> ObservedMotion | None:
     """Convert the last cycles of a Solution to an ObservedMotion; None if it is unbounded."""
-    return None if raw.outcome in UNBOUNDED_OUTCOMES else _observe(raw.window, raw.values)
+    return None if raw.outcome in UNBOUNDED_OUTCOMES else _measure_motion(raw.window, raw.values)
 
 
-def _observe(window: Response, values: dict) -> ObservedMotion:
+def _measure_motion(window: Response, values: dict) -> ObservedMotion:
     """Return the motion in a window with its peak acceleration and displacement amplitude."""
     return ObservedMotion(
         window, values["absolute_acceleration_peak"], values["relative_displacement_amplitude"]

@@ -134,7 +134,7 @@ def shear_modes_of_points(model, patch, count: int | None = None):
     count = count or model.accuracy.shear_modes
     if model.side != "lower":
         return bond_shear_modes(patch, law, count, tolerance)
-    # This call refuses a patch that could jump without a change of displacement.
+    # Computing a single mode first refuses a patch that could jump without a change of displacement.
     bond_shear_modes(patch, law, 1, 1.0)
     return bond_shear_modes(
         patch,

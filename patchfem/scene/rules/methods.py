@@ -75,7 +75,7 @@ class EngineSupport(NamedTuple):
     features: str
 
 
-# Feature -> function of MotionFeatures that returns the words after the name of the engine in a message; "" without it.
+# Function for each feature that an engine may lack. It returns the end of a message, or "" if a motion lacks the feature.
 FEATURE_FINDERS = {
     "no-law": lambda motion: "" if motion.joints else "for law 'none'",
     "load": lambda motion: motion.load_change,

@@ -152,7 +152,7 @@ class SceneDraft:
 
 
 def find_value(value: Any, key: str) -> Any:
-    """Return the value at a dotted key of a plain table, with items by number; None without one."""
+    """Return the value at a dotted key of nested tables; None if there is none."""
     for piece in _split_at_dots(key):
         if isinstance(value, dict):
             value = value.get(piece)

@@ -16,12 +16,12 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, make_trace
 from .raster import make_scan_of_matrix, make_scan_of_points
-from .raw import MAX_POINTS, Raw, shorten
+from .raw import MAX_POINTS, RawFile, shorten
 from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
 MAX_HEADER = 10_000  # bytes of the header of an .npy file; usual ones have fewer than 200
 MIN_ROWS = 8  # rows of an unnamed matrix that may be a table of columns
-EXAMPLE = 'np.save("scan.npy", np.column_stack([x, z]))'
+ARRAY_EXAMPLE = 'np.save("scan.npy", np.column_stack([x, z]))'
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 _HEADER_READERS = {
     (1, 0): npy_format.read_array_header_1_0,
@@ -36,7 +36,7 @@ class LengthFactors(NamedTuple):
     height: float
 
 
-def read_npy(raw: Raw, units: tuple | None) -> Profile | Areal:
+def read_npy(raw: RawFile, units: tuple | None) -> Profile | Areal:
     """Read an .npy file of two or three columns, or a matrix of heights with a pixel size."""
     table = _load_npy(raw)
     pixel = None if units is None else parse_pixel_size(units[0])
@@ -52,12 +52,12 @@ def read_npy(raw: Raw, units: tuple | None) -> Profile | Areal:
     if table.ndim != 2 or table.shape[1] not in (2, 3):
         raise PatchfemError(
             f"{raw.path}: contains an array of shape {table.shape}; columns x, z or x, y, z are "
-            f"needed, as {EXAMPLE} writes them; for a matrix of heights, {GIVE_PIXEL_SIZE}"
+            f"needed, as {ARRAY_EXAMPLE} writes them; for a matrix of heights, {GIVE_PIXEL_SIZE}"
         )
     return _read_table(raw, table, factors)
 
 
-def read_mat(raw: Raw, units: tuple | None) -> Profile | Areal:
+def read_mat(raw: RawFile, units: tuple | None) -> Profile | Areal:
     """Read a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
     numbers = {
         name: found
@@ -85,8 +85,8 @@ def read_mat(raw: Raw, units: tuple | None) -> Profile | Areal:
     return _read_table(raw, tables[0].values(), factors)
 
 
-def length_factors(raw: Raw, units: tuple | None) -> LengthFactors:
-    """Return the factors to metres of units by their names.
+def length_factors(raw: RawFile, units: tuple | None) -> LengthFactors:
+    """Return the factors that convert named length units to metres.
 
     Raises PatchfemError if they are missing or unknown.
     """
@@ -103,7 +103,7 @@ def length_factors(raw: Raw, units: tuple | None) -> LengthFactors:
     return LengthFactors(*map(parse_length_unit, units))
 
 
-def _read_table(raw: Raw, table, factors: LengthFactors) -> Profile | Areal:
+def _read_table(raw: RawFile, table, factors: LengthFactors) -> Profile | Areal:
     columns = [np.ascontiguousarray(column, dtype=float) for column in table.T]
     if len(columns[0]) < 2:
         raise PatchfemError(f"{raw.path}: {len(columns[0])} rows; a trace needs at least two")
@@ -112,7 +112,7 @@ def _read_table(raw: Raw, table, factors: LengthFactors) -> Profile | Areal:
     return make_scan_of_points(raw.path, columns, None, (factors.lateral, *factors), GIVEN)
 
 
-def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profile | Areal:
+def _read_variables(raw: RawFile, places: list, z, factors: LengthFactors) -> Profile | Areal:
     """Read a trace or a scan from variables x, (y) and z of a MATLAB file."""
     z = np.asarray(z, float)
     flat = [np.asarray(values, float).ravel() for values in places]
@@ -130,7 +130,7 @@ def _read_variables(raw: Raw, places: list, z, factors: LengthFactors) -> Profil
     )
 
 
-def _load_npy(raw: Raw) -> np.ndarray:
+def _load_npy(raw: RawFile) -> np.ndarray:
     """Load the array of an .npy file without copying its bytes."""
     path = raw.path
     file = io.BytesIO(raw.data)
@@ -138,7 +138,7 @@ def _load_npy(raw: Raw) -> np.ndarray:
         version = npy_format.read_magic(file)
         if version not in _HEADER_READERS:
             raise PatchfemError(
-                f"{path}: an .npy file of an unknown version; save it anew: {EXAMPLE}"
+                f"{path}: an .npy file of an unknown version; save it anew: {ARRAY_EXAMPLE}"
             )
         shape, is_fortran, kind = _HEADER_READERS[version](file, max_header_size=MAX_HEADER)
         if min(shape, default=0) < 0:
@@ -148,13 +148,13 @@ def _load_npy(raw: Raw) -> np.ndarray:
     except Exception:  # NumPy passes on any exception of Python for a damaged header
         raise PatchfemError(
             f"{path}: the header of the .npy file is damaged or holds an unsupported array; save "
-            f"it anew: {EXAMPLE}"
+            f"it anew: {ARRAY_EXAMPLE}"
         ) from None
     if kind.kind not in "fiu" or kind.itemsize > 8:
         what = f"'{shorten(kind.str)}'"
         if kind.hasobject:
             what = "Python objects, which are not loaded because they may run code"
-        raise PatchfemError(f"{path}: contains {what}; save plain numbers: {EXAMPLE}")
+        raise PatchfemError(f"{path}: contains {what}; save plain numbers: {ARRAY_EXAMPLE}")
     count = math.prod(shape)
     size = len(raw.data) - file.tell()
     if count > MAX_POINTS * 3:

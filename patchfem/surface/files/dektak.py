@@ -15,7 +15,7 @@ from ...formatting import format_length
 from ..profile import Profile
 from ..samples import make_trace, printed_digit
 from .head import Head
-from .raw import Raw, shorten
+from .raw import RawFile, shorten
 from .rows import read_columns
 from .text import decode_text
 from .units import parse_length_unit
@@ -29,7 +29,7 @@ _LENGTH = re.compile(
 _HEADER = re.compile(r"^\s*Lateral\s+(\w+)\s*,\s*Raw\s+(\w+)[^\n]*$", re.MULTILINE | re.IGNORECASE)
 
 
-def read_dektak(raw: Raw) -> Profile:
+def read_dektak(raw: RawFile) -> Profile:
     """Read the trace of a Dektak export; raises PatchfemError that names the line."""
     path = raw.path
     text = decode_text(raw)

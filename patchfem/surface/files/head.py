@@ -18,7 +18,7 @@ MAX_LINE = 1000  # characters; a longer line is not one of two to four columns
 MAX_LINES = 500  # lines of a head; instruments write fewer than 200
 MAX_NAME = 80  # characters of the name of a column and its unit
 MAX_COLUMNS = 4  # x, y, z and a column of validity or of numbers
-EXAMPLE = "write the header as `x [um],z [um]`"
+HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
 DELIMITERS = (";", ",", "\t", "|")
 COMMENT = ("#", "%", "//")
 DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
@@ -180,7 +180,7 @@ def read_head(path, text: str) -> Head:
         if len(line) > MAX_LINE and not is_comment and not _NUMERIC.fullmatch(line):
             raise PatchfemError(
                 f"{path}:{number}: a line is {len(line)} characters long; two columns are needed, "
-                f"{EXAMPLE}"
+                f"{HEADER_EXAMPLE}"
             )
         plain = line[:MAX_LINE].lstrip("#%/").strip() if is_comment else line
         if len(plain) <= MAX_LINE:
@@ -198,7 +198,7 @@ def read_head(path, text: str) -> Head:
     if all(line.is_comment for line in lines):
         raise PatchfemError(f"{path}: no data, only comments")
     raise PatchfemError(
-        f"{path}: no row of numbers in the first {number} lines; {EXAMPLE} above rows of two "
+        f"{path}: no row of numbers in the first {number} lines; {HEADER_EXAMPLE} above rows of two "
         "numbers"
     )
 

@@ -20,7 +20,7 @@ from ..profile import Profile
 from ..samples import GIVEN, make_trace
 from .arrays import length_factors
 from .raster import make_scan_of_matrix
-from .raw import MAX_POINTS, UNPACK_ERRORS, Raw, shorten, shorten_reason
+from .raw import MAX_POINTS, UNPACK_ERRORS, RawFile, shorten, shorten_reason
 from .units import UNITS_IGNORED
 
 PYTHON = sys.executable
@@ -30,7 +30,7 @@ EXIT_NO_LIBRARY = 3  # exit code of the script if SurfaceTopography is not insta
 CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIGXCPU)
 
 
-def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
+def read_instrument(raw: RawFile, units: tuple | None) -> Profile | Areal:
     """Read a file in the format of an instrument by the package SurfaceTopography.
 
     Raises Missing without SurfaceTopography, and PatchfemError if it cannot read the file, if the

@@ -47,7 +47,7 @@ UNPACK_ERRORS = (  # exceptions of zipfile, gzip and NumPy for a damaged file
 )
 
 
-class Raw(NamedTuple):
+class RawFile(NamedTuple):
     """Contents of a surface file in memory.
 
     path: name for messages; kind: "text", "binary", "x3p" or one of FIRST_BYTES; suffix: of the unpacked
@@ -61,7 +61,7 @@ class Raw(NamedTuple):
     data: bytes
 
 
-def fetch(path) -> Raw:
+def fetch(path) -> RawFile:
     """Read a surface file, and decompress it if it is packed.
 
     Raises Missing or PatchfemError if it is too large, damaged or packed twice.
@@ -77,7 +77,7 @@ def fetch(path) -> Raw:
             if kind == "binary" and suffix in TEXT_SUFFIXES:
                 kind = "text"  # its reader names the line that is not text
             if kind == "binary":
-                return Raw(file_path, kind, suffix, b"")
+                return RawFile(file_path, kind, suffix, b"")
             data = _read_limited(file, head, _max_bytes(kind) + 1)
     except FileNotFoundError:
         raise Missing(f"{path}: there is no such file") from None
@@ -86,7 +86,7 @@ def fetch(path) -> Raw:
     _check_size(path, kind, len(data))
     if kind == "gzip":
         return _unpack(file_path, Path(file_path.stem), _gunzip(path, data))
-    raw = Raw(file_path, kind, suffix, data)
+    raw = RawFile(file_path, kind, suffix, data)
     return _unzip(raw) if kind == "zip" else raw
 
 
@@ -118,13 +118,13 @@ def _check_size(path, kind: str, size: int) -> None:
         raise PatchfemError(f"{path}: more than {limit}{remedy}")
 
 
-def _unpack(path: Path, name: Path, data: bytes) -> Raw:
+def _unpack(path: Path, name: Path, data: bytes) -> RawFile:
     """Decompress the contents of a packed surface file."""
     kind = _find_kind(data[:HEAD_BYTES])
     if kind == "gzip" or (kind == "zip" and path.suffix.lower() == ".zip"):
         raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
     _check_size(path, kind, len(data))
-    raw = Raw(path, kind, name.suffix.lower(), data)
+    raw = RawFile(path, kind, name.suffix.lower(), data)
     return _unzip(raw, is_unpacked=True) if kind == "zip" else raw
 
 
@@ -154,7 +154,7 @@ def _gunzip(path, data: bytes) -> bytes:
     return content
 
 
-def _unzip(raw: Raw, *, is_unpacked: bool = False) -> Raw:
+def _unzip(raw: RawFile, *, is_unpacked: bool = False) -> RawFile:
     """Return the single member of a zip file; return an X3P file unchanged."""
     archive = open_zip(raw)
     members = [member for member in archive.infolist() if not member.filename.endswith("/")]
@@ -168,7 +168,7 @@ def _unzip(raw: Raw, *, is_unpacked: bool = False) -> Raw:
     return raw._replace(kind="binary")
 
 
-def open_zip(raw: Raw) -> zipfile.ZipFile:
+def open_zip(raw: RawFile) -> zipfile.ZipFile:
     """Open a zip file in memory after the size of its directory was checked."""
     end = raw.data.rfind(b"PK\x05\x06")
     if end < 0 or end + 22 > len(raw.data):
@@ -188,12 +188,14 @@ def open_zip(raw: Raw) -> zipfile.ZipFile:
         ) from None
 
 
-def read_member(raw: Raw, archive: zipfile.ZipFile, name: str, max_bytes: int = MAX_BYTES) -> bytes:
+def read_member(
+    raw: RawFile, archive: zipfile.ZipFile, name: str, max_bytes: int = MAX_BYTES
+) -> bytes:
     """Read a member of a zip file; raise PatchfemError if it is damaged or too large.
 
     Parameters
     ----------
-    raw : Raw
+    raw : RawFile
     archive : zipfile.ZipFile
     name : str
     max_bytes : int
@@ -224,7 +226,7 @@ def read_member(raw: Raw, archive: zipfile.ZipFile, name: str, max_bytes: int = 
     return content
 
 
-def _check_ratio(raw: Raw, info: zipfile.ZipInfo) -> None:
+def _check_ratio(raw: RawFile, info: zipfile.ZipInfo) -> None:
     limit = max(MIB, MAX_UNPACK_RATIO * info.compress_size)
     if info.file_size > limit or info.compress_size > len(raw.data):
         raise PatchfemError(

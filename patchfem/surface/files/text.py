@@ -19,10 +19,10 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, make_trace
-from .head import EXAMPLE, ColumnNames, Fact, parse_column, read_head
+from .head import HEADER_EXAMPLE, ColumnNames, Fact, parse_column, read_head
 from .matrix import is_matrix, read_scan
 from .raster import make_scan_of_points
-from .raw import Raw, shorten
+from .raw import RawFile, shorten
 from .rows import read_columns
 from .units import GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
@@ -44,7 +44,7 @@ class Factors(NamedTuple):
     notes: tuple
 
 
-def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
+def read_text(raw: RawFile, units: tuple | None = None) -> Profile | Areal:
     """Read the trace or areal scan in a text file of two or three columns or a matrix.
 
     units: units of x (and y) and of z, which complete what the file states and overrule it with a
@@ -73,12 +73,12 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
     if width < 2:
         raise PatchfemError(
             f"{path}:{head.number + 1}: only one column, '{shorten(head.row[0])}', but x and z are "
-            f"needed; {EXAMPLE}"
+            f"needed; {HEADER_EXAMPLE}"
         )
     line = f"{path}:{named.number or head.number + 1}"
     if not (named.names or units or named.units or "lateral" in facts):
         raise PatchfemError(
-            f"{line}: there is no header, and units are never guessed; {EXAMPLE} above the first "
+            f"{line}: there is no header, and units are never guessed; {HEADER_EXAMPLE} above the first "
             f"sample, or {GIVE_UNITS}"
         )
     names = named.names or list("xz" if width == 2 else "xyz")
@@ -108,13 +108,13 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
     return replace(surface, notes=(*notes, *factors.notes, *surface.notes))
 
 
-def decode_text(raw: Raw) -> str:
+def decode_text(raw: RawFile) -> str:
     """Decode a text file, with \\n at the ends of lines and without quotes."""
     path = raw.path
     data = raw.data
     if not data.strip(b"\xef\xbb\xbf \t\r\n"):
         raise PatchfemError(
-            f"{path}: the profile is empty; export it again as text with two columns and {EXAMPLE}"
+            f"{path}: the profile is empty; export it again as text with two columns and {HEADER_EXAMPLE}"
         )
     text = (
         data.decode(_find_encoding(raw), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
@@ -122,13 +122,13 @@ def decode_text(raw: Raw) -> str:
     return _QUOTED.sub(r"\1.\2", text).replace('"', "") if '"' in text else text
 
 
-def _find_encoding(raw: Raw) -> str:
+def _find_encoding(raw: RawFile) -> str:
     if raw.data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
     if raw.kind != "text" or _CONTROL.search(raw.data):
         raise PatchfemError(
             f"{raw.path}: not a text file; export the profile as text with two columns and "
-            f"{EXAMPLE}"
+            f"{HEADER_EXAMPLE}"
         )
     try:
         raw.data.decode("utf-8")
@@ -148,7 +148,7 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
         )
         raise PatchfemError(
             f"{line}: {listed}, but x and z, or x, y and z, are needed; keep one trace of two "
-            f"columns and {EXAMPLE}"
+            f"columns and {HEADER_EXAMPLE}"
         )
     known = ("x", "z") if len(data) == 2 else ("x", "y", "z")
     notes = ()
@@ -159,7 +159,7 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
         wanted = "x and z" if len(data) == 2 else "x, y and z"
         raise PatchfemError(
             f"{line}: column '{shorten(strange.partition('[')[0].strip())}' is not known; the "
-            f"columns {wanted} are needed; {EXAMPLE}"
+            f"columns {wanted} are needed; {HEADER_EXAMPLE}"
         )
     if strange is not None:
         listed = ", ".join(f"'{shorten(names[k])}'" for k in data)
@@ -168,7 +168,7 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
     places = {role: k for k, role in data.items()}
     if len(places) < len(data):
         twice = next(role for role in known if list(data.values()).count(role) > 1)
-        raise PatchfemError(f"{line}: two columns are named {twice}; {EXAMPLE}")
+        raise PatchfemError(f"{line}: two columns are named {twice}; {HEADER_EXAMPLE}")
     return Places({role: places[role] for role in known} | valid, notes)
 
 
@@ -190,7 +190,7 @@ def _find_factors(
             name = named.names[k] if named.names else role
             raise PatchfemError(
                 f"{line}: column '{shorten(name)}' has no unit, and units are never guessed; "
-                f"{EXAMPLE}, or {GIVE_UNITS}"
+                f"{HEADER_EXAMPLE}, or {GIVE_UNITS}"
             )
         factor = parse_length_unit(unit)
         if factor is None:

@@ -21,7 +21,7 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import METRES
 from .raster import make_scan_of_matrix, make_scan_of_points
-from .raw import MAX_POINTS, MIB, Raw, open_zip, read_member, shorten, shorten_reason
+from .raw import MAX_POINTS, MIB, RawFile, open_zip, read_member, shorten, shorten_reason
 
 MAX_XML_BYTES = 16 * MIB  # bytes of main.xml; with its heights as a list it has 30 for each
 MAX_ELEMENTS = 500_000  # elements of main.xml; more take over 100 MB
@@ -59,7 +59,7 @@ class Shape(NamedTuple):
 class Package(NamedTuple):
     """Open X3P file with the folder and the root element of its main.xml."""
 
-    raw: Raw
+    raw: RawFile
     archive: ZipFile
     folder: str
     root: Element
@@ -99,7 +99,7 @@ class Package(NamedTuple):
         return data
 
 
-def read_x3p(raw: Raw) -> Profile | Areal:
+def read_x3p(raw: RawFile) -> Profile | Areal:
     """Read the scan or trace of an X3P file.
 
     Raises PatchfemError that names what is wrong in it.

@@ -32,13 +32,19 @@ P_LOWER = 0.05  # probability of the lower bound
 P_UPPER = 0.95  # probability of the upper bound
 N_SIMULATED_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
 MAX_SAMPLES = 2048  # samples of a simulated trace, which keeps all of them below 10 MB
-SPENT_FREEDOM = 2.5  # degrees of freedom that estimating the spectrum takes, from coverage tests
+SPECTRUM_FREEDOM = (
+    2.5  # number of degrees of freedom that estimating the spectrum uses up, from coverage tests
+)
 MAX_DEVIATIONS = 1.96  # standard deviations of skewness and kurtosis of Gaussian heights
 PEAK_FACTOR = 1.3  # scatter of the dominant wavelength / that of simulated traces
 MIN_WAVES = 4  # dominant waves in a trace; self-affine traces have 2.7 to 3.5
 MIN_FREEDOM = 12.0  # degrees of freedom of a trace; self-affine traces have 6 to 11, others 16
 LATERAL = ("wave", "band")  # kinds whose intervals need no Gaussian heights
-SIZES = ("power", "ratio", "extreme")  # kinds that grow with the length of a self-affine trace
+SIZES = (
+    "power",
+    "ratio",
+    "extreme",
+)  # kinds of parameters that grow with the length of a self-affine trace
 
 
 class Intervals:
@@ -130,7 +136,7 @@ class Intervals:
         squares = float(density @ density) / (1 + 1 / spectrum.tapers)  # minus the scatter
         total = 2 * spectrum.length * float(density.sum()) ** 2 * spectrum.step / squares
         widening = self._slope_widening if kind == "slope" else self._height_widening
-        return max((total - SPENT_FREEDOM) / widening**2, 1.0)
+        return max((total - SPECTRUM_FREEDOM) / widening**2, 1.0)
 
     def _simulated_interval(
         self, row: Parameter, value: float

@@ -12,7 +12,10 @@ MIN_TAPERS = 3  # averaged spectra; fewer are too noisy to show the dominant wav
 MAX_TAPERS = 16  # averaged spectra; more blur the dominant wave and do not narrow the intervals
 MAX_UNTRIMMED = 65_536  # samples; longer traces are trimmed to a length with a fast transform
 BLUR_FRACTION = 0.15  # half-width of the smoothing / frequency of the dominant wave
-BAND = (60e-6, 110e-6)  # [m] wavelengths of `band_amplitude`, about the 80 um of the 1985 report
+BAND = (
+    60e-6,
+    110e-6,
+)  # wavelengths [m] of `band_amplitude`, around the 80 um waves of the 1985 report
 
 
 @dataclass(frozen=True, eq=False)

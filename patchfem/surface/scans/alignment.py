@@ -29,7 +29,7 @@ from .search import (
 from .wear import find_change, widen
 
 N_IMAGE_POINTS = 20_000  # heights of a fit to images
-N_THINNED = 8_000  # heights of the subsample with which starting planes are refined
+N_SUBSAMPLE_HEIGHTS = 8_000  # heights of the subsample with which starting planes are refined
 LONG_WAVES = 8.0  # pixels; Gaussian filter whose mean is subtracted from an image
 MAX_SIDE = 1000  # pixels along a side of the finest image, which limits the time
 MIN_RIVAL = 0.5  # score of a second plane / fraction on the first, above which both may be unworn
@@ -143,7 +143,7 @@ def _find_unworn_planes(model: ScanModel, state) -> list:
     wear leaves nothing above the first scan. The flat bottom of a groove is as quiet as an unworn
     part, but most heights lie above it.
     """
-    thin = model.thin(N_THINNED)
+    thin = model.thin(N_SUBSAMPLE_HEIGHTS)
     state = fit_biweight(thin, state, list(PLANE)).state  # a tilt would blur the mode of a tile
     planes = find_floors(thin, state, list(PLANE), list(PLANE))
     planes = [plane for plane in planes if plane.unworn >= max(MIN_UNWORN, plane.grown)]
