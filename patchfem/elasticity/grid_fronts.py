@@ -314,7 +314,8 @@ def _add_updates(shape: RegionShape, updates) -> StiffnessBlocks:
                 rectangle = update[:, row.source, column.source]
                 if half is halves[0]:
                     block[:, row.target, column.target] = (
-                        rectangle  # the first contribution to a zero block is copied, which is faster than adding
+                        # copying the first contribution to a zero block is faster than adding it
+                        rectangle
                     )
                 else:
                     block[:, row.target, column.target] += rectangle
