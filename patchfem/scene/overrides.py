@@ -128,7 +128,7 @@ class BaseScene:
 
 
 class NumberLocation(NamedTuple):
-    """Table and attribute of a number in a scene.
+    """Location of a number in the tables of a scene.
 
     - table: table of the scene.
     - part: index of a mode, name of a shape, None for the table itself.

@@ -332,7 +332,7 @@ def drive_and_knee(model: Model) -> dict:
 
 
 def _participation_ratio(rig) -> float:
-    """Return the ratio of slide to base participation of the first mode with relative motion.
+    """Return the ratio of slide to base participation of the first mode that is not rigid.
 
     This is the effect of friction over that of the drive. It is 1 if the scene lists no modes, or if
     the drive does not excite the mode.

@@ -243,7 +243,7 @@ def parse_column(cell: str) -> Column:
 
 
 def split_cells(text: str) -> Cells:
-    """Split a line at the delimiter for which all cells are numbers.
+    """Split a line at the delimiter that leaves only numbers, else at the first delimiter.
 
     So a decimal comma is not taken for a delimiter.
     """
