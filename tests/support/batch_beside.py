@@ -3,9 +3,6 @@
 import numpy as np
 import pytest
 
-from patchfem.runs import CaseResults
-from patchfem.runs.batch.lumped import lumped
-
 LOOPS = ("loop_area", "equivalent_damping", "friction_work")
 # by extremes and phasors alone
 BITS = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady")
@@ -30,18 +27,6 @@ def conditioned(found, case: int) -> float:
     """How much round-off of the coordinate counts in the slip: static displacement of the drive over the slip."""
     slip = found.values["slip_amplitude"][case]
     return max(1.0, 1e-6 / slip) if slip > 0 else 1.0
-
-
-def solve_by_group(cases) -> CaseResults:
-    """Return the answers of the exact batch of lumped cases, group by group."""
-    found = CaseResults.blank(len(cases))
-    groups = {}
-    for case, model in enumerate(cases):
-        assert lumped.refuses(model) == ""
-        groups.setdefault(lumped.group(model), []).append(case)
-    for places in groups.values():
-        found.insert(places, lumped.solve([cases[case] for case in places]))
-    return found
 
 
 def held_against(cases, ones, many) -> None:

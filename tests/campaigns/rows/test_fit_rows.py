@@ -178,8 +178,7 @@ def rubbed(tmp_path_factory):
 
 
 def test_exact_a_rig_with_friction_is_recovered_from_its_own_rows(tmp_path, rubbed):
-    path = table(tmp_path, rubbed)
-    found = fitted(scene_of(tmp_path, RUBS), path, free(*RUBS_FREE), starts=1)
+    found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, rubbed), free(*RUBS_FREE), starts=1)
     assert found.keys.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
     assert any("steady motions are computed" in text for text in found.keys.warnings)
 

@@ -5,8 +5,8 @@ The whole campaign, beside single runs, is `lanes` of tests/support/campaigns.py
 
 import numpy as np
 import pytest
-from batch_beside import solve_by_group
 from lane_cases import LAWS, SCENE, draw_points, rows
+from test_lumped import solve_by_group
 
 from patchfem.api import build, get_base_scene, load, run_many
 from patchfem.runs import CaseResults

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from batch_beside import held_against, solve_by_group
+from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import build, get_base_scene, load
+from patchfem.runs import CaseResults
 from patchfem.runs.batch import one_by_one
 from patchfem.runs.batch.lumped import lumped
 from patchfem.scene import format_assignments
@@ -50,6 +51,18 @@ def models(law: str, seed: int, count: int) -> list:
         scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
         out.append(build(get_base_scene(scene).override(format_assignments(sets))))
     return out
+
+
+def solve_by_group(cases) -> CaseResults:
+    """Return the answers of the exact batch of lumped cases, group by group."""
+    found = CaseResults.blank(len(cases))
+    groups = {}
+    for case, model in enumerate(cases):
+        assert lumped.refuses(model) == ""
+        groups.setdefault(lumped.group(model), []).append(case)
+    for places in groups.values():
+        found.insert(places, lumped.solve([cases[case] for case in places]))
+    return found
 
 
 @pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
