@@ -212,26 +212,6 @@ def dither_drift(low, high, breakaway=0.0):
     )
 
 
-def report_loop(amplitude, length, limit=1.0):
-    """Return area and end force of the steady loop of the printed law (p = 0, constant bond length).
-
-    They are 4 limit (A coth(2A/eps) - eps/2) and limit: as printed the law reaches its full force at ANY amplitude.
-    ValueError unless amplitude and length are positive.
-
-    Parameters
-    ----------
-    amplitude, length : float
-        [m]
-    limit : float
-        mu_s N [N].
-    """
-    require_positive(amplitude=amplitude, length=length)
-    amplitude = np.asarray(amplitude, float)
-    return 4 * limit * (
-        amplitude / np.tanh(2 * amplitude / length) - length / 2
-    ), limit * np.ones_like(amplitude)
-
-
 def jenkins_loop(amplitude, length, limit=1.0):
     """Return area and end force of the steady loop of the elastic-plastic law 3.12 with its reversal.
 

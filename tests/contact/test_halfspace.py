@@ -72,34 +72,7 @@ def test_exact_westergaard_at_64_points_per_half_wave(share):
     assert state.iterations <= 250  # conjugate directions; steepest descent takes 3000
 
 
-@pytest.mark.parametrize("share", [1.0, 1.001, 1.2, 3.0])
-def test_exact_full_contact_is_one_wave(share):
-    x, state = waves(64, share)
-    p = exact.westergaard_pressure(x, share * FULL, WAVE, HIGH, MODULUS)
-    assert np.abs(state.pressure - p).max() <= 1e-11 * p.max() and state.gap.max() <= 1e-11 * HIGH
-    assert state.closing == pytest.approx(HIGH, rel=1e-12) and state.iterations <= 3
-
-
 # ---- crowns
-
-
-@pytest.mark.parametrize("period", [8, 16, 64])
-def test_exact_hertz_on_a_wide_period(period):
-    """The images of a period L raise the peak by (pi a/L)^2/12; the rest is Hertz."""
-    half = 0.1e-3
-    load = 9107.0
-    radius = np.pi * MODULUS * half**2 / (4 * load)
-    length = period * half
-    points = 256 * period
-    x = places(points, length)
-    state = press_periodic(half_planes(points, length), crown(x, radius), length, load)
-    hertz = exact.hertz_pressure(x, load, radius, MODULUS)
-    images = (np.pi / period) ** 2 / 12
-    assert state.pressure.max() / hertz.max() - 1 == pytest.approx(images, rel=0.02, abs=2e-6)
-    inside = np.abs(x) < 0.9 * half
-    assert np.abs(state.pressure - hertz)[inside].max() <= (2 * images + 1e-3) * hertz.max()
-    outside = np.abs(x) > (1 + 2 / 128) * half
-    assert np.all(state.pressure[outside] == 0) and np.all(state.gap[outside] > 0)
 
 
 def crowned(half, fine, growth):

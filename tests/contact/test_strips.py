@@ -251,23 +251,6 @@ def test_figure_yaw_moment_of_a_rolled_pad_on_a_linear_skin(roll, yaw):
 
 
 # ------------------------------------------------------------------------------------------------------------- mirrors
-@each_skin
-@each_control
-def test_exact_mirrors(skin, control):
-    c, x, weight, y = real(5, 30)
-    c = (c + c[::-1, ::-1]) / 2
-    gap = random_gaps(np.random.default_rng(4), x, 5, 3e-7)
-    state = press_strips(c, x, weight, y, gap, 3e-5, LOAD, asperities=skin, **control)
-    over = press_strips(c, x, weight, y, gap[::-1], -3e-5, LOAD, asperities=skin, **control)
-    assert np.abs(over.force[::-1] - state.force).max() <= 1e-11 * LOAD
-    assert over.centre_y == pytest.approx(-state.centre_y, rel=1e-10)
-    back = control | {"moment": -control["moment"]} if control else control
-    turned = press_strips(c, x, weight[::-1], y, gap[:, ::-1], 3e-5, LOAD, asperities=skin, **back)
-    assert np.abs(turned.force[:, ::-1] - state.force).max() <= 1e-11 * LOAD
-    assert turned.moment == pytest.approx(-state.moment, rel=1e-9)
-    assert turned.theta == pytest.approx(-state.theta, rel=1e-9, abs=1e-18)
-
-
 # ------------------------------------------------------------------------------------------- the definitions themselves
 def law_of(skin, weight, opening, load, count):
     """Nodal force that the skin gives at a separation."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -13,8 +14,7 @@ from patchfem.dynamics.harmonic.laws import Jenkins
 
 
 def modes_of(omega, zeta, slide, output) -> ModalBasis:
-    one = [np.array(part, float) for part in (omega, zeta, slide, np.ones(len(omega)), output)]
-    return ModalBasis(tuple("abc"[: len(omega)]), *one, 0.5)
+    return basis_of(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
 
 
 def rates(modes: ModalBasis, y, force: float):

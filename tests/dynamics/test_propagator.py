@@ -4,9 +4,10 @@ from math import pi
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 from scipy.integrate import solve_ivp
 
-from patchfem.core import G_N, ModalBasis, SineDrive
+from patchfem.core import G_N, SineDrive
 from patchfem.dynamics.propagator import make_propagator
 from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels
 
@@ -27,11 +28,7 @@ DRIVES = {
 
 
 def basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
-    omega = np.atleast_1d(np.array(omega, float))
-    zeta = np.atleast_1d(np.array(zeta, float))
-    slide = np.array(slide, float)
-    base = np.array(base, float)
-    return ModalBasis(tuple("abcdef"[: omega.size]), omega, zeta, slide, base, slide, mass, damping)
+    return basis_of(omega, zeta, slide, base, mass=mass, damping=damping)
 
 
 def coupled():

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from any_mesh_cases import of_grid
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import HEIGHT, LENGTH, TITANIUM, bare, refined_middle
@@ -15,7 +17,7 @@ from patchfem.contact.gaps import crown
 from patchfem.core import Compliance, Interface, PatchfemError
 from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery, substructure
 from patchfem.elasticity.mortar import clip_nodes, transfer_matrix
-from patchfem.mesh import PieceMesh, tributary_lengths
+from patchfem.mesh import TensorGrid, tributary_lengths
 from patchfem.mesh.tensor import graded_rows
 
 A = 0.1e-3  # half width of the Hertz contact [m]
@@ -75,43 +77,16 @@ def pressed(x, nn, gap, load=LOAD):
     return press(Compliance(Interface(x, tributary_lengths(x), 1.0), nn, nn), gap, load)
 
 
-@given(one=cells, other=cells)
-def test_exact_transfer_is_the_mortar_integral(one, other):
-    x = nodes(one, 2.0)
-    own = nodes(other, 2.0)
-    place, weight = quadrature(x, own)
-    found = transfer_matrix(x, own).toarray()
-    for i in range(x.size):
-        psi = dual(x, i, place) * weight
-        # biorthogonal, D = lengths
-        assert psi @ hat(x, i, place) == pytest.approx(tributary_lengths(x)[i], rel=1e-12)
-        wanted = [psi @ hat(own, j, place) for j in range(own.size)]
-        assert np.abs(found[i] * tributary_lengths(x)[i] - wanted).max() <= 1e-13
-
-
 def crooked(sizes, seed):
     """A block as any mesh: these columns, half the quads cut in two, inner nodes moved at random."""
     x = nodes(sizes)
     depth = np.linspace(0, HEIGHT, 7)
-    node = np.arange(x.size * depth.size).reshape(x.size, depth.size)
-    points = np.stack([np.repeat(x, depth.size), np.tile(depth, x.size)], axis=1)
-    rng = np.random.default_rng(seed)
-    inner = node[1:-1, 1:-1].ravel()
-    points[inner] += rng.uniform(-0.2, 0.2, (inner.size, 2)) * [np.diff(x).min(), depth[1]]
-    quads = np.stack(
-        [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
-        axis=1,
-    )
-    cut = rng.random(len(quads)) < 0.5
-    triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
-    return PieceMesh(
-        points,
-        triangles,
-        quads[~cut],
-        np.zeros(len(triangles) + (~cut).sum(), bool),
-        node[:, 0],
-        node[:, -1],
-    )
+    piece = of_grid(TensorGrid(x, depth, 0), 0.5)
+    points = piece.points.copy()
+    inner = (points > [x[0], 0]).all(axis=1) & (points < [x[-1], HEIGHT]).all(axis=1)
+    moved = np.random.default_rng(seed).uniform(-0.2, 0.2, (inner.sum(), 2))
+    points[inner] += moved * [np.diff(x).min(), depth[1]]
+    return replace(piece, points=points)
 
 
 def two_crooked(poisson=0.0, stiff=100.0):

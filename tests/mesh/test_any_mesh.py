@@ -262,6 +262,10 @@ SPOILT = {
         lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3),
         "no cells or nodes are tagged upper_substrate",
     ),
+    "no substrate": (
+        lambda m: m.quad_tags.fill(CELL_TAGS["upper_coating"]),
+        "no cells or nodes are tagged lower_substrate, upper_substrate",
+    ),
 }
 
 

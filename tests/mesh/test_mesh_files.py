@@ -76,39 +76,6 @@ def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
         write_mesh(SMALL, tmp_path / "nowhere" / "pair.msh")
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"",
-        b"hello\nworld\n",
-        b"\x00\xff" * 500,
-        b"$MeshFormat\n2.2 1 8\n",
-        b"$MeshFormat\n9.9 0 8\n$EndMeshFormat\n",
-    ],
-)
-def test_refuses_garbage_in_bounded_time(content, tmp_path):
-    path = tmp_path / "pair.msh"
-    path.write_bytes(content)
-    begin = time.process_time()
-    with pytest.raises(PatchfemError, match=r"pair\.msh"):
-        read_grid(path)
-    assert time.process_time() - begin < 2
-
-
-def test_refuses_missing_tags(tmp_path):
-    pair = pair_mesh(SMALL)
-    lower = {k: v for k, v in CELL_TAGS.items() if k.startswith("lower")}
-    with pytest.raises(PatchfemError, match="upper_substrate"):
-        read_grid(store(tmp_path / "pair.msh", pair, lower))
-    with pytest.raises(PatchfemError, match="lower_substrate, upper_substrate"):
-        read_grid(store(tmp_path / "pair.msh", pair, {}))
-    with pytest.raises(PatchfemError, match="lower_far, upper_far"):
-        near = {k: v for k, v in EDGE_TAGS.items() if k.endswith("interface")}
-        read_grid(store(tmp_path / "pair.msh", pair, edges=near))
-    with pytest.raises(PatchfemError, match="lower_substrate, upper_substrate"):
-        read_grid(store(tmp_path / "pair.msh", {**pair, "tags": pair["tags"] + 100}))
-
-
 def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, capsys):
     path = tmp_path / "pair.msh"
     write_mesh(SMALL, path)
@@ -160,17 +127,6 @@ def test_exact_unlike_pieces_on_the_same_columns_are_two_grids(other, tmp_path):
             grid.depth, rel=1e-12
         )
         assert back.x == pytest.approx(SMALL.x, rel=1e-12)
-
-
-def test_exact_pieces_on_other_columns_are_any_meshes_and_other_ends_are_refused(tmp_path):
-    bodies = read_bodies(
-        store(tmp_path / "pair.msh", together(SMALL, graded_grid(2e-3, 1e-3, 4e-4, 1e-4)))
-    )
-    assert all(isinstance(body, PieceMesh) for body in bodies)
-    with pytest.raises(PatchfemError, match="do not match"):
-        read_bodies(
-            store(tmp_path / "pair.msh", together(SMALL, graded_grid(2.1e-3, 1e-3, 5.25e-4, 1e-4)))
-        )
 
 
 def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_path):

@@ -13,7 +13,7 @@ from patchfem.contact import press, tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
 from patchfem.slip import enough_modes, fewest_gauss_points, jenkins_set, scale_limits
-from patchfem.slip.shear_modes import fewest_modes, gauss_rule, shear_modes
+from patchfem.slip.shear_modes import fewest_modes, shear_modes
 
 MU = 0.3
 
@@ -322,19 +322,6 @@ def test_exact_backbone_error_is_the_error_of_the_resultant(angle):
         few = np.array([few_modes(modes, limit, length, q) for q in slides])
         assert modes.backbone_error == pytest.approx(
             np.abs(few - whole).max() / limit.sum(), abs=1e-12
-        )
-
-
-@pytest.mark.parametrize("count", [4, 9])
-def test_exact_gauss_points_of_a_sum(count):
-    r = np.random.default_rng(count)
-    x = np.sort(r.uniform(-2e-3, 5e-3, 60))
-    weight = r.uniform(0.1, 1.0, 60)
-    place, share = gauss_rule(x, weight, count)
-    assert (share > 0).all() and x[0] < place.min() and place.max() < x[-1]
-    for power in range(2 * count):
-        assert share @ (place / 5e-3) ** power == pytest.approx(
-            weight @ (x / 5e-3) ** power, rel=1e-11, abs=1e-11
         )
 
 

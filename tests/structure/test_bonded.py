@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from modal_bases import basis_of
 
-from patchfem.core import ModalBasis, PatchfemError
+from patchfem.core import PatchfemError
 from patchfem.structure import compute_receptance, masses
 from patchfem.structure.bonded import add_spring, remove_springs
 
 
 def one(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):
-    a = np.array
-    return ModalBasis(("axial",), a([omega]), a([zeta]), a([slide]), a([slide]), a([slide]), mass)
+    return basis_of(omega, zeta, [slide], mass=mass)
 
 
 @given(st.integers(0, 10**6))
@@ -59,15 +59,8 @@ def test_always_what_a_joint_adds_comes_off_again(seed):
     k = rng.uniform(0.1, 5, faces)
     c = rng.uniform(0, 0.3)
     omega = np.sort(rng.uniform(1, 4, n))
-    base = ModalBasis(
-        tuple("abcd"[:n]),
-        omega,
-        rng.uniform(0, 0.1, n),
-        rows[0],
-        rng.uniform(-1, 1, n),
-        rng.uniform(-1, 1, n),
-        2.0,
-        faces=rows,
+    base = basis_of(
+        omega, rng.uniform(0, 0.1, n), rows, rng.uniform(-1, 1, n), rng.uniform(-1, 1, n), mass=2.0
     )
     held = add_spring(base, k[0], c)
     for row, one in zip(held.interfaces[1:], k[1:]):

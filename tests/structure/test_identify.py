@@ -80,29 +80,6 @@ def test_always_modes_outside_the_band_go_into_the_rest():
     np.testing.assert_allclose(got, shape[:, 1:3] * signs, atol=0.02 * np.abs(shape).max())
 
 
-def test_exact_shapes_of_masses():
-    """Responses of a chain give its own mass-normalised shapes, up to their signs."""
-    rig = masses.build_basis(
-        [1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1
-    )
-    zeta = np.array([0.01, 0.02, 0.005])
-    rig = type(rig)(
-        rig.names,
-        rig.omega,
-        zeta,
-        *(getattr(rig, k) for k in ("slide", "base", "output", "mass")),
-        shapes=rig.shapes,
-    )
-    H = compute_receptance(rig, 2 * np.pi * BAND, rig.shapes, rig.shapes[1])[:, :, 0]
-    notes = []
-    found = identify_modes(BAND, {((k, 2), (1, 2)): (H[:, k], 0) for k in range(3)}, notes)
-    np.testing.assert_allclose(2 * np.pi * found.frequency, rig.omega, rtol=1e-8)
-    np.testing.assert_allclose(found.zeta, zeta, rtol=1e-6)
-    got = np.stack([found.motion[k, 2] for k in range(3)])
-    np.testing.assert_allclose(got, rig.shapes * np.sign(rig.shapes[1]), atol=1e-6)
-    assert not notes
-
-
 def test_always_a_free_rig_is_told_that_its_rigid_mode_is_missing():
     """Two free masses: of rigid mode and sqrt(2) the elastic one is found, and the rigid one named as left out."""
     rig = masses.build_basis([1.0, 1.0], [((1, 2), 4e5)], [((1, 2), 8.0)], [], 1)

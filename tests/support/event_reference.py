@@ -10,8 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from patchfem.core import ModalBasis
-
 
 class Stretch(NamedTuple):
     """A smooth stretch of a drive that begins at `start` [s].
@@ -232,37 +230,3 @@ def march_reference(modes, drive, limit, end, z, v, steps):
         v = new
         out.append(z)
     return np.linspace(0, end, steps + 1), np.array(out)
-
-
-def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
-    omega = np.atleast_1d(np.asarray(omega, float))
-    n = omega.size
-    faces = np.atleast_2d(np.asarray(faces, float))
-    base, output = (np.asarray(faces[0] if x is None else x, float) for x in (base, output))
-    return ModalBasis(
-        tuple(f"m{k}" for k in range(n)),
-        omega,
-        np.broadcast_to(np.asarray(zeta, float), (n,)).copy(),
-        faces[0],
-        base,
-        output,
-        mass,
-        damping,
-        faces,
-    )
-
-
-def random_basis(rng, n, faces, coupled=True, rigid=False):
-    omega = rng.uniform(0.3, 3, n)
-    root = rng.normal(size=(n, n)) * 0.15
-    if rigid:
-        omega[0] = 0.0
-    return basis_of(
-        omega,
-        0.01,
-        rng.normal(size=(faces, n)),
-        rng.normal(size=n),
-        rng.normal(size=n),
-        1.3,
-        root @ root.T + 0.02 * np.eye(n) if coupled else None,
-    )

@@ -1,9 +1,9 @@
 """Structures and a plain march that the tests of harmonic balance share."""
 
 import numpy as np
+from modal_bases import basis_of
 from scipy.linalg import expm
 
-from patchfem.core import ModalBasis
 from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
 from patchfem.friction import Bonds, TanhLaw, points_element
 
@@ -19,8 +19,7 @@ def bonds(limit, length):
 
 
 def sdof(xi=0.003, omega=1.0, mass=1.0):
-    one = np.ones(1)
-    return ModalBasis(("a",), omega * one, xi * one, one, one, one, mass)
+    return basis_of(omega, xi, mass=mass)
 
 
 def five(damping=None, zeta=0.02):
@@ -28,15 +27,8 @@ def five(damping=None, zeta=0.02):
     omega = np.array([1.0, 2.3, 3.9, 6.1, 8.8])
     slide = np.array([1.0, 0.7, -0.5, 0.4, 0.3])
     base = np.array([1.0, 0.3, 0.2, -0.1, 0.1])
-    return ModalBasis(
-        tuple("abcde"),
-        omega,
-        np.full(5, zeta),
-        slide,
-        base,
-        np.array([1.0, -0.6, 0.4, 0.5, -0.2]),
-        2.0,
-        damping,
+    return basis_of(
+        omega, zeta, slide, base, [1.0, -0.6, 0.4, 0.5, -0.2], mass=2.0, damping=damping
     )
 
 

@@ -1,8 +1,8 @@
 """A basis of one mode, and a prescribed path through the compiled loop of the march."""
 
 import numpy as np
+from modal_bases import basis_of
 
-from patchfem.core import ModalBasis
 from patchfem.dynamics import STEP_TOL, JointsModel, element_model, load_instances
 from patchfem.friction import TanhLaw
 
@@ -28,8 +28,7 @@ def rate_model(limit: float, speed: float):
 
 
 def one_mode(omega, zeta, mass):
-    one = np.ones(1)
-    return ModalBasis(("axial",), omega * one, zeta * one, one, one, one, mass)
+    return basis_of(omega, zeta, mass=mass)
 
 
 def follow(model, path, dt=0.3):

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from patchfem.contact import ContactSets
 from patchfem.contact.unilateral import solve_forces
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.dynamics.march import varying_load
 from patchfem.friction import Bonds
 from patchfem.response import energy_balance
@@ -38,6 +38,10 @@ def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
         normal=np.array(normal, float),
         pitch=np.array(pitch, float),
     )
+
+
+# slide, heave and pitch in every mode
+MIXED = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
 
 
 def elastic(m: int = 21, crown: float = 0.0) -> ContactSets:
@@ -72,3 +76,65 @@ def balance(done, basis) -> float:
         mechanical(done.response, basis)[-1], rel=1e-9, abs=1e-18
     )
     return energy_balance(book)
+
+
+def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -> None:
+    """Require that a random march loses energy only, that its balance closes and that no force exceeds mu N."""
+    rng = np.random.default_rng(seed)
+    n = rng.integers(1, 5)
+    basis = modes(
+        rng.uniform(50, 900, n),
+        rng.normal(size=n),
+        rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
+        rng.normal(size=n) * rng.choice([0, 50.0, 300.0]),
+        0.01,
+    )
+    drive = SineDrive(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
+    start = InitialState(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n))
+    done = varying_load.march(
+        basis, drive, crowned(), LAWS[name], 3, steps, 3, start=start, shear=shear
+    )
+    response = done.response
+    peak = done.ledger["peak_stored"]
+    assert done.outcome is None, done.message
+    assert balance(done, basis) <= 1e-11
+    work, stored, lost, created = response.extra["ledger"]
+    assert created[-1] == 0 and (np.diff(lost) >= -1e-12 * peak).all()
+    if shear is not None:  # the work of the holder
+        assert work[-1] == pytest.approx(stored[-1] + lost[-1], rel=1e-9, abs=1e-12 * peak)
+    within = 1e-9 * (lost[-1] + stored[-1]) + 1e-18
+    assert done.ledger["friction"] == pytest.approx(lost[-1], abs=within)
+    limit = 0.3 * response.extra["normal_load"]
+    assert (np.abs(response.force) <= limit + 1e-9 * LOAD).all()
+
+
+def march_with_lift_off(name: str, shear=None) -> tuple:
+    """Return a march that leaves the contact and lands again without a force in flight, and its balance."""
+    basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
+    drive = SineDrive(30.0, 2 * np.pi * 143)
+    start = InitialState([0, 5e-7], [0, 0.0])
+    done = varying_load.march(
+        basis, drive, crowned(), LAWS[name], 6, 400, 6, start=start, shear=shear
+    )
+    force = done.response.force
+    apart = done.response.extra["normal_load"] == 0
+    assert 0.02 < apart.mean() < 0.95 and not force[apart].any()
+    assert np.abs(force).max() > 0.1 * 0.3 * LOAD
+    assert np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
+    return done, balance(done, basis)
+
+
+def check_order_two(name: str, steps: int, within: float, shear=None) -> None:
+    """Require that the error of `MIXED` falls by nearly four when the step is halved, from `steps` a cycle on."""
+    drive = SineDrive(40.0, 2 * np.pi * 143)
+    ends = []
+    for factor in (1, 2, 4, 8):
+        done = varying_load.march(
+            MIXED, drive, crowned(), LAWS[name], 1, factor * steps, 1, shear=shear
+        )
+        response = done.response
+        ends.append(np.concatenate([response.modal[-1], response.modal_rate[-1] / MIXED.omega]))
+        assert done.outcome is None
+    change = np.abs(np.diff(ends, axis=0)).max(axis=1)
+    assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()
+    assert np.log2(change[0] / change[2]) / 2 == pytest.approx(2, abs=within)

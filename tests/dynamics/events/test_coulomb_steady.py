@@ -4,8 +4,8 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from event_reference import basis_of, random_basis
 from event_run import period_map, simulate, steady
+from modal_bases import basis_of, random_basis
 from vibration_forms import sliding_amplitude, two_stop_amplitude
 
 from patchfem.core import InitialState, PatchfemError, SineDrive
@@ -170,36 +170,6 @@ def test_exact_derivative_of_the_map(seed, n, faces, ratio):
         e[j] = step
         ends = [period_map(modes, drive, static, ratio * static, x + s * e).end for s in (1, -1)]
         np.testing.assert_allclose(one.slope[:, j], (ends[0] - ends[1]) / (2 * step), atol=3e-8)
-
-
-def test_exact_multiplier_is_the_decay_of_a_perturbed_run():
-    modes = basis_of(1.0, 0.02)
-    drive = SineDrive(1.4, 1.1)
-    static = 0.5
-    found = steady(modes, drive, static, static)
-    values = found.multipliers
-    assert 0.5 < abs(values[0]) < 1
-    state = np.concatenate([found.start.z, found.start.v])
-    kick = 1e-7 * np.array([1.0, 0.3])
-    ends = []
-    for cycles in (1, 2, 3):
-        run = simulate(
-            modes,
-            drive,
-            static,
-            static,
-            cycles,
-            1,
-            start=InitialState((state + kick)[:1], (state + kick)[1:]),
-        )
-        ends.append(np.array([run.window.modal[-1, 0], run.window.modal_rate[-1, 0]]) - state)
-    # two multipliers: the kick obeys d3 = (m1 + m2) d2 - m1 m2 d1
-    trace, product = np.linalg.solve(np.array([ends[0], -kick]).T, ends[1])
-    assert trace == pytest.approx(np.sum(values).real, rel=1e-5)
-    assert product == pytest.approx(np.prod(values).real, rel=1e-5)
-    np.testing.assert_allclose(
-        ends[2], trace * ends[1] - product * ends[0], atol=1e-5 * np.abs(ends[0]).max()
-    )
 
 
 def test_exact_figure_16_repeats():

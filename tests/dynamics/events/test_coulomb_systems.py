@@ -5,10 +5,11 @@ from math import atan, cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from event_reference import basis_of, march_reference, random_basis, run_reference
+from event_reference import march_reference, run_reference
 from event_run import rows_of, run, simulate, starts
 from hypothesis import given
 from hypothesis import strategies as st
+from modal_bases import basis_of, random_basis
 
 from patchfem.core import (
     DriveSegment,

@@ -3,10 +3,11 @@
 import event_run
 import numpy as np
 import pytest
+from modal_bases import basis_of
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem import plan
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics.events import event_list
 from patchfem.response.run_events import convert_event_log
 from patchfem.runs.run import run
@@ -27,10 +28,8 @@ cycles = 25
 )
 
 
-def one_mode(zeta=0.003, slide=1.0):
-    return ModalBasis(
-        ("a",), np.array([1.0]), np.array([zeta]), np.array([slide]), np.ones(1), np.ones(1), 1.0
-    )
+def one_mode(zeta=0.003):
+    return basis_of(1.0, zeta)
 
 
 def test_exact_borders_of_levels_are_listed():

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 
 from patchfem.compiled.no_jit import load_uncompiled
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics import InterfaceMeasure, RunMeasure, make_elements
 from patchfem.dynamics.events import histories
 from patchfem.response import (
@@ -19,24 +20,13 @@ PLACE, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 
 def basis(omega, zeta, mass=1.0):
-    return ModalBasis(
-        ("one",), *(np.array([one], float) for one in (omega, zeta, 1.0, 1.0, 1.0)), mass
-    )
+    return basis_of(omega, zeta, mass=mass)
 
 
 def several() -> tuple:
     """(ModalBasis, groups) of three modes behind two interfaces."""
     faces = np.array([[1.0, -0.8, 0.5], [0.4, 0.9, -0.6]])
-    modes = ModalBasis(
-        ("a", "b", "c"),
-        np.array([1.0, 2.3, 3.1]),
-        np.full(3, 0.05),
-        faces[0],
-        np.array([0.8, 0.3, -0.5]),
-        np.array([1.0, -0.6, 0.3]),
-        1.3,
-        faces=faces,
-    )
+    modes = basis_of([1.0, 2.3, 3.1], 0.05, faces, [0.8, 0.3, -0.5], [1.0, -0.6, 0.3], mass=1.3)
     return modes, [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2]), make_elements([2.0], [0.15])]
 
 

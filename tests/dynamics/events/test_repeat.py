@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics import make_elements
 from patchfem.dynamics.events import histories
 from patchfem.response import energy_balance
@@ -14,15 +15,8 @@ def case(modes: int, faces: int, elements: int) -> tuple:
     """(ModalBasis, drive, Elements of every interface) of a damped rig that settles within 250 cycles."""
     rows = np.linspace(0.6, 1.0, faces * modes).reshape(faces, modes)
     rows[:, 1::2] *= -1
-    basis = ModalBasis(
-        tuple("abc"[:modes]),
-        np.linspace(1.0, 2.7, modes),
-        np.full(modes, 0.05),
-        rows[0],
-        np.full(modes, 0.8),
-        np.linspace(1.0, 0.4, modes),
-        1.0,
-        faces=rows if faces > 1 else None,
+    basis = basis_of(
+        np.linspace(1.0, 2.7, modes), 0.05, rows, np.full(modes, 0.8), np.linspace(1.0, 0.4, modes)
     )
     y = np.linspace(0.1, 0.5, elements)
     groups = [

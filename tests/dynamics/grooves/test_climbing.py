@@ -4,8 +4,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 
-from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
+from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics import element_model, make_bonds_law, make_elastic_plastic_law, points_model
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.grooves.run import make_model
@@ -16,8 +17,7 @@ from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.response import energy_balance
 
 LOAD, MU = 115.65, 0.4
-ONE = np.ones(1)
-BASIS = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), ONE, ONE, ONE, 1.194)
+BASIS = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
 DRIVE = SineDrive(49.0, 2 * np.pi * 143)
 LAWS = {
     "elastic-plastic": (

@@ -4,10 +4,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 
 import patchfem as pf
 from patchfem import load
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics import jenkins_model, make_bonds_law, make_elastic_plastic_law
 from patchfem.dynamics.grooves import climbing
 from patchfem.dynamics.grooves.climbing import ClimbingModel
@@ -174,10 +175,7 @@ def test_exact_the_books_of_coulombs_points_close():
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-9
     )
-    one = np.ones(1)
-    basis = ModalBasis(
-        ("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194
-    )
+    basis = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
     done = march(
         basis,
         SineDrive(49.0, 2 * np.pi * 143),
@@ -198,10 +196,7 @@ def test_exact_the_books_close(law):
         energies[-1, 1] - energies[0, 1], rel=1e-10
     )
     assert energies[:-1, 0].min() >= -1e-15 * work
-    one = np.ones(1)
-    basis = ModalBasis(
-        ("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), one, one, one, 1.194
-    )
+    basis = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
     model = giving(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), GIVING)
     done = march(basis, SineDrive(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
     assert done.outcome is None and energy_balance(done.ledger) < 1e-11

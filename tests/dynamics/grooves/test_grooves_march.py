@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from event_run import simulate
 from grooves_reference import case_of, flank, forces, run
+from modal_bases import basis_of
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from patchfem.core import InitialState, ModalBasis, Outcome, PatchfemError, SineDrive
+from patchfem.core import InitialState, Outcome, PatchfemError, SineDrive
 from patchfem.dynamics import start_run
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.march import march
@@ -15,11 +16,9 @@ from patchfem.friction import Grooves
 from patchfem.response import energy_balance
 from patchfem.structure.drives import make_levels, make_step
 
-ONE = np.ones(1)
-
 
 def modes(omega, zeta=0.0, mass=1.0):
-    return ModalBasis(("axial",), np.array([omega]), np.array([zeta]), ONE, ONE, ONE, mass)
+    return basis_of(omega, zeta, mass=mass)
 
 
 def marched(case, cycles: int, steps: int):
@@ -163,14 +162,13 @@ def test_always_a_rig_of_80_um_grooves_runs_away_from_rest_at_8_g(frequency, sta
     load = 115.65
     g = 9.80665
     mass = 0.4 * load / (4.2 * g)
-    basis = ModalBasis(
-        ("axial", "yaw"),
+    basis = basis_of(
         2 * np.pi * np.array([143.0, 129.0]),
-        np.full(2, 0.003),
-        np.array([1.0, 0.0932]),
-        np.array([1.0, 0.0]),
-        np.array([1.0, 0.0]),
-        mass,
+        0.003,
+        [1.0, 0.0932],
+        [1.0, 0.0],
+        [1.0, 0.0],
+        mass=mass,
     )
     model = make_model(
         Grooves(80e-6, 0.51 * 80e-6 / (2 * np.pi), 0.0, mass), load, 0.4, 0.4, None, basis
@@ -235,14 +233,8 @@ def test_always_a_fork_goes_on_as_the_march_does():
 @pytest.mark.parametrize("kinetic", [0.4, 0.32])
 def test_exact_two_modes_on_flat_grooves_by_the_exact_engine(kinetic):
     """Flanks of a slope of 1e-12: stops, sticks with a mode that goes on swinging, and releases of Coulomb's law."""
-    basis = ModalBasis(
-        ("axial", "yaw"),
-        2 * np.pi * np.array([143.0, 129.0]),
-        np.full(2, 0.003),
-        np.array([1.0, 0.4]),
-        np.array([1.0, 0.0]),
-        np.array([1.0, 0.0]),
-        1.2,
+    basis = basis_of(
+        2 * np.pi * np.array([143.0, 129.0]), 0.003, [1.0, 0.4], [1.0, 0.0], [1.0, 0.0], mass=1.2
     )
     drive = SineDrive(48.0, 2 * np.pi * 143)
     done = march(

@@ -5,8 +5,9 @@ import pytest
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from modal_bases import basis_of
 
-from patchfem.core import ModalBasis, NotConverged, PatchfemError, SineDrive
+from patchfem.core import NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics import (
     Interlock,
     LawGroup,
@@ -151,9 +152,7 @@ def test_exact_linear_limits(omega):
 def test_exact_a_mode_without_stiffness_or_damping():
     """A rigid mode and an undamped one at its own frequency have no receptance and need none."""
     one = np.ones(2)
-    modes = ModalBasis(
-        ("r", "a"), np.array([0.0, 1.0]), np.zeros(2), np.array([1.0, 0.6]), one, one, 1.5
-    )
+    modes = basis_of([0.0, 1.0], 0.0, [1.0, 0.6], one, one, mass=1.5)
     for omega in (0.8, 1.0):
         found = find_point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
         assert found.modal[1] == pytest.approx(dense(modes, omega, 1.0, 2.0), rel=1e-10)
@@ -172,17 +171,7 @@ def test_exact_the_jacobian_of_the_balance():
     c = 0.1 * np.eye(3) + 0.05
     faces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
     for damping in (None, c):
-        modes = ModalBasis(
-            ("r", "a", "b"),
-            np.array([0.0, 1.0, 3.0]),
-            0.02 * one,
-            faces[0],
-            one,
-            one,
-            1.3,
-            damping,
-            faces,
-        )
+        modes = basis_of([0.0, 1.0, 3.0], 0.02, faces, one, one, mass=1.3, damping=damping)
         group = LawGroup(
             modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024
         )

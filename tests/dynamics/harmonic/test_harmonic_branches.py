@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
+from modal_bases import basis_of
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem import plan, run
-from patchfem.core import G_N, ModalBasis, NotConverged, PatchfemError, SineDrive
+from patchfem.core import G_N, NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics import (
     FreeBalance,
     LawGroup,
@@ -29,9 +30,7 @@ from patchfem.dynamics.periodic import find_multipliers
 
 W = 2 * np.pi * 143
 MASS = 0.884
-RIG = ModalBasis(
-    ("axial",), np.array([W]), np.array([0.003]), np.ones(1), np.ones(1), np.ones(1), MASS
-)
+RIG = basis_of(W, 0.003, mass=MASS)
 CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the flexure at 1 mm
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
@@ -54,21 +53,6 @@ def test_exact_a_circle_and_its_folds():
     )
     assert path.x[:, 0] ** 2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
     assert path.folds == (pytest.approx(1.0, abs=1e-8),) and not path.crossings
-
-
-def test_exact_a_lopsided_fold():
-    """p = x exp(-5 x^3): the fold at x^3 = 1/15 from points 0.1 apart on the arc."""
-
-    def curve(x, p):
-        e = np.exp(-5 * x[0] ** 3)
-        return x * e - p, np.array([[e * (1 - 15 * x[0] ** 3)]]), np.array([-1.0])
-
-    path = follow_curve(
-        curve, [0.1], 0.1 * np.exp(-0.005), (0.05, 1.0), True, PathSettings(0.1, 0.1, size=1.0)
-    )
-    assert path.ended == "start" and path.folds == (
-        pytest.approx(15 ** (-1 / 3) * np.exp(-1 / 3), abs=5e-5),
-    )
 
 
 def test_exact_a_pitchfork_is_a_crossing():

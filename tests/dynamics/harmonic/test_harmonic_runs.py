@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 from harmonic_cases import bonds, five, march, plain_jenkins, sdof
+from modal_bases import basis_of
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem import plan
-from patchfem.core import ModalBasis, NotConverged, SineDrive
+from patchfem.core import NotConverged, SineDrive
 from patchfem.dynamics import (
     Spring,
     evaluate_series,
@@ -77,9 +78,7 @@ def test_exact_many_interfaces_on_few_modes():
     rng = np.random.default_rng(2)
     faces = rng.normal(size=(30, 5)) * np.array([1.0, 0.5, 0.4, 0.3, 0.2])
     base = five()
-    modes = ModalBasis(
-        base.names, base.omega, base.zeta, faces[0], base.base, base.output, base.mass, None, faces
-    )
+    modes = basis_of(base.omega, base.zeta, faces, base.base, base.output, mass=base.mass)
     laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
     drive = SineDrive(1.0, 0.9)
     p = find_point(modes, drive, laws, tolerance=1e-4)

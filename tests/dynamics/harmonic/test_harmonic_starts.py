@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from modal_bases import basis_of
 
-from patchfem.core import G_N, ModalBasis, SineDrive
+from patchfem.core import G_N, SineDrive
 from patchfem.dynamics import Spring, find_branches
 from patchfem.dynamics.harmonic.laws import Jenkins
 
@@ -14,8 +15,7 @@ def test_exact_three_motions_near_the_end_of_the_upper_branch():
     w = 2 * np.pi * 143
     mass = 0.884
     limit = 0.3 * 26 * 4.4482216152605
-    one = np.ones(1)
-    modes = ModalBasis(("axial",), w * one, 0.003 * one, one, one, one, mass)
+    modes = basis_of(w, 0.003, mass=mass)
     laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
     for hertz in np.linspace(147.2, 147.6, 5):
         found = find_branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)

@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 from event_run import steady
+from modal_bases import basis_of
 
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics import element_model, start_run
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.harmonic import orbits
 from patchfem.friction import Grooves, parallel_element
 from patchfem.response import energy_balance
 
-ONE, OMEGA, ZETA = np.ones(1), 2 * np.pi * 143, 0.003
-BASIS = ModalBasis(("axial",), np.array([OMEGA]), np.array([ZETA]), ONE, ONE, ONE, 1.194)
+OMEGA, ZETA = 2 * np.pi * 143, 0.003
+BASIS = basis_of(OMEGA, ZETA, mass=1.194)
 
 
 def test_exact_a_spring_beside_a_mode():

@@ -174,7 +174,7 @@ def test_exact_a_case_is_the_same_in_any_company(law):
         np.testing.assert_array_equal(getattr(mixed, name), getattr(whole, name)[order])
 
 
-@pytest.mark.share(*ALWAYS, LAWS.index("friction.laws.lugre_kernels"))
+@pytest.mark.share(*ALWAYS)
 @pytest.mark.parametrize("law", LAWS)
 def test_order_of_events_is_above_three(law):
     """Between events a step is exact and an event is found to the fourth order, so the amplitudes of most cases

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from march_paths import OMEGA
+from modal_bases import basis_of
 from test_march_loop import half_plane
 
-from patchfem.core import ModalBasis, Response, SineDrive
+from patchfem.core import Response, SineDrive
 from patchfem.dynamics import points_model
 from patchfem.dynamics.march import lanes
 from patchfem.dynamics.march.march import march
@@ -14,18 +15,8 @@ from patchfem.response import loops, measures, spectrum
 from patchfem.runs.batch.samples import Samples
 from patchfem.slip.shear_modes import shear_modes
 
-ONE = ModalBasis(
-    ("a",), np.array([OMEGA]), np.full(1, 0.05), np.ones(1), np.ones(1), np.ones(1), 1.0
-)
-TWO = ModalBasis(
-    ("a", "b"),
-    OMEGA * np.array([1.0, 0.9]),
-    np.full(2, 0.05),
-    np.array([1.0, 0.2]),
-    np.ones(2),
-    np.array([1.0, -0.5]),
-    1.0,
-)
+ONE = basis_of(OMEGA, 0.05)
+TWO = basis_of(OMEGA * np.array([1.0, 0.9]), 0.05, [1.0, 0.2], np.ones(2), [1.0, -0.5])
 PUSHES, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
 LAW, DRIVE = Bonds(0.4, 1e-6), SineDrive(1.0, OMEGA)
 BOOKS = {
@@ -74,7 +65,7 @@ def pairs() -> tuple:
     return both(TWO)
 
 
-def near(one, other, rel: float):
+def near(one, other, rel: float = 1e-12):
     np.testing.assert_allclose(one, other, rtol=rel, atol=rel * np.abs(other).max())
 
 

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from friction_paths import random_walk, upper_pressure, walk
 from march_paths import OMEGA, follow, one_mode
+from modal_bases import basis_of
 from scipy.integrate import solve_ivp
 
-from patchfem.core import InitialState, ModalBasis, Outcome, SineDrive
+from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics import bond_list_model, jenkins_model, points_model, start_run
 from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
@@ -327,7 +328,7 @@ def test_always_free_decay_never_gains_energy(shear, steps_per_cycle):
     modes = shear_modes(compliance, law.static * area * sigma, law.length, 10) if shear else None
     omega = OMEGA * np.array([1.0, 1.7, 3.1, 5.3, 8.9, 14.2])
     slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
-    basis = ModalBasis(tuple("abcdef"), omega, np.zeros(6), slide, slide, slide, 1.0)
+    basis = basis_of(omega, 0.0, slide)
     start = InitialState(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
     done = march(
         basis,

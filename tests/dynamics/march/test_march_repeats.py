@@ -5,12 +5,13 @@ from time import process_time
 import numpy as np
 import pytest
 from march_paths import ALL, OMEGA, one_mode, rate_model
+from modal_bases import basis_of
 from test_joints import chain, coulomb, elastic_plastic
 from test_march_loop import half_plane
 from test_varying_shear import reduced
 from varying_load_cases import LAWS, crowned, modes
 
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics import JointsModel, coulomb_model, jenkins_model, points_model
 from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import run as marching_run
@@ -121,15 +122,7 @@ def test_always_a_hundred_times_the_cycles_cost_little_more():
 def test_exact_a_mode_that_beats_and_bonds_that_grow_are_marched_to_the_end(monkeypatch):
     """A mode without damping beside the friction, and bonds that grow over far more than the run."""
     ones = np.ones(2)
-    beats = ModalBasis(
-        ("a", "b"),
-        OMEGA * np.array([1.0, 1.37]),
-        np.array([0.05, 0.0]),
-        np.array([1.0, 0.0]),
-        ones,
-        ones,
-        1.0,
-    )
+    beats = basis_of(OMEGA * np.array([1.0, 1.37]), [0.05, 0.0], [1.0, 0.0], ones, ones)
     grows = points_model(
         Bonds(0.4, 1e-6, ratio=2.0, rest_growth=1e-12, slip_growth=1e3), [1e-4], [50e4]
     )

@@ -1,34 +1,18 @@
 """Cycles of bonds behind shear modes that are folded as they pass, against a march that keeps every sample."""
 
+from dataclasses import replace
 from time import process_time
 
 import numpy as np
 import pytest
 from march_paths import OMEGA
+from test_lanes import TWO, near
 from test_march_repeats import BASIS, sheared
 
-from patchfem.core import ModalBasis, SineDrive
+from patchfem.core import SineDrive
 from patchfem.dynamics.march.march import march
 
-TWO = ModalBasis(
-    ("a", "b"),
-    OMEGA * np.array([1.0, 0.9]),
-    np.full(2, 0.05),
-    np.array([1.0, 0.2]),
-    np.ones(2),
-    np.array([1.0, -0.5]),
-    1.0,
-)
-COUPLED = ModalBasis(
-    TWO.names,
-    TWO.omega,
-    TWO.zeta,
-    TWO.slide,
-    TWO.base,
-    TWO.output,
-    TWO.mass,
-    damping=OMEGA * np.array([[0.1, 0.02], [0.02, 0.09]]),
-)
+COUPLED = replace(TWO, damping=OMEGA * np.array([[0.1, 0.02], [0.02, 0.09]]))
 BOOKS = (
     "work_in",
     "viscous",
@@ -49,10 +33,6 @@ def both(basis, push: float, cycles: float, steps: int = 80, **more) -> tuple:
     return march(basis, drive, model, cycles, steps, 5, **more), march(
         basis, drive, model, cycles, steps, 5, keeps_samples=False, keeps_extremes=True, **more
     )
-
-
-def near(one, other, rel=1e-12):
-    np.testing.assert_allclose(one, other, rtol=rel, atol=rel * np.abs(other).max())
 
 
 @pytest.mark.parametrize(

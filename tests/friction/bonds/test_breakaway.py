@@ -4,8 +4,9 @@ import friction_forms
 import numpy as np
 import pytest
 from friction_paths import random_walk, slides, triangle, upper_pressure, walk
+from march_paths import follow
 
-from patchfem.dynamics import load_instances, points_model
+from patchfem.dynamics import points_model
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
@@ -58,13 +59,8 @@ def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):
 def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
     law = bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
-    model = points_model(law, [1.0], [1.0])
-    contact = model.build()
-    energies = np.zeros((path.size, 2))
-    forces = np.zeros((path.size, 3))
-    assert (
-        load_instances().follow_path(path, 1.0, model.kind, contact, 1e-12, energies, forces) == 0
-    )
+    forces, energies, bad, _ = follow(points_model(law, [1.0], [1.0]), path, 1.0)
+    assert bad == 0
     run = walk(FirstOrderBonds(law), path, ONE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)

@@ -5,6 +5,9 @@ import pytest
 from law_runs import LOAD, bench_along, shrinking
 from scipy.integrate import solve_ivp
 
+from patchfem.compiled import load_uncompiled
+from patchfem.friction import LuGre
+
 STATIC, KINETIC, STIFFNESS, SPEED = 0.31 * LOAD, 0.22 * LOAD, 1.3e7, 2e-3
 DAHL = 'law = "lugre"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nstribeck_speed = "2 mm/s"\n'
 LAW = DAHL + "kinetic = 0.22\n"
@@ -63,3 +66,21 @@ def test_exact_straight_legs_are_the_equations():
         )
     work, stored, dissipated, created = found.ledger
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1], rel=1e-12) and not created.any()
+
+
+def test_exact_rate_equation_and_its_derivatives():
+    """Of the kernel that the engines integrate in time, run as Python: the equations, and their central differences."""
+    kernels = load_uncompiled("patchfem.friction.laws.lugre_kernels")
+    law = LuGre(0.31, 0.22, STIFFNESS / LOAD, SPEED, 900 / LOAD, 300 / LOAD)
+    numbers = law.element(LOAD).numbers
+
+    def force(z, v):
+        return rates(z, v, 900, 300)[1]
+
+    for z, v in ((1e-6, 1e-3), (-2e-6, 3e-3), (5e-7, -2e-3), (-1e-6, -1e-2)):
+        found = kernels.rate_equation(numbers, z, v, np.sign(v))
+        by_stretch = (force(z + 1e-9, v) - force(z - 1e-9, v)) / 2e-9
+        by_velocity = (force(z, v + 1e-7) - force(z, v - 1e-7)) / 2e-7
+        assert found[0] == pytest.approx(force(z, v), rel=1e-12)
+        assert found[1] * v == pytest.approx(rates(z, v)[0], rel=1e-12)
+        assert found[2:] == pytest.approx((by_stretch, by_velocity), rel=1e-6)
