@@ -67,7 +67,7 @@ class PressedState(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pivot(sets, k):
-    """Exchange force and gap of a node in the tableau; return False on a bad pivot.
+    """Exchange force and gap of node k in the tableau; return False on a bad pivot.
 
     Cost: m^2 multiplications.
     """
