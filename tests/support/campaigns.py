@@ -41,6 +41,7 @@ KINDS = {  # name on the command line -> module and function
     "static-fine": ("static_scenes", "compare_fine_patch"),
     "traces": ("random_traces", "compare_trace"),
     "wear": ("wear_scenes", "compare_bench"),
+    "predicted-wear": ("predicted_pairs", "compare_pair"),
     "stick-together": ("sticks_together", "compare_rig"),
     "lanes": ("lane_cases", "compare_cases"),
     "decay-fits": ("decay_fits", "compare_fit"),

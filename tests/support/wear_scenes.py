@@ -106,8 +106,17 @@ def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
     )
 
 
-def wear(model: Model, scene: WearScene, steps: int) -> dict:
-    """Integrate the depth over the path in `steps` steps that grow geometrically; return the measures after wear."""
+class WornPatch(NamedTuple):
+    """State after wear: depth of both pieces together (m,) [m], nodal forces, approach, nodes in contact."""
+
+    depth: np.ndarray
+    force: np.ndarray
+    approach: float
+    active: np.ndarray
+
+
+def integrate(model: Model, scene: WearScene, steps: int) -> WornPatch:
+    """Integrate the depth over the path in `steps` steps that grow geometrically."""
     load = scene.patch.load / scene.patch.width
     edges = (
         np.expm1(np.linspace(0, 1, steps + 1) * np.log1p(1 / FIRST_STEP)) * FIRST_STEP * scene.path
@@ -120,6 +129,12 @@ def wear(model: Model, scene: WearScene, steps: int) -> dict:
             model.normal + np.diag(rate), model.gap + depth, load, active
         )
         depth = depth + rate * force
+    return WornPatch(depth, force, approach, active)
+
+
+def wear(model: Model, scene: WearScene, steps: int) -> dict:
+    """Return the measures after wear that is integrated in `steps` steps."""
+    depth, force, approach, active = integrate(model, scene, steps)
     pressure = force / model.weight
     index = np.flatnonzero(active)
     patch = scene.patch
