@@ -43,6 +43,7 @@ from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
+from .export.surfaces import predicted as predicted_wear
 from .export.surfaces import roughness, worn, worn_runs
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
@@ -1160,6 +1161,8 @@ def compare(
     keep_spikes: bool = False,
     pairs: str | Path | None = None,
     datum: str = "",
+    predicted: str | Path | None = None,
+    piece: str = "",
 ) -> dict[str, Any]:
     """Compare a measured surface before and after wear.
 
@@ -1180,6 +1183,10 @@ def compare(
         Table of pairs instead of files, with the columns before and after.
     datum : str
         "straight" if the datum of the instrument is known to be straight, so that no bow is subtracted from traces.
+    predicted : path, optional
+        Results folder of a run with [wear], whose worn depth is laid over that of the traces.
+    piece : str
+        "upper" or "lower", of which the traces are; it may be left out if both pieces wear alike.
 
     Returns
     -------
@@ -1189,7 +1196,8 @@ def compare(
         `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With `pairs` the dict has
         `pairs`, an entry per pair, and `means` with mean, interval and scatter; a pair that fails has its reason as
         `message`. For two results folders it has the wear between the two runs over the whole patch, and the measures of
-        both runs under `runs`.
+        both runs under `runs`. With `predicted` it has the fitted wear `coefficient`, `difference_rms` and a `sentence`
+        under `predicted`.
 
     Raises
     ------
@@ -1217,8 +1225,14 @@ def compare(
     files = [_require_path(file, "compare") for file in files]
     _require_string(direction, "compare: direction")
     _require_string(datum, "compare: datum")
+    _require_string(piece, "compare: piece")
+    if predicted is not None:
+        predicted = _require_path(predicted, "compare: predicted")
+    elif piece:
+        raise PatchfemError("compare: piece needs predicted")
     if pairs is None and len(files) > 1 and any(file.is_dir() for file in files):
         has_setting = units is not None or shift is not None or keep_spikes or datum or direction
+        has_setting = has_setting or predicted is not None
         if len(files) > 2 or has_setting:
             raise PatchfemError(
                 "compare: give two results folders alone, without other files or settings of traces"
@@ -1226,7 +1240,19 @@ def compare(
         wear = worn_runs.compare_runs(*files)
         return worn.wear_data(wear, worn.wear_verdict(wear))
     if pairs is None:
-        return compared_data.comparison_data(*verdict.judge_files(files, direction, **settings))
+        judgement = verdict.judge_files(files, direction, **settings)
+        if predicted is None:
+            return compared_data.comparison_data(*judgement)
+        worn_prediction = predicted_wear.predict_wear(judgement.parts, predicted, piece)
+        sentences = compared_data.add_predicted_sentence(judgement.verdict, worn_prediction)
+        return compared_data.comparison_data(
+            judgement.parts,
+            sentences,
+            judgement.directions,
+            compared_data.ComputedParts(predicted=worn_prediction),
+        )
+    if predicted is not None:
+        raise PatchfemError("compare: give either predicted or a table of pairs, not both")
     if files:
         raise PatchfemError("compare: give either files or a table of pairs, not both")
     table = pairs_tables.read_pairs(_require_path(pairs, "compare: pairs"))

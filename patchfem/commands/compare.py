@@ -10,6 +10,7 @@ from ..campaigns import compare as pressing
 from ..export import results, summary
 from ..export.surfaces import compare as paper
 from ..export.surfaces import pairs as pairs_paper
+from ..export.surfaces import predicted as predicted_paper
 from ..export.surfaces import worn, worn_runs
 from ..surface import profile
 from ..surface.compare import pairs as tables
@@ -76,6 +77,17 @@ def compare(
         ),
     ] = None,
     set_: Sets = (),
+    predicted: Annotated[
+        Path | None,
+        Parameter(
+            help="results folder of a run with [wear], such as out/wear; its worn depth is laid "
+            "over that of the traces, and the wear coefficient is fitted"
+        ),
+    ] = None,
+    piece: word(
+        "piece of which the traces are, upper or lower, for --predicted; it may be left out if "
+        "both pieces wear alike (wear.upper_share = 0.5)"
+    ) = "",
     out: Out = None,
     json_: Json = False,
     quiet: Quiet = False,
@@ -85,7 +97,8 @@ def compare(
     the levelled difference as X3P and text. To compare the perpendicular direction too, append its two traces. With
     --pairs, all pairs of a table are compared; the results are then mean, scatter and interval over the pairs. BEFORE
     and AFTER may also be two results folders. AFTER must then belong to a run with [wear], and the page shows the wear
-    between the two runs.
+    between the two runs. With --predicted, the worn depth of a run is laid over that of the traces, and the wear
+    coefficient is fitted with its interval.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
@@ -102,11 +115,14 @@ def compare(
         "datum": datum,
     }
     files = [path for path in (before, after, *other) if path is not None]
+    if piece and predicted is None:
+        raise Refused(f"compare --piece {piece}: this option needs --predicted")
     if pairs is not None:
-        if files or scene is not None:
+        if files or scene is not None or predicted is not None:
+            other_option = "--scene" if scene is not None else "--predicted"
             raise Refused(
                 f"compare --pairs {pairs}: give the table alone, without "
-                f"{'other files' if files else '--scene'}"
+                f"{'other files' if files else other_option}"
             )
         _compare_table(pairs, direction, how, choose_folder(out, pairs.stem), json_, quiet)
         return
@@ -126,27 +142,33 @@ def compare(
                 "--datum": datum,
                 "--scene": scene,
                 "--set": set_,
+                "--predicted": predicted,
             }
         )
         return _compare_runs(before, after, out, json_)
     parts, comparison, directions = verdict.judge_files(tuple(files), direction, **how)
     target = choose_folder(out, f"{before.stem}-{after.stem}")
+    worn_prediction = None
+    if predicted is not None:
+        worn_prediction = predicted_paper.predict_wear(parts, predicted, piece)
+        comparison = paper.add_predicted_sentence(comparison, worn_prediction)
     with results.Folder(target) as folder:
-        pressing = (
-            _press_surfaces(scene, set_, parts[0], folder.path, quiet)
-            if scene is not None
-            else None
-        )
-        data = paper.comparison_data(parts, comparison, directions, pressing)
+        pressing = None
+        if scene is not None:
+            pressing = _press_surfaces(scene, set_, parts[0], folder.path, quiet)
+        computed = paper.ComputedParts(pressing, worn_prediction)
+        data = paper.comparison_data(parts, comparison, directions, computed)
         summary.write_json(data, folder.path / "compare.json")
-        paper.write_page(folder.path / "report.html", parts, comparison, directions, pressing)
+        paper.write_page(folder.path / "report.html", parts, comparison, directions, computed)
         paper.write_difference(folder.path, parts[0])
+        if worn_prediction is not None:
+            predicted_paper.write_csv(folder.path / "predicted.csv", worn_prediction)
     for text in data["notes"]:
         note(text)
     if json_:
         print(json.dumps(data, ensure_ascii=False, allow_nan=False))
     else:
-        print("\n".join(paper.format_comparison(parts, comparison, pressing)))
+        print("\n".join(paper.format_comparison(parts, comparison, computed)))
         print(f"results: {target}")
 
 

@@ -11,8 +11,11 @@ from ... import __version__
 from ...campaigns.compare import SurfaceRuns
 from ...campaigns.compare import surface_runs_data as pressed_data
 from ...disk.atomic_write import write_text
+from ...formatting import format_length
 from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
+from ...surface.compare.predicted import PredictedWear
+from ...surface.compare.track_roughness import TrackRoughness, measure_track_roughness
 from ...surface.profile import Profile, level, resample_evenly
 from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
@@ -29,7 +32,15 @@ from ..pages.sentences import format_with_error
 from . import pictures
 from .areal import write_columns, write_x3p
 from .pictures import Picture
-from .quantities import MISSING, QuantityTable, Row, format_quantity, quantity_data
+from .predicted import predicted_data, predicted_picture, predicted_table
+from .quantities import (
+    MISSING,
+    QuantityTable,
+    Row,
+    choose_common_unit,
+    format_quantity,
+    quantity_data,
+)
 
 QUANTITY_LABELS = {
     "shift": "shift",
@@ -67,6 +78,7 @@ QUANTITY_LABELS = {
     "shift_y": "shift along y",
     "rotation": "rotation",
 }
+ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
 TABLE_HEADS = ("quantity", "value", "95 %", "unit")
 SIDES = ("before", "after")
 MAX_DRAWN_HEIGHTS = (
@@ -108,7 +120,31 @@ def _quantities_table(comparison: Comparison) -> QuantityTable:
     return QuantityTable(TABLE_HEADS, rows)
 
 
-def format_comparison(parts: list, verdict: tuple, pressed: SurfaceRuns | None = None) -> list:
+class ComputedParts(NamedTuple):
+    """Results of runs beside a comparison of measured surfaces, None where they were not requested.
+
+    pressed: a scene with each of the two surfaces; predicted: the wear of a run, fitted to the
+    measured one.
+    """
+
+    pressed: SurfaceRuns | None = None
+    predicted: PredictedWear | None = None
+
+
+NOTHING_COMPUTED = ComputedParts()
+
+
+def add_predicted_sentence(verdict: tuple, predicted: PredictedWear | None) -> tuple:
+    """Return headline and sentences with that on the computed wear as the last one."""
+    if predicted is None:
+        return verdict
+    headline, sentences = verdict
+    return headline, [*sentences, predicted.sentence]
+
+
+def format_comparison(
+    parts: list, verdict: tuple, computed: ComputedParts = NOTHING_COMPUTED
+) -> list:
     """Return the comparison of two surfaces as lines of text.
 
     Parameters
@@ -117,19 +153,26 @@ def format_comparison(parts: list, verdict: tuple, pressed: SurfaceRuns | None =
         One for each direction.
     verdict : tuple
         Headline and sentences.
-    pressed : SurfaceRuns, optional
-        A scene with each of the two surfaces.
+    computed : ComputedParts
+        Results of runs.
 
     Returns
     -------
     list of str
     """
     headline, sentences = verdict
+    pressed = computed.pressed
     out = [headline, *(f"  {text}" for text in sentences), ""]
     for part in parts:
         direction = f", along {part.direction}" if part.direction else ""
         out.append(f"{part.before.source} -> {part.after.source}{direction}")
         out += _quantities_table(part).lines()
+        roughness = measure_track_roughness(part)
+        if roughness.regions:
+            out += ["", *_roughness_table(roughness).lines()]
+    if computed.predicted is not None:
+        predicted = computed.predicted
+        out += ["", *predicted_table(predicted).lines()]
     if pressed is not None:
         out += ["", f"{pressed.title}, pressed with each surface"]
         rows = []
@@ -160,8 +203,23 @@ def _format_measure(name: str, measure) -> str:
     )
 
 
+def _roughness_table(roughness: TrackRoughness) -> QuantityTable:
+    """Return the table of the roughness inside and outside a track, before and after wear."""
+    rows = []
+    for name in ROUGHNESS_NAMES:
+        for region, sides in roughness.regions.items():
+            quantities = [sides[side][name] for side in SIDES]
+            unit = choose_common_unit(quantities)
+            after = format_quantity(quantities[1], unit)
+            row = Row(f"{name} {region} the track", quantities[0], unit, after[:2])
+            rows.append(row._replace(meaning=quantities[0].text))
+    cutoff = format_length(roughness.cutoff)
+    heads = (f"roughness, cut-off {cutoff}", "before", "95 %", "after", "95 %", "unit")
+    return QuantityTable(heads, rows)
+
+
 def comparison_data(
-    parts: list, verdict: tuple, directions: list, pressed: SurfaceRuns | None = None
+    parts: list, verdict: tuple, directions: list, computed: ComputedParts = NOTHING_COMPUTED
 ) -> dict:
     """Return the comparison of two surfaces as a dict, in SI units.
 
@@ -174,8 +232,8 @@ def comparison_data(
         Headline and sentences.
     directions : list
         (when, amplitude ratio, slope ratio) of x over y.
-    pressed : SurfaceRuns, optional
-        A scene with each of the two surfaces.
+    computed : ComputedParts
+        Results of runs.
 
     Returns
     -------
@@ -201,8 +259,11 @@ def comparison_data(
                 "slope_ratio": quantity_data(slope),
             }
             out["anisotropy"][when] = ratios
-    if pressed is not None:
-        out["pressed"] = pressed_data(pressed)
+    if computed.pressed is not None:
+        out["pressed"] = pressed_data(computed.pressed)
+    if computed.predicted is not None:
+        out["predicted"] = predicted_data(computed.predicted)
+        out["notes"] += computed.predicted.notes
     return out
 
 
@@ -223,9 +284,20 @@ def _part_data(part: Comparison) -> dict:
             "track": sizes or None,
             "other_tracks": others,
             "removed": dict(zip(SIDES, part.removed)),
+            "roughness": _roughness_data(measure_track_roughness(part)),
         }
     elif part.change is not None:
         out |= _scans_data(part.change)
+    return out
+
+
+def _roughness_data(roughness: TrackRoughness) -> dict:
+    """Return the roughness inside and outside a track as a dict, with a reason if it is unknown."""
+    out = {"cutoff": roughness.cutoff, "inside": None, "outside": None}
+    if not roughness.regions:
+        return {**out, "reason": roughness.reason}
+    for region, sides in roughness.regions.items():
+        out[region] = {side: _values_data(values) for side, values in sides.items()}
     return out
 
 
@@ -317,27 +389,30 @@ def write_page(
     parts: list,
     verdict: tuple,
     directions: list = (),
-    pressed: SurfaceRuns | None = None,
+    computed: ComputedParts = NOTHING_COMPUTED,
 ) -> None:
     """Write the HTML page of a comparison of two surfaces.
 
     Parameters
     ----------
     path : Path
-    parts, verdict, directions, pressed
+    parts, verdict, directions, computed
         As in `comparison_data`.
     """
-    write_text(path, page_html(parts, verdict, directions, pressed))
+    write_text(path, page_html(parts, verdict, directions, computed))
 
 
 def page_html(
-    parts: list, verdict: tuple, directions: list = (), pressed: SurfaceRuns | None = None
+    parts: list,
+    verdict: tuple,
+    directions: list = (),
+    computed: ComputedParts = NOTHING_COMPUTED,
 ) -> str:
     """Return the HTML page of a comparison of two surfaces, with the verdict first.
 
     Parameters
     ----------
-    parts, verdict, directions, pressed
+    parts, verdict, directions, computed
         As in `comparison_data`.
 
     Returns
@@ -345,7 +420,10 @@ def page_html(
     str
     """
     names = [Path(surface.source).name for surface in (parts[0].before, parts[0].after)]
+    pressed = computed.pressed
     sections = []
+    if computed.predicted is not None:
+        sections.append(_predicted_section(computed.predicted))
     if directions:
         ratios = []
         for when, amplitude, _ in directions:
@@ -372,6 +450,9 @@ def page_html(
             for place, picture in enumerate(_draw_pictures(part))
         ]
         body += [_quantities_table(part).html(), f"<p class=soft>{sentence_html(PAGE_NOTE)}</p>"]
+        roughness = measure_track_roughness(part)
+        if roughness.regions:
+            body.append(_roughness_table(roughness).html())
         sections.append(Section(f"changes{number}", heading, "\n".join(body)))
     if pressed is not None:
         sections.append(
@@ -380,7 +461,15 @@ def page_html(
             )
         )
     notes = [f"{text}." for part in parts for text in part.notes]
+    if computed.predicted is not None:
+        notes += [f"{text}." for text in computed.predicted.notes]
     return SurfacePage(f"{names[0]} and {names[1]}", verdict, notes).html(sections)
+
+
+def _predicted_section(predicted: PredictedWear) -> Section:
+    """Return the section of a page with the computed wear over the measured one."""
+    body = [figure_html("w", *predicted_picture(predicted)), predicted_table(predicted).html()]
+    return Section("predicted", "Computed wear over the measured wear", "\n".join(body))
 
 
 def _draw_pictures(part: Comparison) -> list:

@@ -62,6 +62,12 @@ def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityTe
     return QuantityText(text, " .. ".join(ends), name)
 
 
+def choose_common_unit(quantities: list) -> tuple:
+    """Choose the unit (name, scale) that suits the largest bound of several quantities of one kind."""
+    size = max(quantity.high for quantity in quantities)
+    return choose_unit(UNITS[quantities[0].unit], size)
+
+
 def _format_below_million(value: float, digits: int) -> str:
     """Write a number with `digits` digits, without a power of ten below a million."""
     if value == 0 or not 1 <= abs(value) < MAX_PLAIN_NUMBER:
