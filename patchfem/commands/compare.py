@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from cyclopts import Parameter
 
@@ -146,16 +146,51 @@ def compare(
             }
         )
         return _compare_runs(before, after, out, json_)
-    parts, comparison, directions = verdict.judge_files(tuple(files), direction, **how)
+    request = _RunRequest(scene, set_, predicted, piece)
     target = choose_folder(out, f"{before.stem}-{after.stem}")
+    judgement = verdict.judge_files(tuple(files), direction, **how)
+    data = _write_comparison(judgement, request, target, json_, quiet)
+    for text in data["notes"]:
+        note(text)
+    if json_:
+        print(json.dumps(data, ensure_ascii=False, allow_nan=False))
+
+
+class _RunRequest(NamedTuple):
+    """What to compute besides the comparison: a scene to press, and a run with wear to lay over it."""
+
+    scene: Path | None
+    sets: tuple
+    predicted: Path | None
+    piece: str
+
+
+def _write_comparison(
+    judgement: "verdict.Judgement", request: _RunRequest, target: Path, json_: bool, quiet: bool
+) -> dict:
+    """Write the files of a comparison into a folder, and print it as text unless `json_`.
+
+    Parameters
+    ----------
+    judgement : Judgement
+    request : _RunRequest
+    target : Path
+    json_, quiet : bool
+
+    Returns
+    -------
+    dict
+        The content of compare.json.
+    """
+    parts, comparison, directions = judgement
     worn_prediction = None
-    if predicted is not None:
-        worn_prediction = predicted_paper.predict_wear(parts, predicted, piece)
+    if request.predicted is not None:
+        worn_prediction = predicted_paper.predict_wear(parts, request.predicted, request.piece)
         comparison = paper.add_predicted_sentence(comparison, worn_prediction)
     with results.Folder(target) as folder:
         pressing = None
-        if scene is not None:
-            pressing = _press_surfaces(scene, set_, parts[0], folder.path, quiet)
+        if request.scene is not None:
+            pressing = _press_surfaces(request.scene, request.sets, parts[0], folder.path, quiet)
         computed = paper.ComputedParts(pressing, worn_prediction)
         data = paper.comparison_data(parts, comparison, directions, computed)
         summary.write_json(data, folder.path / "compare.json")
@@ -163,13 +198,10 @@ def compare(
         paper.write_difference(folder.path, parts[0])
         if worn_prediction is not None:
             predicted_paper.write_csv(folder.path / "predicted.csv", worn_prediction)
-    for text in data["notes"]:
-        note(text)
-    if json_:
-        print(json.dumps(data, ensure_ascii=False, allow_nan=False))
-    else:
+    if not json_:
         print("\n".join(paper.format_comparison(parts, comparison, computed)))
         print(f"results: {target}")
+    return data
 
 
 def _compare_table(

@@ -44,6 +44,7 @@ FILES = (
     "profile.csv",
     "surfaces",
     "pairs.csv",
+    "predicted.csv",
     "pairs.json",
     "backbone.csv",
     "backbone.nc",

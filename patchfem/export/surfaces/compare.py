@@ -169,10 +169,11 @@ def format_comparison(
         out += _quantities_table(part).lines()
         roughness = measure_track_roughness(part)
         if roughness.regions:
-            out += ["", *_roughness_table(roughness).lines()]
+            table = _roughness_table(roughness)
+            out += ["", table.heads[0], *table.lines()]
     if computed.predicted is not None:
-        predicted = computed.predicted
-        out += ["", *predicted_table(predicted).lines()]
+        table = predicted_table(computed.predicted)
+        out += ["", table.heads[0], *table.lines()]
     if pressed is not None:
         out += ["", f"{pressed.title}, pressed with each surface"]
         rows = []
@@ -214,7 +215,8 @@ def _roughness_table(roughness: TrackRoughness) -> QuantityTable:
             row = Row(f"{name} {region} the track", quantities[0], unit, after[:2])
             rows.append(row._replace(meaning=quantities[0].text))
     cutoff = format_length(roughness.cutoff)
-    heads = (f"roughness, cut-off {cutoff}", "before", "95 %", "after", "95 %", "unit")
+    name = f"roughness inside and outside the track, cut-off {cutoff}"
+    heads = (name, "before", "95 %", "after", "95 %", "unit")
     return QuantityTable(heads, rows)
 
 

@@ -19,7 +19,7 @@ from .quantities import QuantityTable, Row, format_quantity, quantity_data
 from .worn_runs import PatchRun, read_run
 
 PIECES = ("upper", "lower")
-TABLE_HEADS = ("computed wear", "value", "95 %", "unit")
+HEADS = ("value", "95 %", "unit")
 LABELS = {
     "coefficient": "wear coefficient",
     "patch_centre": "middle of the patch, x in the second trace",
@@ -139,7 +139,10 @@ def predicted_table(predicted: PredictedWear) -> QuantityTable:
     for name, quantity in _quantities(predicted).items():
         unit = ("m^2/N", 1.0) if name == "coefficient" else None
         rows.append(Row(LABELS[name], quantity, unit, meaning=quantity.text))
-    return QuantityTable(TABLE_HEADS, rows)
+    name = f"computed wear of {predicted.history.source}"
+    if predicted.is_mirrored:
+        name += ", x of the patch against x of the traces"
+    return QuantityTable((name, *HEADS), rows)
 
 
 def _quantities(predicted: PredictedWear) -> dict:

@@ -379,8 +379,7 @@ def _add_wear_frames(result, evolved):
     period = find_period(result.plan.model, result)
     motion = result.fields
     n_motion = len(motion["time"])
-    numbers = np.linspace(0, len(evolved.moments) - 1, N_FRAMES).round().astype(int)
-    states = [evolved.moments[number] for number in np.unique(numbers)[:-1]]
+    states = [evolved.moments[number] for number in _choose_moments(evolved.moments)[:-1]]
     n_states = len(states)
     depth = evolved.state.depth
     pressure = np.array([state.pressure for state in states])
@@ -406,6 +405,19 @@ def _add_wear_frames(result, evolved):
         fields[name] = np.concatenate([wear.get(name, zeros), field])
     shown = {"period": period, "states": n_states}
     return replace(result, fields=fields, extra=result.extra | {"wear_shown": shown})
+
+
+def _choose_moments(moments) -> np.ndarray:
+    """Choose the moments that are stored: half of them evenly by jump, and half by cycle.
+
+    The last jumps are much longer than the first ones, and the worn depth changes most in them.
+    """
+    last = len(moments) - 1
+    cycles = np.array([moment.cycle for moment in moments])
+    by_jump = np.linspace(0, last, N_FRAMES // 2).round().astype(int)
+    places = np.linspace(0, cycles[-1], N_FRAMES // 2)
+    by_cycle = np.searchsorted(cycles, places).clip(0, last)
+    return np.unique([*by_jump, *by_cycle])
 
 
 def _list_wear_history(evolved) -> dict:

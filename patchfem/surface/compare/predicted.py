@@ -5,8 +5,8 @@ passes through on its way are therefore those of smaller coefficients after all 
 changes as the pieces wear. The coefficient and the place of the patch in the trace are fitted by least squares to
 means of both depths over a hundredth of the patch. The interval contains the drawn errors of the measured depth
 (`errors`), the scatter of the measured wear about the computed one with its correlation along x, and the numerical
-error of the run. If the measured depth is larger than that of the run,
-the interval also contains the coefficient that the last depth in proportion would give.
+error of the run. It also contains the coefficient that straight lines between the frames would give or, if the measured
+depth is larger than that of the run, the last depth in proportion.
 """
 
 from dataclasses import dataclass, replace
@@ -61,6 +61,7 @@ class WearHistory:
     - coefficient: wear coefficient of the run [m2/N].
     - error: relative numerical error of the depth.
     - source, piece: folder of the run, and name of the piece.
+    - is_linear: whether the depth between two frames lies on a straight line.
     """
 
     x: np.ndarray
@@ -70,14 +71,17 @@ class WearHistory:
     error: float
     source: str
     piece: str
+    is_linear: bool = False
 
     @cached_property
     def _curve(self):
-        from scipy.interpolate import PchipInterpolator
+        from scipy.interpolate import PchipInterpolator, make_interp_spline
 
+        if self.is_linear:
+            return make_interp_spline(self.work, self.depth, k=1)
         return PchipInterpolator(self.work, self.depth, axis=0)
 
-    def depth_at(self, ratio: float) -> np.ndarray:
+    def interpolate_depth(self, ratio: float) -> np.ndarray:
         """Return the depth (m,) [m] for a coefficient of `ratio` times that of the run.
 
         Beyond the end of the run it grows at the rate of the last frames.
@@ -180,7 +184,7 @@ class PredictedWear:
     @property
     def is_extrapolated(self) -> bool:
         """Whether the coefficient is larger than that of the run."""
-        return self.coefficient.value > self.history.coefficient
+        return bool(self.coefficient.value > self.history.coefficient)
 
     @property
     def on_patch(self) -> np.ndarray:
@@ -258,7 +262,7 @@ def fit_computed_wear(comparison: Comparison, history: WearHistory) -> Predicted
     PatchfemError
         If the traces show no worn depth, or the run cannot be that of the measured contact.
     """
-    measured = average_measured_depth(comparison, 2 * history.half / N_BINS)
+    measured = _average_measured_depth(comparison, 2 * history.half / N_BINS)
     _check_length(measured, comparison, history)
     start, others = _search_placements(measured, history)
     margin = (1 + MARGIN) * history.half
@@ -267,11 +271,12 @@ def fit_computed_wear(comparison: Comparison, history: WearHistory) -> Predicted
     others = [_refine(near, history, other, is_fixed=True) for other in others]
     opposite = best._replace(is_mirrored=not best.is_mirrored)
     others.append(_refine(near, history, opposite))
+    _check_width(near, history, best, comparison)
     _check_ratio(best.ratio, history)
-    return _evaluate(near, history, best, others, comparison)
+    return _evaluate(near, history, best, others)
 
 
-def average_measured_depth(comparison: Comparison, width: float) -> MeasuredDepth:
+def _average_measured_depth(comparison: Comparison, width: float) -> MeasuredDepth:
     """Average the measured depth over bins of a width [m] along the second trace.
 
     Raises PatchfemError if the comparison has no worn depth.
@@ -313,10 +318,10 @@ def _average(x, depth, draws, width: float) -> MeasuredDepth:
     return MeasuredDepth(edges, rows[0], np.array(rows[1:]), 0.0)
 
 
-def average_computed_depth(history: WearHistory, edges, placement: Placement) -> np.ndarray:
+def _average_computed_depth(history: WearHistory, edges, placement: Placement) -> np.ndarray:
     """Average the computed depth (b,) [m] over bins with edges (b + 1,) [m] along the trace."""
     x = history.x
-    depth = history.depth_at(placement.ratio)
+    depth = history.interpolate_depth(placement.ratio)
     area = np.concatenate([[0.0], np.cumsum(np.diff(x) * (depth[1:] + depth[:-1]) / 2)])
     sign = -1 if placement.is_mirrored else 1
     places = sign * (edges - placement.centre)
@@ -374,7 +379,7 @@ def _search_placements(measured: MeasuredDepth, history: WearHistory) -> tuple:
     chosen = np.zeros(shape)
     for ratio in ratios:
         for side in (False, True):
-            template = average_computed_depth(history, template_edges, Placement(ratio, 0.0, side))
+            template = _average_computed_depth(history, template_edges, Placement(ratio, 0.0, side))
             total = np.correlate(ones, template**2, "full")
             total -= 2 * np.correlate(measured.depth, template, "full")
             better = total < squares[int(side)]
@@ -409,18 +414,18 @@ def _refine(
     """
     from scipy.optimize import least_squares
 
-    def place(values) -> Placement:
+    def make_placement(values) -> Placement:
         centre = start.centre if is_fixed else start.centre + values[1] * measured.width
-        return Placement(start.ratio * values[0], centre, start.is_mirrored)
+        return Placement(float(start.ratio * values[0]), float(centre), start.is_mirrored)
 
     def differences(values):
-        computed = average_computed_depth(history, measured.edges, place(values))
+        computed = _average_computed_depth(history, measured.edges, make_placement(values))
         return (computed - measured.depth) * 1e6
 
     values = [1.0] if is_fixed else [1.0, 0.0]
     bounds = ([0.2], [5.0]) if is_fixed else ([0.2, -5.0], [5.0, 5.0])
     fit = least_squares(differences, values, bounds=bounds, diff_step=1e-3)
-    return place(fit.x)._replace(squares=float(fit.fun @ fit.fun) * 1e-12)
+    return make_placement(fit.x)._replace(squares=float(fit.fun @ fit.fun) * 1e-12)
 
 
 def _check_ratio(ratio: float, history: WearHistory) -> None:
@@ -450,18 +455,19 @@ def _evaluate(
     history: WearHistory,
     best: Placement,
     others: list,
-    comparison: Comparison,
 ) -> PredictedWear:
     """Make the result of the best placement; the interval contains the placements that fit as well."""
-    computed = average_computed_depth(history, measured.edges, best)
-    _check_width(measured, computed, comparison, history)
+    computed = _average_computed_depth(history, measured.edges, best)
     jacobian = _derive(measured, history, best)
     spread = _measure_spread(measured, computed, jacobian)
     final = _scale_last_depth(history)
     proportional = _refine(measured, final, best, is_fixed=True).ratio
     relative = np.hypot(SIDE * measured.scale_error, history.error)
-    extrapolation = abs(proportional - best.ratio) if best.ratio > 1 else 0.0
-    half = float(np.hypot(np.hypot(SIDE * spread.ratio, relative * best.ratio), extrapolation))
+    other = proportional
+    if best.ratio <= 1:
+        other = _refine(measured, replace(history, is_linear=True), best, is_fixed=True).ratio
+    between_frames = abs(other - best.ratio)
+    half = float(np.hypot(np.hypot(SIDE * spread.ratio, relative * best.ratio), between_frames))
     threshold = best.squares + ACCEPTED_DEVIANCE * spread.correlation * spread.variance
     accepted = [other for other in others if other.squares <= threshold]
     ratios = [best.ratio, *(other.ratio for other in accepted)]
@@ -506,14 +512,19 @@ def _scale_last_depth(history: WearHistory) -> WearHistory:
 
 
 def _check_width(
-    measured: MeasuredDepth, computed, comparison: Comparison, history: WearHistory
+    measured: MeasuredDepth, history: WearHistory, best: Placement, comparison: Comparison
 ) -> None:
-    """Refuse a measured track whose width is not that of the computed wear."""
+    """Refuse a measured track whose width is not that of the computed wear.
+
+    A track may be wider than the wear of a run that wore far less, as the contact grows.
+    """
     width = comparison.tracks.sizes.get("width")
     if width is None or width.high is None or width.value is None:
         return
+    computed = _average_computed_depth(history, measured.edges, best)
     shown = float((computed > WORN_FRACTION * computed.max()).sum()) * measured.width
-    if not 1 / MAX_WIDTH_RATIO < width.value / shown < MAX_WIDTH_RATIO:
+    is_too_wide = width.value > MAX_WIDTH_RATIO * shown and best.ratio <= MAX_RATIO
+    if is_too_wide or width.value < shown / MAX_WIDTH_RATIO:
         raise _refuse_width(width.value, shown, history)
 
 
@@ -523,7 +534,7 @@ def _derive(measured: MeasuredDepth, history: WearHistory, best: Placement) -> n
     for name, step in (("ratio", 0.01 * best.ratio), ("centre", measured.width / 2)):
         value = getattr(best, name)
         high, low = (
-            average_computed_depth(history, measured.edges, best._replace(**{name: value + side}))
+            _average_computed_depth(history, measured.edges, best._replace(**{name: value + side}))
             for side in (step, -step)
         )
         columns.append((high - low) / (2 * step))

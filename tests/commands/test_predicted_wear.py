@@ -1,0 +1,177 @@
+"""patchfem compare --predicted: wear coefficient from traces and a run with wear, refusals, roughness by region."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import predicted_pairs
+import pytest
+import xarray
+from command_line import cli
+from scene_texts import SMALL_PATCH
+
+import patchfem as pf
+
+SEED = 5  # a tilted patch; the traces show all of the track
+PIECE_SHARE = 0.5
+RUN = """
+[contact]
+length = "3 mm"
+width = "3 mm"
+height = "2 mm"
+load = "60 N"
+substrate = "steel"
+[contact.crown]
+radius = "2 m"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "10 um"
+frequency = "10 Hz"
+cycles = 2
+[wear]
+coefficient = "1e-14 m^2/N"
+cycles = 300000
+"""
+
+
+def write_trace(path: Path, x, z) -> Path:
+    rows = [f"{a * 1e6!r},{b * 1e6!r}" for a, b in zip(x.tolist(), z.tolist())]
+    path.write_text("\n".join(["x [um],z [um]", *rows, ""]), "utf-8")
+    return path
+
+
+def draw_surface(x) -> np.ndarray:
+    """Draw a Gaussian surface (n,) [m] of 0.5 um rms and waves above 10 um."""
+    random = np.random.default_rng(58)
+    kernel = np.exp(-0.5 * (np.arange(-40, 41) / 8) ** 2)
+    z = np.convolve(random.normal(size=x.size + 80), kernel, "valid")
+    return 0.5e-6 * z / z.std()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory) -> tuple:
+    """Folder with the traces and the run of a made pair, and the pair."""
+    folder = tmp_path_factory.mktemp("made")
+    pair = predicted_pairs.draw_pair(SEED)
+    predicted_pairs.write_pair(pair, folder)
+    pf.run(folder / "scene.toml").save(folder / "wear")
+    return folder, pair
+
+
+@pytest.fixture(scope="module")
+def crowned(tmp_path_factory) -> Path:
+    """Folder of a run in which the contact of a crown grows by wear."""
+    folder = tmp_path_factory.mktemp("crowned") / "wear"
+    pf.run(RUN).save(folder)
+    return folder
+
+
+def test_always_the_interval_of_the_coefficient_contains_the_truth(made):
+    folder, pair = made
+    out = folder / "out"
+    files = (folder / "before.csv", folder / "after.csv")
+    answer = cli(
+        "compare", *files, "--predicted", folder / "wear", "--piece", pair.piece, "-o", out
+    )
+    assert answer.code == 0, answer.err
+    data = json.loads((out / "compare.json").read_text("utf-8"))
+    predicted = data["predicted"]
+    for name, truth in (("coefficient", pair.scene.coefficient), ("patch_centre", pair.centre)):
+        assert predicted[name]["low"] <= truth <= predicted[name]["high"]
+    assert predicted["coefficient"]["high"] < 1.1 * predicted["coefficient"]["low"]
+    assert predicted["coefficient"]["unit"] == "m2 N-1"
+    assert data["sentences"][-1] == predicted["sentence"]
+    assert predicted["sentence"] in answer.out and "wear coefficient" in answer.out
+    table = np.loadtxt(out / "predicted.csv", delimiter=",", skiprows=1)
+    rms = np.sqrt(np.mean(table[np.abs(table[:, 0]) <= 5e5 * pair.scene.patch.length, 3] ** 2))
+    assert rms * 1e-6 == pytest.approx(predicted["difference_rms"], rel=1e-4)
+    page = (out / "report.html").read_text("utf-8")
+    assert "Computed wear over the measured wear" in page
+
+
+def test_exact_the_coefficient_is_read_from_the_history_of_the_run(crowned, tmp_path):
+    """A wear that the run passed through: the depth is not proportional to the coefficient there."""
+    with xarray.open_dataset(crowned / "result.nc") as result:
+        frame = 8
+        place = result.x.values
+        depth = result.worn_depth.values[frame]
+        volume = result.worn_depth.values @ result.weight.values
+    ratio = volume[frame] / volume[-1]
+    x = np.arange(0.0, 5e-3, 1e-6)
+    before = draw_surface(x)
+    worn = PIECE_SHARE * np.interp(x - 2.2e-3, place, depth, left=0.0, right=0.0)
+    noise = 1e-9 * np.random.default_rng(1).normal(size=x.size)
+    files = (
+        write_trace(tmp_path / "before.csv", x, before),
+        write_trace(tmp_path / "after.csv", x, before - worn + noise),
+    )
+    predicted = pf.compare(*files, predicted=crowned)["predicted"]
+    assert predicted["coefficient"]["value"] / 1e-14 == pytest.approx(ratio, rel=2e-3)
+    assert predicted["proportional_coefficient"] / 1e-14 > 1.05 * ratio
+    assert predicted["largest_difference"] is None or predicted["difference_rms"] < 2e-9
+    assert any("not proportional" in note for note in predicted["notes"])
+    deep = write_trace(tmp_path / "deep.csv", x, before - 1e3 * worn)
+    with pytest.raises(pf.PatchfemError, match="check the units of z"):
+        pf.compare(files[0], deep, shift=0.0, predicted=crowned)
+
+
+def _stretch(folder: Path, tmp_path: Path, factor: float) -> list:
+    """Write the traces of a made pair with another scale of x."""
+    files = []
+    for name in ("before.csv", "after.csv"):
+        x, z = np.loadtxt(folder / name, delimiter=",", skiprows=1, unpack=True)
+        files.append(write_trace(tmp_path / name, factor * x * 1e-6, z * 1e-6))
+    return files
+
+
+def test_always_bad_input_is_named(made, tmp_path):
+    folder, pair = made
+    files = [folder / "before.csv", folder / "after.csv"]
+    pf.run(SMALL_PATCH).save(tmp_path / "unworn")
+    (tmp_path / "empty").mkdir()
+    wear = folder / "wear"
+    cases = [
+        (files, {"predicted": tmp_path / "none"}, "there is no such folder"),
+        (files, {"predicted": tmp_path / "empty"}, "not a results folder"),
+        (files, {"predicted": tmp_path / "unworn"}, r"no \[wear\]"),
+        (files, {"predicted": wear}, "say with --piece upper or --piece lower"),
+        (files, {"predicted": wear, "piece": "left"}, "must be upper or lower"),
+        (files, {"piece": "upper"}, "piece needs predicted"),
+        (files, {"predicted": wear, "piece": "upper", "direction": "y"}, "along y"),
+        (files[:1] * 2, {"predicted": wear, "piece": "upper"}, "no worn depth was measured"),
+        (_stretch(folder, tmp_path, 3.0), {"predicted": wear, "piece": "upper"}, "wide"),
+    ]
+    for paths, options, message in cases:
+        with pytest.raises(pf.PatchfemError, match=message):
+            pf.compare(*paths, **options)
+    small = _stretch(folder, tmp_path, 0.1)
+    with pytest.raises(pf.PatchfemError, match="within the traces"):
+        pf.compare(*small, predicted=wear, piece="upper")
+    assert pair.share != 0.5  # so that the piece has to be named
+
+
+def test_always_roughness_is_that_of_each_region(tmp_path):
+    """Inside the track a third of the heights remain; outside nothing changes."""
+    x = np.arange(0.0, 12e-3, 1e-6)
+    before = draw_surface(x)
+    inside = (x > 4e-3) & (x < 8e-3)
+    after = np.where(inside, before / 3 - 4e-6, before)
+    after += 1e-9 * np.random.default_rng(2).normal(size=x.size)
+    files = (
+        write_trace(tmp_path / "before.csv", x, before),
+        write_trace(tmp_path / "after.csv", x, after),
+    )
+    roughness = pf.compare(*files)["roughness"]
+    for name in ("Ra", "Rq", "slope"):
+        worn, unworn = (roughness[region] for region in ("inside", "outside"))
+        assert worn["after"][name]["value"] == pytest.approx(
+            worn["before"][name]["value"] / 3, rel=0.02
+        )
+        assert unworn["after"][name]["value"] == pytest.approx(
+            unworn["before"][name]["value"], rel=1e-3
+        )
+    assert unworn["before"]["Rq"]["high"] < 0.55e-6
+    assert roughness["cutoff"] == 2.5e-4
