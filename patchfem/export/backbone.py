@@ -254,7 +254,7 @@ class FormattedPoint(NamedTuple):
 
 
 def _format_point(curve: Curve, k: int) -> FormattedPoint:
-    """Format one point of a backbone curve with its errors."""
+    """Format point k of a backbone curve with its errors."""
     return FormattedPoint(
         formatting.format_quantity(curve.amplitude[k], "m", 3),
         formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit="Hz"),

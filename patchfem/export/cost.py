@@ -191,11 +191,8 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     changed = changed_measures(runs) or measures_with_error(runs)
     names = measures_with_error(runs)
     worst = {worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances}
-    return [
-        name
-        for name in (*MAIN_MEASURES, *sorted(worst.difference(MAIN_MEASURES)))
-        if name in changed
-    ] or changed
+    ordered_names = (*MAIN_MEASURES, *sorted(worst.difference(MAIN_MEASURES)))
+    return [name for name in ordered_names if name in changed] or changed
 
 
 def write(folder: Path, curves: dict) -> Path:

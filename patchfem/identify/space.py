@@ -51,7 +51,7 @@ class SearchSpace:
         return np.clip(u, 0.0, 1.0)
 
     def slope(self, u) -> np.ndarray:
-        """Return the derivatives (n,) of the parameters with respect to the unit-cube coordinates."""
+        """Return the derivatives (n,) of the parameters with respect to unit-cube coordinates u."""
         slope = self.high - self.low
         ratio = self.high[self.log] / self.low[self.log]
         slope[self.log] = self.values(u)[self.log] * np.log(ratio)

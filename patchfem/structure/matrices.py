@@ -207,7 +207,7 @@ def _require_finite(per_mass) -> np.ndarray:
 
 
 def _factor_mass(M):
-    """Return the Cholesky factor (n, n) of the mass matrix, or roots (n,) if it is diagonal."""
+    """Return the Cholesky factor (n, n) of a mass matrix M, or roots (n,) if M is diagonal."""
     diagonal = np.diag(M)
     scale = np.sqrt(np.maximum(diagonal, 0.0))
     if not (M - np.diag(diagonal)).any():
@@ -318,7 +318,7 @@ def _project_damper_rows(phi, damper_rows) -> np.ndarray:
 
 
 def _decouple_equal_frequencies(phi, omega, D) -> tuple:
-    """Rotate mode shapes of equal frequency so that the damping does not couple them."""
+    """Rotate mode shapes of equal frequency so that the damping D does not couple them."""
     first = 0
     for last in range(1, len(omega) + 1):
         if last < len(omega) and omega[last] - omega[first] <= EQUAL_FREQUENCY_TOL * omega[last]:

@@ -199,7 +199,7 @@ def _refuse_indefinite(matrix, name: str) -> None:
 
 
 def _factorize(K) -> SparseFactor | None:
-    """Factorize a stiffness matrix; return None if it has rigid-body modes."""
+    """Factorize a stiffness matrix K; return None if it has rigid-body modes."""
     try:
         return SparseFactor(K, MIN_PIVOT)
     except ZeroEnergyMotion:

@@ -32,11 +32,11 @@ class Areal:
         return np.isnan(self.z)
 
     def row(self, k: int) -> Profile:
-        """Return the trace along x at one position y."""
+        """Return the trace along x at y[k]."""
         return self._trace(self.x, self.z, k, "row")
 
     def column(self, k: int) -> Profile:
-        """Return the trace along y at one position x."""
+        """Return the trace along y at x[k]."""
         return self._trace(self.y, self.z.T, k, "column")
 
     def _trace(self, places, heights, k: int, name: str) -> Profile:

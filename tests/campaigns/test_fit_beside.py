@@ -8,7 +8,7 @@ from command_line import cli
 from test_fit import LAWS, LOAD, POINT, SINE, dahl, free_of, play, rows, scene_of, table
 
 from patchfem.campaigns import LoopOptions, fit_loop
-from patchfem.campaigns.fits.loop_path import count_whole_cycles, prepend_run_in
+from patchfem.campaigns.fits.loop_path import count_whole_cycles, prepend_warm_up
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_loop
 
@@ -52,7 +52,7 @@ def test_exact_a_lead_in_ends_where_the_record_begins(tmp_path):
     loop = read_loop(table(tmp_path / "loop.csv", time[3:], place, np.ones(place.size)))
     warm = count_whole_cycles(loop)
     assert warm == 50 or warm == 51
-    moments, path, before = prepend_run_in(loop.time, loop.displacement, warm, 2e-6)
+    moments, path, before = prepend_warm_up(loop.time, loop.displacement, warm, 2e-6)
     assert before == warm + 1 and path[0] == 0 and np.diff(moments).min() > 0
     assert path[before:] - 2e-6 == pytest.approx(loop.displacement, abs=1e-18)
     assert moments[before] - moments[1] == pytest.approx(1e-2, abs=2e-4 * 1e-2 + 1e-9)

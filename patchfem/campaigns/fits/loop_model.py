@@ -16,7 +16,7 @@ from ...runs.bench.engine import choose_smooth_bond_summation
 from ...runs.bench.ledger import PassOptions
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
-from .loop_path import count_whole_cycles, prepend_run_in
+from .loop_path import count_whole_cycles, prepend_warm_up
 from .problem import format_assignments, press_patch
 
 # Largest number of free [contact] keys whose bounds and middles choose the shared meshes: 3**3
@@ -124,7 +124,7 @@ class BenchModel:
     def _reading(self, model: Model, offset: float) -> np.ndarray:
         """Compute force or friction ratio (k,) of a model for a displacement with an offset [m]."""
         patch = self._patch(model)
-        path = prepend_run_in(self.time, self.loop.displacement, self.warm, offset)
+        path = prepend_warm_up(self.time, self.loop.displacement, self.warm, offset)
         corner = np.arange(path.time.size) * self.pieces
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, path.time)

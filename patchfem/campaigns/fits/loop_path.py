@@ -92,7 +92,7 @@ class DrivenPath(NamedTuple):
     n_before: int
 
 
-def prepend_run_in(time, recorded, n_warm: int, offset: float) -> DrivenPath:
+def prepend_warm_up(time, recorded, n_warm: int, offset: float) -> DrivenPath:
     """Return a path that begins at displacement 0 and continues as recorded.
 
     Parameters

@@ -92,7 +92,7 @@ def describe_values(keys: FittedKeys) -> dict:
 
 
 def describe_value(bound: Range, fit: Fit, k: int) -> dict:
-    """Return one fitted value with its confidence interval and range for fit.json."""
+    """Return fitted value k with its confidence interval and range for fit.json."""
     ends = fit.intervals.ends[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {

@@ -130,7 +130,7 @@ def _are_end_to_end(bonds, i, k, width, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_narrow_before_reversal(bonds, i, k, width, law):
-    """Return whether a strip is narrow and the motion reverses right after it."""
+    """Return whether strip i is narrow and the motion reverses right after it, in strip k."""
     is_narrow = bonds[STRIP.covered, i] <= 0.5 * width
     return (
         is_narrow
@@ -244,7 +244,7 @@ def _join_moments(bonds, i, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_clocks(bonds, i, k):
-    """Add weight and path of a strip to an older strip, which takes over its end."""
+    """Add weight and path of strip k to the older strip i, which takes over its end."""
     bonds[STRIP.clock_width, i] += bonds[STRIP.clock_width, k]
     bonds[STRIP.weight, i] += bonds[STRIP.weight, k]
     bonds[STRIP.covered, i] += bonds[STRIP.covered, k]
@@ -277,7 +277,7 @@ def _join_ends(bonds, i, k, clocks, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _joint_start_length(gauss, bonds, i, k, clocks):
-    """Return the scaled initial bond length at a Gauss point of two joined strips."""
+    """Return the scaled initial bond length at a Gauss point of the joined strips i and k."""
     if _is_fully_grown(bonds, k, clocks):
         return 0.0
     width_i = bonds[STRIP.clock_width, i]
@@ -304,7 +304,7 @@ def _spread_strip(bonds, k, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_to_spread_strip(bonds, i, k, was_spread, clocks, law):
-    """Add a strip to a strip whose bonds are spread over its range.
+    """Add strip k to strip i, whose bonds are spread over its range.
 
     The range of the sum is the mean of both ranges, weighted by the paths that both cover.
     """

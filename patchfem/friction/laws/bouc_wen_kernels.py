@@ -60,7 +60,7 @@ def _loading_rate(w, n):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrand(u, n, unloading, is_loading):
-    """Return the rates of displacement and |y| for the integration variable."""
+    """Return the rates of displacement and |y| for the integration variable u."""
     if is_loading:
         return 1 / _loading_rate(u, n), -expm1(-u)
     return 1 / (1 - unloading * u**n), u
