@@ -13,7 +13,7 @@ from ...core import PatchfemError, frozen_array
 
 # Coarse runs that estimate the error of a discretized density of elements: (number of neighbouring cells that are
 # merged into one, first cell that is merged).
-CELL_MERGES = (4, 0), (4, 1), (4, 2), (4, 3)
+CELL_MERGES = tuple((4, first_cell) for first_cell in range(4))
 # Relative difference below which two yield displacements count as equal; it is above round-off.
 YIELD_TOL = 1e-14
 
