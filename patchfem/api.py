@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
 from .campaigns.backbone import curves as backbones
+from .campaigns.backbone import given_modes
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
@@ -50,7 +51,6 @@ from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
 from .model.model import Model, build_without_sweep
 from .model.model import build as build_model
-from .runs import joint
 from .runs.batch import batches, meshes
 from .runs.patch import result as patch_result
 from .runs.plan import Plan
@@ -58,6 +58,7 @@ from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
 from .scene import axes, starting
+from .scene.backbone_scene import BackboneTables
 from .scene.files import require_files
 from .scene.keys import removed
 from .scene.keys.quantities import parse_quantity
@@ -188,17 +189,32 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
     >>> scene.kind, round(scene.normal.load, 2)
     ('bench', 115.65)
     """
+    if not isinstance(scene, Scene):
+        return _load_prepared(scene, None, sets)
+    assignments = format_assignments(sets)
+    if not assignments:
+        return scene
+    return require_units(get_base_scene(scene).override(assignments), sets)
+
+
+def _load_prepared(scene, prepare: Callable | None, sets: dict) -> Scene:
+    """Read a scene whose plain values are changed by `prepare` before they are checked.
+
+    scene, sets: as for `load`.
+    """
     assignments = format_assignments(sets)
     if isinstance(scene, Mapping):
-        loaded = require_files(loads(format_scene(dict(scene)), DICT_NAME, assignments))
+        text = format_scene(dict(scene))
+        loaded = require_files(loads(text, DICT_NAME, assignments, prepare=prepare))
         return require_units(loaded, {**scene, **sets})
     if isinstance(scene, Scene):
-        if not assignments:
-            return scene
-        return require_units(get_base_scene(scene).override(assignments), sets)
+        all_sets = (*scene.sets, *assignments)
+        return require_units(loads(scene.text, scene.path, all_sets, prepare=prepare), sets)
     if _is_scene_text(scene):
-        return require_units(require_files(loads(scene, INLINE_SCENE_NAME, assignments)), sets)
-    return require_units(load_file(_require_path(scene, "a scene"), assignments), sets)
+        loaded = require_files(loads(scene, INLINE_SCENE_NAME, assignments, prepare=prepare))
+        return require_units(loaded, sets)
+    path = _require_path(scene, "a scene")
+    return require_units(load_file(path, assignments, prepare=prepare), sets)
 
 
 def _is_scene_text(scene: Any) -> bool:
@@ -458,24 +474,28 @@ def backbone(
     *,
     mode: str = "",
     amplitudes: float | str | Iterable | None = None,
-    method: str = "all",
+    method: str = "",
+    modes: str | Iterable = "",
     **sets: Any,
 ) -> Dataset:
     """Compute frequency and damping ratio of a mode against its amplitude at the output.
 
-    Every value has a numerical error.
+    Every value has a numerical error. The recommended curve has a band of what tests measure.
 
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
-        As for `build`.
+        As for `build`. [slide] and [drive] are ignored.
     mode : str, optional
         Name of the mode, or its number for a rig of masses. Default: the first mode.
     amplitudes : float, str or list, optional
         One or more amplitudes [m], or a text such as "1 um..1 mm:25". Default: around the amplitude at which the contact
         slips.
     method : str
-        "balance", "decay", "quasi-static" or "all".
+        "balance", "decay", "quasi-static" or "all". Default: "balance", with "quasi-static" beside it.
+    modes : str or list, optional
+        Modes that replace those of the scene, as "120 Hz:0.01, 170 Hz:0.02" (frequency of the bolted joint, damping
+        ratio, and optionally the slide), or a list of tuples such as ("120 Hz", 0.01).
     **sets
         Keys with new values, as for `load`.
 
@@ -484,7 +504,9 @@ def backbone(
     xarray.Dataset
         Each method has its own variables and amplitudes. Attributes are `free_frequency` and `stuck_frequency` [Hz], the
         exponents of the energy dissipated per cycle `exponent_micro` and `exponent_gross`, and `flutter_amplitude` [m],
-        where they are known. `missing` says why a method gave no curve.
+        where they are known. `missing` says why a method gave no curve. `band_frequency_low`, `band_frequency_high`,
+        `band_damping_low` and `band_damping_high` over `band_amplitude` are the band of the curve by the method that the
+        attribute `method` names; `advice` says which method holds where.
 
     Raises
     ------
@@ -501,21 +523,26 @@ def backbone(
     >>> found["quasi_static_frequency"].size
     5
     """
-    # modes that were measured with the joint contain its sticking stiffness, which the friction law would add again
-    model = joint.remove_joint(build(scene, **sets))
-    is_all = _require_string(method, "backbone: method") == "all"
-    methods = backbones.METHODS if is_all else (method,)
-    if unknown := set(methods) - set(backbones.METHODS):
+    methods = backbones.choose_methods(_require_string(method, "backbone: method"))
+
+    def build_with(tables: BackboneTables) -> Model:
+        """Build the model of the scene with the tables of a backbone."""
+        if isinstance(scene, Model):
+            return build(scene, **sets)
+        return build_model(_load_prepared(scene, tables, sets))
+
+    if modes and isinstance(scene, Model):
         raise PatchfemError(
-            f"backbone: method {unknown.pop()!r} does not exist; use one of "
-            f"{', '.join(backbones.METHODS)}, or 'all'"
+            "backbone: modes cannot be given with a Model; give them with the scene"
         )
+    model, notes = given_modes.prepare_model(build_with, modes)
     lengths = None
     if amplitudes is not None:
         lengths = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
     curves = backbones.compute_backbone(
         model, _require_string(mode, "backbone: mode"), lengths, methods
     )
+    curves = curves.add_notes(notes)
     return backbone_files.backbone_contents(curves, model.source.title).to_xarray()
 
 

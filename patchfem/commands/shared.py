@@ -118,7 +118,7 @@ def note(text: str) -> None:
     print_message(make_printable(f"note: {text}"))
 
 
-def load_scene(path: Path, sets, faults=None):
+def load_scene(path: Path, sets, faults=None, prepare=None):
     """Load the scene in a file with --set strings; SceneError names every mistake.
 
     Parameters
@@ -128,8 +128,10 @@ def load_scene(path: Path, sets, faults=None):
         ``table.key=value`` strings.
     faults : callable, optional
         (tables, folder, whole) -> (key, message) of further mistakes.
+    prepare : callable, optional
+        Changes the plain values of the scene before they are read.
     """
-    return scene.load(path, sets, faults)
+    return scene.load(path, sets, faults, prepare)
 
 
 def load_model(path: Path, sets):

@@ -10,12 +10,13 @@ from cyclopts import Parameter
 from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
 from ..campaigns.backbone import curves as backbones
+from ..campaigns.backbone import given_modes
 from ..export import backbone as backbone_files
 from ..export import cost as cost_files
 from ..export import results
 from ..export.fits import request as fits
 from ..export.fits.options import FitOptions
-from ..runs import joint
+from ..model import model
 from ..scene import axes
 from .shared import (
     Json,
@@ -81,9 +82,6 @@ def cost(
         print(json.dumps(data))
 
 
-ALL = "all"  # name of all methods of a backbone
-
-
 def backbone(
     scene: Path,
     /,
@@ -96,25 +94,31 @@ def backbone(
         "the onset of slip"
     ) = "",
     method: Annotated[
-        Literal["balance", "decay", "quasi-static", "all"],
+        Literal["balance", "decay", "quasi-static", "all"] | None,
         Parameter(
-            help="method that computes the motion, "
-            "such as balance; default: all methods, compared with each other"
+            help="method that computes the motion, such as balance; all also runs the free decay, which "
+            "takes longest; default: balance, with quasi-static beside it"
         ),
-    ] = ALL,
+    ] = None,
+    modes: word(
+        'frequency, damping ratio and optionally slide of modes that replace those of the scene, such as "120 Hz:0.01, '
+        '170 Hz:0.02"; the frequencies are those of the bolted joint'
+    ) = "",
     out: Out = None,
     set_: Sets = (),
     no_page: NoPage = False,
     json_: Json = False,
     quiet: Quiet = False,
 ):
-    """Compute frequency and damping ratio of a mode of SCENE against its amplitude. The contact is included; the drive
-    is left out.
+    """Compute frequency and damping ratio of a mode of SCENE against its amplitude: a curve with a band of what tests
+    measure, and which method holds where. The contact is included; [drive] and [slide] are ignored.
 
-    Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
+    Example: patchfem backbone joint.toml --modes "120 Hz:0.01, 170 Hz:0.02"
     """
-    free_model = joint.remove_joint(load_model(scene, set_))
-    methods = backbones.METHODS if method == ALL else (method,)
+    free_model, notes = given_modes.prepare_model(
+        lambda tables: model.build(load_scene(scene, set_, prepare=tables)), modes
+    )
+    methods = backbones.choose_methods(method)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
     with results.Folder(target) as folder:
@@ -125,6 +129,7 @@ def backbone(
             methods,
             None if quiet or json_ else lambda method_name: print_message(f"{method_name} ..."),
         )
+        backbone_result = backbone_result.add_notes(notes)
         data = backbone_files.write_backbone(
             backbone_result,
             free_model.source.title,

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import __version__, formatting
+from ..campaigns.backbone.band import Band
 from ..campaigns.backbone.records import Backbone, Curve
 from ..disk.atomic_write import write_rows, write_text
 from .drawing import charts, pictures
@@ -38,6 +39,14 @@ DESCRIPTIONS = {
     "distributed like the mode with the contact stuck. The damping follows from the loops of the "
     "friction law.",
 }
+BAND_VARIABLES = {  # unit and description of each variable of the band in backbone.nc
+    "frequency_low": ("Hz", "lower limit of the frequency"),
+    "frequency_high": ("Hz", "upper limit of the frequency"),
+    "damping_low": ("1", "lower limit of the damping ratio"),
+    "damping_high": ("1", "upper limit of the damping ratio"),
+}
+BOLD_WIDTH = 3.2  # width of the line of the recommended curve
+THIN_WIDTH = 1.0  # width of the lines of the other curves
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
 LEFT_OUT_NOTE = (
     " Frequencies with errors larger than the frequency itself are left out of the picture, not "
@@ -72,7 +81,18 @@ def backbone_data(backbone: Backbone) -> dict:
         },
         "flutter_amplitude": backbone.flutter,
         "notes": list(backbone.notes),
+        "method": backbone.answer.band and backbone.answer.band.method,
+        "band": _band_data(backbone),
+        "advice": backbone.answer.advice,
     }
+
+
+def _band_data(backbone: Backbone) -> dict | None:
+    """Return the band of a backbone as lists in SI units; None without a band."""
+    band = backbone.answer.band
+    if band is None:
+        return None
+    return {name: getattr(band, name).tolist() for name in ("amplitude", *BAND_VARIABLES)}
 
 
 def backbone_contents(backbone: Backbone, title: str = "") -> Contents:
@@ -87,6 +107,13 @@ def backbone_contents(backbone: Backbone, title: str = "") -> Contents:
         for name, (unit, text) in VARIABLES.items():
             description = {"units": unit, "long_name": f"{text}, by {method}"}
             variables[f"{prefix}_{name}"] = (dimension, getattr(curve, name), description)
+    band = backbone.answer.band
+    if band is not None:
+        description = {"units": "m", "long_name": "half the peak-to-peak motion at the output"}
+        coordinates["band_amplitude"] = ("band_amplitude", band.amplitude, description)
+        for name, (unit, text) in BAND_VARIABLES.items():
+            description = {"units": unit, "long_name": f"{text} that tests measure"}
+            variables[f"band_{name}"] = ("band_amplitude", getattr(band, name), description)
     attributes = {"title": title, "patchfem": __version__, "mode": backbone.mode}
     if backbone.missing:
         reasons = [f"{method}: {text}" for method, text in backbone.missing.items()]
@@ -98,6 +125,8 @@ def backbone_contents(backbone: Backbone, title: str = "") -> Contents:
         "exponent_gross": backbone.exponents.gross,
         "flutter_amplitude": backbone.flutter,
         "notes": "; ".join(backbone.notes) or None,
+        "method": band and band.method,
+        "advice": backbone.answer.advice or None,
     }
     attributes |= {name: value for name, value in numbers.items() if value is not None}
     return Contents(variables, coordinates, attributes)
@@ -131,17 +160,26 @@ def write_backbone(
     write_text(folder.path / "scene.resolved.toml", resolved)
     if backbone.curves:
         write_text(
-            folder.path / "backbone.svg", pictures.draw_charts(backbone_charts(backbone.curves))
+            folder.path / "backbone.svg",
+            pictures.draw_charts(backbone_charts(backbone.curves, backbone.answer.band)),
         )
     if with_page:
         write_text(folder.path / "report.html", page_html(backbone, title))
     return answer
 
 
-def backbone_charts(curves: dict) -> list:
+def backbone_charts(curves: dict, band: Band | None = None) -> list:
     """Chart frequency and damping ratio of a backbone against amplitude, with errors.
 
-    A frequency whose error is larger than itself would stretch the axis, so it is left out.
+    The recommended curve is bold and lies in its band; the others are thin. A frequency whose error
+    is larger than itself would stretch the axis, so it is left out.
+
+    Parameters
+    ----------
+    curves : dict of Curve
+        By method.
+    band : Band, optional
+        None: no curve is recommended, and all have error bars.
     """
     amplitudes = np.concatenate([curve.amplitude for curve in curves.values()])
     unit, scale = formatting.choose_axis_unit(amplitudes, "m")
@@ -149,13 +187,17 @@ def backbone_charts(curves: dict) -> list:
     is_log = all((curve.damping > 0).all() for curve in curves.values())
     frequency = []
     damping = []
+    if band is not None:
+        frequency.append(_band_mark(band, scale, "frequency"))
+        damping.append(_band_mark(band, scale, "damping", floor=_damping_floor(curves, is_log)))
     for method, curve in curves.items():
         x = curve.amplitude * scale
         shown = _has_small_error(curve)
+        style = _curve_style(method, band)
         frequency += _curve_marks(
-            method, x[shown], curve.frequency[shown], curve.frequency_error[shown], False
+            style, x[shown], curve.frequency[shown], curve.frequency_error[shown], False
         )
-        damping += _curve_marks(method, x, curve.damping, curve.damping_error, is_log)
+        damping += _curve_marks(style, x, curve.damping, curve.damping_error, is_log)
     return [
         charts.make_chart("Frequency", along, charts.make_axis("frequency", "Hz"), frequency),
         charts.make_chart(
@@ -164,13 +206,47 @@ def backbone_charts(curves: dict) -> list:
     ]
 
 
-def _curve_marks(method: str, x, y, errors, is_log: bool) -> list:
-    """Return the chart marks of a backbone curve: a line and error bars."""
-    style = {"shape": "circle", "errors": errors}
+def _damping_floor(curves: dict, is_log: bool) -> float:
+    """Return the lower end of bars and bands of the damping ratio; -inf on a linear axis."""
+    if not is_log:
+        return -np.inf
+    return BAR_FLOOR_FACTOR * min(float(curve.damping.min()) for curve in curves.values())
+
+
+def _band_mark(band: Band, scale: float, name: str, floor: float = -np.inf) -> dict:
+    """Return the mark of the band of the frequency or of the damping ratio."""
+    low = np.maximum(getattr(band, f"{name}_low"), floor)
+    high = getattr(band, f"{name}_high")
+    colour = COLOURS[band.method]
+    return charts.make_mark("band", colour, "band", x=band.amplitude * scale, low=low, high=high)
+
+
+class CurveStyle(NamedTuple):
+    """Colour, legend and line width of a curve; None: the usual width, with points and error bars."""
+
+    method: str
+    legend: str
+    width: float | None
+
+
+def _curve_style(method: str, band: Band | None) -> CurveStyle:
+    """Return how the curve of a method is drawn: bold if it is recommended, thin if another is."""
+    if band is None:
+        return CurveStyle(method, method, None)
+    if method == band.method:
+        return CurveStyle(method, f"{method} (use this)", BOLD_WIDTH)
+    return CurveStyle(method, method, THIN_WIDTH)
+
+
+def _curve_marks(style: CurveStyle, x, y, errors, is_log: bool) -> list:
+    """Return the chart marks of a backbone curve: a line, and error bars unless a width is given."""
+    colour = COLOURS[style.method]
+    if style.width is not None:
+        return [charts.make_line(x, y, colour, style.legend, width=style.width)]
+    dots = {"shape": "circle", "errors": errors}
     if is_log:
-        style["floor"] = BAR_FLOOR_FACTOR * float(y.min(initial=1.0))
-    colour = COLOURS[method]
-    return [charts.make_line(x, y, colour, method), charts.make_dots(x, y, colour, **style)]
+        dots["floor"] = BAR_FLOOR_FACTOR * float(y.min(initial=1.0))
+    return [charts.make_line(x, y, colour, style.legend), charts.make_dots(x, y, colour, **dots)]
 
 
 def _has_small_error(curve: Curve) -> np.ndarray:
@@ -188,7 +264,7 @@ def page_html(backbone: Backbone, title: str) -> str:
     if backbone.curves:
         page_charts = [
             chart | {"anchor": f"chart{k}"}
-            for k, chart in enumerate(backbone_charts(backbone.curves))
+            for k, chart in enumerate(backbone_charts(backbone.curves, backbone.answer.band))
         ]
     first, *more = summarise_backbone(backbone)
     paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in more)
@@ -217,6 +293,11 @@ def _charts_html(backbone: Backbone, page_charts: list) -> str:
         for chart in page_charts
     )
     caption = "The bars show the numerical errors."
+    if backbone.answer.band is not None:
+        caption = (
+            "Use the bold curve. The band around it contains the numerical errors and what the other "
+            "kinds of test read; the thin curves are the other methods."
+        )
     if not all(_has_small_error(curve).all() for curve in backbone.curves.values()):
         caption += LEFT_OUT_NOTE
     return f"<figure><div class=row>{cells}</div><figcaption>{caption}</figcaption></figure>"
@@ -281,6 +362,8 @@ def summarise_backbone(backbone: Backbone) -> list:
     curve = next((one for one in ordered if one is not None), None)
     if curve is not None:
         out = [_describe_ends(backbone.mode, curve), *out, *_describe_largest_damping(curve)]
+    if backbone.answer.advice:
+        out.append(backbone.answer.advice)
     exponents = backbone.exponents
     theory = ""
     if exponents.micro_theory is not None:

@@ -86,8 +86,12 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
     try:
         return import_effect("structure.bonded").remove_springs(modes, stiffness, damping)
     except PatchfemError as error:
+        key = "structure.measured"
+        slides = [abs(mode.slide) for mode in scene.structure.mode or ()]
+        if slides and "`slide`" in str(error):
+            key = f"structure.mode.{int(np.argmax(slides))}.slide"
         raise PatchfemError(
-            f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, "
+            f"{scene.where(key)}: {error}; or give the frequencies of the bolted rig, "
             "give a softer joint, or leave `measured` out if the frequencies were measured without the "
             "joint"
         ) from None

@@ -17,6 +17,11 @@ PUBLIC = {
         "read_axes",
         "read_lengths",
     ),
+    "backbone_scene": (
+        "BackboneTables",
+        "GivenMode",
+        "parse_modes",
+    ),
     "files": (
         "file_exists",
         "list_named_files",

@@ -103,7 +103,12 @@ class Scene:
         return self.path.parent / name
 
 
-def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = None) -> Scene:
+def load(
+    path: str | Path,
+    sets: Iterable[str] = (),
+    faults: Callable | None = None,
+    prepare: Callable | None = None,
+) -> Scene:
     """Read a scene file.
 
     Parameters
@@ -114,6 +119,8 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
     faults : Callable, optional
         faults(tables, folder, is_valid) returns (key, message) of further mistakes, such as those inside the files that
         the scene names. `tables` are as far as they could be read; `is_valid` is True if they have no mistake.
+    prepare : Callable, optional
+        As in `loads`.
 
     Raises
     ------
@@ -128,7 +135,7 @@ def load(path: str | Path, sets: Iterable[str] = (), faults: Callable | None = N
             *(faults(read, folder, is_valid) if faults else ()),
         ]
 
-    return loads(read_text(path), path, sets, find_file_faults)
+    return loads(read_text(path), path, sets, find_file_faults, prepare)
 
 
 def loads(
@@ -136,6 +143,7 @@ def loads(
     path: str | Path = "scene.toml",
     sets: Iterable[str] = (),
     faults: Callable | None = None,
+    prepare: Callable | None = None,
 ) -> Scene:
     """Read a scene from its text.
 
@@ -148,6 +156,8 @@ def loads(
         ``table.key=value`` as of --set. A key among them is no longer an axis of [sweep].
     faults : Callable, optional
         faults(tables, is_valid) returns (key, message) of further mistakes, as in `load`.
+    prepare : Callable, optional
+        prepare(raw) changes the plain values of the text and of the sets before they are read.
 
     Raises
     ------
@@ -165,6 +175,8 @@ def loads(
     first = [f"{axis.key}={axis.texts[0]}" for axis in swept if not draft.has_set_key(axis.key)]
     for assignment in (*first, *sets):
         apply_set(draft, assignment)
+    if prepare is not None:
+        prepare(draft.raw)
     scene = finish_scene(draft, path, text, sets, faults)
     return replace(scene, sweep=tuple(swept)) if swept else scene
 

@@ -78,7 +78,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
         raise PatchfemError(
             f"the stiffness of the joint is {100 * ratio:.4g} % of "
             "the stiffness of the mode that the joint stiffens most, so without the joint this mode "
-            "would have a negative stiffness"
+            f"would have a negative stiffness{_advise_on_slides(basis.omega, joint)}"
         )
     squares[squares <= min_square] = 0.0
     damper = -damping / mass * np.outer(slides[0], slides[0])
@@ -92,6 +92,19 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     free = _change_coordinates(basis, np.sqrt(squares), shapes, damper)
     # a single mode keeps its coordinate, so no shapes are needed
     return replace(free, shapes=None) if squares.size == 1 and basis.shapes is None else free
+
+
+def _advise_on_slides(omega, joint) -> str:
+    """Return the factor by which the slides of all modes must fall so that a joint can be removed.
+
+    joint: (n, n) stiffness of the joint over the mass [rad2 s-2]; "" if no factor suffices.
+    """
+    if not omega.all():
+        return ""
+    factor = float(np.linalg.eigvalsh(joint / np.outer(omega, omega))[-1]) ** -0.5
+    exponent = np.floor(np.log10(factor)) - 1
+    rounded = np.floor(factor / 10**exponent) * 10**exponent
+    return f"; `slide` of the modes is too large: multiply `slide` of every mode by {rounded:.2g} or less"
 
 
 def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:

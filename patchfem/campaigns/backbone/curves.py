@@ -13,15 +13,19 @@ from ...model.source import locate_errors
 from ...response.errors import finer_errors
 from ...runs.joint import stuck_patch_stiffness
 from . import notes
+from .advice import write_advice
 from .balance import compute_balance_curve
+from .band import make_band
 from .decay import compute_decay_curve
 from .joint import Joint, build_joint
 from .linear import compute_level_curve
 from .quasi_static import compute_static_curve
 from .records import (
     AMPLITUDE_TOL,
+    DEFAULT_METHODS,
     METHODS,
     ROUND_OFF_ERROR,
+    Answer,
     Backbone,
     Curve,
     LossExponents,
@@ -31,6 +35,25 @@ from .records import (
 # Smallest amplitude of gross slip over the amplitude at which the complete contact begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
 FLUTTER_TOL = 1e-8  # Relative error of the flutter amplitude, below the digits that are printed.
+
+
+def choose_methods(method: str | None) -> tuple:
+    """Return the methods of a request: a name, "all", or the default ones for "" and None.
+
+    Raises
+    ------
+    PatchfemError
+        If no method has this name.
+    """
+    if not method:
+        return DEFAULT_METHODS
+    if method == "all":
+        return METHODS
+    if method not in METHODS:
+        raise PatchfemError(
+            f"backbone: method {method!r} does not exist; use one of {', '.join(METHODS)}, or 'all'"
+        )
+    return (method,)
 
 
 def compute_backbone(
@@ -60,7 +83,7 @@ def compute_backbone(
         Takes the name of a method that begins, and a sentence about the time of a long decay.
     errors : bool
         Whether the errors of the mesh, of the cells of a law and of missing modes are computed; the
-        values are the same without them, in less than half the time.
+        values are the same without them, in less than half the time. Without them there is no band.
 
     Returns
     -------
@@ -98,7 +121,11 @@ def compute_backbone(
                 curves[method] = curve
             except (NotConverged, PatchfemError) as reason:
                 missing[method] = str(reason).removeprefix("backbone: ")
-    return _make_backbone(joint, amplitudes, curves, missing)
+        answer = Answer()
+        if errors:
+            band = make_band(joint, curves)
+            answer = Answer(band, write_advice(joint, band, curves, missing))
+    return _make_backbone(joint, amplitudes, curves, missing)._replace(answer=answer)
 
 
 def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:

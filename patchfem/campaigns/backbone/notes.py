@@ -30,7 +30,7 @@ REASONS_OF_GAPS = {
 REASONS_OF_DIFFERENCES = {
     "decay": "a decay gives mean values over a cycle, and at this amplitude one cycle reduces the "
     "amplitude by the fraction {:.2g}",
-    "quasi-static": "the static curve uses the secant stiffness under a force of fixed shape; "
+    "quasi-static": "the static curve uses the secant stiffness between the turning points; "
     "harmonic balance uses the first harmonic of the force",
 }
 
@@ -119,8 +119,8 @@ def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
     if not slips or "quasi-static" not in curves or "balance" in curves:
         return []
     return [
-        "--method quasi-static takes the stiffness from the two turning points of the motion under "
-        "a force of fixed shape; --method balance takes the stiffness from the first harmonic of "
+        "--method quasi-static takes the stiffness from the two turning points of the motion; "
+        "--method balance takes the stiffness from the first harmonic of "
         "the force, and this stiffness is lower once the contact slips. The frequencies by "
         "quasi-static are therefore higher than the frequencies by balance"
     ]

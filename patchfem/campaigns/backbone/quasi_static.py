@@ -107,7 +107,7 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     """
     modes = joint.modes
     statics = quasi_static.find_static_motions_from_loops(
-        modes, modes.interfaces[0], joint.stuck_mode, slides, loops
+        modes, modes.interfaces[0], joint.mode, slides, loops
     )
     return decays.tabulate_static_motions(modes, statics)
 

@@ -5,6 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 METHODS = ("balance", "decay", "quasi-static")
+# Methods that are computed by default: the recommended one, and another that costs little beside it.
+DEFAULT_METHODS = ("balance", "quasi-static")
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
 AMPLITUDE_TOL = 1e-7  # Relative difference below which two amplitudes are equal.
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
@@ -96,6 +98,21 @@ class LossExponents(NamedTuple):
     micro_theory: float | None = None
 
 
+class Answer(NamedTuple):
+    """Answer of a backbone: the recommended curve with its band, and advice.
+
+    Attributes
+    ----------
+    band : band.Band or None
+        None without a curve.
+    advice : str
+        Sentences on the curve to use and on where the methods hold.
+    """
+
+    band: object = None
+    advice: str = ""
+
+
 class Backbone(NamedTuple):
     """Backbone of a mode: its curves by all methods, frequencies and loss exponents.
 
@@ -112,6 +129,7 @@ class Backbone(NamedTuple):
     flutter : float or None
         Amplitude [m] above which the mode gains energy.
     notes : tuple of str
+    answer : Answer
     """
 
     mode: str
@@ -121,3 +139,8 @@ class Backbone(NamedTuple):
     exponents: LossExponents
     flutter: float | None
     notes: tuple
+    answer: Answer = Answer()
+
+    def add_notes(self, notes) -> "Backbone":
+        """Return the backbone with further notes before its own ones."""
+        return self._replace(notes=(*notes, *self.notes))

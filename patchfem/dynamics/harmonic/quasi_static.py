@@ -1,11 +1,13 @@
-"""Quasi-static backbone of a mode: static force along its shape, and friction loops.
+"""Quasi-static backbone of a mode: static force along its own deflection, and friction loops.
 
-A force alpha m phi along the shape phi of the mode with the contact stuck moves the coordinates to
-z: m omega_i^2 z_i + (rows^T F)_i = alpha m phi_i. The slides reverse together, so each law runs
-through its own loop, whose tip is F. The frequency is omega^2 = alpha/q for the part q = phi
-z/(phi phi) of z along phi, and the damping is what the loops lose of 2 pi alpha q m phi phi. Where
-a law follows Masing's rule the loop is its curve of first loading, twice as large: one static
-curve gives both (Festjens, Chevallier and Dion 2013; Lacayo and Allen 2019).
+The inertia force m omega^2 z of a deflection z holds it in equilibrium: m omega_i^2 z_i + (rows^T F)_i =
+m omega^2 z_i. The slides reverse together, so each law runs through its own loop, whose tip is F, and
+omega is the natural frequency with the secant stiffness of the loops: that of the stuck mode at small
+amplitudes, and that of the mode without the contact at large ones. The damping is what the loops lose
+of 2 pi m omega^2 z z. Where a law follows Masing's rule the loop is its curve of first loading, twice
+as large: one static curve gives both (Festjens, Chevallier and Dion 2013, with the distribution of the
+force updated by the deflection; Lacayo and Allen 2019). A force with the fixed shape of the stuck mode
+would not tend to the free mode where several modes move the contact.
 """
 
 from itertools import chain
@@ -156,17 +158,15 @@ def find_static_motions(
             )
             continue
         z = guess[:-1] * amplitude
-        alpha = float(guess[-1]) * omega**2 * amplitude
+        square = float(guess[-1]) * omega**2
         slides = np.abs(group.rows @ z)
         areas = [find_loops(laws, u, samples).area for u, laws in zip(slides, group.laws)]
         loss = sum(areas)
-        motions.append(_make_static_motion(modes, shape, (z, alpha, loss)))
+        motions.append(_make_static_motion(modes, shape, (z, square, loss)))
     return motions
 
 
-def find_static_motions_from_loops(
-    modes: ModalBasis, row, stuck_mode: tuple, slides, loops
-) -> list:
+def find_static_motions_from_loops(modes: ModalBasis, row, mode: int, slides, loops) -> list:
     """Compute the quasi-static motions of a mode with one interface of known friction loops.
 
     Parameters
@@ -174,10 +174,10 @@ def find_static_motions_from_loops(
     modes : ModalBasis
     row : ndarray
         (n,) slide per coordinate.
-    stuck_mode : tuple
-        See `find_static_motions`.
+    mode : int
+        Index of the coordinate of the mode.
     slides : array_like
-        (k,) amplitudes of the slide [m].
+        (k,) amplitudes of the slide [m], > 0.
     loops : sequence of StaticLoops
         (k,) loop at each amplitude.
 
@@ -185,16 +185,13 @@ def find_static_motions_from_loops(
     -------
     list of StaticMotion
     """
-    shape = stuck_mode[1]
-    n = modes.omega.size
+    row = np.asarray(row)
     motions = []
-    matrix = np.zeros((n + 1, n + 1))
-    matrix[:n, :n] = np.diag(modes.omega**2)
-    matrix[:n, n] = -shape
-    matrix[n, :n] = row
     for slide, loop in zip(slides, loops):
-        x = np.linalg.solve(matrix, np.append(-np.asarray(row) * loop.tip / modes.mass, slide))
-        motions.append(_make_static_motion(modes, shape, (x[:n], float(x[n]), loop.area)))
+        secant_stiffness = np.array([loop.tip / slide])
+        omega, shape = modes.compute_stuck_mode(row[None], secant_stiffness, mode)
+        z = shape * slide / (row @ shape)
+        motions.append(_make_static_motion(modes, shape, (z, omega**2, loop.area)))
     return motions
 
 
@@ -203,8 +200,8 @@ def _solve_equilibrium(
 ) -> np.ndarray:
     """Solve for the static equilibrium of a mode at an amplitude [m].
 
-    Returns z/amplitude and alpha/(omega^2 amplitude). mode: frequency [rad/s] and shape of the stuck mode, and
-    the row of the amplitude.
+    Returns z/amplitude, and the squared frequency over that of the stuck mode. mode: frequency [rad/s] and
+    shape of the stuck mode, and the row of the amplitude.
     """
     omega, shape, row = mode
     m = modes.mass
@@ -218,7 +215,7 @@ def _solve_equilibrium(
         return np.append(
             modal_stiffness @ x[:n]
             + group.rows.T @ force / (m * omega**2 * amplitude)
-            - x[n] * shape,
+            - x[n] * x[:n],
             row @ x[:n] - 1,
         )
 
@@ -226,7 +223,8 @@ def _solve_equilibrium(
         u = np.abs(group.rows @ x[:n] * amplitude)
         tip_slopes = [_find_tip_slope(laws, slide, samples) for slide, laws in zip(u, group.laws)]
         stiffness = modal_stiffness + group.rows.T * tip_slopes @ group.rows / (m * omega**2)
-        return np.block([[stiffness, -shape[:, None]], [row[None], np.zeros((1, 1))]])
+        stiffness -= x[n] * np.eye(n)
+        return np.block([[stiffness, -x[:n, None]], [row[None], np.zeros((1, 1))]])
 
     for start in (guess, np.append(shape, 1.0)):
         solution = root(find_residual, start, jac=find_slopes, tol=1e-13)
@@ -246,12 +244,12 @@ def _find_tip_slope(laws, u: float, samples: int) -> float:
 def _make_static_motion(modes, shape, motion: tuple) -> StaticMotion:
     """Return the quasi-static motion with the frequency and damping ratio of an equilibrium.
 
-    motion: z (n,) [m], alpha [m s-2] and loss [J].
+    motion: z (n,) [m], squared frequency [rad2 s-2] and loss [J].
 
     """
-    z, alpha, loss = motion
+    z, square, loss = motion
     component = float(shape @ z / (shape @ shape))
-    omega = float(np.sqrt(alpha / component)) if alpha * component > 0 else np.nan
+    omega = float(np.sqrt(square)) if square > 0 else np.nan
     viscous = np.pi * omega * modes.mass * float(z @ modes.damping_matrix @ z)
-    work = 2 * np.pi * alpha * component * modes.mass * float(shape @ shape)
+    work = 2 * np.pi * square * modes.mass * float(z @ z)
     return StaticMotion(component, omega, (loss + viscous) / work, z, float(loss))

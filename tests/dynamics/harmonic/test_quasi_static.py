@@ -5,7 +5,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from modal_bases import basis_of
-from scipy.optimize import minimize
 
 from patchfem.core import ModalBasis, PatchfemError
 from patchfem.dynamics import LawGroup, Spring
@@ -14,7 +13,7 @@ from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw
 from patchfem.friction.laws import tanh
 
 
-def modes_of(omega, zeta, slide, output) -> ModalBasis:
+def modes_of(omega, zeta, slide, output):
     return basis_of(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
 
 
@@ -41,7 +40,7 @@ def test_exact_one_mode_on_elastic_plastic_elements():
     again = quasi_static.find_static_motions_from_loops(
         ONE,
         ONE.slide,
-        held(ONE, group),
+        0,
         a,
         [quasi_static.StaticLoops(*one) for one in zip(force, loss)],
     )
@@ -72,27 +71,21 @@ def test_exact_a_linear_spring_is_the_held_mode():
     assert found.loss == pytest.approx(0, abs=1e-12 * 2e5 * 1e-8)
 
 
-def test_exact_two_modes_hold_at_the_least_energy():
-    """At a share q of the shape the coordinates make the energy of modes and elements least."""
+def test_exact_two_modes_move_in_the_mode_of_the_secant_stiffness():
+    """A generalised eigenproblem with the secant of the loop; at large amplitudes, the free mode."""
     modes = modes_of([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
     group = LawGroup(modes, Jenkins(STIFF, LIMIT))
-    share = 3e-4
-    omega, shape = held(modes, group)
-    [found] = quasi_static.find_static_motions(modes, group, [share], (omega, shape))
-
-    def energy(z):
-        u = abs(modes.slide @ z)
-        slips = np.maximum(u - LIMIT, 0)
-        return 0.25 * np.sum((modes.omega * z) ** 2) + float(
-            STIFF @ ((u - slips) ** 2 / 2 + LIMIT * slips)
-        )
-
-    across = np.array([-shape[1], shape[0]])
-    least = minimize(
-        lambda x: 1e3 * energy(share * shape + x[0] * share * across), [0.0], tol=1e-14
-    )
-    assert found.z == pytest.approx(share * (shape + least.x[0] * across), rel=1e-5)
-    assert found.amplitude == pytest.approx(share, rel=1e-12)
+    amplitudes = [3e-4, 3.0]
+    found, gross = quasi_static.find_static_motions(modes, group, amplitudes, held(modes, group))
+    slide = float(modes.slide @ found.z)
+    secant = STIFF @ np.minimum(slide, LIMIT) / slide
+    stiffness = np.diag(modes.omega**2) + secant / 0.5 * np.outer(modes.slide, modes.slide)
+    assert stiffness @ found.z == pytest.approx(found.omega**2 * found.z, rel=1e-9)
+    assert found.amplitude == pytest.approx(3e-4, rel=1e-12)
+    assert gross.omega == pytest.approx(700.0, rel=1e-4)
+    loops = [quasi_static.find_loops(group.laws[0], slide, 4096)]
+    [again] = quasi_static.find_static_motions_from_loops(modes, modes.slide, 0, [slide], loops)
+    assert (again.omega, again.zeta) == pytest.approx((found.omega, found.zeta), rel=1e-9)
 
 
 def test_refuses_friction_that_follows_the_speed():

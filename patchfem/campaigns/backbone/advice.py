@@ -1,0 +1,160 @@
+"""Sentences that say which method of a backbone holds where, and which curve a designer should use."""
+
+import numpy as np
+
+from ...formatting import format_length, format_quantity
+from .band import Band, forced_mode_ratio, match_amplitudes
+from .joint import Joint
+
+AGREEMENT = 0.02  # Relative difference of the damping below which two methods agree.
+MIN_STATED_LOSS = 0.05  # Fall of the amplitude per cycle from which it is stated.
+MIN_STATED_RATIO = 0.05  # Motion of other modes from which their coupling is stated.
+PURPOSES = {
+    "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
+    "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
+    "decay": "no curve of the steady vibration is known here, and a slow ring-down follows it",
+}
+
+
+def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -> str:
+    """Write the sentences on the curve to use, its band, and where the methods hold.
+
+    Parameters
+    ----------
+    joint : Joint
+    band : Band or None
+    curves : dict of Curve
+        By method.
+    missing : dict of str
+        By method, the reason why it has no curve.
+    """
+    if band is None:
+        return "No method gives a curve here; try --method decay, which neglects nothing."
+    if joint.is_linear:
+        return "All methods agree: no friction acts, so frequency and damping are constant."
+    curve = curves[band.method]
+    sentences = [
+        f"Use the bold curve, method {band.method}: {PURPOSES[band.method]}.",
+        _describe_width(band, curve),
+        *_describe_agreement(band, curves),
+        *_describe_ring_down(joint, band, curves),
+        *_describe_static_curve(band, curves),
+        *_describe_coupling(joint, band, curve),
+    ]
+    for method, reason in missing.items():
+        if method != "decay" or "balance" in missing:
+            sentences.append(f"Method {method} does not hold here: {reason}.")
+    return " ".join(sentences)
+
+
+def _describe_width(band: Band, curve) -> str:
+    """Describe the largest half-widths of the band."""
+    frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
+    damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
+    k = int(np.argmax(damping))
+    return (
+        f"Its band contains the numerical error and what the other kinds of test read; it is widest at "
+        f"{format_length(curve.amplitude[k], 3)}, where the damping ratio is {band.damping_low[k]:.3g} to "
+        f"{band.damping_high[k]:.3g} beside {curve.damping[k]:.3g}, and the frequency is within "
+        f"{100 * frequency.max():.2g} % everywhere."
+    )
+
+
+def _largest_distance(value, low, high) -> np.ndarray:
+    """Return the distance (k,) of a value from the farther limit of its band, relative to the value."""
+    return np.maximum(high - value, value - low) / np.maximum(np.abs(value), 1e-300)
+
+
+def _describe_agreement(band: Band, curves: dict) -> list:
+    """Describe up to which amplitude nothing distinguishes the methods."""
+    curve = curves[band.method]
+    distance = _largest_distance(curve.damping, band.damping_low, band.damping_high)
+    beyond = np.flatnonzero(distance > AGREEMENT)
+    if not beyond.size:
+        return [f"All methods agree within {100 * AGREEMENT:g} % of the damping at all amplitudes."]
+    if not beyond[0]:
+        return []
+    edge = format_length(curve.amplitude[beyond[0] - 1], 3)
+    return [
+        f"Up to {edge} all methods agree within {100 * AGREEMENT:g} % of the damping, because the contact hardly slips."
+    ]
+
+
+def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
+    """Describe how the damping of a ring-down differs from that of the steady vibration, and why."""
+    ring_down = band.ring_down
+    if ring_down is None:
+        return []
+    curve = curves[band.method]
+    ratio = ring_down.damping / curve.damping
+    if not np.isfinite(ratio).any():
+        return ["How a ring-down differs is not known: its motion stops within a cycle."]
+    k = int(np.nanargmax(np.abs(np.log(np.abs(ratio)))))
+    if abs(ratio[k] - 1) <= AGREEMENT:
+        return ["A ring-down has the same damping (method decay holds as well)."]
+    reasons = []
+    if ratio[k] > 1 and not joint.is_rigid:
+        reasons.append(
+            "the joint stiffens as the amplitude falls, so the amplitude loses more than the energy"
+        )
+    lost_fraction = -np.expm1(-2 * np.pi * ring_down.damping[k])
+    if lost_fraction > MIN_STATED_LOSS:
+        reasons.append(
+            f"a cycle takes {100 * lost_fraction:.2g} % of the amplitude, so the decay gives means over unequal motions"
+        )
+    size = f"{100 * abs(ratio[k] - 1):.2g} % {'more' if ratio[k] > 1 else 'less'}"
+    edge = "upper" if ratio[k] > 1 else "lower"
+    because = f": {'; '.join(reasons)}" if reasons else ""
+    return [
+        f"A ring-down (method decay) reads up to {size} damping, most at {format_length(curve.amplitude[k], 3)}"
+        f"{because}; for a ring-down use the {edge} edge of the band."
+    ]
+
+
+def _describe_static_curve(band: Band, curves: dict) -> list:
+    """Describe where the quasi-static curve holds."""
+    if band.method != "balance" or "quasi-static" not in curves:
+        return []
+    balance = curves["balance"]
+    here, there = match_amplitudes(balance, curves["quasi-static"])
+    if not here.size:
+        return []
+    static = curves["quasi-static"].at(there)
+    balance = balance.at(here)
+    difference = np.maximum(
+        np.abs(static.damping / balance.damping - 1),
+        np.abs(static.frequency / balance.frequency - 1),
+    )
+    k = int(np.argmax(difference))
+    if difference[k] <= AGREEMENT:
+        return [f"The quasi-static curve holds within {100 * AGREEMENT:g} % at all its amplitudes."]
+    beyond = np.flatnonzero(difference > AGREEMENT)
+    extent = "nowhere within"
+    if beyond[0]:
+        extent = f"up to {format_length(balance.amplitude[beyond[0] - 1], 3)} within"
+    return [
+        f"The quasi-static curve holds {extent} {100 * AGREEMENT:g} %; beyond, its secant stiffness is higher than that "
+        f"of the motion (by up to {100 * difference[k]:.2g} %, at {format_length(balance.amplitude[k], 3)})."
+    ]
+
+
+def _describe_coupling(joint: Joint, band: Band, curve) -> list:
+    """Describe the coupling of the mode with the other modes."""
+    modes = joint.modes
+    if modes.omega.size == 1:
+        return []
+    ratio = forced_mode_ratio(joint, curve)
+    change = 0.0
+    if band.ring_down is not None:
+        change = float(np.nan_to_num(band.ring_down.shape_change).max())
+    omega = 2 * np.pi * curve.frequency[-1]
+    others = np.delete(modes.omega, joint.mode)
+    nearest = others[np.argmin(np.abs(others - omega))] / (2 * np.pi)
+    name = format_quantity(float(nearest), "Hz", 4)
+    if max(ratio.max(), change) < MIN_STATED_RATIO:
+        return [f"The coupling with the other modes (nearest: {name} without the contact) is weak."]
+    return [
+        f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes by "
+        f"up to {100 * ratio.max():.2g} % of its motion, and a cycle of a ring-down changes its shape by up to "
+        f"{100 * change:.2g} %, so that the modes exchange energy; a test reads the curve only if it isolates the mode."
+    ]

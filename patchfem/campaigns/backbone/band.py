@@ -1,0 +1,155 @@
+"""Band of a backbone: the range of frequency and damping that tests of a mode measure.
+
+The recommended curve is that of `balance` where it exists: a steady vibration in phase resonance. The band around it
+contains its numerical error, the curve of a ring-down (computed, or predicted by `ring_down`), the quasi-static curve,
+and the effect of the other modes that a force at a single place excites.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .joint import Joint
+from .records import AMPLITUDE_TOL, Curve
+from .ring_down import RingDown, predict_ring_down
+
+PREFERRED_METHODS = ("balance", "quasi-static", "decay")  # Order in which a curve is recommended.
+# Fraction of the distance of the predicted ring-down from the curve by which the band is widened, because the prediction
+# is of second order in the loss of a half cycle.
+RING_DOWN_MARGIN = 0.4
+# Part of the damping by which other modes change a ring-down in which the contact slips, per relative change of the shape
+# in a cycle, which excites them.
+SHAPE_MARGIN = 4.0
+
+
+class Band(NamedTuple):
+    """Recommended curve of a backbone with the band of what tests measure.
+
+    Attributes
+    ----------
+    method : str
+        Method of the recommended curve.
+    amplitude : (k,) array
+        Amplitudes of this curve [m].
+    frequency_low, frequency_high : (k,) array
+        [Hz]
+    damping_low, damping_high : (k,) array
+        Damping ratio.
+    ring_down : RingDown or None
+        Predicted ring-down.
+    """
+
+    method: str
+    amplitude: np.ndarray
+    frequency_low: np.ndarray
+    frequency_high: np.ndarray
+    damping_low: np.ndarray
+    damping_high: np.ndarray
+    ring_down: RingDown | None
+
+
+class _Limits:
+    """Lower and upper limits of a quantity at the amplitudes of a curve, which further values widen."""
+
+    def __init__(self, value, error):
+        self.low = value - error
+        self.high = value + error
+
+    def include(self, points, value, error) -> None:
+        """Widen the limits at some points to contain a value with its error; NaN changes nothing."""
+        self.low[points] = np.fmin(self.low[points], value - error)
+        self.high[points] = np.fmax(self.high[points], value + error)
+
+
+def make_band(joint: Joint, curves: dict) -> Band | None:
+    """Make the band of the recommended curve; None without a curve.
+
+    Parameters
+    ----------
+    joint : Joint
+    curves : dict of Curve
+        By method.
+    """
+    method = next((name for name in PREFERRED_METHODS if name in curves), None)
+    if method is None:
+        return None
+    curve = curves[method]
+    frequency = _Limits(curve.frequency, curve.frequency_error)
+    damping = _Limits(curve.damping, curve.damping_error)
+    for other in curves.values():
+        _include_curve(frequency, damping, curve, other)
+    ring_down = None
+    if method == "balance":
+        ring_down = predict_ring_down(joint, curve)
+        _include_forced_modes(joint, frequency, damping, curve)
+    if ring_down is not None:
+        _include_ring_down(frequency, damping, curve, ring_down)
+    return Band(
+        method=method,
+        amplitude=curve.amplitude,
+        frequency_low=frequency.low,
+        frequency_high=frequency.high,
+        damping_low=damping.low,
+        damping_high=damping.high,
+        ring_down=ring_down,
+    )
+
+
+def match_amplitudes(curve: Curve, other: Curve) -> tuple:
+    """Return the indices of the amplitudes that two curves share, in each of them."""
+    distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
+    return np.nonzero(distance < AMPLITUDE_TOL)
+
+
+def _include_curve(frequency: _Limits, damping: _Limits, curve: Curve, other: Curve) -> None:
+    """Widen the limits around a curve to contain another curve with its errors."""
+    here, there = match_amplitudes(curve, other)
+    other = other.at(there)
+    frequency.include(here, other.frequency, other.frequency_error)
+    damping.include(here, other.damping, other.damping_error)
+
+
+def _include_ring_down(
+    frequency: _Limits, damping: _Limits, curve: Curve, ring_down: RingDown
+) -> None:
+    """Widen the limits around a curve to contain a predicted ring-down."""
+    every = slice(None)
+    margin = RING_DOWN_MARGIN * np.abs(ring_down.damping - curve.damping)
+    margin += SHAPE_MARGIN * largest_from_above(ring_down.shape_change) * curve.damping
+    margin += np.abs(ring_down.damping - ring_down.slow_damping)
+    damping.include(every, ring_down.damping, margin + curve.damping_error)
+    margin = np.abs(ring_down.frequency - curve.frequency) + curve.frequency_error
+    frequency.include(every, ring_down.frequency, margin)
+
+
+def largest_from_above(values) -> np.ndarray:
+    """Return the largest of the values (k,) at each amplitude and all larger ones.
+
+    What a ring-down excites at large amplitudes is still there at small ones.
+    """
+    return np.maximum.accumulate(np.nan_to_num(values)[::-1])[::-1]
+
+
+def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve) -> None:
+    """Widen the limits by the other modes that a force at the output excites beside the resonance.
+
+    They move in phase with the force, by the ratio r to the resonant motion at the output. This shifts the phase
+    resonance by the fraction r zeta of the frequency, and increases the loss of a cycle by r^2.
+    """
+    ratio = forced_mode_ratio(joint, curve)
+    every = slice(None)
+    frequency.include(every, curve.frequency, ratio * np.abs(curve.damping) * curve.frequency)
+    damping.include(every, curve.damping, ratio**2 * np.abs(curve.damping))
+
+
+def forced_mode_ratio(joint: Joint, curve: Curve) -> np.ndarray:
+    """Return the motion (k,) at the output of other modes over that of the mode, under a force at the output."""
+    modes = joint.modes
+    square = (2 * np.pi * curve.frequency) ** 2
+    own = modes.output[joint.mode]
+    ratio = np.zeros(curve.amplitude.size)
+    for k, omega in enumerate(modes.omega):
+        if k != joint.mode and own:
+            distance = np.abs(omega**2 - square)
+            ratio += (modes.output[k] / own) ** 2 * 2 * np.abs(curve.damping) * square / distance
+    return np.minimum(ratio, 1.0)

@@ -1,0 +1,145 @@
+"""Model of a backbone from a scene without modes, or from modes given beside the scene."""
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...formatting import format_quantity
+from ...model.model import Model
+from ...model.structure import compute_sticking_stiffness
+from ...runs import joint
+from ...runs.patch import result as patch_result
+from ...scene.backbone_scene import BackboneTables, GivenMode, parse_modes
+
+# Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
+ASSUMED_JOINT_FRACTION = 0.1
+MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
+IGNORED = "{tables} {verb} ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+
+
+class PreparedModel(NamedTuple):
+    """Model whose backbone is computed, and notes on what was ignored and assumed."""
+
+    model: Model
+    notes: tuple
+
+
+def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
+    """Build the model of a backbone from a scene with or without modes.
+
+    Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_FRACTION of
+    their stiffness. The frequencies of modes given beside the scene are those of the bolted joint.
+
+    Parameters
+    ----------
+    build : callable
+        Maps `BackboneTables` to the model of the scene with these tables.
+    modes : str or iterable
+        See `scene.backbone_scene.parse_modes`; "" for the modes of the scene.
+    """
+    tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
+    model = build(tables)
+    notes = _note_ignored_tables(tables.ignored)
+    if not tables.modes:
+        return PreparedModel(joint.remove_joint(model), notes)
+    patch, stiffness = _find_sticking_stiffness(model)
+    given_modes = tables.modes
+    used_modes = given_modes
+    if stiffness is not None:
+        used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
+        model = joint.remove_joint(build(BackboneTables(used_modes)), patch)
+    notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
+    if any(mode.slide is None for mode in given_modes):
+        notes += _note_slides(len(given_modes), stiffness)
+    return PreparedModel(model, notes)
+
+
+class StickingContact(NamedTuple):
+    """Pressed patch, or None, and tangential stiffness [N/m] of a sticking contact, None if rigid."""
+
+    patch: object
+    stiffness: float | None
+
+
+def _find_sticking_stiffness(model: Model) -> StickingContact:
+    """Press the contact of a rig with a single interface and find its stiffness while it sticks."""
+    interfaces = model.rig.friction.interfaces
+    if len(interfaces) != 1 or model.friction is None:
+        return StickingContact(None, None)
+    if model.patch is not None:
+        patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
+        stiffness = 0.0
+        if patch.pressure.load > 0:
+            stiffness = joint.patch_stiffness(model, patch)
+        is_elastic = 0 < stiffness < np.inf
+        return StickingContact(patch, stiffness if is_elastic else None)
+    try:
+        return StickingContact(None, compute_sticking_stiffness(interfaces[0], model.nominal_load))
+    except PatchfemError:
+        return StickingContact(None, None)
+
+
+def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
+    """Return the modes, those without `slide` with the one of the assumed stiffness of the joint.
+
+    stiffness_per_mass: stiffness of the sticking contact over the modal mass [1/s2].
+    """
+    fraction = _assumed_fraction(len(modes))
+    completed = []
+    for mode in modes:
+        slide = mode.slide
+        if slide is None:
+            omega = 2 * np.pi * mode.frequency
+            slide = float(omega * np.sqrt(fraction / stiffness_per_mass))
+        completed.append(mode._replace(slide=slide))
+    return tuple(completed)
+
+
+def _assumed_fraction(n_modes: int) -> float:
+    """Return the fraction of the stiffness of each mode that the joint is assumed to contribute."""
+    return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
+
+
+def _note_ignored_tables(names: list) -> tuple:
+    """Return a note on tables of the scene that are ignored."""
+    if not names:
+        return ()
+    tables = " and ".join(f"[{name}]" for name in names)
+    return (IGNORED.format(tables=tables, verb="is" if len(names) == 1 else "are"),)
+
+
+def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:
+    """Return notes on modes that do not stand in the scene."""
+    names = ", ".join(_describe_mode(mode) for mode in modes)
+    place = "with the contact stuck" if is_stuck else "without the contact"
+    if not is_assumed:
+        return (f"the modes are those given beside the scene ({place}): {names}",)
+    return (
+        f"the scene has no mode, so this is an example, a mode {place} of {names}: the relative "
+        "change of its frequency and the damping by friction hold for any frequency and mass at the "
+        "same motion of the contact; for your own modes, give their frequencies and damping ratios, "
+        'as --modes "120 Hz:0.01, 170 Hz:0.02"',
+    )
+
+
+def _describe_mode(mode: GivenMode) -> str:
+    """Describe a mode by its frequency, its damping ratio and its slide."""
+    text = f"{format_quantity(mode.frequency, 'Hz', 4)}, damping ratio {mode.damping:.3g}"
+    return text if mode.slide is None else f"{text}, slide {mode.slide:.3g}"
+
+
+def _note_slides(n_modes: int, stiffness: float | None) -> tuple:
+    """Return a note on the assumed `slide` of modes.
+
+    stiffness: of the sticking contact [N/m], or None if it is rigid.
+    """
+    if stiffness is None:
+        return ("`slide` is 1 for every mode: the contact moves as far as the output",)
+    return (
+        f"`slide` is assumed such that the sticking joint, of {format_quantity(stiffness, 'N/m', 3)}, "
+        f"contributes {100 * _assumed_fraction(n_modes):.3g} % of the stiffness of each mode; the "
+        "frequencies without the contact and the damping depend on it: give the motion of the contact "
+        "per motion of the output as a third number, as 120 Hz:0.01:0.02",
+    )

@@ -1,0 +1,140 @@
+"""Scenes of a backbone: modes given beside the scene, and tables that are ignored.
+
+A backbone is the motion of a structure on its own. So `BackboneTables` takes [slide] out of the plain values
+of a scene, adds the [drive] that a rig must have, and writes given or assumed modes into [structure].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from ..exceptions import PatchfemError
+from .keys.quantities import format_si, parse_quantity
+
+MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
+ASSUMED_MODES = "100 Hz:0.001"  # Mode of a scene without modes.
+ASSUMED_MASS = "1 kg"  # Modal mass of modes of a scene without [structure].
+# Drive of a scene without one; nothing that a backbone gives depends on it.
+UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
+STRUCTURES = {"mode", "masses", "reduced", "file"}  # Keys of [structure] that give its modes.
+MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
+
+
+class GivenMode(NamedTuple):
+    """Mode given beside a scene, with the contact stuck.
+
+    Attributes
+    ----------
+    frequency : float
+        [Hz]
+    damping : float
+        Damping ratio.
+    slide : float or None
+        Relative displacement of the contact per displacement of the output; None if it is not given.
+    """
+
+    frequency: float
+    damping: float
+    slide: float | None
+
+
+def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
+    """Read modes from a text such as "120 Hz:0.01, 170 Hz:0.02", or from a list of tuples.
+
+    Parameters
+    ----------
+    modes : str or iterable
+        A tuple holds frequency (a text, or a number in Hz), damping ratio and optionally the slide.
+
+    Raises
+    ------
+    PatchfemError
+        If an item is not a mode.
+    """
+    items = modes.split(",") if isinstance(modes, str) else list(modes)
+    parsed = []
+    for item in items:
+        parts = item.split(":") if isinstance(item, str) else list(item)
+        try:
+            parsed.append(_parse_mode(*parts))
+        except (TypeError, ValueError) as error:
+            reason = f"{error}; " if isinstance(error, ValueError) else ""
+            raise PatchfemError(f"modes: {item!r}: {reason}{MODES_FORM}") from None
+    return tuple(parsed)
+
+
+def _parse_mode(frequency, damping, slide=None) -> GivenMode:
+    """Read the parts of a mode; ValueError if one is not a quantity of its kind."""
+    if isinstance(frequency, str):
+        frequency = parse_quantity(frequency.strip(), "frequency")
+    slide = None if slide is None else float(slide)
+    mode = GivenMode(float(frequency), float(damping), slide)
+    if not (0 < mode.frequency < float("inf") and -1 < mode.damping < 1 and slide != 0):
+        raise ValueError(
+            "a frequency above 0, a damping ratio below 1 and no slide of 0 are needed"
+        )
+    return mode
+
+
+class BackboneTables:
+    """Change of the plain values of a scene into those of a rig whose backbone is computed.
+
+    Parameters
+    ----------
+    modes : tuple of GivenMode
+        Modes that replace those of the scene; () keeps the modes of the scene.
+
+    Attributes
+    ----------
+    modes : tuple of GivenMode
+        Modes that were written into the scene: the given or the assumed ones; () for those of the scene.
+    is_assumed : bool
+        Whether the modes are assumed.
+    has_frequencies_of_stuck_modes : bool
+        Whether the frequencies of the modes belong to the sticking contact.
+    ignored : list of str
+        Names of the tables that are ignored.
+    """
+
+    def __init__(self, modes: tuple[GivenMode, ...] = (), *, stuck: bool = True):
+        self.modes = modes
+        self.is_assumed = False
+        self.has_frequencies_of_stuck_modes = stuck
+        self.ignored: list[str] = []
+
+    def __call__(self, raw: dict[str, Any]) -> None:
+        """Change the plain values of a scene."""
+        self.ignored = [name for name in ("slide", "drive") if name in raw]
+        raw.pop("slide", None)
+        structure = raw.get("structure", {})
+        has_structure = not isinstance(structure, dict) or bool(STRUCTURES & structure.keys())
+        if not (self.modes or has_structure) and {"contact", "normal"} & raw.keys():
+            self.modes = parse_modes(ASSUMED_MODES)
+            self.is_assumed = True
+        if self.modes:
+            self._write_modes(raw)
+        if "structure" in raw:
+            raw.setdefault("drive", dict(UNUSED_DRIVE))
+
+    def _write_modes(self, raw: dict[str, Any]) -> None:
+        """Write the modes into [structure]."""
+        structure = raw.setdefault("structure", {})
+        if not isinstance(structure, dict) or (STRUCTURES - {"mode"}) & structure.keys():
+            raise PatchfemError(
+                "modes: the scene has a structure of masses or files; leave the modes out, or leave out [structure]"
+            )
+        structure.setdefault("moving_mass", ASSUMED_MASS)
+        if self.has_frequencies_of_stuck_modes:
+            structure.setdefault("measured", "stuck")
+        structure["mode"] = [
+            {
+                "name": MODE_NAMES[k] if k < len(MODE_NAMES) else f"mode-{k + 1}",
+                "frequency": format_si(mode.frequency, "frequency"),
+                "damping": mode.damping,
+                "slide": 1.0 if mode.slide is None else mode.slide,
+                "base": 0.0,
+                "output": 1.0,
+            }
+            for k, mode in enumerate(self.modes)
+        ]
