@@ -35,9 +35,8 @@ DESCRIPTIONS = {
     "loss of energy. A slow decay follows this motion, and so does a test in phase resonance.",
     "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping "
     "are evaluated from one turning point to the next.",
-    "quasi-static": "The frequency follows from the deflection under a static force that is "
-    "distributed like the mode with the contact stuck. The damping follows from the loops of the "
-    "friction law.",
+    "quasi-static": "The frequency is that with the secant stiffness of the contact between the "
+    "turning points. The damping follows from the loops of the friction law.",
 }
 BAND_VARIABLES = {  # unit and description of each variable of the band in backbone.nc
     "frequency_low": ("Hz", "lower limit of the frequency"),
@@ -363,7 +362,7 @@ def summarise_backbone(backbone: Backbone) -> list:
     if curve is not None:
         out = [_describe_ends(backbone.mode, curve), *out, *_describe_largest_damping(curve)]
     if backbone.answer.advice:
-        out.append(backbone.answer.advice)
+        out += backbone.answer.sentences
     exponents = backbone.exponents
     theory = ""
     if exponents.micro_theory is not None:

@@ -48,6 +48,7 @@ KINDS = {  # name on the command line -> module and function
     "scan-pairs": ("surface_pairs", "compare_scans"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
     "roughness": ("roughness_coverage", "compare_trace"),
+    "backbone-bands": ("backbone_band", "compare_band"),
 }
 MAX_CPU_SECONDS = 60  # of one scene with its reference; a longer one is noted as failed
 SHARP_FACTOR = 5.0  # a sharp error is at most so many times the true error

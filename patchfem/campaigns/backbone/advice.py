@@ -16,7 +16,7 @@ PURPOSES = {
 }
 
 
-def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -> str:
+def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -> tuple:
     """Write the sentences on the curve to use, its band, and where the methods hold.
 
     Parameters
@@ -29,9 +29,9 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
         By method, the reason why it has no curve.
     """
     if band is None:
-        return "No method gives a curve here; try --method decay, which neglects nothing."
+        return ("No method gives a curve here; try --method decay, which neglects nothing.",)
     if joint.is_linear:
-        return "All methods agree: no friction acts, so frequency and damping are constant."
+        return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = curves[band.method]
     sentences = [
         f"Use the bold curve, method {band.method}: {PURPOSES[band.method]}.",
@@ -44,7 +44,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
     for method, reason in missing.items():
         if method != "decay" or "balance" in missing:
             sentences.append(f"Method {method} does not hold here: {reason}.")
-    return " ".join(sentences)
+    return tuple(sentences)
 
 
 def _describe_width(band: Band, curve) -> str:

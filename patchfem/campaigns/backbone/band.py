@@ -17,9 +17,10 @@ PREFERRED_METHODS = ("balance", "quasi-static", "decay")  # Order in which a cur
 # Fraction of the distance of the predicted ring-down from the curve by which the band is widened, because the prediction
 # is of second order in the loss of a half cycle.
 RING_DOWN_MARGIN = 0.4
-# Part of the damping by which other modes change a ring-down in which the contact slips, per relative change of the shape
-# in a cycle, which excites them.
-SHAPE_MARGIN = 4.0
+# Motion of other modes in a ring-down over its amplitude, per relative change of its shape in a cycle, which excites them,
+# and of a release that was to excite one mode alone.
+SHAPE_EXCITATION = 0.3
+RELEASE_EXCITATION = 1e-3
 
 
 class Band(NamedTuple):
@@ -83,7 +84,7 @@ def make_band(joint: Joint, curves: dict) -> Band | None:
         ring_down = predict_ring_down(joint, curve)
         _include_forced_modes(joint, frequency, damping, curve)
     if ring_down is not None:
-        _include_ring_down(frequency, damping, curve, ring_down)
+        _include_ring_down(joint, frequency, damping, curve, ring_down)
     return Band(
         method=method,
         amplitude=curve.amplitude,
@@ -110,15 +111,21 @@ def _include_curve(frequency: _Limits, damping: _Limits, curve: Curve, other: Cu
 
 
 def _include_ring_down(
-    frequency: _Limits, damping: _Limits, curve: Curve, ring_down: RingDown
+    joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve, ring_down: RingDown
 ) -> None:
     """Widen the limits around a curve to contain a predicted ring-down."""
     every = slice(None)
     margin = RING_DOWN_MARGIN * np.abs(ring_down.damping - curve.damping)
-    margin += SHAPE_MARGIN * largest_from_above(ring_down.shape_change) * curve.damping
+    # Other modes of the relative motion e change the ratio of successive half cycles by up to 2 e.
+    others = np.zeros(curve.amplitude.size)
+    if joint.modes.omega.size > 1:
+        change = largest_from_above(ring_down.shape_change)
+        others = RELEASE_EXCITATION + SHAPE_EXCITATION * change
+    margin += others / np.pi
     margin += np.abs(ring_down.damping - ring_down.slow_damping)
     damping.include(every, ring_down.damping, margin + curve.damping_error)
     margin = np.abs(ring_down.frequency - curve.frequency) + curve.frequency_error
+    margin += others * np.abs(curve.damping) * curve.frequency
     frequency.include(every, ring_down.frequency, margin)
 
 

@@ -105,12 +105,17 @@ class Answer(NamedTuple):
     ----------
     band : band.Band or None
         None without a curve.
-    advice : str
+    sentences : tuple of str
         Sentences on the curve to use and on where the methods hold.
     """
 
     band: object = None
-    advice: str = ""
+    sentences: tuple = ()
+
+    @property
+    def advice(self) -> str:
+        """All sentences as one text."""
+        return " ".join(self.sentences)
 
 
 class Backbone(NamedTuple):

@@ -1,0 +1,304 @@
+"""Random joints: the band of a backbone against marched steady responses and released decays.
+
+Campaign `backbone-bands` of `campaigns`. A row is a frequency or a damping ratio at an amplitude: its value is the middle
+of the band, its error the half-width, its truth the reading of a test.
+
+A joint has 1 + (seed // 6) % 3 modes and law LAWS[seed % 6]. Mass 0.3 to 3 kg, first mode 50 to 300 Hz, the next one 1.25
+to 2.5 times the one before, damping ratios of 2e-3 to 2e-2, a joint of 0.05 to 1 of the stiffness of the first mode, a
+load of 20 to 500 N with a coefficient of 0.2 to 0.6, all drawn evenly in logarithms. The first mode slides and moves the
+output by 1, the others by 0.2 to 1 of either sign.
+
+- Steady responses: `march_steady` integrates the equation of motion under a sinusoidal force at the output with its own
+  leapfrog scheme and its own form of each law, from a start at the amplitude until the cycles repeat. It shares no code
+  with the package. F conj(X) = m Z^2 (w0^2 - w^2 + 2 i zeta w0^2) gives the frequency w0 and the damping ratio, with the
+  first harmonics X of the output and Z of the modes. A second run has the frequency of the first reading. Four forces.
+- Decays: method `decay` of the package, at every third amplitude.
+
+Seeds below 58000 are for making the band, those from 58000 on are held out.
+"""
+
+from pathlib import Path
+from time import process_time
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from campaigns import Row
+from decay_fits import sliders
+
+import patchfem as pf
+from patchfem.campaigns import compute_backbone
+from patchfem.core import PatchfemError
+
+LAWS = ("elastic-plastic", "iwan", "bouc-wen", "lugre", "tanh", "coulomb")
+FRACTIONS = (0.3, 0.6, 0.72, 0.88)  # of the logarithmic range of amplitudes; forces aim at these
+STEPS = {"iwan": 1000}  # per cycle of the drive; other laws need more
+MOST_STEPS = 4000
+MAX_CYCLES = 1500
+BLOCK = 25  # cycles between two looks at the change of a cycle
+REPEATS = 1e-4  # of the response: expected further change at which the march ends
+N_DECAY = 3  # a decay counts at every third amplitude
+
+
+class Joint(NamedTuple):
+    """A drawn joint; arrays of modes (n,), and friction numbers of its law."""
+
+    law: str
+    mass: float
+    omega: np.ndarray
+    zeta: np.ndarray
+    slide: np.ndarray
+    output: np.ndarray
+    load: float
+    static: float
+    numbers: dict
+
+
+class Reading(NamedTuple):
+    """Reading of a steady response: amplitude [m], frequency [Hz], damping, and the doubts of the last two."""
+
+    amplitude: float
+    frequency: float
+    damping: float
+    frequency_doubt: float
+    damping_doubt: float
+
+
+def draw_joint(seed: int) -> Joint:
+    """Draw the joint of a seed."""
+    rng = np.random.default_rng(seed)
+
+    def even(low, high, size=None):
+        return np.exp(rng.uniform(np.log(low), np.log(high), size))
+
+    count = 1 + (seed // 6) % 3
+    law = LAWS[seed % 6]
+    mass = float(even(0.3, 3))
+    ratios = np.append(1.0, np.cumprod(even(1.25, 2.5, count - 1)))
+    omega = 2 * np.pi * float(even(50, 300)) * ratios
+    signs = rng.choice([-1.0, 1.0], (2, count - 1))
+    slide = np.append(1.0, signs[0] * rng.uniform(0.2, 1, count - 1))
+    output = np.append(1.0, signs[1] * rng.uniform(0.2, 1, count - 1))
+    load = float(even(20, 500))
+    static = float(even(0.2, 0.6))
+    stiffness = float(even(0.05, 1)) * mass * omega[0] ** 2
+    slip = static * load / stiffness
+    numbers = {
+        "elastic-plastic": {"bond_length": slip},
+        "iwan": {"stiffness": stiffness, "chi": float(rng.uniform(-0.8, -0.1)), "beta": 0.5},
+        "bouc-wen": {"stiffness": stiffness, "exponent": float(rng.uniform(1, 3))},
+        "lugre": {"stiffness": stiffness, "stribeck_speed": slip * omega[0] * float(even(0.3, 3))},
+        "tanh": {"reference_speed": slip * omega[0] * float(even(0.3, 3))},
+        "coulomb": {},
+    }[law]
+    if law == "lugre":
+        numbers["kinetic"] = static * float(rng.uniform(0.8, 1))
+    return Joint(law, mass, omega, even(2e-3, 2e-2, count), slide, output, load, static, numbers)
+
+
+def write_scene(joint: Joint) -> dict:
+    """Write a joint as the tables of a scene."""
+    modes = [
+        {
+            "name": f"mode{k + 1}",
+            "frequency": joint.omega[k] / (2 * np.pi),
+            "damping": joint.zeta[k],
+            "slide": joint.slide[k],
+            "output": joint.output[k],
+            "base": 0.0,
+        }
+        for k in range(joint.omega.size)
+    ]
+    return {
+        "normal": {"load": joint.load},
+        "friction": {"law": joint.law, "static": joint.static, **joint.numbers},
+        "structure": {"moving_mass": joint.mass, "mode": modes},
+    }
+
+
+def law_numbers(joint: Joint) -> tuple:
+    """Stiffness (s,) [N/m] and limit (s,) [N] of sliders, or the numbers of another law in the first of both."""
+    limit = joint.static * joint.load
+    numbers = joint.numbers
+    if joint.law == "iwan":
+        return sliders("iwan", numbers["stiffness"], limit, numbers["chi"])
+    if joint.law == "elastic-plastic":
+        return np.array([limit / numbers["bond_length"]]), np.array([limit])
+    if joint.law == "bouc-wen":
+        return np.array([numbers["stiffness"], numbers["exponent"]]), np.array([limit])
+    if joint.law == "lugre":
+        kinetic = numbers["kinetic"] * joint.load
+        return np.array([numbers["stiffness"], numbers["stribeck_speed"], kinetic]), np.array(
+            [limit]
+        )
+    return np.array([numbers.get("reference_speed", 0.0)]), np.array([limit])
+
+
+@numba.njit
+def step_law(kind, numbers, limits, state, move, speed):
+    """Friction force after a move, whose speed is given; the state is changed."""
+    if kind <= 1:
+        force = 0.0
+        for k in range(numbers.size):
+            state[k] = min(max(state[k] + numbers[k] * move, -limits[k]), limits[k])
+            force += state[k]
+        return force
+    if kind == 2:  # Bouc-Wen with weight 1/2, by the midpoint rule
+        middle = state[0]
+        for part in (0.5, 1.0):
+            fall = abs(middle) ** numbers[1] * (0.5 * np.sign(move * middle) + 0.5)
+            middle = state[0] + part * move * numbers[0] / limits[0] * (1 - fall)
+        state[0] = middle
+        return limits[0] * middle
+    if kind == 3:  # LuGre without damping, by the midpoint rule
+        g = numbers[2] + (limits[0] - numbers[2]) * np.exp(-((speed / numbers[1]) ** 2))
+        half = state[0] + 0.5 * (move - numbers[0] * abs(move) * state[0] / g)
+        state[0] += move - numbers[0] * abs(move) * half / g
+        return numbers[0] * state[0]
+    return limits[0] * np.tanh(speed / numbers[0])
+
+
+@numba.njit
+def march(kind, numbers, limits, state, modes, mass, drive, steps, cycles, motion, q, v, force):
+    """March some cycles with the leapfrog scheme; the last two go to `motion` (2 steps, n). Returns the force."""
+    omega, zeta, slide, output = modes
+    size, frequency = drive
+    dt = 2 * np.pi / frequency / steps
+    total = cycles * steps
+    weaker = 1 / (1 + zeta * omega * dt)
+    compliance = (slide * slide * weaker).sum() / mass
+    for n in range(total):
+        push = size * np.cos(2 * np.pi * (n % steps) / steps)
+        pull = -omega * omega * q + push * output / mass
+        v[:] = ((1 - zeta * omega * dt) * v + dt * pull) * weaker
+        if kind == 5:
+            speed = (slide * v).sum()
+            impulse = min(max(speed / compliance, -limits[0] * dt), limits[0] * dt)
+            v[:] -= slide * impulse / mass * weaker
+        else:
+            v[:] -= dt * slide * force / mass * weaker
+        q[:] += dt * v
+        if kind != 5:
+            speed = (slide * v).sum()
+            force = step_law(kind, numbers, limits, state, speed * dt, speed)
+        late = n - (total - 2 * steps)
+        if late >= 0:
+            motion[late] = q
+    return force
+
+
+def march_steady(joint: Joint, force: float, frequency: float, start: float) -> Reading:
+    """March a joint under a sinusoidal force at the output until its cycles repeat, and read it.
+
+    force [N], frequency [Hz], start: displacement of the first mode [m].
+    """
+    steps = STEPS.get(joint.law, MOST_STEPS)
+    numbers, limits = law_numbers(joint)
+    state = np.zeros(numbers.size)
+    modes = np.array([joint.omega, joint.zeta, joint.slide, joint.output])
+    omega = 2 * np.pi * frequency
+    q = np.zeros(joint.omega.size)
+    v = np.zeros(joint.omega.size)
+    v[0] = omega * start
+    motion = np.empty((2 * steps, joint.omega.size))
+    kind = LAWS.index(joint.law)
+    drive = (force, omega)
+    friction = 0.0
+    for _ in range(MAX_CYCLES // BLOCK):
+        friction = march(
+            kind,
+            numbers,
+            limits,
+            state,
+            modes,
+            joint.mass,
+            drive,
+            steps,
+            BLOCK,
+            motion,
+            q,
+            v,
+            friction,
+        )
+        before, after = (read_cycle(joint, part, force, omega) for part in np.split(motion, 2))
+        # the transient falls by exp(-2 pi zeta) a cycle at least
+        rest = 1 / max(1 - np.exp(-2 * np.pi * joint.zeta.min()), 1e-3)
+        change = rest * np.abs(np.subtract(after, before))
+        if (change <= REPEATS * np.abs(after)).all():
+            break
+    return Reading(*after, change[1], change[2])
+
+
+def read_cycle(joint: Joint, motion, force: float, omega: float) -> tuple:
+    """Amplitude [m], frequency [Hz] and damping ratio of a cycle (steps, n) of modal coordinates."""
+    steps = len(motion)
+    output = motion @ joint.output
+    # a sample follows the step whose force it is beside
+    turn = np.exp(-2j * np.pi * np.arange(1, steps + 1) / steps) * 2 / steps
+    modal = turn @ motion
+    work = force * np.conj(turn @ output) / (joint.mass * np.sum(np.abs(modal) ** 2))
+    square = omega**2 + work.real
+    own = np.sqrt(max(square, 0.0))
+    return np.ptp(output) / 2, own / (2 * np.pi), work.imag / (2 * max(square, 1e-300))
+
+
+def band_rows(band, name: str, points) -> list:
+    """Rows of readings (amplitude, frequency, damping, doubts of both) inside the amplitudes of a band."""
+    rows = []
+    x = np.log(band.amplitude)
+    for amplitude, *values in points:
+        at = np.log(amplitude)
+        if not x[0] - 1e-9 <= at <= x[-1] + 1e-9 or not np.isfinite(values).all():
+            continue
+        for k, quantity in enumerate(("frequency", "damping")):
+            low = np.interp(at, x, getattr(band, f"{quantity}_low"))
+            high = np.interp(at, x, getattr(band, f"{quantity}_high"))
+            middle = (low + high) / 2
+            rows.append(
+                Row(f"{name}_{quantity}", middle, (high - low) / 2, 0.0, values[k], values[2 + k])
+            )
+    return rows
+
+
+def steady_points(joint: Joint, curve) -> list:
+    """Readings of marched steady responses that aim at some amplitudes of a curve."""
+    points = []
+    for fraction in FRACTIONS:
+        k = int(fraction * (curve.amplitude.size - 1))
+        amplitude = curve.amplitude[k]
+        square = (2 * np.pi * curve.frequency[k]) ** 2
+        force = 2 * curve.damping[k] * joint.mass * square * amplitude
+        first = march_steady(joint, force, curve.frequency[k], amplitude)
+        if first.frequency > 0:
+            points.append(march_steady(joint, force, first.frequency, first.amplitude))
+    return points
+
+
+def compare_band(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the band of a joint with steady responses and a decay; see `campaigns`."""
+    joint = draw_joint(seed)
+    scene = write_scene(joint)
+    model = pf.build(
+        scene | {"drive": {"kind": "force", "frequency": 100.0, "force": 1.0, "cycles": 9}}
+    )
+    begin = process_time()
+    try:
+        backbone = compute_backbone(model, "mode1", methods=("balance", "quasi-static"))
+    except PatchfemError as reason:
+        return {"rows": [], "refused": str(reason)}
+    seconds = process_time() - begin
+    line = {"law": joint.law, "modes": joint.omega.size, "seconds": seconds, "rows": []}
+    band = backbone.answer.band
+    if "balance" not in backbone.curves:
+        return line | {"refused": str(backbone.missing)}
+    curve = backbone.curves["balance"]
+    points = steady_points(joint, curve)
+    line["rows"] += band_rows(band, "steady", points)
+    begin = process_time()
+    decay = compute_backbone(model, "mode1", curve.amplitude[::N_DECAY], ("decay",), errors=False)
+    line["decay_seconds"] = process_time() - begin
+    if "decay" in decay.curves:
+        names = ("amplitude", "frequency", "damping", "frequency_error", "damping_error")
+        columns = [getattr(decay.curves["decay"], name) for name in names]
+        line["rows"] += band_rows(band, "decay", zip(*columns))
+    return line
