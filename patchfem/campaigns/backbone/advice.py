@@ -86,10 +86,11 @@ def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
     if ring_down is None:
         return []
     curve = curves[band.method]
-    ratio = ring_down.damping / curve.damping
-    if not np.isfinite(ratio).any():
+    is_known = (ring_down.damping > 0) & (curve.damping > 0)
+    if not is_known.any():
         return ["How a ring-down differs is not known: its motion stops within a cycle."]
-    k = int(np.nanargmax(np.abs(np.log(np.abs(ratio)))))
+    ratio = np.where(is_known, ring_down.damping / curve.damping, 1.0)
+    k = int(np.argmax(np.abs(np.log(ratio))))
     if abs(ratio[k] - 1) <= AGREEMENT:
         return ["A ring-down has the same damping (method decay holds as well)."]
     reasons = []

@@ -101,7 +101,9 @@ def _read_motions(
     return out
 
 
-def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int) -> list:
+def find_free_motions(
+    group: LawGroup, joint: Joint, amplitudes, harmonics: int, *, exact: bool = True
+) -> list:
     """Find the free motions at amplitudes (k,) [m] of the output by harmonic balance.
 
     The search starts from the motion at the amplitude before. If there is none, for example after a
@@ -117,13 +119,16 @@ def find_free_motions(group: LawGroup, joint: Joint, amplitudes, harmonics: int)
     amplitudes : (k,) array
         Increasing [m].
     harmonics : int
+    exact : bool
+        Whether the motions have these amplitudes; without, they have amplitudes near these, in a
+        fraction of the time.
 
     Returns
     -------
     list of Free or None
         `dynamics.harmonic.backbone.FreeMotion`; None if no motion is found.
     """
-    search = _FreeMotionSearch(group, joint, amplitudes, harmonics)
+    search = _FreeMotionSearch(group, joint, amplitudes, harmonics, exact=exact)
     out: list = [None] * len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
         before = out[k - 1] if k else None
@@ -146,9 +151,12 @@ class _FreeMotionSearch:
     amplitudes : (k,) array
         Increasing, at the output [m].
     harmonics : int
+    exact : bool
+        See `find_free_motions`.
     """
 
-    def __init__(self, group: LawGroup, joint: Joint, amplitudes, harmonics: int):
+    def __init__(self, group: LawGroup, joint: Joint, amplitudes, harmonics: int, *, exact: bool):
+        self.max_steps = MAX_STEPS if exact else 1
         modes = joint.modes
         omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), joint.mode)
         self.joint = joint
@@ -173,7 +181,7 @@ class _FreeMotionSearch:
             x = self.equations.follow_to_amplitude(
                 neighbour.unknowns, neighbour.free.amplitude, here
             )
-            return _reach_amplitude(self.equations, self.joint, x, here, amplitude)
+            return self._reach_amplitude(x, here, amplitude)
         except NotConverged:
             return None
 
@@ -188,65 +196,60 @@ class _FreeMotionSearch:
                 x = _solve_from_stuck(self.equations, self.first, self.small, here)
             else:
                 x = self.equations.solve(self.first, here)[0]
-            return _reach_amplitude(self.equations, self.joint, x, here, amplitude)
+            return self._reach_amplitude(x, here, amplitude)
         except NotConverged:
             return None
 
+    def _reach_amplitude(self, x, coordinate_amplitude: float, amplitude: float) -> FreeMotion:
+        """Find the free motion of a given output amplitude [m] by secant steps.
 
-def _reach_amplitude(
-    equations: FreeBalance, joint: Joint, x, coordinate_amplitude: float, amplitude: float
-) -> FreeMotion:
-    """Find the free motion of a given output amplitude [m] by secant steps.
+        The steps end at ROUND_OFF_ERROR, or at AMPLITUDE_TOL if they lead no further.
 
-    The steps end at ROUND_OFF_ERROR, or at AMPLITUDE_TOL if they lead no further.
+        Parameters
+        ----------
+        x : (N,) array
+            Unknowns near the amplitude of the coordinate.
+        coordinate_amplitude : float
+            Amplitude of the coordinate [m].
+        amplitude : float
+            Requested amplitude at the output [m].
 
-    Parameters
-    ----------
-    equations : FreeBalance
-    joint : Joint
-    x : (N,) array
-        Unknowns at the amplitude `here`.
-    coordinate_amplitude : float
-        Amplitude of the coordinate [m].
-    amplitude : float
-        Requested amplitude at the output [m].
-
-    Raises
-    ------
-    NotConverged
-        If no motion with this amplitude is found.
-    """
-    slope = 1.0
-    before = None
-    best = None
-    best_distance = np.inf
-    for _ in range(MAX_STEPS):
-        try:
-            x, free = equations.solve(x, coordinate_amplitude)
-        except NotConverged:
-            if best is None:
-                raise
-            break
-        largest = half_range(free.modal @ joint.modes.output)
-        distance = float(np.log(largest / amplitude))
-        if best is not None and abs(distance) >= best_distance:
-            break
-        if abs(distance) < AMPLITUDE_TOL:
-            best_distance = abs(distance)
-            best = FreeMotion(free, x, amplitude / coordinate_amplitude)
-        if abs(distance) < ROUND_OFF_ERROR:
-            break
-        if before is not None:
-            last_here, last_distance = before
-            slope = (distance - last_distance) / np.log(coordinate_amplitude / last_here)
-        slope = slope if slope > MIN_SLOPE else 1.0
-        before = (coordinate_amplitude, distance)
-        coordinate_amplitude *= np.exp(-distance / slope)
-    if best is not None:
-        return best
-    raise NotConverged(
-        f"no free motion has an amplitude of {format_length(amplitude, 3)} at the output"
-    )
+        Raises
+        ------
+        NotConverged
+            If no motion with this amplitude is found.
+        """
+        slope = 1.0
+        before = None
+        best = None
+        best_distance = np.inf
+        for _ in range(self.max_steps):
+            try:
+                x, free = self.equations.solve(x, coordinate_amplitude)
+            except NotConverged:
+                if best is None:
+                    raise
+                break
+            largest = half_range(free.modal @ self.joint.modes.output)
+            distance = float(np.log(largest / amplitude))
+            if best is not None and abs(distance) >= best_distance:
+                break
+            if abs(distance) < AMPLITUDE_TOL or self.max_steps == 1:
+                best_distance = abs(distance)
+                best = FreeMotion(free, x, amplitude / coordinate_amplitude)
+            if abs(distance) < ROUND_OFF_ERROR:
+                break
+            if before is not None:
+                last_here, last_distance = before
+                slope = (distance - last_distance) / np.log(coordinate_amplitude / last_here)
+            slope = slope if slope > MIN_SLOPE else 1.0
+            before = (coordinate_amplitude, distance)
+            coordinate_amplitude *= np.exp(-distance / slope)
+        if best is not None:
+            return best
+        raise NotConverged(
+            f"no free motion has an amplitude of {format_length(amplitude, 3)} at the output"
+        )
 
 
 def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:

@@ -19,8 +19,14 @@ PREFERRED_METHODS = ("balance", "quasi-static", "decay")  # Order in which a cur
 RING_DOWN_MARGIN = 0.4
 # Motion of other modes in a ring-down over its amplitude, per relative change of its shape in a cycle, which excites them,
 # and of a release that was to excite one mode alone.
-SHAPE_EXCITATION = 0.3
+SHAPE_EXCITATION = 0.1
 RELEASE_EXCITATION = 1e-3
+# Factor on the effect of other modes under a force at the output, which is of first order in the damping.
+FORCED_MODE_FACTOR = 1.2
+# Fall of the frequency of a ring-down over frequency and damping ratio squared: 1/2 and terms of higher order.
+VISCOUS_FALL = 0.6
+# Largest ratio of successive amplitudes between which a reader interpolates; the band covers the chord there.
+MAX_INTERPOLATED_RATIO = 1.6
 
 
 class Band(NamedTuple):
@@ -56,6 +62,20 @@ class _Limits:
         self.low = value - error
         self.high = value + error
 
+    def cover_chords(self, value, amplitude) -> None:
+        """Widen the limits by the error of linear interpolation between close amplitudes (k,) [m].
+
+        A kink halfway between two points lies off their chord by a quarter of the second difference.
+        """
+        x = np.log(amplitude)
+        if x.size < 3 or np.diff(x).max() > np.log(MAX_INTERPOLATED_RATIO):
+            return
+        bend = np.zeros(x.size)
+        bend[1:-1] = np.abs(np.diff(value, 2)) / 4
+        bend = np.maximum(bend, np.maximum(np.append(bend[1:], 0.0), np.append(0.0, bend[:-1])))
+        self.low -= bend
+        self.high += bend
+
     def include(self, points, value, error) -> None:
         """Widen the limits at some points to contain a value with its error; NaN changes nothing."""
         self.low[points] = np.fmin(self.low[points], value - error)
@@ -85,6 +105,8 @@ def make_band(joint: Joint, curves: dict) -> Band | None:
         _include_forced_modes(joint, frequency, damping, curve)
     if ring_down is not None:
         _include_ring_down(joint, frequency, damping, curve, ring_down)
+    frequency.cover_chords(curve.frequency, curve.amplitude)
+    damping.cover_chords(curve.damping, curve.amplitude)
     return Band(
         method=method,
         amplitude=curve.amplitude,
@@ -126,6 +148,8 @@ def _include_ring_down(
     damping.include(every, ring_down.damping, margin + curve.damping_error)
     margin = np.abs(ring_down.frequency - curve.frequency) + curve.frequency_error
     margin += others * np.abs(curve.damping) * curve.frequency
+    # Viscous damping lowers the frequency by the fraction zeta^2/2, and constant friction leaves it.
+    margin += VISCOUS_FALL * ring_down.damping**2 * curve.frequency
     frequency.include(every, ring_down.frequency, margin)
 
 
@@ -143,20 +167,27 @@ def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, cu
     They move in phase with the force, by the ratio r to the resonant motion at the output. This shifts the phase
     resonance by the fraction r zeta of the frequency, and increases the loss of a cycle by r^2.
     """
-    ratio = forced_mode_ratio(joint, curve)
+    ratio = FORCED_MODE_FACTOR * forced_mode_ratio(joint, curve)
     every = slice(None)
     frequency.include(every, curve.frequency, ratio * np.abs(curve.damping) * curve.frequency)
     damping.include(every, curve.damping, ratio**2 * np.abs(curve.damping))
 
 
 def forced_mode_ratio(joint: Joint, curve: Curve) -> np.ndarray:
-    """Return the motion (k,) at the output of other modes over that of the mode, under a force at the output."""
+    """Return the motion (k,) of other modes over that of the mode, under a force at the output.
+
+    The force acts at the output and the friction at the contact, so each of them moves the other modes.
+    """
     modes = joint.modes
     square = (2 * np.pi * curve.frequency) ** 2
     own = modes.output[joint.mode]
+    row = modes.interfaces[joint.face] if len(modes.interfaces) else modes.output
     ratio = np.zeros(curve.amplitude.size)
     for k, omega in enumerate(modes.omega):
         if k != joint.mode and own:
-            distance = np.abs(omega**2 - square)
-            ratio += (modes.output[k] / own) ** 2 * 2 * np.abs(curve.damping) * square / distance
+            participation = np.abs(modes.output[k] / own)
+            if row[joint.mode]:
+                participation += np.abs(row[k] / row[joint.mode])
+            distance = np.maximum(np.abs(omega**2 - square), 1e-9 * square)
+            ratio += participation**2 * 2 * np.abs(curve.damping) * square / distance
     return np.minimum(ratio, 1.0)

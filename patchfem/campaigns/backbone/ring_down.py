@@ -14,11 +14,11 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from ...core import NotConverged
-from .balance import HARMONIC_COUNTS, find_free_motions
+from .balance import HARMONIC_COUNTS, find_free_motions, half_range
 from .joint import Joint
 from .records import Curve
 
-POINTS_PER_DECADE = 16  # Number of free motions per decade; fewer blur the onset of slip.
+POINTS_PER_DECADE = 12  # Number of free motions per decade; fewer blur the onset of slip.
 # Ratio of the last amplitude of the free motions to the last one of the curve, and of the first ones:
 # three half cycles around an amplitude reach so far with a damping ratio of 0.1.
 MARGIN_FACTOR = 1.8
@@ -31,7 +31,7 @@ class RingDown(NamedTuple):
     Attributes
     ----------
     frequency, damping : (k,) array
-        Frequency [Hz] and damping ratio, as read from three half cycles.
+        Frequency [Hz], without its fall by viscous damping, and damping ratio, of three half cycles.
     slow_damping : (k,) array
         Damping ratio of the limit of an infinitely small loss per cycle.
     shape_change : (k,) array
@@ -84,12 +84,15 @@ def _tabulate_motions(joint: Joint, curve: Curve) -> _MotionTable:
         return _tabulate_rigid_motions(joint, curve, low, high)
     count = 2 + int(np.ceil(POINTS_PER_DECADE * np.log10(high / low)))
     amplitudes = np.geomspace(low, high, count)
-    motions = find_free_motions(joint.steady_laws(), joint, amplitudes, HARMONIC_COUNTS[0])
+    motions = find_free_motions(
+        joint.steady_laws(), joint, amplitudes, HARMONIC_COUNTS[0], exact=False
+    )
     x = []
     rows = []
-    for amplitude, motion in zip(amplitudes, motions):
+    for motion in motions:
         row = None if motion is None else _measure_motion(joint, motion)
-        if row is not None:
+        amplitude = 0.0 if row is None else half_range(motion.modal @ joint.modes.output)
+        if row is not None and (not x or np.log(amplitude) > x[-1]):
             x.append(np.log(amplitude))
             rows.append(row)
     return _interpolate_table(np.array(x), rows)
@@ -111,7 +114,10 @@ def _interpolate_table(x, rows: list) -> _MotionTable:
 
 
 def _tabulate_rigid_motions(joint: Joint, curve: Curve, low: float, high: float) -> _MotionTable:
-    """Tabulate motions of a rig whose contact stores no energy, from its curve by balance."""
+    """Tabulate motions of a rig whose contact stores no energy, from its curve by balance.
+
+    Constant friction does not change the length of a half cycle, which is that of the free mode.
+    """
     free = joint.modes.omega[joint.mode] or joint.omega
     amplitude = np.unique([low, *curve.amplitude, high])
     values = curve.interpolate(amplitude)
@@ -126,7 +132,8 @@ def _tabulate_rigid_motions(joint: Joint, curve: Curve, low: float, high: float)
     loss = 2 * np.pi * damping * omega**2 * amplitude**2
     if not (loss > 0).all():
         raise NotConverged("the motion gains energy")
-    rows = np.column_stack([energy, loss, values["frequency"], amplitude])
+    free_frequency = np.full(amplitude.size, free / (2 * np.pi))
+    rows = np.column_stack([energy, loss, free_frequency, amplitude])
     return _interpolate_table(np.log(amplitude), list(rows))
 
 
@@ -174,7 +181,7 @@ def _read_half_cycles(table: _MotionTable, x: float) -> tuple:
     sizes = np.exp([x + half + 2 * before, x + half, x - half, x - half - 2 * after])
     middles = 0.5 * (sizes[1:] + sizes[:-1])
     decrement = np.log(middles[0] / middles[2]) / (2 * np.pi)
-    frequency = float(np.mean(table.frequency(np.log(middles)))) / np.sqrt(1 + decrement**2)
+    frequency = float(np.mean(table.frequency(np.log(middles))))
     return frequency, decrement / np.sqrt(1 + decrement**2), slow_damping, change
 
 

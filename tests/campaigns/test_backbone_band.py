@@ -1,0 +1,132 @@
+"""One answer of a backbone: the recommended curve, its band and the advice, from any scene of a joint."""
+
+import json
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.__main__ import main
+
+LAW = '[normal]\nload = "100 N"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "60 um"\n'
+SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\n'
+MODES = "100 Hz:0.005:0.5, 160 Hz:0.01:0.4"
+STRUCTURE = """[structure]
+moving_mass = "1 kg"
+measured = "stuck"
+[[structure.mode]]
+name = "first"
+frequency = "100 Hz"
+damping = 0.005
+slide = 0.5
+output = 1.0
+[[structure.mode]]
+name = "second"
+frequency = "160 Hz"
+damping = 0.01
+slide = 0.4
+output = 1.0
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "1 g"
+cycles = 20
+"""
+AMPLITUDES = np.geomspace(1e-5, 2e-3, 19)
+
+
+@pytest.fixture(scope="module")
+def all_methods():
+    """All three curves of two modes that were given beside the scene of a bench."""
+    return pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="all")
+
+
+def test_exact_modes_beside_a_bench_are_those_of_the_scene_of_a_rig(all_methods):
+    found = pf.backbone(LAW + STRUCTURE, amplitudes=AMPLITUDES)
+    assert found.balance_frequency.values == pytest.approx(all_methods.balance_frequency, rel=1e-9)
+    assert found.attrs["stuck_frequency"] == pytest.approx(100)
+    assert "[slide] is ignored" in all_methods.attrs["notes"]
+    assert "[drive] is ignored" in found.attrs["notes"]
+    assert not any(name.startswith("decay") for name in found)
+
+
+def test_the_band_contains_all_three_methods(all_methods):
+    """The decay read up to 30 % more damping than the motion of the same loss."""
+    found = all_methods
+    assert found.attrs["method"] == "balance" and "ring-down" in found.attrs["advice"]
+    for method in ("balance", "quasi_static", "decay"):
+        amplitude = found[f"{method}_amplitude"].values
+        here = np.isin(found.band_amplitude, amplitude)
+        assert here.sum() >= 8
+        for name in ("frequency", "damping"):
+            value = found[f"{method}_{name}"].values[np.isin(amplitude, found.band_amplitude)]
+            assert (found[f"band_{name}_low"].values[here] <= value).all()
+            assert (found[f"band_{name}_high"].values[here] >= value).all()
+
+
+def test_the_band_contains_a_ring_down_that_was_not_run(all_methods):
+    found = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="balance")
+    assert set(found.data_vars) & {"decay_damping", "quasi_static_damping"} == set()
+    amplitude = all_methods.decay_amplitude.values
+    high = np.interp(amplitude, found.band_amplitude, found.band_damping_high)
+    low = np.interp(amplitude, found.band_amplitude, found.band_damping_low)
+    error = all_methods.decay_damping_error.values
+    inside = (low - error <= all_methods.decay_damping) & (
+        all_methods.decay_damping <= high + error
+    )
+    assert inside.mean() > 0.9
+    excess = all_methods.decay_damping.values / np.interp(
+        amplitude, found.band_amplitude, found.balance_damping
+    )
+    assert excess.max() > 1.05
+
+
+def test_static_curve_of_two_modes_tends_to_the_mode_without_contact():
+    found = pf.backbone(LAW + STRUCTURE, amplitudes=[1e-6, 1.0], method="quasi-static")
+    assert found.quasi_static_frequency.values == pytest.approx(
+        [100, found.attrs["free_frequency"]], rel=1e-3
+    )
+
+
+def test_the_scene_of_a_new_joint_has_a_backbone_as_it_is(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "joint.toml").write_text(pf.new("joint"), "utf-8")
+    for options, stuck in (((), 100), (("--modes", "120 Hz:0.01, 170 Hz:0.02"), 120)):
+        with pytest.raises(SystemExit) as ended:
+            main(
+                [
+                    "backbone",
+                    "joint.toml",
+                    "--json",
+                    "--no-page",
+                    "--amplitudes",
+                    "9 um..1 mm:9",
+                    *options,
+                ]
+            )
+        assert not ended.value.code
+        answer = json.loads(capsys.readouterr().out)
+        assert set(answer["band"]) == {
+            "amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high"
+        }  # fmt: skip
+        assert answer["stuck_frequency"] == pytest.approx(stuck, rel=1e-4)
+        assert set(answer["curves"]) == {"balance", "quasi-static"}
+        assert answer["advice"].startswith("Use the bold curve, method balance")
+        assert any("[slide] is ignored" in note for note in answer["notes"])
+        assert any("`slide` is assumed" in note for note in answer["notes"])
+
+
+@pytest.mark.parametrize(
+    "scene, modes, said",
+    [
+        (LAW + SLIDE, "120", "'120': .*FREQUENCY:DAMPING"),
+        (LAW + SLIDE, "120 mm:0.01", "120 mm.*frequency"),
+        (LAW + SLIDE, "120 Hz:0.01:0", "no slide of 0"),
+        (LAW + SLIDE, [("120 Hz", 0.01, 40.0)], r"structure\.mode\[1\]\.slide.*multiply `slide`"),
+        ('[structure]\nmasses = ["1 kg"]\n' + LAW + SLIDE, "9 Hz:0.01", "structure of masses"),
+        (pf.build(LAW + STRUCTURE), "9 Hz:0.01", "cannot be given with a Model"),
+    ],
+)  # fmt: skip
+def test_refuses_modes_that_do_not_fit(scene, modes, said):
+    with pytest.raises(pf.PatchfemError, match=f"(?s){said}"):
+        pf.backbone(scene, modes=modes)
