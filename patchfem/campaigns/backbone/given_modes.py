@@ -69,7 +69,7 @@ def _find_sticking_stiffness(model: Model) -> StickingContact:
     if len(interfaces) != 1 or model.friction is None:
         return StickingContact(None, None)
     if model.patch is not None:
-        patch = patch_result.solve_all(model.patch, model.accuracy.tolerance)[0]
+        patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         stiffness = 0.0
         if patch.pressure.load > 0:
             stiffness = joint.patch_stiffness(model, patch)

@@ -137,7 +137,7 @@ def _tabulate_rigid_motions(joint: Joint, curve: Curve, low: float, high: float)
     return _interpolate_table(np.log(amplitude), list(rows))
 
 
-def _measure_motion(joint: Joint, motion) -> tuple | None:
+def _measure_motion(joint: Joint, motion) -> np.ndarray | None:
     """Return energy [J], loss [J], frequency [Hz] and modal amplitude [m] of a free motion.
 
     The energy that elastic-plastic elements store at a reversal is half of tip displacement times tip
@@ -158,46 +158,49 @@ def _measure_motion(joint: Joint, motion) -> tuple | None:
     loss = 2 * np.pi * kinetic * motion.zeta
     if not (energy > 0 and loss > 0):
         return None
-    return energy, loss, motion.omega / (2 * np.pi), np.sqrt(squares.sum())
+    return np.array([energy, loss, motion.omega / (2 * np.pi), np.sqrt(squares.sum())])
 
 
-def _read_half_cycles(table: _MotionTable, x: float) -> tuple:
-    """Read a ring-down around the log amplitude x, as (frequency, damping, slow damping, shape change).
+def _read_half_cycles(table: _MotionTable, x: float) -> RingDown:
+    """Read a ring-down around the log amplitude x.
 
     The three half cycles have their middle at the amplitude. They are NaN if the motion stops before.
     """
     if not table.low <= x <= table.high:
-        return (np.nan,) * len(RingDown._fields)
+        return RingDown(*[np.nan] * len(RingDown._fields))
     loss = np.exp(table.loss(x))
     slope = float(np.exp(table.energy(x)) * table.energy(x, 1))
     slow_damping = loss / (2 * np.pi * slope) if slope > 0 else np.nan
     change = abs(1 - table.modal(x, 1)) * 2 * np.pi * slow_damping
     try:
-        half = _solve_half_cycle(table, lambda step: (x + step, x - step), x)
-        before = _solve_half_cycle(table, lambda step: (x + half + 2 * step, x + half), x)
-        after = _solve_half_cycle(table, lambda step: (x - half, x - half - 2 * step), x)
+        half = _solve_half_cycle(table, (x, x), (1, -1))
+        before = _solve_half_cycle(table, (x + half, x + half), (2, 0))
+        after = _solve_half_cycle(table, (x - half, x - half), (0, -2))
     except ValueError:
-        return np.nan, np.nan, slow_damping, change
+        return RingDown(np.nan, np.nan, slow_damping, change)
     sizes = np.exp([x + half + 2 * before, x + half, x - half, x - half - 2 * after])
     middles = 0.5 * (sizes[1:] + sizes[:-1])
     decrement = np.log(middles[0] / middles[2]) / (2 * np.pi)
     frequency = float(np.mean(table.frequency(np.log(middles))))
-    return frequency, decrement / np.sqrt(1 + decrement**2), slow_damping, change
+    return RingDown(frequency, decrement / np.sqrt(1 + decrement**2), slow_damping, change)
 
 
-def _solve_half_cycle(table: _MotionTable, ends, x: float) -> float:
+def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> float:
     """Return half the fall of the log amplitude in a half cycle; ValueError if there is none.
 
-    ends: maps half the fall to the log amplitudes at the begin and at the end.
+    ends: log amplitudes at the begin and at the end for a fall of 0; directions: their changes per half the fall.
     """
 
+    scale = np.exp(_extend_energy(table, ends[0]))
+
     def excess(step: float) -> float:
-        """Return the energy given up in a half cycle less its loss, over the energy at x."""
-        begin, end = ends(step)
+        """Return the energy given up in a half cycle less its loss, over the energy."""
+        begin = ends[0] + directions[0] * step
+        end = ends[1] + directions[1] * step
         middle = np.log(0.5 * (np.exp(begin) + np.exp(end)))
         middle = np.clip(middle, table.low, table.high)
         fall = np.exp(_extend_energy(table, begin)) - np.exp(_extend_energy(table, end))
-        return float((fall - 0.5 * np.exp(table.loss(middle))) / np.exp(table.energy(x)))
+        return float((fall - 0.5 * np.exp(table.loss(middle))) / scale)
 
     return brentq(excess, 0.0, MAX_HALF_CYCLE_LOSS / 2, xtol=1e-12)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from modal_bases import basis_of
 
-from patchfem.core import ModalBasis, PatchfemError
+from patchfem.core import PatchfemError
 from patchfem.dynamics import LawGroup, Spring
 from patchfem.dynamics.harmonic import quasi_static
 from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw
