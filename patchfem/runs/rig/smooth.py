@@ -8,6 +8,7 @@ from dataclasses import replace
 from time import perf_counter
 
 from ...core import IntegratedMeasures
+from ...dynamics.cycles import SAMPLES_PER_CYCLE
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import ROWS_NEEDING_RUN, find_definition
@@ -68,9 +69,7 @@ class SmoothReader(Reader):
     """Evaluation of the runs of the smooth engine, whose measures are integrals over its steps."""
 
     def __init__(self, model, numerics, patch, contact):
-        super().__init__(
-            model, numerics, patch, contact, 1e-3 * contact.length, engine.SAMPLES_PER_CYCLE
-        )
+        super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, SAMPLES_PER_CYCLE)
 
     def integrated_measures(self, run, drive) -> IntegratedMeasures:
         """Return the measures integrated over the polynomials of the time steps."""
