@@ -149,7 +149,7 @@ def compare(
     request = _RunRequest(scene, set_, predicted, piece)
     target = choose_folder(out, f"{before.stem}-{after.stem}")
     judgement = verdict.judge_files(tuple(files), direction, **how)
-    data = _write_comparison(judgement, request, target, json_, quiet)
+    data = _write_comparison(judgement, request, target, json_=json_, quiet=quiet)
     for text in data["notes"]:
         note(text)
     if json_:
@@ -166,7 +166,7 @@ class _RunRequest(NamedTuple):
 
 
 def _write_comparison(
-    judgement: "verdict.Judgement", request: _RunRequest, target: Path, json_: bool, quiet: bool
+    judgement: "verdict.Judgement", request: _RunRequest, target: Path, *, json_: bool, quiet: bool
 ) -> dict:
     """Write the files of a comparison into a folder, and print it as text unless `json_`.
 

@@ -174,8 +174,7 @@ PUBLIC = {
         "points_model",
     ),
     "march.varying_load": (
-        "PLASTIC",
-        "POINTS",
+        "LawKind",
         "choose_shear_modes",
         "make_bond_lists_law",
         "make_bonds_law",

@@ -188,7 +188,9 @@ def backbone_charts(curves: dict, band: Band | None = None) -> list:
     damping = []
     if band is not None:
         frequency.append(_band_mark(band, scale, "frequency"))
-        damping.append(_band_mark(band, scale, "damping", floor=_damping_floor(curves, is_log)))
+        damping.append(
+            _band_mark(band, scale, "damping", floor=_damping_floor(curves, is_log=is_log))
+        )
     for method, curve in curves.items():
         x = curve.amplitude * scale
         shown = _has_small_error(curve)
@@ -205,7 +207,7 @@ def backbone_charts(curves: dict, band: Band | None = None) -> list:
     ]
 
 
-def _damping_floor(curves: dict, is_log: bool) -> float:
+def _damping_floor(curves: dict, *, is_log: bool) -> float:
     """Return the lower end of bars and bands of the damping ratio; -inf on a linear axis."""
     if not is_log:
         return -np.inf

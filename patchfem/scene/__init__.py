@@ -28,7 +28,6 @@ PUBLIC = {
         "require_files",
     ),
     "joint_laws": (
-        "JOINT_LAWS",
         "KNOWLEDGE",
         "WISHES",
         "choose_law",

@@ -77,6 +77,19 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
     return mode
 
 
+def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:
+    """Return the table [[structure.mode]] of a given mode; `number` counts from 0."""
+    name = MODE_NAMES[number] if number < len(MODE_NAMES) else f"mode-{number + 1}"
+    return {
+        "name": name,
+        "frequency": format_si(mode.frequency, "frequency"),
+        "damping": mode.damping,
+        "slide": 1.0 if mode.slide is None else mode.slide,
+        "base": 0.0,
+        "output": 1.0,
+    }
+
+
 class BackboneTables:
     """Change of the plain values of a scene into those of a rig whose backbone is computed.
 
@@ -127,14 +140,4 @@ class BackboneTables:
         structure.setdefault("moving_mass", ASSUMED_MASS)
         if self.has_frequencies_of_stuck_modes:
             structure.setdefault("measured", "stuck")
-        structure["mode"] = [
-            {
-                "name": MODE_NAMES[k] if k < len(MODE_NAMES) else f"mode-{k + 1}",
-                "frequency": format_si(mode.frequency, "frequency"),
-                "damping": mode.damping,
-                "slide": 1.0 if mode.slide is None else mode.slide,
-                "base": 0.0,
-                "output": 1.0,
-            }
-            for k, mode in enumerate(self.modes)
-        ]
+        structure["mode"] = [_write_mode(k, mode) for k, mode in enumerate(self.modes)]

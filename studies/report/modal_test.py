@@ -76,11 +76,9 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
     model = pf.build(scene)
     drive = drive or model.rig.drive.signal
     modes = model.rig.modes
-    patch = (
-        None
-        if model.patch is None
-        else solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
-    )
+    patch = None
+    if model.patch is not None:
+        patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     contact = make_contact(model, choose_numerics(model), patch)
     # 1e-6: a whole number stays one
     cycles = int((seconds or drive.duration) / drive.period + 1e-6)

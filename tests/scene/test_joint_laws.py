@@ -12,7 +12,6 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem.scene import (
-    JOINT_LAWS,
     KNOWLEDGE,
     WISHES,
     choose_law,
@@ -20,6 +19,7 @@ from patchfem.scene import (
     load,
     loads,
 )
+from patchfem.scene.joint_laws import JOINT_LAWS
 
 ROWS = {f"{row.law}-{row.scene.rpartition('/')[2]}": row for row in JOINT_LAWS}
 POINT = '[normal]\nload = "100 N"\n[friction]\nstatic = 0.3\n'

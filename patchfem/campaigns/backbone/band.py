@@ -77,7 +77,15 @@ class _Limits:
         self.high += bend
 
     def include(self, points, value, error) -> None:
-        """Widen the limits at some points to contain a value with its error; NaN changes nothing."""
+        """Widen the limits to contain values with their errors; NaN changes nothing.
+
+        Parameters
+        ----------
+        points : index
+            Points of the curve.
+        value, error : float or ndarray
+            Value and error at these points.
+        """
         self.low[points] = np.fmin(self.low[points], value - error)
         self.high[points] = np.fmax(self.high[points], value + error)
 

@@ -16,7 +16,7 @@ from ...scene.backbone_scene import BackboneTables, GivenMode, parse_modes
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_FRACTION = 0.1
 MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
-IGNORED = "{tables} {verb} ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+IGNORED_TABLES_NOTE = "{tables} {verb} ignored: a backbone is the motion of a mode at every amplitude, without a drive"
 
 
 class PreparedModel(NamedTuple):
@@ -107,7 +107,7 @@ def _note_ignored_tables(names: list) -> tuple:
     if not names:
         return ()
     tables = " and ".join(f"[{name}]" for name in names)
-    return (IGNORED.format(tables=tables, verb="is" if len(names) == 1 else "are"),)
+    return (IGNORED_TABLES_NOTE.format(tables=tables, verb="is" if len(names) == 1 else "are"),)
 
 
 def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:

@@ -397,12 +397,11 @@ def _search_placements(measured: MeasuredDepth, history: WearHistory) -> tuple:
         placements.append(Placement(float(chosen[side, place]), centre, bool(side), total))
     best = placements[0]
     distance = MIN_PLACE_DISTANCE * measured.width
-    is_other = [
-        other.is_mirrored != best.is_mirrored or abs(other.centre - best.centre) > distance
-        for other in placements
-    ]
-    others = [other for other, is_apart in zip(placements, is_other) if is_apart]
-    return best, others[:MAX_PLACES]
+
+    def is_apart(other: Placement) -> bool:
+        return other.is_mirrored != best.is_mirrored or abs(other.centre - best.centre) > distance
+
+    return best, list(filter(is_apart, placements))[:MAX_PLACES]
 
 
 def _refine(
@@ -530,14 +529,14 @@ def _check_width(
 
 def _derive(measured: MeasuredDepth, history: WearHistory, best: Placement) -> np.ndarray:
     """Return the derivatives (b, 2) of the computed depth by ratio and by centre."""
+
+    def compute_depth(name: str, change: float) -> np.ndarray:
+        placement = best._replace(**{name: getattr(best, name) + change})
+        return _average_computed_depth(history, measured.edges, placement)
+
     columns = []
     for name, step in (("ratio", 0.01 * best.ratio), ("centre", measured.width / 2)):
-        value = getattr(best, name)
-        high, low = (
-            _average_computed_depth(history, measured.edges, best._replace(**{name: value + side}))
-            for side in (step, -step)
-        )
-        columns.append((high - low) / (2 * step))
+        columns.append((compute_depth(name, step) - compute_depth(name, -step)) / (2 * step))
     return np.column_stack(columns)
 
 

@@ -6,6 +6,7 @@ chi-square distributed with the degrees of freedom of the spectrum; Ra has that 
 as for Gaussian heights.
 """
 
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -51,13 +52,11 @@ def measure_track_roughness(comparison: Comparison) -> TrackRoughness:
     pieces = _split_regions(comparison)
     if pieces is None:
         return TrackRoughness(None, {}, NO_TRACK)
-    traces = [trace for sides in pieces.values() for side in sides.values() for trace in side]
-    if not all(side for sides in pieces.values() for side in sides.values()):
+    groups = [*chain.from_iterable(sides.values() for sides in pieces.values())]
+    if not all(groups):
         return TrackRoughness(None, {}, TOO_SHORT)
-    step = max(resample_evenly(trace).step for trace in traces)
-    longest = [
-        max(trace.length for trace in side) for sides in pieces.values() for side in sides.values()
-    ]
+    step = max(resample_evenly(trace).step for trace in chain.from_iterable(groups))
+    longest = [max(trace.length for trace in group) for group in groups]
     cutoff = fitting_cutoff(min(longest), step)
     if cutoff is None:
         return TrackRoughness(None, {}, TOO_SHORT)

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from patchfem.scene import JOINT_LAWS, KNOWLEDGE, WISHES
+from patchfem.scene import KNOWLEDGE, WISHES
+from patchfem.scene.joint_laws import JOINT_LAWS
 
 from .keys import FOLDER, grid
 
