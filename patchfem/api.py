@@ -1477,7 +1477,7 @@ class Plots:
         reason = (
             self._explain_missing_motion() or "the number of time steps does not limit its accuracy"
         )
-        return self._draw(ax, ("accuracy",), reason)
+        return self._draw_first_chart(ax, ("accuracy",), reason)
 
     def stress(self, ax: Axes | None = None) -> Axes:
         """Plot the von Mises stress in both pieces under load, and an enlarged view of the contact.

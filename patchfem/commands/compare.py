@@ -85,7 +85,7 @@ def compare(
         ),
     ] = None,
     piece: word(
-        "piece of which the traces are, upper or lower, for --predicted; it may be left out if "
+        "piece of which the traces are, such as upper (or lower), for --predicted; it may be left out if "
         "both pieces wear alike (wear.upper_share = 0.5)"
     ) = "",
     out: Out = None,

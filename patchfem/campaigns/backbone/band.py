@@ -66,15 +66,19 @@ class _Limits:
         """Widen the limits by the error of linear interpolation between close amplitudes (k,) [m].
 
         A kink halfway between two points lies off their chord by a quarter of the second difference.
+        No limit leaves the range of the limits at the point and its neighbours: between two points the
+        curve is monotonic.
         """
         x = np.log(amplitude)
         if x.size < 3 or np.diff(x).max() > np.log(MAX_INTERPOLATED_RATIO):
             return
         bend = np.zeros(x.size)
         bend[1:-1] = np.abs(np.diff(value, 2)) / 4
-        bend = np.maximum(bend, np.maximum(np.append(bend[1:], 0.0), np.append(0.0, bend[:-1])))
-        self.low -= bend
-        self.high += bend
+        bend = _stack_neighbours(bend).max(axis=0)
+        lowest = _stack_neighbours(self.low).min(axis=0)
+        highest = _stack_neighbours(self.high).max(axis=0)
+        self.low = np.maximum(self.low - bend, lowest)
+        self.high = np.minimum(self.high + bend, highest)
 
     def include(self, points, value, error) -> None:
         """Widen the limits to contain values with their errors; NaN changes nothing.
@@ -88,6 +92,13 @@ class _Limits:
         """
         self.low[points] = np.fmin(self.low[points], value - error)
         self.high[points] = np.fmax(self.high[points], value + error)
+
+
+def _stack_neighbours(values: np.ndarray) -> np.ndarray:
+    """Return (3, k) values: those of the points, of the points before and of those after; an end is its own neighbour."""
+    return np.stack(
+        [values, np.append(values[:1], values[:-1]), np.append(values[1:], values[-1:])]
+    )
 
 
 def make_band(joint: Joint, curves: dict) -> Band | None:

@@ -114,9 +114,13 @@ def cases_of(seed: int, count: int):
             count -= 1
 
 
-@pytest.mark.parametrize("count", [50, pytest.param(150, marks=pytest.mark.slow)])
+# Of 50 random cases of these scenes, at most two are derived from the first model.
+RARELY_DERIVED = ("weakening", "two loads", "bonded")
+
+
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_models_made_from_the_first_are_those_built_from_text(name, count):
+def test_exact_models_made_from_the_first_are_those_built_from_text(name):
+    count = 150 if name in RARELY_DERIVED else 50
     asked = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",))
     alike = 0
     for sets, values in cases_of(len(name), count):

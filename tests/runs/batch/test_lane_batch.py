@@ -11,7 +11,13 @@ from test_lumped import solve_by_group
 from patchfem.api import build, get_base_scene, load, run_many
 from patchfem.runs import CaseResults
 from patchfem.runs.batch import batches, one_by_one
-from patchfem.runs.batch.lumped import lane_check, lane_numbers, lane_refinement, lane_runs
+from patchfem.runs.batch.lumped import (
+    lane_check,
+    lane_numbers,
+    lane_refinement,
+    lane_runs,
+    lumped,
+)
 from patchfem.scene import format_assignments
 
 # beside others, without an exact batch, stand single runs
@@ -172,7 +178,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
         )
     )
     name = "relative_displacement_amplitude"
-    end = solve_by_group([far]).values[name][0]
+    end = lumped.solve([far]).values[name][0]
     assert end == pytest.approx(1.697322e-4, rel=1e-6)
     assert (
         abs(found.values[name + "_steady"][0] - end)
