@@ -504,9 +504,8 @@ def backbone(
     xarray.Dataset
         Each method has its own variables and amplitudes. Attributes are `free_frequency` and `stuck_frequency` [Hz], the
         exponents of the energy dissipated per cycle `exponent_micro` and `exponent_gross`, and `flutter_amplitude` [m],
-        where they are known. `missing` says why a method gave no curve. The variables that begin with
-        band_ are the band of the curve by the method that the attribute `method` names; `advice` says which method
-        holds where.
+        where they are known. `missing` says why a method gave no curve. The variables whose names begin with "band" limit
+        the curve by the method that the attribute `method` names; `advice` says which method holds where.
 
     Raises
     ------
