@@ -19,13 +19,17 @@ SAMPLES_PER_CYCLE = 400
 MIN_SAMPLES = 101
 
 
-def sample_last_cycles(begin: float, end: float, period: float) -> np.ndarray:
-    """Return the times at which the last cycles of a run are sampled.
+def choose_sample_times(
+    begin: float, end: float, period: float, min_samples: int = MIN_SAMPLES
+) -> np.ndarray:
+    """Return evenly spaced times at which some cycles of a run are sampled.
 
     Parameters
     ----------
     begin, end, period : float
         Start and end of the cycles, and duration of a cycle [s].
+    min_samples : int
+        Smallest number of times.
 
     Returns
     -------
@@ -33,24 +37,7 @@ def sample_last_cycles(begin: float, end: float, period: float) -> np.ndarray:
         (k,) [s].
     """
     count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
-    return np.linspace(begin, end, max(MIN_SAMPLES, count))
-
-
-def sample_earlier_cycles(begin: float, end: float, period: float) -> np.ndarray:
-    """Return the times at which the cycles before the last ones are sampled as densely.
-
-    Parameters
-    ----------
-    begin, end, period : float
-        Start and end of the cycles, and duration of a cycle [s].
-
-    Returns
-    -------
-    ndarray
-        (k,) [s].
-    """
-    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
-    return np.linspace(begin, end, max(2, count))
+    return np.linspace(begin, end, max(min_samples, count))
 
 
 def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:

@@ -48,7 +48,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
 
 
 def _describe_width(band: Band, curve) -> str:
-    """Describe the largest half-widths of the band."""
+    """Say at which amplitude the band of the damping ratio is widest, and how far the frequency may deviate."""
     frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
     damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
     k = int(np.argmax(damping))

@@ -157,7 +157,7 @@ def _note_largest_difference(
     name : {"frequency", "damping"}
     curve, balance : Curve
     reason : str
-        Reason of the difference, with a placeholder for the fraction that a cycle loses.
+        Reason of the difference, a format string; {} stands for the fraction that a cycle loses.
     """
     value = getattr(curve, name)
     balance_value = getattr(balance, name)

@@ -1,4 +1,4 @@
-"""Release of a single mode at a given amplitude, and the run of its decay."""
+"""Free decay of one mode that is released at a given amplitude."""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -92,15 +92,15 @@ class DrivenPath(NamedTuple):
     n_before: int
 
 
-def prepend_warm_up(time, recorded, n_warm: int, offset: float) -> DrivenPath:
+def prepend_warm_up(time, recorded, n_warm_up_rows: int, offset: float) -> DrivenPath:
     """Return a path that begins at displacement 0 and continues as recorded.
 
     Parameters
     ----------
     time, recorded : (r,) array
         Times [s] and displacements [m] of the record; the first displacement is 0.
-    n_warm : int
-        Leading rows that form complete cycles and are driven once before the record; 0 for none.
+    n_warm_up_rows : int
+        Number of leading rows that form complete cycles and are driven once before the record; 0 for none.
     offset : float
         Displacement of the first row [m]; it is reached at the mean speed of the record.
 
@@ -116,14 +116,14 @@ def prepend_warm_up(time, recorded, n_warm: int, offset: float) -> DrivenPath:
         lead_in.append(0.0)
         lead_in_times.append(-abs(offset) / speed)
     start = 0.0
-    if n_warm:
+    if n_warm_up_rows:
         # The last of these rows comes before the first displacement is reached again; the record
         # gives the time from there to the first displacement.
-        before, after = recorded[n_warm - 1 : n_warm + 1]
-        step = time[n_warm] - time[n_warm - 1]
-        return_time = time[n_warm - 1] + step * (0.0 - before) / (after - before)
-        lead_in = [*lead_in, *displacement[:n_warm]]
-        lead_in_times = [*lead_in_times, *(time[:n_warm] - time[0])]
+        before, after = recorded[n_warm_up_rows - 1 : n_warm_up_rows + 1]
+        step = time[n_warm_up_rows] - time[n_warm_up_rows - 1]
+        return_time = time[n_warm_up_rows - 1] + step * (0.0 - before) / (after - before)
+        lead_in = [*lead_in, *displacement[:n_warm_up_rows]]
+        lead_in_times = [*lead_in_times, *(time[:n_warm_up_rows] - time[0])]
         start = return_time - time[0]
     times = np.concatenate([lead_in_times, time - time[0] + start])
     return DrivenPath(times - times[0], np.concatenate([lead_in, displacement]), len(lead_in))

@@ -17,7 +17,7 @@ from ...core import (
 )
 from ...cost_model import PYTHON_READ_TIME_RATIO
 from ...structure.drive_sizes import choose_samples_per_cycle
-from ..cycles import SAMPLES_PER_CYCLE, sample_earlier_cycles, sample_last_cycles
+from ..cycles import SAMPLES_PER_CYCLE, choose_sample_times
 from .cost import estimate_cycle_time, estimate_sample_time
 from .elements import (
     element_stretches,
@@ -835,7 +835,7 @@ class _EventRun:
         reversal_rows = np.concatenate([no_rows, *self.early_rows])
         early_rows = np.concatenate([no_rows, *early_rows])
         window = self.sample_rows(
-            window_rows, sample_last_cycles(start_time, end_time, self.period)
+            window_rows, choose_sample_times(start_time, end_time, self.period)
         )
         if len(reversal_rows):
             at_start = np.zeros(len(reversal_rows))
@@ -849,7 +849,7 @@ class _EventRun:
         if len(early_rows):
             first = early_rows[0, Row.TIME]
             early_samples = self.sample_rows(
-                early_rows, sample_earlier_cycles(first, start_time, self.period)
+                early_rows, choose_sample_times(first, start_time, self.period, 2)
             )
             parts.append(_select_samples(early_samples, early_samples.time < start_time))
         return replace(

@@ -1,4 +1,4 @@
-"""Measures of the last cycles of one or several runs, from the numbers of `read_kernels`."""
+"""Amplitudes, energies and slip of the last cycles of event-driven runs, from the sums that `read_kernels` computes."""
 
 from dataclasses import dataclass
 

@@ -54,7 +54,7 @@ def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
 
 
 def lift_message(grooves: Grooves, time: float) -> str:
-    """Return the message that the lifted mass leaves its grooves at a time [s]."""
+    """Return the error message for a lifted mass that loses contact with its grooves at a given time [s]."""
     return (
         f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
         f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load"

@@ -20,7 +20,7 @@ from ..smooth import run as smooth
 from ..smooth.arrays import Counter, Scalar, Work
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
-# relative tolerance of an integration step, the accuracy of a step of the march
+# Relative tolerance of an integration step; the steps of a march with grooves are as accurate.
 STEP_TOLERANCE = 1e-11
 # motion over wavelength/(2 pi), below which the step-size control counts it as rest
 REST_RATIO = 1e-6
@@ -72,7 +72,7 @@ class GroovesModel(FlankModel):
         return SampledRun
 
     def build(self):
-        """Return a placeholder contact without friction, which no kernel evaluates."""
+        """Return a contact without friction, which only fills the argument of the kernels."""
         return coulomb_model(0.0, 0.0).build()
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Element(NamedTuple):
-    """Arrays of a contact with one friction law on one relative displacement.
+    """Numbers and memory of one friction law that acts along one relative displacement.
 
     - num, mem: (1, k), (1, l) numbers and memory of the law
     - last: (2,) increments of the last two steps [m]

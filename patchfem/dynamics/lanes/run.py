@@ -17,7 +17,7 @@ MASING_LAWS = (
 # Number of terms of a Taylor series over a step; the remainder is below round-off for rates up to 2 per step.
 N_TAYLOR_TERMS = 24
 NO_YIELD = 1e300  # Yield displacement of the unused entries of a table after its last yield.
-# A larger displacement [m] belongs to a march that diverged with too long steps; its energies would overflow.
+# Largest displacement [m]: beyond it a march with too long steps has diverged, and the energies would overflow.
 MAX_SLIDE = 1e100
 N_REPEATED_CYCLES_READ = 3  # Number of cycles that are measured of a motion that repeats.
 

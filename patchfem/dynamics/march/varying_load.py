@@ -560,7 +560,7 @@ class VaryingLoadRun(Run):
 
 
 def _make_point_sets(load: float) -> SetArrays:
-    """Return placeholder arrays of contact sets for a prescribed load on one point."""
+    """Return the arrays of contact sets for a prescribed load on one point, which need no contact solution."""
     point = np.zeros(1)
     reference = (load, 0.0, 0.0, 1.0, 1.0)
     return make_set_arrays(np.ones((1, 1)), point, point, reference, np.zeros(1, bool), n_slots=1)

@@ -13,7 +13,7 @@ from ...core import IntegratedMeasures, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import unpack_bonds
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import choose_samples_per_cycle
-from ..cycles import sample_earlier_cycles, sample_last_cycles
+from ..cycles import choose_sample_times
 from ..events.modal_system import drive_segments
 from ..events.positions_kernels import SEGMENT_KIND, Segment
 from ..integrated import make_histories
@@ -514,7 +514,7 @@ class Motion:
             LAST_TOLERANCE_RATIO  # the extension of a step errs more than the step does
         )
         self.arrays.scalars[Scalar.STEP] *= LAST_TOLERANCE_RATIO**0.125
-        times = sample_last_cycles(begin, end, self.drive.period)
+        times = choose_sample_times(begin, end, self.drive.period)
         rows = []
         last_shot = -np.inf
         for shot in [*[t for t in shots if begin <= t < end], end]:
@@ -659,7 +659,7 @@ def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
         rows.append(run.run_to(begin, np.arange(0, begin, period / n_equidistant)))
     if window < last_cycles:
         run.run_ahead_to(end - last_cycles)
-        times = sample_earlier_cycles(end - last_cycles, end - window, period)
+        times = choose_sample_times(end - last_cycles, end - window, period, 2)
         rows.append(run.run_to(end - window, times)[:-1])
     return rows
 

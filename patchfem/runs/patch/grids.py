@@ -63,11 +63,8 @@ MAX_SEARCHES = 8
 # have the same columns.
 BAND_CHANGE_TOL = 0.1
 MIN_LEVELS = 3  # Smallest number of nested meshes from which an order of convergence is seen.
-# Largest predicted CPU time [s] of condensing a mesh that is still tried.
-MAX_CONDENSING_SECONDS = {
-    True: 3.0,
-    False: 0.4,
-}
+# Largest predicted CPU time [s] of condensing a mesh that is still tried, by whether the patch is static.
+MAX_CONDENSING_SECONDS = {True: 3.0, False: 0.4}
 UNSTRUCTURED_COST_FACTOR = (
     4.0  # Ratio of the CPU times of condensing an unstructured mesh and a tensor grid.
 )

@@ -16,8 +16,8 @@ from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_
 from .measures import estimate_measures, max_error_ratio
 from .press import press_patch, solve
 
-# Tolerance [1] at and above which a patch with partial slip gets the CPU time of a moving mesh. The
-# CPU time grows with (1/tolerance)^0.5 below it, so that a tenth of it allows 3.2 times as much.
+# Tolerance [1] at which a patch under prescribed partial slip may take the CPU time of a patch in a rig. A tighter
+# tolerance allows more time, in proportion to (1/tolerance)^0.5: 3.2 times as much for a tenth of it.
 SLIP_REFERENCE_TOL = 1e-3
 # Largest number of columns of a mesh for which no coarser mesh is made.
 MAX_COLUMNS_WITHOUT_COARSER = 8
@@ -209,7 +209,7 @@ def _attach_point_solution(patch, points):
 
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
-    """Return whether the estimated errors of a solved patch meet the tolerance."""
+    """Return whether every measure of a solved patch has an estimated error within the tolerance."""
     patch_measures = estimate_measures(
         _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
     )

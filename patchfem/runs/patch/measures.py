@@ -237,9 +237,9 @@ def extrapolate_measures(
 
 
 def include_peak_error(fraction, error, relative_peak_error):
-    """Add the relative error of the pressure peak to the errors of loaded fractions.
+    """Raise the errors of loaded fractions to at least the error that an inaccurate pressure peak causes.
 
-    The peak is the divisor of the fraction.
+    A loaded fraction is the mean pressure divided by the peak, so that it has the relative error of the peak.
 
     Parameters
     ----------

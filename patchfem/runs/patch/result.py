@@ -49,7 +49,7 @@ MIN_COMPLETE_FRACTION = 1 - 1e-6
 
 
 def static_measures_without_errors(model) -> dict:
-    """Return the static measures of the patch of a model, without error estimates."""
+    """Solve the contact patch of a model and return its static measures without their errors."""
     with locate_errors(model.source):
         return values(solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0])
 

@@ -29,7 +29,7 @@ N_LADDER_CASES = 5
 # Largest number of searches; the columns of each are graded to the contacts of the previous one.
 MAX_SEARCHES = 4
 # Largest number of nodes of the finest interface, because a finer mesh slows down every case.
-MAX_NODES = 400
+MAX_INTERFACE_NODES = 400
 # Highest convergence order of static measures; meshes too coarse even at this order are not tried.
 MAX_ORDER = 3.0
 # Ratio of the coarsest cell to the cell that a case needs, in the order of trial: the longest cells
@@ -372,7 +372,9 @@ def _refine_until_met(
                 ),
                 largest_ratio,
             )
-        is_too_expensive = bodies[0].x.size > MAX_NODES or grids.predict_condensing_seconds(
+        is_too_expensive = bodies[
+            0
+        ].x.size > MAX_INTERFACE_NODES or grids.predict_condensing_seconds(
             bodies
         ) > ladder.max_condensing_seconds(cases[0], tolerance)
         if largest_ratio <= 1 or is_level_count_fixed or is_too_expensive:

@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class SettingScope(NamedTuple):
-    """Kinds of scenes and laws in which a numerical setting has an effect.
+    """Kinds of scenes, engines and friction laws in which a key of [accuracy] has an effect.
 
     - kinds: kinds of scenes.
     - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for
