@@ -65,8 +65,10 @@ def test_exact_the_first_row_is_the_rms_with_the_interval_of_records(found, tmp_
 
 
 def test_exact_the_spectra_of_an_oscillator(found):
-    """White noise of G: G |H|^2 of the place, H = 1/(w0^2 - w^2 + 2 i zeta w0 w); each line of the record scatters by
-    some 18 %, the middle of the band by less."""
+    """Under white noise of density G the displacement has G |H|^2, with H = 1/(w0^2 - w^2 + 2 i zeta w0 w).
+
+    Each of 126 lines scatters by 18 %, their median by less.
+    """
     made = find_picture("spectra", page_data.collect_run_data(found)).charts(
         found.extra["spectra"], 100.0
     )
@@ -82,7 +84,7 @@ def test_exact_the_spectra_of_an_oscillator(found):
     assert np.median(base["y"]) == pytest.approx(0.01, rel=0.1)
     far = np.abs(density["x"] - 100) > 15
     ratio = density["y"][far] * 1e-12 / (0.01 * 9.80665**2 * ideal(density["x"][far]) ** 2)
-    assert np.median(ratio) == pytest.approx(1, rel=0.1) and np.all((ratio > 0.2) & (ratio < 3))
+    assert np.median(ratio) == pytest.approx(1, rel=0.1) and np.all((ratio > 0.4) & (ratio < 1.8))
     assert peak["x"] == [100.0] and peak["y"][0] == pytest.approx(gain["y"].max(), rel=0.2)
 
 
