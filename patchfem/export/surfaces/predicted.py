@@ -177,26 +177,27 @@ def predicted_data(predicted: PredictedWear) -> dict:
 
 def write_csv(path: Path, predicted: PredictedWear) -> None:
     """Write measured and computed depth along the patch as text in micrometres."""
-    depths = (predicted.measured, predicted.computed, predicted.measured - predicted.computed)
-    table = np.column_stack([predicted.x, *depths, predicted.noise]) * 1e6
+    x, measured, computed, noise = predicted.depths
+    table = np.column_stack([x, measured, computed, predicted.depths.difference, noise]) * 1e6
     rows = [",".join(f"{number:.6g}" for number in row) for row in table]
     write_text(path, "\n".join([COLUMNS, *rows, ""]))
 
 
 def predicted_picture(predicted: PredictedWear) -> Picture:
-    """Draw the computed depth over the measured one, and their difference below."""
-    along, mm = choose_axis_unit(predicted.x, "m")
-    up, um = choose_axis_unit(predicted.measured, "m")
-    x = predicted.x * mm
-    low = (predicted.measured - 2 * predicted.noise) * um
-    high = (predicted.measured + 2 * predicted.noise) * um
-    difference = (predicted.measured - predicted.computed) * um
+    """Draw the computed depth over the measured one, and their difference beside it."""
+    place, measured, computed, noise = predicted.depths
+    along, mm = choose_axis_unit(place, "m")
+    up, um = choose_axis_unit(measured, "m")
+    x = place * mm
+    low = (measured - 2 * noise) * um
+    high = (measured + 2 * noise) * um
+    difference = predicted.depths.difference * um
     axis = make_axis("x of the patch", along) | {"range": [x[0], x[-1]]}
-    depths = np.concatenate([predicted.measured, predicted.computed])
+    depths = np.concatenate([measured, computed])
     marks = [
         make_mark("band", "soft", "measured, 95 % noise", x=x, low=low, high=high),
-        make_line(x, predicted.measured * um, "soft", "measured", most=MAX_POINTS, width=1.0),
-        make_line(x, predicted.computed * um, "accent", "computed", most=MAX_POINTS, width=1.6),
+        make_line(x, measured * um, "soft", "measured", most=MAX_POINTS, width=1.0),
+        make_line(x, computed * um, "accent", "computed", most=MAX_POINTS, width=1.6),
     ]
     below = [
         make_line(x, difference, "warm", "measured less computed", most=MAX_POINTS, width=1.0),

@@ -17,38 +17,40 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...formatting import format_length, format_number
-from ..quantity import SIDE, Quantity
+from ..quantity import LEVEL, SIDE, Quantity
 from .compare import Comparison
 from .errors import correlation_length, student_factor
 from .sentences import is_significant
 from .worn import make_section
 
-N_BINS = 100  # bins along the patch; noise of single heights averages out, and the form of the wear remains
-N_RATIOS = 90  # trial coefficients of the search
-MIN_OVERLAP = 0.25  # part of the patch that the traces must show; less does not place the patch
-MARGIN = (
-    0.1  # part of the patch beyond each of its ends, where unworn heights show where the wear ends
-)
-# coefficient / that of the run; beyond this, the shape of the worn depth is a guess
+# Number of bins along the patch, whose means are compared: the noise of single heights averages out.
+N_BINS = 100
+# Number of trial coefficients of the search.
+N_RATIOS = 90
+# Smallest fraction of the patch that the traces must show, so that the place of the patch is known.
+MIN_OVERLAP = 0.25
+# Length beyond each end of the patch, as a fraction of it, in which unworn heights show where the wear ends.
+MARGIN = 0.1
+# Largest ratio of the fitted coefficient to that of the run; beyond it the computed shape is a guess.
 MAX_RATIO = 2.0
-SEARCHED_RATIO = (
-    1e4  # largest coefficient / that of the run of the search, which finds what to set instead
-)
-MAX_WIDTH_RATIO = (
-    1.5  # measured / computed width of the wear; above it, the two are not of one contact
-)
-WORN_FRACTION = 0.05  # depth / largest depth at the ends of the computed wear
-ACCEPTED_DEVIANCE = (
-    4.0  # increase of the sum of squares / variance of places that explain the wear as well
-)
-MAX_PLACES = 24  # places that are tried besides the best one
-MIN_PLACE_DISTANCE = 1.5  # bins between two places that count as different
-MIN_REMAINDER = 0.5  # smallest part of a variance that the fit leaves; smaller ones are too uncertain to divide by
-MIN_BLOCKS = (
-    3.0  # smallest number of independent terms of Student's t; fewer give no useful interval
-)
-MIN_DEPARTURE = 0.01  # relative difference of the coefficient by proportion that is reported
-SCAN_LEVEL = 0.95  # probability with which noise alone shows no difference
+# Largest ratio that the search tries, to find the coefficient that a refused run should have.
+SEARCHED_RATIO = 1e4
+# Largest ratio of measured to computed width of the wear; above it the run is not of the measured contact.
+MAX_WIDTH_RATIO = 1.5
+# Depth at the ends of the computed wear, as a fraction of the largest depth.
+WORN_FRACTION = 0.05
+# Largest increase of the sum of squares, in variances, of a place that explains the wear as well as the best one.
+ACCEPTED_DEVIANCE = 4.0
+# Number of places that are tried in addition to the best one.
+MAX_PLACES = 24
+# Smallest distance [bins] of two places that count as different.
+MIN_PLACE_DISTANCE = 1.5
+# Smallest fraction of a variance that the fit leaves; smaller ones are too uncertain to divide by.
+MIN_REMAINDER = 0.5
+# Smallest number of independent terms of Student's t; fewer give no useful interval.
+MIN_BLOCKS = 3.0
+# Smallest relative difference of the coefficient in proportion that a note reports.
+MIN_DEPARTURE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,7 @@ class MeasuredDepth(NamedTuple):
         """Width of a bin [m]."""
         return float(self.edges[1] - self.edges[0])
 
-    def cut(self, low: float, high: float) -> "MeasuredDepth":
+    def select_range(self, low: float, high: float) -> "MeasuredDepth":
         """Return the bins whose middle lies between two positions [m]."""
         middles = (self.edges[1:] + self.edges[:-1]) / 2
         inside = np.flatnonzero((middles >= low) & (middles <= high))
@@ -132,7 +134,7 @@ class MeasuredDepth(NamedTuple):
 class Placement(NamedTuple):
     """Computed wear at a place in the trace.
 
-    - ratio: coefficient / that of the run.
+    - ratio: coefficient divided by that of the run.
     - centre: middle of the patch in x of the second trace [m].
     - is_mirrored: whether x of the patch runs against x of the trace.
     - squares: sum of the squared differences [m2] over the bins.
@@ -158,14 +160,32 @@ class Difference(NamedTuple):
     computed: float
 
 
+class ComparedDepths(NamedTuple):
+    """Measured and computed worn depth in bins along the patch.
+
+    - x: position on the patch (b,) [m].
+    - measured, computed: mean depths (b,) [m].
+    - noise: standard deviation (b,) [m] of the measured depth.
+    """
+
+    x: np.ndarray
+    measured: np.ndarray
+    computed: np.ndarray
+    noise: np.ndarray
+
+    @property
+    def difference(self) -> np.ndarray:
+        """Measured less computed depth (b,) [m]."""
+        return self.measured - self.computed
+
+
 @dataclass(frozen=True, eq=False)
 class PredictedWear:
     """Computed worn depth, fitted to the measured one.
 
     - coefficient, centre: `Quantity` of the wear coefficient, and of the middle of the patch in x of the second trace.
     - is_mirrored: whether x of the patch runs against x of the trace; None where both fit.
-    - x: position on the patch (b,) [m] of each bin, with the depths `measured` and `computed` and
-      the standard deviation `noise` of the measured one, (b,) [m].
+    - depths: both depths along the patch.
     - difference: largest difference, or None where noise explains all.
     - proportional: coefficient [m2/N] for which the last depth of the run, in proportion, fits best.
     """
@@ -174,10 +194,7 @@ class PredictedWear:
     coefficient: Quantity
     centre: Quantity
     is_mirrored: bool | None
-    x: np.ndarray
-    measured: np.ndarray
-    computed: np.ndarray
-    noise: np.ndarray
+    depths: ComparedDepths
     difference: Difference | None
     proportional: float
 
@@ -189,18 +206,17 @@ class PredictedWear:
     @property
     def on_patch(self) -> np.ndarray:
         """Bins (b,) bool whose middle lies on the patch."""
-        return np.abs(self.x) <= self.history.half
+        return np.abs(self.depths.x) <= self.history.half
 
     @property
     def difference_rms(self) -> float:
         """Root mean square [m] of the difference between both depths over the patch."""
-        difference = (self.measured - self.computed)[self.on_patch]
-        return float(np.sqrt(np.mean(difference**2)))
+        return float(np.sqrt(np.mean(self.depths.difference[self.on_patch] ** 2)))
 
     @property
     def sentence(self) -> str:
         """Sentence that says where the depths differ, and by how much."""
-        mean = float(self.computed[self.on_patch].mean())
+        mean = float(self.depths.computed[self.on_patch].mean())
         text = (
             f"With a wear coefficient of {_format_coefficient(self.coefficient, self.history.coefficient)}, the "
             "computed depth of the "
@@ -266,7 +282,7 @@ def fit_computed_wear(comparison: Comparison, history: WearHistory) -> Predicted
     _check_length(measured, comparison, history)
     start, others = _search_placements(measured, history)
     margin = (1 + MARGIN) * history.half
-    near = measured.cut(start.centre - margin, start.centre + margin)
+    near = measured.select_range(start.centre - margin, start.centre + margin)
     best = _refine(near, history, start)
     others = [_refine(near, history, other, is_fixed=True) for other in others]
     opposite = best._replace(is_mirrored=not best.is_mirrored)
@@ -407,10 +423,7 @@ def _search_placements(measured: MeasuredDepth, history: WearHistory) -> tuple:
 def _refine(
     measured: MeasuredDepth, history: WearHistory, start: Placement, *, is_fixed: bool = False
 ) -> Placement:
-    """Refine coefficient and place of a placement by least squares.
-
-    is_fixed: whether the place stays.
-    """
+    """Refine coefficient and place of a placement by least squares; with `is_fixed` the place stays."""
     from scipy.optimize import least_squares
 
     def make_placement(values) -> Placement:
@@ -495,10 +508,12 @@ def _evaluate(
         coefficient=coefficient,
         centre=centre,
         is_mirrored=None if is_unknown else best.is_mirrored,
-        x=x[order],
-        measured=measured.depth[order],
-        computed=computed[order],
-        noise=measured.draws.std(axis=0)[order],
+        depths=ComparedDepths(
+            x[order],
+            measured.depth[order],
+            computed[order],
+            measured.draws.std(axis=0)[order],
+        ),
         difference=_find_difference(x, measured, computed, draws, history),
         proportional=proportional * history.coefficient,
     )
@@ -601,7 +616,7 @@ def _find_difference(
     residual = (measured.depth - computed)[first:last]
     if measured.draws.any():
         peaks = [_scan(draw[first:last])[0] for draw in draws]
-        limit = float(np.quantile(peaks, SCAN_LEVEL))
+        limit = float(np.quantile(peaks, LEVEL))
     else:
         limit = 0.0
     peak, low, high = _scan(residual)
@@ -619,7 +634,11 @@ def _find_difference(
 
 
 class _Scan(NamedTuple):
-    """Largest sum over a part / root of its length, and the first and last + 1 bin of this part."""
+    """Part with the largest sum divided by the root of its length.
+
+    - peak: this quotient.
+    - low, high: first bin of the part, and the bin after its last one.
+    """
 
     peak: float
     low: int

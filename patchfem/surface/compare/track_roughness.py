@@ -23,8 +23,10 @@ from .ratios import resample
 from .worn import split_at_flanks, split_at_tracks
 
 REGIONS = ("inside", "outside")
-MIN_CUTOFFS = 2.0  # length of a piece / cut-off; half a cut-off is trimmed at each end
-RA_VARIANCE = np.pi - 2  # relative variance of Ra / that of Rq, for Gaussian heights
+# Smallest ratio of the length of a piece to the cut-off; half a cut-off is trimmed at each end.
+MIN_CUTOFFS = 2.0
+# Ratio of the relative variance of Ra to that of Rq, for Gaussian heights.
+RA_VARIANCE = np.pi - 2
 TEXTS = {
     "Ra": ("m", "mean of the absolute heights of the roughness profile"),
     "Rq": ("m", "root mean square of the heights of the roughness profile"),
