@@ -18,7 +18,9 @@ def new(
     /,
     *,
     out: out_option("file to write, such as mine.toml; default: the screen") = None,
-    ask: flag("ask what you know about a joint and what you want to compute") = False,
+    ask: flag(
+        "list the answers, and ask what you know about a joint and what you want to compute"
+    ) = False,
     know: word("answer to the first question of --ask, such as loop,roughness") = "",
     want: word("answer to the second question of --ask, such as loss,squeal") = "",
 ):
@@ -87,9 +89,9 @@ def _ask(option: str, question: str, answers: dict[str, str]) -> str:
     Refused
         If there is no terminal, or if the input ends before the answer.
     """
+    print_message(joint_laws.format_question(question, answers))
     if sys.stdin is None or not sys.stdin.isatty():
         raise Refused(f"--ask: no terminal to ask at; give {option}, from {', '.join(answers)}")
-    print_message(joint_laws.format_question(question, answers))
     line = sys.stdin.buffer.readline()
     if not line:
         raise Refused(f"--ask: the input ended before the answer; give {option}")

@@ -490,7 +490,6 @@ def _measured_picture(data: RunData) -> Picture | None:
     )
 
 
-# The keys are in the order of the page.
 def _accuracy_picture(data: RunData) -> Picture | None:
     """Return the picture of accuracy against computing time."""
     curve = data.evaluations.accuracy
@@ -499,6 +498,7 @@ def _accuracy_picture(data: RunData) -> Picture | None:
     return Picture(accuracy.accuracy_charts, (curve,), accuracy.accuracy_caption(curve))
 
 
+# The keys are in the order of the page.
 PICTURES = {
     "wear": _wear_picture,
     "worn": _worn_map_picture,

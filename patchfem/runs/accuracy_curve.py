@@ -35,14 +35,17 @@ class AccuracyCurve(NamedTuple):
 
     - coarser: StepSettings of the coarser runs, fine to coarse.
     - present: StepSetting of the run.
-    - finer: StepSetting expected of twice the steps; None if these would not make the run more accurate.
-    - cause: kind of coarsening to which the present error is mostly due, as in `CoarserRuns.of`.
+    - finer: StepSetting expected of twice the steps; None if these would not reduce the worst error.
+    - limiting_measure: measure with the worst error after twice the steps.
+    - cause: kind of coarsening, other than the steps, that contributes most to its error, as in
+      `CoarserRuns.of`; "" if there is none.
     - tolerance: tolerance of the scene.
     """
 
     coarser: list
     present: StepSetting
     finer: StepSetting | None
+    limiting_measure: str
     cause: str
     tolerance: float
 
@@ -98,13 +101,15 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
     if coarser[-1].error * NO_EFFECT_RATIO < present.error:
         return None
     open_kinds = result.extra["left_open"]
-    expected = _expect_errors(errors, open_kinds)
-    finer = make_setting(2 * present.steps, expected)
-    if finer.error > NO_EFFECT_RATIO * present.error:
-        finer = None
-    parts = open_kinds["parts"]
-    cause = max(parts, key=lambda kind: parts[kind].get(present.measure, 0.0))
-    return AccuracyCurve(coarser, present, finer, cause, tolerance)
+    expected = make_setting(2 * present.steps, _expect_errors(errors, open_kinds))
+    other_errors = {
+        kind: part.get(expected.measure, 0.0)
+        for kind, part in open_kinds["parts"].items()
+        if kind != "steps"
+    }
+    cause = max(other_errors, key=other_errors.get, default="")
+    finer = expected if expected.error <= NO_EFFECT_RATIO * present.error else None
+    return AccuracyCurve(coarser, present, finer, expected.measure, cause, tolerance)
 
 
 def _select_measures(measures: dict, step_runs) -> dict:

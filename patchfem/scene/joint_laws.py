@@ -34,8 +34,8 @@ WISHES = {
     "reversal": "force just after a reversal, small loops",
     "ageing": "force after a rest",
     "squeal": "vibration that begins by itself, stick-slip",
-    "smooth": "friction as a smooth function of the speed",
-    "averaging": "friction law of Oden and Pires",
+    "smooth": "friction as a smooth function of the speed, as other programs have it",
+    "averaging": "friction from the pressure averaged over a neighbourhood (Oden and Pires)",
 }
 
 
@@ -107,9 +107,9 @@ JOINT_LAWS = (
         ("loss", "force-limit"),
         "elastic-plastic",
         ("stiffness",),
-        "loop area to 1 % above an amplitude of 2.2 bond lengths",
-        "dissipates nothing up to one bond length; the force just after a reversal is wrong (rms 14 % at 3 bond "
-        "lengths)",
+        "loop area of law nonlocal to 1 % from an amplitude of 2.5 bond lengths",
+        "dissipates nothing up to one bond length; the force just after a reversal is wrong (rms 14 % of the friction "
+        "limit at 3 bond lengths)",
         "joint_laws/elastic-plastic",
     ),
     JointLaw(
@@ -156,8 +156,9 @@ JOINT_LAWS = (
         ("force-limit", "loss"),
         "coulomb",
         (),
-        "loop area too large by at most 1 % from an amplitude of 100 bond lengths",
-        "no stiffness and no loss before slip; the force is wrong after each reversal (rms 34 % at 100 bond lengths)",
+        "loop area too large by 1 % at an amplitude of 100 bond lengths, by less above",
+        "no stiffness and no loss before slip; the force is wrong after each reversal (rms 34 % of the friction limit at "
+        "100 bond lengths)",
         "joint_laws/coulomb",
     ),
     JointLaw(
@@ -222,7 +223,7 @@ def parse_answer(answer: str, words: Iterable[str], name: str) -> list[str]:
 
 
 def choose_law(known: str, wanted: str) -> Choice:
-    """Choose the law that answers most wishes; of several, the one that needs least further knowledge.
+    """Choose the law that answers most wishes; of several, the one with least to assume.
 
     Parameters
     ----------
@@ -239,12 +240,16 @@ def choose_law(known: str, wanted: str) -> Choice:
     known_words = parse_answer(known, KNOWLEDGE, "--know")
     wanted_words = parse_answer(wanted, WISHES, "--want")
 
-    def rank(row: JointLaw) -> tuple[int, int]:
+    def count_costs(row: JointLaw) -> tuple[int, int, int]:
+        """Return what a law leaves to wish and to assume; the least of all rows is chosen."""
         # a friction coefficient can be assumed from tables, the other knowledge cannot
         missing = set(row.known).difference(known_words, {"coefficient"})
-        return -len(set(row.wanted).intersection(wanted_words)), len(missing)
+        n_answered = len(set(row.wanted).intersection(wanted_words))
+        # of laws whose values must be assumed, that with fewer of them
+        n_assumed_keys = len(row.keys) if missing else 0
+        return -n_answered, len(missing), n_assumed_keys
 
-    return Choice(min(JOINT_LAWS, key=rank), known_words, wanted_words)
+    return Choice(min(JOINT_LAWS, key=count_costs), known_words, wanted_words)
 
 
 def format_question(question: str, meanings: dict[str, str]) -> str:
@@ -258,7 +263,9 @@ def describe_choice(choice: Choice) -> list[str]:
     """Return sentences on the chosen law, its accuracy and limits, and the answers that it does not use."""
     row = choice.row
     missing = [word for word in row.known if word not in choice.known]
-    unused = [word for word in choice.known if word not in (*row.known, NOTHING)]
+    # every law has the coefficient (key `static`); another word may be a key of the law
+    used = {*row.known, *row.keys, "coefficient", NOTHING}
+    unused = [word for word in choice.known if word not in used]
     unanswered = [word for word in choice.wanted if word not in row.wanted]
     sentences = [
         f"you know {', '.join(choice.known)} and want {', '.join(choice.wanted)}",

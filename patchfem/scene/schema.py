@@ -6,7 +6,7 @@ A schema cannot express which keys go together and which files exist; `patchfem 
 import re
 
 from .keys.contact import Material
-from .keys.materials import MATERIALS, SEPARATORS, list_spellings
+from .keys.materials import MATERIALS, SEPARATORS, is_case_sensitive, list_spellings
 from .keys.quantities import NUMBER_PATTERN, UNIT_FACTORS, find_si_unit
 from .keys.tables import Tables
 from .keys.types import (
@@ -146,8 +146,10 @@ def _describe_material(table: dict) -> dict:
 def _make_material_pattern() -> str:
     """Return the regular expression of every spelling of every name of a material."""
     spellings = []
-    for spelling in list_spellings():
-        letters = (_make_letter_pattern(letter) for letter in spelling)
+    for spelling, name in list_spellings().items():
+        letters = map(_make_letter_pattern, spelling)
+        if is_case_sensitive(spelling):
+            letters = map(re.escape, name)
         spellings.append(f"{SEPARATORS}*".join(letters))
     return rf"^{SEPARATORS}*(?:{'|'.join(spellings)}){SEPARATORS}*$"
 

@@ -13,8 +13,11 @@ from exported import CROWNED
 import patchfem as pf
 
 MPA = 1e6  # Pa
-STRESSES = {"stress", "von_mises", "normal_stress", "shear_stress"}
-BONDS = {f"{name}_bond_{side}" for name in ("normal", "shear") for side in ("lower", "upper")}
+UNITS = dict.fromkeys(("displacement", "gap", "slip", "worn_depth"), "m")
+UNITS |= dict.fromkeys(("stress", "von_mises", "normal_stress", "shear_stress"), "MPa")
+UNITS |= {
+    f"{name}_bond_{side}": "MPa" for name in ("normal", "shear") for side in ("lower", "upper")
+}
 
 
 @pytest.fixture(scope="module")
@@ -51,10 +54,9 @@ def compare_with_file(blocks, path) -> int:
 
 def compare_arrays(grid, values, written, name: str) -> int:
     """Assert that an array of a grid is the written one, in MPa if it is a stress."""
-    unit = "MPa" if name in STRESSES | BONDS else None
-    if unit:
-        assert f"{name} [{unit}]" in list(grid.field_data["units"])
-    factor = MPA if unit else 1.0
+    unit = UNITS.get(name, "1")
+    assert f"{name} [{unit}]" in list(grid.field_data["units"])
+    factor = MPA if unit == "MPa" else 1.0
     assert np.allclose(values * factor, written, rtol=3e-7, atol=0), name
     return 1
 

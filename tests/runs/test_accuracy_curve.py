@@ -2,10 +2,12 @@
 
 import re
 from itertools import pairwise
+from types import SimpleNamespace as Fake
 
 import pytest
 
 import patchfem as pf
+from patchfem.export.drawing.accuracy import accuracy_caption
 from patchfem.runs import compute_accuracy_curve
 
 BLOCK = """
@@ -65,6 +67,11 @@ def test_exact_the_present_point_is_the_stated_error_and_takes_a_part_of_the_tim
     )
     assert present.error == pytest.approx(worst, rel=1e-12) and present.measure in MAIN
     assert 0 < present.seconds < marched.seconds["total"]
+    step_runs = marched.extra["step_runs"]
+    assert present.steps == step_runs[0].steps
+    assert present.seconds / present.steps == pytest.approx(
+        min(run.seconds / run.steps for run in step_runs), rel=1e-12
+    )
 
 
 def test_exact_the_page_has_one_picture_that_names_the_neighbours(marched, tmp_path):
@@ -75,6 +82,25 @@ def test_exact_the_page_has_one_picture_that_names_the_neighbours(marched, tmp_p
     assert "Next better: accuracy.steps_per_cycle = 3200" in text
     names = marched.plot.accuracy().get_legend_handles_labels()[1]
     assert {"this run", "fewer steps per cycle"} < set(names)
+
+
+def test_exact_the_caption_names_what_limits_after_twice_the_steps():
+    values = [{"loop_area": area, "absolute_acceleration_peak": 1.0} for area in (1.0, 1.03, 1.12)]
+    step_runs = [
+        Fake(steps=steps, seconds=steps / 400, values=row)
+        for steps, row in zip((400, 200, 100), values, strict=True)
+    ]
+    parts = {"steps": {"loop_area": 0.01}, "mesh": {"absolute_acceleration_peak": 0.0095}}
+    measures = {
+        "loop_area": Fake(value=1.0, error=0.01, floor=0.0),
+        "absolute_acceleration_peak": Fake(value=1.0, error=0.0095, floor=0.0),
+    }
+    extra = {"step_runs": step_runs, "left_open": {"parts": parts, "orders": {"loop_area": 2.0}}}
+    plan = Fake(model=Fake(accuracy=Fake(tolerance=0.01)))
+    curve = compute_accuracy_curve(Fake(extra=extra, measures=measures, plan=plan))
+    assert curve.finer is None
+    caption = accuracy_caption(curve)
+    assert "that of absolute_acceleration_peak would remain, mainly because of the mesh" in caption
 
 
 @pytest.mark.parametrize(

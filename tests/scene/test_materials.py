@@ -7,6 +7,7 @@ from jsonschema import Draft202012Validator
 
 import patchfem as pf
 from patchfem.scene import MATERIALS, loads, make_schema, read_template
+from patchfem.scene.keys.materials import find_material_name, normalise_material_name
 
 PATCH = read_template("patch")
 # name that an engineer writes -> name in the table
@@ -34,7 +35,7 @@ SPELLINGS = {
     "peek": "PEEK",
     "dlc": "DLC",
     "hard chrome": "Cr",
-    "tin": "TiN",
+    "Ti N": "TiN",
     "aluminum": "aluminium",
     " Steel ": "steel",
 }
@@ -45,6 +46,7 @@ NEAREST = {
     "inconell718": "'Inconel 718'",
     "316": "'316L'",
     "stainles": "'stainless steel'",
+    "tin": "'bronze' or 'TiN'",  # the metal tin is not the nitride
 }
 # values of release 0.4, which scenes rely on
 OLD_VALUES = {
@@ -95,7 +97,8 @@ def test_always_records_are_plausible_and_name_their_sources():
     names = [
         spelling for name, record in MATERIALS.items() for spelling in (name, *record.other_names)
     ]
-    assert len({name.casefold() for name in names}) == len(names)
+    assert len({normalise_material_name(name) for name in names}) == len(names)
+    assert all(find_material_name(name) == name for name in MATERIALS)
     for name, record in MATERIALS.items():
         for other in record.other_names:
             assert loads(PATCH, sets=[f"contact.substrate={other}"]).contact.substrate.name == name

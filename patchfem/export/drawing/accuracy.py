@@ -11,6 +11,7 @@ CAUSES = {
     "modes": "the modes that are left out",
     "bonds": "the sum over bonds",
     "cells": "the cells of the friction law",
+    "end": "the end of the run, which is not exactly at the requested time",
 }
 
 
@@ -51,10 +52,10 @@ def accuracy_caption(curve: AccuracyCurve) -> str:
             f"Next better: {STEPS_KEY} = {curve.finer.steps}, expected {_describe(curve.finer)}."
         )
     else:
-        cause = CAUSES.get(curve.cause, "other settings than the steps")
+        cause = CAUSES.get(curve.cause, "other causes than the steps")
         sentences.append(
-            f"Twice the steps would not make {curve.present.measure} more accurate: most of its error "
-            f"is due to {cause}."
+            f"Twice the steps would hardly reduce the worst error: that of {curve.limiting_measure} "
+            f"would remain, mainly because of {cause}."
         )
     sentences.append(
         "`patchfem cost SCENE` measures the time and errors of whole runs at several tolerances."

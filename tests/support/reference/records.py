@@ -82,8 +82,8 @@ know it. For one alloy, the elastic constants differ by a few
 per cent between handbooks; for a sprayed coating they differ by far more. If your result depends on one of these
 constants, measure it on your material.
 
-Case, blanks, hyphens and underscores do not matter in a name: `ti64`, `Ti6Al4V` and `ti-6al-4v` mean `Ti-6Al-4V`. The
-error for an unknown name proposes the nearest materials.
+Case, blanks, hyphens and underscores do not matter in a name, except the case of `TiN`: `ti64`, `Ti6Al4V` and
+`ti-6al-4v` mean `Ti-6Al-4V`. The error for an unknown name proposes the nearest materials.
 """
 
     @classmethod
