@@ -530,6 +530,8 @@ def backbone(
             return build(scene, **sets)
         return build_model(_load_prepared(scene, tables, sets))
 
+    if not isinstance(modes, str) and isinstance(modes, Iterable):
+        modes = list(modes)
     if modes and isinstance(scene, Model):
         raise PatchfemError(
             "backbone: modes cannot be given with a Model; give them with the scene"

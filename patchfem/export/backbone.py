@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import __version__, formatting
-from ..campaigns.backbone.band import Band
+from ..campaigns.backbone.band import PREFERRED_METHODS, Band
 from ..campaigns.backbone.records import Backbone, Curve
 from ..disk.atomic_write import write_rows, write_text
 from .drawing import charts, pictures
@@ -32,7 +32,8 @@ VARIABLES = {  # unit and description of each variable of backbone.nc
 }
 DESCRIPTIONS = {
     "balance": "The curve belongs to the periodic motion that the rig would have without a net "
-    "loss of energy. A slow decay follows this motion, and so does a test in phase resonance.",
+    "loss of energy. A test in phase resonance follows this motion; a ring-down has its frequency, "
+    "but loses amplitude faster if the joint stiffens as the amplitude falls.",
     "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping "
     "are evaluated from one turning point to the next.",
     "quasi-static": "The frequency is that with the secant stiffness of the contact between the "
@@ -295,9 +296,12 @@ def _charts_html(backbone: Backbone, page_charts: list) -> str:
     )
     caption = "The bars show the numerical errors."
     if backbone.answer.band is not None:
+        tests = ""
+        if backbone.answer.band.ring_down is not None:
+            tests = " and what the other kinds of test read"
         caption = (
-            "Use the bold curve. The band around it contains the numerical errors and what the other "
-            "kinds of test read; the thin curves are the other methods."
+            f"Use the bold curve. The band around it contains the numerical errors{tests}; the thin "
+            "curves are the other methods."
         )
     if not all(_has_small_error(curve).all() for curve in backbone.curves.values()):
         caption += LEFT_OUT_NOTE
@@ -359,12 +363,11 @@ def summarise_backbone(backbone: Backbone) -> list:
     if backbone.frequencies.stuck is not None:
         stuck = f", and {_format_stuck(backbone)} while the contact sticks"
     out = [f"The natural frequency of mode {backbone.mode} is {free} without the contact{stuck}."]
-    ordered = [backbone.curves.get(method) for method in ("balance", "quasi-static", "decay")]
-    curve = next((one for one in ordered if one is not None), None)
+    methods = [method for method in PREFERRED_METHODS if method in backbone.curves]
+    curve = backbone.curves[methods[0]] if methods else None
     if curve is not None:
         out = [_describe_ends(backbone.mode, curve), *out, *_describe_largest_damping(curve)]
-    if backbone.answer.advice:
-        out += backbone.answer.sentences
+    out += backbone.answer.sentences
     exponents = backbone.exponents
     theory = ""
     if exponents.micro_theory is not None:

@@ -38,14 +38,16 @@ def remove_joint(model: Model, patch=None) -> Model:
     with locate_errors(model.source):
         if patch is None:
             patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
-        stiffness = patch_stiffness(model, patch) if patch.pressure.load > 0 else 0.0
+        stiffness = patch_stiffness(model, patch)
         return replace(model, rig=model.rig.structure.without_joint(stiffness))
 
 
 def patch_stiffness(model: Model, patch) -> float:
-    """Return the tangential stiffness [N/m] of a pressed patch that sticks everywhere."""
+    """Return the tangential stiffness [N/m] of a patch that sticks everywhere; 0 if nothing presses it."""
     f = model.friction
     load = patch.pressure.load
+    if not load > 0:
+        return 0.0
     stiffness = record.stick_stiffness(f, load)
     if not model.partial_slip or (
         np.isfinite(stiffness) and not law_has_trait(f.law, "set-valued")

@@ -52,11 +52,13 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
     PatchfemError
         If an item is not a mode.
     """
+    if not isinstance(modes, (str, Iterable)):
+        raise PatchfemError(f"modes: {modes!r}: {MODES_FORM}")
     items = modes.split(",") if isinstance(modes, str) else list(modes)
     parsed = []
     for item in items:
-        parts = item.split(":") if isinstance(item, str) else list(item)
         try:
+            parts = item.split(":") if isinstance(item, str) else list(item)
             parsed.append(_parse_mode(*parts))
         except (TypeError, ValueError) as error:
             reason = f"{error}; " if isinstance(error, ValueError) else ""
@@ -72,7 +74,7 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
     mode = GivenMode(float(frequency), float(damping), slide)
     if not (0 < mode.frequency < float("inf") and -1 < mode.damping < 1 and slide != 0):
         raise ValueError(
-            "a frequency above 0, a damping ratio below 1 and no slide of 0 are needed"
+            "a frequency above 0, a damping ratio between -1 and 1 and no slide of 0 are needed"
         )
     return mode
 
@@ -106,6 +108,8 @@ class BackboneTables:
         Whether the modes are assumed.
     has_frequencies_of_stuck_modes : bool
         Whether the frequencies of the modes belong to the sticking contact.
+    assumes_mass : bool
+        Whether the modal mass is assumed, because the scene gives none.
     ignored : list of str
         Names of the tables that are ignored.
     """
@@ -114,6 +118,7 @@ class BackboneTables:
         self.modes = modes
         self.is_assumed = False
         self.has_frequencies_of_stuck_modes = stuck
+        self.assumes_mass = False
         self.ignored: list[str] = []
 
     def __call__(self, raw: dict[str, Any]) -> None:
@@ -137,7 +142,8 @@ class BackboneTables:
             raise PatchfemError(
                 "modes: the scene has a structure of masses or files; leave the modes out, or leave out [structure]"
             )
+        self.assumes_mass = "moving_mass" not in structure
         structure.setdefault("moving_mass", ASSUMED_MASS)
-        if self.has_frequencies_of_stuck_modes:
-            structure.setdefault("measured", "stuck")
+        # the key `measured` of the scene belongs to the modes that are replaced
+        structure["measured"] = "stuck" if self.has_frequencies_of_stuck_modes else "free"
         structure["mode"] = [_write_mode(k, mode) for k, mode in enumerate(self.modes)]

@@ -4,9 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.__main__ import main
+from patchfem.campaigns import compute_backbone
 
 LAW = '[normal]\nload = "100 N"\n[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "60 um"\n'
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\n'
@@ -32,6 +34,21 @@ frequency = "100 Hz"
 acceleration = "1 g"
 cycles = 20
 """
+DUFFING = """[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "first"
+frequency = "100 Hz"
+damping = 0.02
+slide = 1.0
+output = 1.0
+base = 0.0
+[drive]
+kind = "force"
+frequency = "100 Hz"
+force = "1 N"
+cycles = 10
+"""
 AMPLITUDES = np.geomspace(1e-5, 2e-3, 19)
 
 
@@ -46,6 +63,7 @@ def test_exact_modes_beside_a_bench_are_those_of_the_scene_of_a_rig(all_methods)
     assert found.balance_frequency.values == pytest.approx(all_methods.balance_frequency, rel=1e-9)
     assert found.attrs["stuck_frequency"] == pytest.approx(100)
     assert "[slide] is ignored" in all_methods.attrs["notes"]
+    assert "modal mass is assumed" in all_methods.attrs["notes"]
     assert "[drive] is ignored" in found.attrs["notes"]
     assert not any(name.startswith("decay") for name in found)
 
@@ -75,10 +93,49 @@ def test_the_band_contains_a_ring_down_that_was_not_run(all_methods):
         all_methods.decay_damping <= high + error
     )
     assert inside.mean() > 0.9
+    curve = found.balance_damping.values
+    width = (found.band_damping_high.values - found.band_damping_low.values) / curve
+    assert width[-1] < 0.1
     excess = all_methods.decay_damping.values / np.interp(
         amplitude, found.band_amplitude, found.balance_damping
     )
     assert excess.max() > 1.05
+
+
+def test_the_band_of_one_mode_is_narrow_but_at_the_onset_of_slip():
+    found = pf.backbone(
+        LAW + SLIDE, modes="100 Hz:0.005:0.5", amplitudes=AMPLITUDES, method="balance"
+    )
+    width = (found.band_damping_high - found.band_damping_low).values / found.balance_damping.values
+    assert width[0] < 1e-3 and width[-1] < 0.03 and np.median(width) < 0.1
+    assert (found.band_damping_low.values > 0.0049).all()
+
+
+def test_a_single_method_claims_nothing_about_the_others():
+    modes = "100 Hz:0.005:0.5"
+    advice = pf.backbone(LAW + SLIDE, modes=modes, method="quasi-static").attrs["advice"]
+    assert "all methods agree" not in advice.lower() and "other kinds of test" not in advice
+
+
+@pytest.mark.parametrize(("cubic", "start"), [(4e10, 6.5e-3), (-2e10, 2.75e-3)])
+def test_exact_the_predicted_ring_down_of_a_cubic_spring_is_that_of_the_duffing_oscillator(
+    cubic, start
+):
+    omega = 2 * np.pi * 100
+
+    def rates(t, y):
+        return [y[1], -(omega**2) * y[0] - cubic * y[0] ** 3 - 2 * 0.02 * omega * y[1]]
+
+    run = solve_ivp(rates, (0, 0.2), [start, 0], events=lambda t, y: y[1], rtol=1e-10, atol=1e-14)
+    peaks = np.abs(run.y_events[0][1:, 0])
+    middles = (peaks[1:] + peaks[:-1]) / 2
+    decrement = np.log(middles[:-2] / middles[2:]) / (2 * np.pi)
+    damping = decrement / np.sqrt(1 + decrement**2)
+    amplitudes = middles[1:-1][:12:4]
+    scene = DUFFING + f'[structure.stiffening]\ncubic = "{cubic} N/m^3"\n'
+    curves = compute_backbone(pf.build(scene), "", amplitudes, ("balance",))
+    found = curves.answer.band.ring_down.damping
+    assert found[::-1] == pytest.approx(damping[:12:4], rel=5e-3)
 
 
 def test_static_curve_of_two_modes_tends_to_the_mode_without_contact():
@@ -113,7 +170,7 @@ def test_the_scene_of_a_new_joint_has_a_backbone_as_it_is(tmp_path, monkeypatch,
         assert set(answer["curves"]) == {"balance", "quasi-static"}
         assert answer["advice"].startswith("Use the bold curve, method balance")
         assert any("[slide] is ignored" in note for note in answer["notes"])
-        assert any("`slide` is assumed" in note for note in answer["notes"])
+        assert any("`slide` is assumed such" in note for note in answer["notes"])
 
 
 @pytest.mark.parametrize(
@@ -121,6 +178,8 @@ def test_the_scene_of_a_new_joint_has_a_backbone_as_it_is(tmp_path, monkeypatch,
     [
         (LAW + SLIDE, "120", "'120': .*FREQUENCY:DAMPING"),
         (LAW + SLIDE, "120 mm:0.01", "120 mm.*frequency"),
+        (LAW + SLIDE, [120, 0.01], "120: .*FREQUENCY:DAMPING"),
+        (LAW + SLIDE, 120, "120: .*FREQUENCY:DAMPING"),
         (LAW + SLIDE, "120 Hz:0.01:0", "no slide of 0"),
         (LAW + SLIDE, [("120 Hz", 0.01, 40.0)], r"structure\.mode\[1\]\.slide.*multiply `slide`"),
         ('[structure]\nmasses = ["1 kg"]\n' + LAW + SLIDE, "9 Hz:0.01", "structure of masses"),

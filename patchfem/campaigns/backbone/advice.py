@@ -3,8 +3,9 @@
 import numpy as np
 
 from ...formatting import format_length, format_quantity
-from .band import Band, forced_mode_ratio, match_amplitudes
+from .band import Band, forced_mode_ratio
 from .joint import Joint
+from .records import ROUND_OFF_ERROR, match_amplitudes
 
 AGREEMENT = 0.02  # Relative difference of the damping below which two methods agree.
 MIN_STATED_LOSS = 0.05  # Fall of the amplitude per cycle from which it is stated.
@@ -12,7 +13,7 @@ MIN_STATED_RATIO = 0.05  # Motion of other modes from which their coupling is st
 PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
-    "decay": "no curve of the steady vibration is known here, and a slow ring-down follows it",
+    "decay": "no curve of the steady vibration is known here; the damping of a ring-down may differ from it",
 }
 
 
@@ -29,6 +30,8 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
         By method, the reason why it has no curve.
     """
     if band is None:
+        if "decay" in missing:
+            return ("No method gives a curve at these amplitudes; give others with --amplitudes.",)
         return ("No method gives a curve here; try --method decay, which neglects nothing.",)
     if joint.is_linear:
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
@@ -42,8 +45,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
         *_describe_coupling(joint, band, curve),
     ]
     for method, reason in missing.items():
-        if method != "decay" or "balance" in missing:
-            sentences.append(f"Method {method} does not hold here: {reason}.")
+        sentences.append(f"Method {method} has no curve here: {reason}.")
     return tuple(sentences)
 
 
@@ -52,8 +54,11 @@ def _describe_width(band: Band, curve) -> str:
     frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
     damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
     k = int(np.argmax(damping))
+    content = "the numerical error"
+    if band.ring_down is not None:
+        content += " and what the other kinds of test read"
     return (
-        f"Its band contains the numerical error and what the other kinds of test read; it is widest at "
+        f"Its band contains {content}; it is widest at "
         f"{format_length(curve.amplitude[k], 3)}, where the damping ratio is {band.damping_low[k]:.3g} to "
         f"{band.damping_high[k]:.3g} beside {curve.damping[k]:.3g}, and the frequency is within "
         f"{100 * frequency.max():.2g} % everywhere."
@@ -66,18 +71,18 @@ def _largest_distance(value, low, high) -> np.ndarray:
 
 
 def _describe_agreement(band: Band, curves: dict) -> list:
-    """Describe up to which amplitude nothing distinguishes the methods."""
+    """Describe up to which amplitude the methods agree but for the numerical error."""
+    if band.ring_down is None:
+        return []
     curve = curves[band.method]
-    distance = _largest_distance(curve.damping, band.damping_low, band.damping_high)
-    beyond = np.flatnonzero(distance > AGREEMENT)
+    distance = np.maximum(band.damping_high - curve.damping, curve.damping - band.damping_low)
+    beyond = np.flatnonzero(distance > AGREEMENT * np.abs(curve.damping) + curve.damping_error)
+    within = f"within {100 * AGREEMENT:g} % of the damping, apart from the numerical error"
     if not beyond.size:
-        return [f"All methods agree within {100 * AGREEMENT:g} % of the damping at all amplitudes."]
+        return [f"All methods agree {within}, at all amplitudes."]
     if not beyond[0]:
         return []
-    edge = format_length(curve.amplitude[beyond[0] - 1], 3)
-    return [
-        f"Up to {edge} all methods agree within {100 * AGREEMENT:g} % of the damping, because the contact hardly slips."
-    ]
+    return [f"Up to {format_length(curve.amplitude[beyond[0] - 1], 3)} all methods agree {within}."]
 
 
 def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
@@ -86,9 +91,9 @@ def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
     if ring_down is None:
         return []
     curve = curves[band.method]
-    is_known = (ring_down.damping > 0) & (curve.damping > 0)
+    is_known = (ring_down.damping > 0) & (curve.damping > curve.damping_error + ROUND_OFF_ERROR)
     if not is_known.any():
-        return ["How a ring-down differs is not known: its motion stops within a cycle."]
+        return ["How the damping of a ring-down differs is not known at these amplitudes."]
     ratio = np.where(is_known, ring_down.damping / curve.damping, 1.0)
     k = int(np.argmax(np.abs(np.log(ratio))))
     if abs(ratio[k] - 1) <= AGREEMENT:
@@ -108,7 +113,8 @@ def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
     because = f": {'; '.join(reasons)}" if reasons else ""
     return [
         f"A ring-down (method decay) reads up to {size} damping, most at {format_length(curve.amplitude[k], 3)}"
-        f"{because}; for a ring-down use the {edge} edge of the band."
+        f"{because}. The band contains it, but its {edge} limit lies farther out; for the curve of a ring-down, "
+        "run --method decay."
     ]
 
 
@@ -122,20 +128,23 @@ def _describe_static_curve(band: Band, curves: dict) -> list:
         return []
     static = curves["quasi-static"].at(there)
     balance = balance.at(here)
-    difference = np.maximum(
-        np.abs(static.damping / balance.damping - 1),
-        np.abs(static.frequency / balance.frequency - 1),
-    )
-    k = int(np.argmax(difference))
-    if difference[k] <= AGREEMENT:
-        return [f"The quasi-static curve holds within {100 * AGREEMENT:g} % at all its amplitudes."]
-    beyond = np.flatnonzero(difference > AGREEMENT)
-    extent = "nowhere within"
-    if beyond[0]:
-        extent = f"up to {format_length(balance.amplitude[beyond[0] - 1], 3)} within"
+    is_beyond = np.zeros(here.size, bool)
+    for name in ("frequency", "damping"):
+        value = getattr(balance, name)
+        errors = getattr(balance, f"{name}_error") + getattr(static, f"{name}_error")
+        limit = AGREEMENT * np.abs(value) + errors + ROUND_OFF_ERROR
+        is_beyond |= np.abs(getattr(static, name) - value) > limit
+    tolerance = f"{100 * AGREEMENT:g} %"
+    if not is_beyond.any():
+        return [f"The quasi-static curve holds within {tolerance} at all its amplitudes."]
+    first = int(np.argmax(is_beyond))
+    if not first:
+        return [
+            f"The quasi-static curve differs by more than {tolerance} from its smallest amplitude on."
+        ]
+    edge = format_length(balance.amplitude[first - 1], 3)
     return [
-        f"The quasi-static curve holds {extent} {100 * AGREEMENT:g} %; beyond, its secant stiffness is higher than that "
-        f"of the motion (by up to {100 * difference[k]:.2g} %, at {format_length(balance.amplitude[k], 3)})."
+        f"The quasi-static curve holds up to {edge} within {tolerance}; the notes give the largest difference."
     ]
 
 
@@ -154,8 +163,13 @@ def _describe_coupling(joint: Joint, band: Band, curve) -> list:
     name = format_quantity(float(nearest), "Hz", 4)
     if max(ratio.max(), change) < MIN_STATED_RATIO:
         return [f"The coupling with the other modes (nearest: {name} without the contact) is weak."]
+    size = f"by up to {100 * ratio.max():.2g} % of its motion"
+    if ratio.max() >= 1:
+        size = "as much as the mode itself"
+    shape = ""
+    if band.ring_down is not None and not joint.is_rigid:
+        shape = f", and a cycle of a ring-down changes its shape by up to {100 * change:.2g} %"
     return [
-        f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes by "
-        f"up to {100 * ratio.max():.2g} % of its motion, and a cycle of a ring-down changes its shape by up to "
-        f"{100 * change:.2g} %, so that the modes exchange energy; a test reads the curve only if it isolates the mode."
+        f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes "
+        f"{size}{shape}, so that the modes exchange energy; a test reads the curve only if it isolates the mode."
     ]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .joint import Joint
-from .records import AMPLITUDE_TOL, Curve
+from .records import ROUND_OFF_ERROR, Curve, match_amplitudes
 from .ring_down import RingDown, predict_ring_down
 
 PREFERRED_METHODS = ("balance", "quasi-static", "decay")  # Order in which a curve is recommended.
@@ -65,15 +65,19 @@ class _Limits:
     def cover_chords(self, value, amplitude) -> None:
         """Widen the limits by the error of linear interpolation between close amplitudes (k,) [m].
 
-        A kink halfway between two points lies off their chord by a quarter of the second difference.
+        A kink halfway between two points lies off their chord by half the distance of a point from the
+        chord of its neighbours.
         No limit leaves the range of the limits at the point and its neighbours: between two points the
         curve is monotonic.
         """
         x = np.log(amplitude)
-        if x.size < 3 or np.diff(x).max() > np.log(MAX_INTERPOLATED_RATIO):
+        if x.size < 3:
             return
+        steps = np.diff(x)
+        chord = (value[:-2] * steps[1:] + value[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
+        is_close = np.maximum(steps[1:], steps[:-1]) <= np.log(MAX_INTERPOLATED_RATIO)
         bend = np.zeros(x.size)
-        bend[1:-1] = np.abs(np.diff(value, 2)) / 4
+        bend[1:-1] = np.where(is_close, np.abs(value[1:-1] - chord) / 2, 0.0)
         bend = _stack_neighbours(bend).max(axis=0)
         lowest = _stack_neighbours(self.low).min(axis=0)
         highest = _stack_neighbours(self.high).max(axis=0)
@@ -135,12 +139,6 @@ def make_band(joint: Joint, curves: dict) -> Band | None:
         damping_high=damping.high,
         ring_down=ring_down,
     )
-
-
-def match_amplitudes(curve: Curve, other: Curve) -> tuple:
-    """Return the indices of the amplitudes that two curves share, in each of them."""
-    distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
-    return np.nonzero(distance < AMPLITUDE_TOL)
 
 
 def _include_curve(frequency: _Limits, damping: _Limits, curve: Curve, other: Curve) -> None:
@@ -207,6 +205,6 @@ def forced_mode_ratio(joint: Joint, curve: Curve) -> np.ndarray:
             participation = np.abs(modes.output[k] / own)
             if row[joint.mode]:
                 participation += np.abs(row[k] / row[joint.mode])
-            distance = np.maximum(np.abs(omega**2 - square), 1e-9 * square)
+            distance = np.maximum(np.abs(omega**2 - square), ROUND_OFF_ERROR * square)
             ratio += participation**2 * 2 * np.abs(curve.damping) * square / distance
     return np.minimum(ratio, 1.0)

@@ -11,7 +11,7 @@ from ...model.model import Model
 from ...model.structure import compute_sticking_stiffness
 from ...runs import joint
 from ...runs.patch import result as patch_result
-from ...scene.backbone_scene import BackboneTables, GivenMode, parse_modes
+from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, parse_modes
 
 # Fraction of the stiffness of a mode that a joint of unknown `slide` is assumed to contribute.
 ASSUMED_JOINT_FRACTION = 0.1
@@ -51,6 +51,11 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
         used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
         model = joint.remove_joint(build(BackboneTables(used_modes)), patch)
     notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
+    if tables.assumes_mass and not tables.is_assumed:
+        notes += (
+            f"the modal mass is assumed to be {ASSUMED_MASS}, so the effect of a given `slide` on frequency and "
+            "damping holds for this mass only; give yours as structure.moving_mass",
+        )
     if any(mode.slide is None for mode in given_modes):
         notes += _note_slides(len(given_modes), stiffness)
     return PreparedModel(model, notes)
@@ -70,9 +75,7 @@ def _find_sticking_stiffness(model: Model) -> StickingContact:
         return StickingContact(None, None)
     if model.patch is not None:
         patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
-        stiffness = 0.0
-        if patch.pressure.load > 0:
-            stiffness = joint.patch_stiffness(model, patch)
+        stiffness = joint.patch_stiffness(model, patch)
         is_elastic = 0 < stiffness < np.inf
         return StickingContact(patch, stiffness if is_elastic else None)
     try:
@@ -136,10 +139,12 @@ def _note_slides(n_modes: int, stiffness: float | None) -> tuple:
     stiffness: of the sticking contact [N/m], or None if it is rigid.
     """
     if stiffness is None:
-        return ("`slide` is 1 for every mode: the contact moves as far as the output",)
+        return (
+            "`slide` is assumed to be 1 for each mode given without it: the contact moves as far as the output",
+        )
     return (
-        f"`slide` is assumed such that the sticking joint, of {format_quantity(stiffness, 'N/m', 3)}, "
-        f"contributes {100 * _assumed_fraction(n_modes):.3g} % of the stiffness of each mode; the "
-        "frequencies without the contact and the damping depend on it: give the motion of the contact "
-        "per motion of the output as a third number, as 120 Hz:0.01:0.02",
+        f"for each mode given without it, `slide` is assumed such that the sticking joint, of "
+        f"{format_quantity(stiffness, 'N/m', 3)}, contributes {100 * _assumed_fraction(n_modes):.3g} % of the "
+        "stiffness of the mode; the frequencies without the contact, the damping and the amplitude of slip depend on "
+        "it: give the motion of the contact per motion of the output as a third number, as 120 Hz:0.01:0.02",
     )

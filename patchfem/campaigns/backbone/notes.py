@@ -6,7 +6,7 @@ from ...formatting import format_length
 from ...model.model import Model
 from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
-from .records import Curve
+from .records import Curve, match_amplitudes
 
 # Largest amplitude of micro-slip over the amplitude at which the complete contact begins to slip.
 MAX_MICRO_SLIP_RATIO = 0.3
@@ -135,9 +135,7 @@ def note_differences(curves: dict) -> list:
     for method, reason in REASONS_OF_DIFFERENCES.items():
         if method not in curves:
             continue
-        _, here, there = np.intersect1d(
-            curves[method].amplitude, balance.amplitude, return_indices=True
-        )
+        here, there = match_amplitudes(curves[method], balance)
         curve = curves[method].at(here)
         other = balance.at(there)
         for name in ("frequency", "damping"):

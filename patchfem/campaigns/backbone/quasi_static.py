@@ -1,4 +1,4 @@
-"""Backbone of a mode from a static force with the shape of the stuck mode."""
+"""Quasi-static backbone of a mode, from the friction loops of its own deflection."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ MIN_FLOOR = 1e-10  # Smallest relative error of a friction loop on a bench.
 
 
 def compute_static_curve(joint: Joint, amplitudes) -> Curve:
-    """Compute the backbone of a mode from loops under a static modal force.
+    """Compute the quasi-static backbone of a mode from the loops of its contact.
 
     Loops of laws without a closed form are computed on a bench.
     """
@@ -66,7 +66,7 @@ def _select_rising_part(best, error) -> Curve:
     count = rises.size if rises.all() else int(np.argmin(rises))
     if not count:
         raise NotConverged(
-            "no static force with the shape of the mode holds the rig in equilibrium at these "
+            "no inertia force of the mode holds the rig in equilibrium at these "
             "amplitudes; use --method balance"
         )
     return make_curve(best[0], best[1:], error[1:]).at(slice(count))

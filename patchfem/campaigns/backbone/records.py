@@ -41,7 +41,7 @@ class Curve(NamedTuple):
     other_modes: np.ndarray | None = None
 
     def at(self, points) -> "Curve":
-        """Return the points of the curve selected by bools (k,) or by a slice."""
+        """Return the points of the curve selected by bools (k,), indices or a slice."""
         columns = {name: getattr(self, name)[points] for name in COLUMNS}
         if self.other_modes is not None:
             columns["other_modes"] = self.other_modes[points]
@@ -51,6 +51,12 @@ class Curve(NamedTuple):
         """Interpolate frequency and damping at given amplitudes (k,) [m], by name."""
         names = ("frequency", "damping")
         return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
+
+
+def match_amplitudes(curve: Curve, other: Curve) -> tuple:
+    """Return the indices of the amplitudes that two curves share, in each of them."""
+    distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
+    return np.nonzero(distance < AMPLITUDE_TOL)
 
 
 def make_curve(amplitude, values, errors, **columns) -> Curve:

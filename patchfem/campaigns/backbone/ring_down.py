@@ -146,11 +146,15 @@ def _measure_motion(joint: Joint, motion) -> np.ndarray | None:
     modes = joint.modes
     order = np.arange(motion.modal.shape[0])
     tip = motion.modal.real.sum(axis=0)
-    work = (np.conj(motion.slides) * motion.forces).imag
-    areas = np.pi * np.sum(order * work, axis=1)
-    tip_slides = motion.slides.real.sum(axis=1)
-    tip_forces = motion.forces.real.sum(axis=1)
-    stored = np.maximum(0.5 * tip_slides * tip_forces - areas / 8, 0.0).sum()
+    # The cubic spring is the last row. It is elastic and not linear, so Masing's rule does not hold for it.
+    cubic = joint.model.rig.springs.cubic
+    n_friction = len(motion.slides) - (cubic is not None)
+    slides = motion.slides[:n_friction]
+    forces = motion.forces[:n_friction]
+    areas = np.pi * np.sum(order * (np.conj(slides) * forces).imag, axis=1)
+    work = 0.5 * slides.real.sum(axis=1) * forces.real.sum(axis=1)
+    stored = np.maximum(work - areas / 8, 0.0).sum()
+    stored += (cubic or 0.0) * float(tip @ modes.output) ** 4 / 4
     energy = 0.5 * modes.mass * np.sum((modes.omega * tip) ** 2) + stored
     squares = np.sum(np.abs(motion.modal) ** 2, axis=1)
     # 4 times the mean kinetic energy

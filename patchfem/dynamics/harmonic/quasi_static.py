@@ -41,7 +41,7 @@ class StaticLoops(NamedTuple):
 class StaticMotion(NamedTuple):
     """Quasi-static motion of a mode with its frequency and damping ratio.
 
-    - amplitude: amplitude of the motion along the shape of the stuck mode [m]
+    - amplitude: amplitude of the motion along the shape of the given mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
     - z: (n,) modal coordinates at the reversal [m]
     - loss: friction loss per cycle [J]

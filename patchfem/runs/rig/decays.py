@@ -153,7 +153,7 @@ def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> 
         Modal basis.
     laws : LawGroup
     number : int
-        Index of the mode, along which the static force acts.
+        Index of the mode.
     amplitudes : (k,)
         Amplitudes of the output [m].
     samples : int
