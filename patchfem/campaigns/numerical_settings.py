@@ -72,11 +72,9 @@ def list_settings(model: Model, knob: str) -> list:
         return _list_integer_values(model, knob)
     if model.patch.mesh.file is not None:
         return _split_meshes(model)
-    return (
-        _list_tolerance_meshes(model)
-        if model.patch.mesh.is_automatic
-        else _list_uniform_meshes(model)
-    )
+    if model.patch.mesh.is_automatic:
+        return _list_tolerance_meshes(model)
+    return _list_uniform_meshes(model)
 
 
 def _split_meshes(model: Model) -> list:

@@ -170,11 +170,9 @@ def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
 
 def mean_half_range(reversals) -> float:
     """Return half the range of the displacement [m], averaged over the cycles."""
-    return (
-        float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
-        if reversals
-        else 0.0
-    )
+    if not reversals:
+        return 0.0
+    return float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
 
 
 def secant_stiffness(reversals) -> float | None:

@@ -253,11 +253,9 @@ def _predict_cost(model: Model) -> Cost:
 
     The memory parts are ordered from the largest to the smallest.
     """
-    pressing = (
-        patch_plan.predict_cost(model)
-        if model.patch is not None or model.has_interface_patches
-        else Cost()
-    )
+    pressing = Cost()
+    if model.patch is not None or model.has_interface_patches:
+        pressing = patch_plan.predict_cost(model)
     points = pressing.sizes.get("interface_points", 1)
     motion = Cost()
     if model.rig is not None:

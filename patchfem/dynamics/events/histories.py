@@ -798,11 +798,9 @@ class _EventRun:
             and self.modal_system.interfaces[0, 0] != 0
             and not self.has_rigid
         )
-        ring = (
-            find_stick_vibration(self.modal_system, self.table, reading)
-            if has_closed_form
-            else None
-        )
+        ring = None
+        if has_closed_form:
+            ring = find_stick_vibration(self.modal_system, self.table, reading)
         end = (
             InitialState(*self.motion.copy()),
             type(self.memory)(*(part.copy() for part in self.memory)),

@@ -462,11 +462,9 @@ class FlowNodes(NamedTuple):
             + np.where(np.arange(self.z.size) < nodes[:, None], log_decay[-1], 0.0)
         )
         cycle_loss = -np.expm1(log_decay[-1])
-        return (
-            np.exp(log_remainder) / cycle_loss
-            if cycle_loss > 1e-12
-            else np.zeros_like(log_remainder)
-        )
+        if not cycle_loss > 1e-12:
+            return np.zeros_like(log_remainder)
+        return np.exp(log_remainder) / cycle_loss
 
     def find_cell_factors(self) -> tuple:
         """Return the decay factor (N,) of the stretch per cell and its derivative by the slide."""

@@ -218,11 +218,10 @@ def find_point(
     if harmonics is not None:
         return _solve_harmonics(modes, drive, group, harmonics, x, 1, near=min_samples)
     motion = None
-    min_count = (
-        start.harmonics
-        if isinstance(start, SteadyMotion)
-        else _estimate_min_harmonics(modes, drive, group)
-    )
+    if isinstance(start, SteadyMotion):
+        min_count = start.harmonics
+    else:
+        min_count = _estimate_min_harmonics(modes, drive, group)
     for h in [h for h in HARMONIC_COUNTS if h >= min_count] or HARMONIC_COUNTS[-1:]:
         try:
             motion = _solve_harmonics(
@@ -259,11 +258,9 @@ def _estimate_min_harmonics(modes, drive, group) -> float:
 
 
 def _next_harmonic_count(h: int) -> int:
-    return (
-        HARMONIC_COUNTS[min(HARMONIC_COUNTS.index(h) + 1, len(HARMONIC_COUNTS) - 1)]
-        if h in HARMONIC_COUNTS
-        else 2 * h + 1
-    )
+    if h not in HARMONIC_COUNTS:
+        return 2 * h + 1
+    return HARMONIC_COUNTS[min(HARMONIC_COUNTS.index(h) + 1, len(HARMONIC_COUNTS) - 1)]
 
 
 def change_harmonic_count(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
@@ -317,11 +314,9 @@ def refine_point(motion: SteadyMotion, modes, drive) -> SteadyMotion:
         n_harmonics // h,
         DEFAULT_TOLERANCE,
     )
-    return (
-        refined
-        if np.isfinite(refined.error)
-        else _solve_harmonics(modes, drive, balance.contact, n_harmonics, x, 1)
-    )
+    if np.isfinite(refined.error):
+        return refined
+    return _solve_harmonics(modes, drive, balance.contact, n_harmonics, x, 1)
 
 
 def _solve_harmonics(
@@ -610,11 +605,9 @@ def _make_steady_motion(
     left = 0.0
     if n_harmonics > h:
         # error of the unfinished sweeps, and of the harmonics above `top`, which decrease like k^-5/2
-        ratio = (
-            min((changes[-2] / changes[1]) ** (1 / max(len(changes) - 3, 1)), 0.9)
-            if len(changes) > 3
-            else 0.9
-        )
+        ratio = 0.9
+        if len(changes) > 3:
+            ratio = min((changes[-2] / changes[1]) ** (1 / (len(changes) - 3)), ratio)
         left = changes[-2] * ratio / (1 - ratio)
         error = 2 * (changes[-1] + left + max(changes) * (h / n_harmonics) ** 2.5)
     size = max(size, 1e-300)

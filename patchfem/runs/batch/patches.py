@@ -42,11 +42,9 @@ class _NodePositions(NamedTuple):
 
 def refuses(model: Model) -> str:
     """Return the reason why a static patch cannot be solved in a batch with others, or ""."""
-    return (
-        static_batch.reason_not_batched(model.patch)
-        if model.kind == "patch"
-        else "the case is no static patch"
-    )
+    if model.kind != "patch":
+        return "the case is no static patch"
+    return static_batch.reason_not_batched(model.patch)
 
 
 def group(model: Model) -> Hashable:

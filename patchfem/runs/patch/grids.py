@@ -379,11 +379,9 @@ def _pressure_peaks(x, sigma) -> tuple:
     increase = np.diff(sigma) / np.diff(x)
     bend = -2 * np.diff(increase)[peak_node] / (x[peak_node + 2] - x[peak_node])
     half_width = np.sqrt(2 * sigma[peak_node + 1] / bend)
-    return (
-        tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
-        if peak_node.size <= MAX_CONTACT_ENDS
-        else ()
-    )
+    if peak_node.size > MAX_CONTACT_ENDS:
+        return ()
+    return tuple(zip(x[peak_node + 1].tolist(), half_width.tolist()))
 
 
 def make_grids(patch_model, layout: Layout) -> list:

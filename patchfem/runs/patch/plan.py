@@ -110,20 +110,14 @@ def predict_cost(model: Model) -> Cost:
     Equal patches of interfaces are pressed once.
     """
     tolerance = model.accuracy.tolerance
-    total_cost = (
-        Cost()
-        if model.patch is None
-        else pressing_cost(model.patch, model.patch.mesh.tolerance or tolerance)
-    )
-    interface_patches = (
-        {}
-        if model.rig is None
-        else {
-            store.content_key(interface.patch): interface.patch
-            for interface in model.rig.friction.interfaces
-            if interface.patch is not None
-        }
-    )
+    total_cost = Cost()
+    if model.patch is not None:
+        total_cost = pressing_cost(model.patch, model.patch.mesh.tolerance or tolerance)
+    interface_patches = {}
+    if model.rig is not None:
+        for interface in model.rig.friction.interfaces:
+            if interface.patch is not None:
+                interface_patches[store.content_key(interface.patch)] = interface.patch
     for patch in interface_patches.values():
         total_cost += pressing_cost(patch, tolerance)
     patches = [*interface_patches.values()] if model.patch is None else [model.patch]
@@ -245,11 +239,9 @@ def assembly_sentence(patch_model) -> str:
             "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
             "piece is a tensor grid, from the matrices of three reference cells"
         )
-    return (
-        "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
-        if patch_model.pieces.has_overhang
-        else "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
-    )
+    if patch_model.pieces.has_overhang:
+        return "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
+    return "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
 
 
 def write_verdict(dimensionless_groups: dict, patch_model) -> list:
@@ -257,15 +249,11 @@ def write_verdict(dimensionless_groups: dict, patch_model) -> list:
 
     The tilt group determines the extent of the contact of flat pieces only.
     """
-    rough = (
-        []
-        if patch_model.interface.skin is None
-        else skin.note_on_peak_stiffness(
-            patch_model,
-            patch_model.nominal_load
-            / (patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs),
-        )
-    )
+    rough = []
+    if patch_model.interface.skin is not None:
+        pieces = patch_model.pieces
+        mean_pressure = patch_model.nominal_load / (pieces.length * pieces.width * pieces.pairs)
+        rough = skin.note_on_peak_stiffness(patch_model, mean_pressure)
     return [
         *_tilt_sentence(dimensionless_groups, patch_model),
         *rough,
