@@ -59,255 +59,277 @@ class MaterialRecord(NamedTuple):
 
 MATERIALS: dict[str, MaterialRecord] = {
     "Ti-8Al-1Mo-1V": MaterialRecord(
-        121e9,
-        0.32,
-        4370.0,
-        "Handbook values of the mill-annealed near-alpha alloy at 20 degC.",
-        ("Ti-8-1-1",),
-        YieldStrength(
+        young=121e9,
+        poisson=0.32,
+        density=4370.0,
+        source="Handbook values of the mill-annealed near-alpha alloy at 20 degC.",
+        other_names=("Ti-8-1-1",),
+        strength=YieldStrength(
             930e6,
             "MatWeb MTA816: value after annealing for 8 h at 790 degC; the specified minimum "
             "is 828 MPa.",
         ),
-        ThermalProperties(
-            7.0,
-            526.0,
-            "Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K.",
+        heat=ThermalProperties(
+            conductivity=7.0,
+            heat_capacity=526.0,
+            source="Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K.",
         ),
     ),
     "WC-Co": MaterialRecord(
-        250e9,
-        0.24,
-        14500.0,
-        "Assumed value for a sprayed coating: pores and splat boundaries reduce Young's modulus "
+        young=250e9,
+        poisson=0.24,
+        density=14500.0,
+        source="Assumed value for a sprayed coating: pores and splat boundaries reduce Young's modulus "
         "from 600 GPa (sintered) to 200-350 GPa.",
     ),
     "WC-Co sintered": MaterialRecord(
-        600e9, 0.22, 14900.0, "Handbook values of the dense cermet with about 6 % cobalt."
+        young=600e9,
+        poisson=0.22,
+        density=14900.0,
+        source="Handbook values of the dense cermet with about 6 % cobalt.",
     ),
     "steel": MaterialRecord(
-        210e9,
-        0.30,
-        7850.0,
-        "Handbook values of plain carbon steel at 20 degC.",
-        ("carbon steel", "S235", "S235JR", "1.0038"),
-        YieldStrength(
+        young=210e9,
+        poisson=0.30,
+        density=7850.0,
+        source="Handbook values of plain carbon steel at 20 degC.",
+        other_names=("carbon steel", "S235", "S235JR", "1.0038"),
+        strength=YieldStrength(
             235e6,
             "EN 10025-2: minimum yield strength of S235 (up to 16 mm thick), the common grade with "
             "the lowest strength.",
         ),
-        ThermalProperties(50.0, 490.0, "Handbook values of plain carbon steel."),
+        heat=ThermalProperties(
+            conductivity=50.0, heat_capacity=490.0, source="Handbook values of plain carbon steel."
+        ),
     ),
     "stainless steel": MaterialRecord(
-        193e9,
-        0.29,
-        8000.0,
-        "Handbook values of austenitic steel 304 at 20 degC.",
-        ("304", "AISI 304", "1.4301", "X5CrNi18-10"),
-        YieldStrength(
+        young=193e9,
+        poisson=0.29,
+        density=8000.0,
+        source="Handbook values of austenitic steel 304 at 20 degC.",
+        other_names=("304", "AISI 304", "1.4301", "X5CrNi18-10"),
+        strength=YieldStrength(
             205e6, "ASTM A240: minimum yield strength of annealed 304; a typical value is 310 MPa."
         ),
     ),
     "cast iron": MaterialRecord(
-        110e9,
-        0.26,
-        7200.0,
-        "Handbook values of grey cast iron; Young's modulus is near the middle "
+        young=110e9,
+        poisson=0.26,
+        density=7200.0,
+        source="Handbook values of grey cast iron; Young's modulus is near the middle "
         "of the range 66-140 GPa of the grades.",
-        ("grey cast iron", "gray cast iron"),
+        other_names=("grey cast iron", "gray cast iron"),
     ),
     "aluminium": MaterialRecord(
-        69e9,
-        0.33,
-        2700.0,
-        "Handbook values of alloy 6061 at 20 degC.",
-        ("aluminum", "6061", "6061-T6", "Al 6061", "Al 6061-T6", "EN AW-6061"),
-        YieldStrength(240e6, "ASTM B209: minimum yield strength of 6061-T6."),
+        young=69e9,
+        poisson=0.33,
+        density=2700.0,
+        source="Handbook values of alloy 6061 at 20 degC.",
+        other_names=("aluminum", "6061", "6061-T6", "Al 6061", "Al 6061-T6", "EN AW-6061"),
+        strength=YieldStrength(240e6, "ASTM B209: minimum yield strength of 6061-T6."),
     ),
     "bronze": MaterialRecord(
-        110e9,
-        0.34,
-        8800.0,
-        "Handbook values of tin bronze; Young's modulus is about 100-115 GPa, "
+        young=110e9,
+        poisson=0.34,
+        density=8800.0,
+        source="Handbook values of tin bronze; Young's modulus is about 100-115 GPa, "
         "depending on the alloy.",
-        ("tin bronze",),
+        other_names=("tin bronze",),
     ),
     "alumina": MaterialRecord(
-        370e9,
-        0.22,
-        3900.0,
-        "Handbook values of dense sintered ceramic with 99.5 % Al2O3.",
-        ("Al2O3", "aluminium oxide", "aluminum oxide"),
+        young=370e9,
+        poisson=0.22,
+        density=3900.0,
+        source="Handbook values of dense sintered ceramic with 99.5 % Al2O3.",
+        other_names=("Al2O3", "aluminium oxide", "aluminum oxide"),
     ),
     "PTFE": MaterialRecord(
-        0.5e9,
-        0.46,
-        2200.0,
-        "Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
+        young=0.5e9,
+        poisson=0.46,
+        density=2200.0,
+        source="Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
         "0.4-0.6 GPa; this material creeps.",
-        ("Teflon",),
+        other_names=("Teflon",),
     ),
     "Ti-6Al-4V": MaterialRecord(
-        114e9,
-        0.31,
-        4430.0,
-        "Data sheets of annealed grade 5 (AMS 4928); MIL-HDBK-5J, table 5.4.1.0, gives 110 GPa "
+        young=114e9,
+        poisson=0.31,
+        density=4430.0,
+        source="Data sheets of annealed grade 5 (AMS 4928); MIL-HDBK-5J, table 5.4.1.0, gives 110 GPa "
         "for sheet and 117 GPa for bar.",
-        ("Ti64", "Ti grade 5", "titanium grade 5", "3.7165", "3.7164", "TA6V"),
-        YieldStrength(
+        other_names=("Ti64", "Ti grade 5", "titanium grade 5", "3.7165", "3.7164", "TA6V"),
+        strength=YieldStrength(
             828e6, "AMS 4928 and ASTM B348: minimum of annealed bar; a typical value is 910 MPa."
         ),
     ),
     "Inconel 718": MaterialRecord(
-        200e9,
-        0.29,
-        8190.0,
-        "Special Metals, publication SMC-045 (2007), tables 2 and 3: 29.0e6 psi and 0.296 lb/in3 "
+        young=200e9,
+        poisson=0.29,
+        density=8190.0,
+        source="Special Metals, publication SMC-045 (2007), tables 2 and 3: 29.0e6 psi and 0.296 lb/in3 "
         "at 21 degC.",
-        ("IN718", "718", "alloy 718", "UNS N07718", "2.4668", "NiCr19Fe19Nb5Mo3"),
-        YieldStrength(
+        other_names=("IN718", "718", "alloy 718", "UNS N07718", "2.4668", "NiCr19Fe19Nb5Mo3"),
+        strength=YieldStrength(
             1034e6,
             "AMS 5662 and AMS 5663: minimum of bar that is solution annealed and aged.",
         ),
     ),
     "316L": MaterialRecord(
-        200e9,
-        0.30,
-        8000.0,
-        "EN 10088-1, 1.4404: Young's modulus and density at 20 degC; EN 1993-1-4: Poisson's "
+        young=200e9,
+        poisson=0.30,
+        density=8000.0,
+        source="EN 10088-1, 1.4404: Young's modulus and density at 20 degC; EN 1993-1-4: Poisson's "
         "ratio. American handbooks give 193 GPa.",
-        ("AISI 316L", "SS 316L", "stainless steel 316L", "1.4404", "X2CrNiMo17-12-2", "UNS S31603"),
-        YieldStrength(
+        other_names=(
+            "AISI 316L",
+            "SS 316L",
+            "stainless steel 316L",
+            "1.4404",
+            "X2CrNiMo17-12-2",
+            "UNS S31603",
+        ),
+        strength=YieldStrength(
             170e6,
             "ASTM A240: minimum of annealed 316L; EN 10088-2 asks for 220 to 240 MPa of 1.4404.",
         ),
     ),
     "17-4PH": MaterialRecord(
-        196e9,
-        0.27,
-        7800.0,
-        "MMPDS-04, section 2.6.9: 28.5e6 psi, and 0.282 lb/in3 in condition H900; the other conditions "
+        young=196e9,
+        poisson=0.27,
+        density=7800.0,
+        source="MMPDS-04, section 2.6.9: 28.5e6 psi, and 0.282 lb/in3 in condition H900; the other conditions "
         "differ by less than 1 %.",
-        ("AISI 630", "630", "1.4542", "X5CrNiCuNb16-4", "UNS S17400"),
-        YieldStrength(
+        other_names=("AISI 630", "630", "1.4542", "X5CrNiCuNb16-4", "UNS S17400"),
+        strength=YieldStrength(
             725e6,
             "ASTM A564, type 630: minimum in condition H1150; H1150-M has 520 MPa, H1025 1000 MPa "
             "and H900 1170 MPa.",
         ),
     ),
     "42CrMo4": MaterialRecord(
-        200e9,
-        0.32,
-        7830.0,
-        "MIL-HDBK-5J, section 2.3.1, low-alloy steels such as AISI 4140: 29.0e6 psi and "
+        young=200e9,
+        poisson=0.32,
+        density=7830.0,
+        source="MIL-HDBK-5J, section 2.3.1, low-alloy steels such as AISI 4140: 29.0e6 psi and "
         "0.283 lb/in3; European data sheets give 190 to 210 GPa.",
-        ("4140", "AISI 4140", "SAE 4140", "1.7225", "42CrMoS4", "SCM440"),
-        YieldStrength(
+        other_names=("4140", "AISI 4140", "SAE 4140", "1.7225", "42CrMoS4", "SCM440"),
+        strength=YieldStrength(
             650e6,
             "EN 10083-3, quenched and tempered: minimum at a diameter of 40 to 100 mm; it is "
             "900 MPa up to 16 mm and 500 MPa up to 250 mm.",
         ),
     ),
     "100Cr6": MaterialRecord(
-        210e9,
-        0.30,
-        7810.0,
-        "Data of rolling bearing makers for hardened steel of ISO 683-17; data sheets of "
+        young=210e9,
+        poisson=0.30,
+        density=7810.0,
+        source="Data of rolling bearing makers for hardened steel of ISO 683-17; data sheets of "
         "AISI 52100 give 190 to 210 GPa and 0.27 to 0.30.",
-        ("52100", "AISI 52100", "SAE 52100", "1.3505", "SUJ2", "bearing steel"),
-        YieldStrength(
+        other_names=("52100", "AISI 52100", "SAE 52100", "1.3505", "SUJ2", "bearing steel"),
+        strength=YieldStrength(
             2030e6,
             "Data sheets of AISI 52100 balls, hardened to 60 HRC: 295 ksi; soft annealed steel has "
             "350 to 590 MPa.",
         ),
     ),
     "Al 7075-T6": MaterialRecord(
-        71e9,
-        0.33,
-        2800.0,
-        "MIL-HDBK-5J, section 3.7: 10.3e6 psi and 0.101 lb/in3.",
-        ("7075", "7075-T6", "7075-T651", "Al 7075", "EN AW-7075", "AA 7075", "3.4365"),
-        YieldStrength(
+        young=71e9,
+        poisson=0.33,
+        density=2800.0,
+        source="MIL-HDBK-5J, section 3.7: 10.3e6 psi and 0.101 lb/in3.",
+        other_names=("7075", "7075-T6", "7075-T651", "Al 7075", "EN AW-7075", "AA 7075", "3.4365"),
+        strength=YieldStrength(
             460e6,
             "EN 485-2: minimum of plates of 6 to 12.5 mm; thick plates have less; a typical value "
             "is 503 MPa.",
         ),
     ),
     "Al 6082-T6": MaterialRecord(
-        70e9,
-        0.30,
-        2700.0,
-        "EN 1999-1-1, section 3.2.5: design values of structural aluminium.",
-        ("6082", "6082-T6", "6082-T651", "Al 6082", "EN AW-6082", "AA 6082", "3.2315"),
-        YieldStrength(
+        young=70e9,
+        poisson=0.30,
+        density=2700.0,
+        source="EN 1999-1-1, section 3.2.5: design values of structural aluminium.",
+        other_names=("6082", "6082-T6", "6082-T651", "Al 6082", "EN AW-6082", "AA 6082", "3.2315"),
+        strength=YieldStrength(
             240e6, "EN 485-2: minimum of plates of 12.5 to 100 mm; sheets up to 6 mm have 260 MPa."
         ),
     ),
     "CuZn39Pb3": MaterialRecord(
-        97e9,
-        0.31,
-        8470.0,
-        "Data sheets of CW614N; Poisson's ratio is that of C36000, a similar brass. Brasses have 95 to 110 GPa.",
-        ("brass", "free-cutting brass", "CW614N", "CZ121", "C38500"),
-        YieldStrength(
+        young=97e9,
+        poisson=0.31,
+        density=8470.0,
+        source="Data sheets of CW614N; Poisson's ratio is that of C36000, a similar brass. Brasses have 95 to 110 GPa.",
+        other_names=("brass", "free-cutting brass", "CW614N", "CZ121", "C38500"),
+        strength=YieldStrength(
             220e6,
             "EN 12167: lowest proof strength of drawn bar of 3 to 20 mm; brass as extruded may "
             "have 110 MPa.",
         ),
     ),
     "CuBe": MaterialRecord(
-        131e9,
-        0.30,
-        8360.0,
-        "Materion, Guide to High Performance Alloys, alloy 25 after age hardening: 19e6 psi and "
+        young=131e9,
+        poisson=0.30,
+        density=8360.0,
+        source="Materion, Guide to High Performance Alloys, alloy 25 after age hardening: 19e6 psi and "
         "0.302 lb/in3.",
-        ("C17200", "CuBe2", "alloy 25", "beryllium copper", "copper beryllium", "BeCu", "CW101C"),
-        YieldStrength(
+        other_names=(
+            "C17200",
+            "CuBe2",
+            "alloy 25",
+            "beryllium copper",
+            "copper beryllium",
+            "BeCu",
+            "CW101C",
+        ),
+        strength=YieldStrength(
             960e6,
             "Materion, alloy 25 strip in temper TF00 (age hardened without cold work): minimum; "
             "solution annealed strip has about 200 MPa.",
         ),
     ),
     "silicon nitride": MaterialRecord(
-        310e9,
-        0.27,
-        3200.0,
-        "SKF, materials of super-precision bearings: Young's modulus and density of dense balls; makers "
+        young=310e9,
+        poisson=0.27,
+        density=3200.0,
+        source="SKF, materials of super-precision bearings: Young's modulus and density of dense balls; makers "
         "give 300 to 320 GPa. Poisson's ratio: middle of the makers' values, 0.25 to 0.29.",
-        ("Si3N4",),
+        other_names=("Si3N4",),
     ),
     "PEEK": MaterialRecord(
-        4.0e9,
-        0.40,
-        1300.0,
-        "Victrex PEEK 450G, data sheet (ISO 527, 23 degC); older editions give 3.5 to 3.7 GPa; "
+        young=4.0e9,
+        poisson=0.40,
+        density=1300.0,
+        source="Victrex PEEK 450G, data sheet (ISO 527, 23 degC); older editions give 3.5 to 3.7 GPa; "
         "this material creeps.",
-        ("PEEK 450G", "Victrex PEEK"),
-        YieldStrength(98e6, "Victrex PEEK 450G, data sheet: tensile strength at yield, ISO 527."),
+        other_names=("PEEK 450G", "Victrex PEEK"),
+        strength=YieldStrength(
+            98e6, "Victrex PEEK 450G, data sheet: tensile strength at yield, ISO 527."
+        ),
     ),
     "DLC": MaterialRecord(
-        259e9,
-        0.25,
-        2070.0,
-        "Nature Communications (2021), doi 10.1038/s41467-021-24766-6, table 1: a-C:H with 20 % "
+        young=259e9,
+        poisson=0.25,
+        density=2070.0,
+        source="Nature Communications (2021), doi 10.1038/s41467-021-24766-6, table 1: a-C:H with 20 % "
         "hydrogen; there ta-C has 490 to 630 GPa; softer a-C:H has 100 GPa. Poisson's ratio assumed.",
-        ("a-C:H", "diamond-like carbon"),
+        other_names=("a-C:H", "diamond-like carbon"),
     ),
     "Cr": MaterialRecord(
-        235e9,
-        0.21,
-        7150.0,
-        "Assumed value for electroplated hard chromium, between 191 GPa (Coatings 12 (2022) 354, "
+        young=235e9,
+        poisson=0.21,
+        density=7150.0,
+        source="Assumed value for electroplated hard chromium, between 191 GPa (Coatings 12 (2022) 354, "
         "trivalent bath) and 279 GPa of the dense metal, whose density and Poisson's ratio are used.",
-        ("chromium", "hard chromium", "hard chrome", "chrome"),
+        other_names=("chromium", "hard chromium", "hard chrome", "chrome"),
     ),
     "TiN": MaterialRecord(
-        450e9,
-        0.25,
-        5210.0,
-        "Assumed value for a dense PVD coating; reported values of Young's modulus are 250 to "
+        young=450e9,
+        poisson=0.25,
+        density=5210.0,
+        source="Assumed value for a dense PVD coating; reported values of Young's modulus are 250 to "
         "590 GPa. Density: CRC Handbook. The case of the name counts: tin is another material.",
-        ("titanium nitride",),
+        other_names=("titanium nitride",),
     ),
 }
 
