@@ -47,6 +47,20 @@ PAGES = (
 )
 
 
+def test_citation_changes_commands_and_files_give_the_version_of_the_package(tmp_path):
+    """The citation file, the newest entry of the changes, `--version`, `doctor`, a summary and a page agree."""
+    citation = (ROOT / "CITATION.cff").read_text()
+    changes = (ROOT / "patchfem" / "CHANGES.md").read_text()
+    released = re.search(r"^date-released: (\S+)$", citation, re.M).group(1)
+    assert re.search(r"^version: (\S+)$", citation, re.M).group(1) == pf.__version__
+    assert re.search(r"^## (.+?):", changes, re.M).group(1) == f"{pf.__version__} ({released})"
+    assert cli("--version").out.strip() == pf.__version__
+    assert re.search(rf"patchfem +{re.escape(pf.__version__)}\n", cli("doctor").out)
+    pf.run(pf.new("bench")).save(tmp_path)
+    assert json.loads((tmp_path / "summary.json").read_text())["patchfem"] == pf.__version__
+    assert f"patchfem {pf.__version__}" in (tmp_path / "report.html").read_text()
+
+
 @pytest.mark.skipif(not (ROOT / ".git").exists() or shutil.which("git") is None, reason="no clone")
 def test_always_the_top_level_holds_what_it_should():
     """No file that a program left there is committed."""
