@@ -694,20 +694,16 @@ def compute_measures(last_cycles: LastCycles) -> dict:
     interface, with its number after the name. A value of the engine replaces the one computed from
     samples.
     """
-    out = {row.name: _compute_value(row, last_cycles) for row in ROWS}
+    out = {}
+    for row in ROWS:
+        if row.name in last_cycles.known:
+            out[row.name] = last_cycles.known[row.name]
+        elif row.function is not None and (last_cycles.run is not None or not row.needs_run):
+            out[row.name] = row.function(last_cycles)
     for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:
             out[add_interface_number(name, number)] = TABLE[name].function(interface)
     return {name: value for name, value in (out | last_cycles.known).items() if value is not None}
-
-
-def _compute_value(row: MeasureDefinition, last_cycles: LastCycles) -> float | None:
-    """Compute the value of a measure; None if the run has no value or lacks histories."""
-    if row.name in last_cycles.known:
-        return last_cycles.known[row.name]
-    if row.function is None or (row.needs_run and last_cycles.run is None):
-        return None
-    return row.function(last_cycles)
 
 
 def stick_fraction(stuck, span):

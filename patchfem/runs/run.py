@@ -24,7 +24,7 @@ from .patch import faces, strength
 from .patch import result as patch_result
 from .plan import Plan, compiled_kind, plan, refuse_large_run
 from .results.patch_rows import find_unknown_measures
-from .results.result import Result, RunInputs, add_meanings, shorten_file_names
+from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
 from .self_checks.checks import mark_failed_checks
 from .wear import evolve, measures
@@ -145,7 +145,12 @@ def _run_plan(
             inputs = _worn_inputs(inputs, evolved)
         try:
             with _saving_context(kept, what, meshes.patch):
-                result = _run_kind(inputs)
+                if what.kind == "patch":
+                    result = patch_result.make_static_result(inputs)
+                elif what.kind == "bench":
+                    result = bench_result.run_prescribed(inputs)
+                else:
+                    result = rig.run_coupled(inputs)
         except NotConverged as error:
             if meshes.patch is not None and what.kind != "patch":
                 at_rest = patch_result.make_static_result(
@@ -192,24 +197,6 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
             f"error; {remedy}"
         )
     return warnings
-
-
-def _run_kind(inputs: RunInputs) -> Result:
-    """Run a plan with the function for its kind of scene (patch, bench or rig)."""
-    if inputs.plan.kind == "patch":
-        return patch_result.make_static_result(inputs)
-    if inputs.plan.kind == "bench":
-        return bench_result.run_prescribed(
-            inputs.plan,
-            inputs.patch,
-            inputs.coarse,
-            inputs.seconds,
-            inputs.warnings,
-            inputs.say,
-            inputs.progress,
-            inputs.estimate,
-        )
-    return rig.run_coupled(inputs)
 
 
 def _result_without_load(inputs: RunInputs) -> Result:
@@ -292,11 +279,16 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
     patch = result.patch
     if patch is not None:
         patch = replace(patch, frames=result.fields)
+    # a number after the name of a measure counts the strips of a patch, or else the interfaces
+    part = "interface" if model.patch is None else "strip"
+    described = {}
+    for name, measure in result.measures.items():
+        described[name] = replace(measure, text=describe_measure(name, part))
     return replace(
         result,
         outcome=outcome,
         patch=patch,
-        measures=add_meanings(result.measures, "interface" if model.patch is None else "strip"),
+        measures=described,
         warnings=shorten_file_names(warnings, path),
         extra=result.extra | {"notes": notes, "yielding_faces": yielding_faces},
     )

@@ -24,6 +24,7 @@ from ..results.notes import (
 from ..results.result import (
     N_FRAMES,
     Result,
+    RunInputs,
     has_known_mesh_error,
     make_interface_frames,
     remove_unknown_errors,
@@ -43,36 +44,23 @@ MAX_EXTRA_CYCLES = 4  # Largest number of further cycles in which a steady loop 
 MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points times samples) of this search.
 
 
-def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estimate) -> Result:
-    """Run a plan with prescribed displacement and return its Result.
-
-    Parameters
-    ----------
-    plan : Plan
-    patch : Patch or None
-        None under [normal].
-    coarse : sequence of Patch or None
-        The patch on coarser meshes.
-    seconds : dict
-        CPU seconds so far by name, to which those of the bench are added.
-    warnings : list of str
-        Warnings so far.
-    say, progress, estimate
-        See `run.run`.
-    """
-    model = plan.model
+def run_prescribed(inputs: RunInputs) -> Result:
+    """Run a plan with prescribed displacement and return its Result."""
+    model = inputs.plan.model
+    patch = inputs.patch
     steps = steps_per_cycle(model)
     frames = N_FRAMES if patch is not None else 0
-    fine = bench.run(model, patch, steps, frames, watch=PassOptions(None, say, progress))
-    seconds["bench"] = fine.seconds
+    options = PassOptions(None, inputs.say, inputs.progress)
+    fine = bench.run(model, patch, steps, frames, watch=options)
+    inputs.seconds["bench"] = fine.seconds
     coarse_passes = PassErrors([], 0.0, None, [])
-    if estimate:
-        patches = [patch, *(mesh for mesh in coarse if mesh is not None)]
-        coarse_passes = estimate_pass_errors(model, patches, fine, steps, say)
-        seconds["error"] = coarse_passes.seconds
+    if inputs.estimate:
+        patches = [patch, *(mesh for mesh in inputs.coarse if mesh is not None)]
+        coarse_passes = estimate_pass_errors(model, patches, fine, steps, inputs.say)
+        inputs.seconds["error"] = coarse_passes.seconds
     measures = add_errors(fine.values, *coarse_passes.errors, min_relative_error=1e-10)
     warnings = [
-        *warnings,
+        *inputs.warnings,
         *_warn_of_bond_law(model),
         *_warn_of_created_energy(model, fine),
         *note_on_heating(model, patch, fine),
@@ -86,7 +74,7 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
             patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames]
         )
     measures = remove_unknown_errors(
-        measures, estimate and has_known_mesh_error(model, patch, coarse)
+        measures, inputs.estimate and has_known_mesh_error(model, patch, inputs.coarse)
     )
     extra = {
         "engine": fine.engine.name,
@@ -98,14 +86,14 @@ def run_prescribed(plan, patch, coarse, seconds, warnings, say, progress, estima
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count
     return Result(
-        plan,
+        inputs.plan,
         judge_outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
         set_final_floors(measures, model.accuracy.tolerance),
         fine,
         fine,
         patch,
         fields,
-        seconds,
+        inputs.seconds,
         warnings,
         extra,
     )

@@ -151,16 +151,10 @@ def values(patch: Patch) -> dict:
     A node at the edge of a step represents half a cell on either side: the value is the weighted
     mean of the patches with and without contact of this node. `patch_rows` has the definitions.
     """
-    weights, patches = zip(*(patch.either or ((1.0, patch),)))
-    parts = [_values(part) for part in patches]
-    return {
-        name: float(sum(weight * part[name] for weight, part in zip(weights, parts)))
-        for name in parts[0]
-    }
-
-
-def _values(patch: Patch) -> dict:
-    """Return the static measures of a patch without a node at a step of the gap."""
+    if patch.either:
+        parts = [(weight, values(part)) for weight, part in patch.either]
+        names = parts[0][1]
+        return {name: float(sum(weight * part[name] for weight, part in parts)) for name in names}
     state = patch.strips
     sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -182,7 +176,7 @@ def _values(patch: Patch) -> dict:
             "roll_moment": state.roll_moment,
             "roll": state.roll,
         }
-    return out
+    return {name: float(value) for name, value in out.items()}
 
 
 def _edge_values(patch: Patch) -> EdgeValues:

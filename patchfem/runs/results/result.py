@@ -86,14 +86,6 @@ def _count_words(count: int, word: str) -> str:
     return f"{count or 'no'} {word}{'s' * (count != 1)}"
 
 
-def add_meanings(measures: dict, apart: str) -> dict:
-    """Return measures to which the text of their meaning is added.
-
-    apart: what a number after a name counts, "interface" or "strip".
-    """
-    return {name: replace(m, text=describe_measure(name, apart)) for name, m in measures.items()}
-
-
 def describe_measure(name: str, apart: str = "interface") -> str:
     """Return the meaning of a measure in one sentence without full stop.
 

@@ -49,8 +49,10 @@ MIN_DECAY = (
 )
 
 
-def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Compute the motion of a rig with Coulomb friction, or none, from event to event.
+def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """Compute the motion of a rig from event to event, level after level of the drive.
+
+    Coulomb friction, or none, has rigid elements, which keep no snapshots.
 
     Parameters
     ----------
@@ -58,27 +60,6 @@ def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     numerics : Numerics
     patch : Patch or None
         None under [normal] or between masses.
-    frames : int
-        Not used.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
-
-    Returns
-    -------
-    Solution
-    """
-    elements_of_model = RigidElements(model, numerics, patch)
-    return _run_drive(PieceReader(model, numerics, patch, elements_of_model), 0, say, progress)
-
-
-def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Compute the motion of a rig with elastic-plastic elements from yield to yield.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    patch : Patch or None
     frames : int
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
@@ -88,14 +69,9 @@ def run_piecewise(model, numerics, patch, frames: int = 0, say=None, progress=No
     -------
     Solution
     """
-    elements_of_model = YieldingElements(model, numerics, patch)
-    return _run_drive(PieceReader(model, numerics, patch, elements_of_model), frames, say, progress)
-
-
-def _run_drive(reader, frames: int, say, progress) -> Solution:
-    """Compute the motion of a rig from event to event, level after level of the drive."""
-    rig = reader.model.rig
-    numerics = reader.numerics
+    contact_elements = RigidElements if numerics.engine == "exact" else YieldingElements
+    reader = PieceReader(model, numerics, patch, contact_elements(model, numerics, patch))
+    rig = model.rig
     begin = perf_counter()
     more = {}
     histories.load_event_kernels(say)
@@ -123,7 +99,7 @@ def _run_drive(reader, frames: int, say, progress) -> Solution:
             cycles,
             numerics.window,
             rig.springs.travel,
-            frames * is_last,
+            frames * (is_last and not reader.rigid),
             watch,
             *state,
             even=bool(ROWS_NEEDING_RUN),

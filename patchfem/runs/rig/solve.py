@@ -27,10 +27,8 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     -------
     Solution
     """
-    if numerics.engine == "exact":
-        run = pieces.run_exact
-    elif numerics.engine == "piecewise":
-        run = pieces.run_piecewise
+    if numerics.engine in ("exact", "piecewise"):
+        run = pieces.run_pieces
     elif numerics.engine == "smooth":
         run = smooth.run_smooth
     elif numerics.engine == "march":
