@@ -48,8 +48,9 @@ NEAREST = {
     "stainles": "'stainless steel'",
     "tin": "'bronze' or 'TiN'",  # the metal tin is not the nitride
 }
-# values of release 0.4, which scenes rely on
-OLD_VALUES = {
+# Young's modulus [Pa], Poisson's ratio, density [kg m-3] and yield strength [Pa], as compared with
+# data sheets and standards; scenes of release 0.4 rely on those down to PTFE
+VALUES = {
     "Ti-8Al-1Mo-1V": (121e9, 0.32, 4370.0, 930e6),
     "WC-Co": (250e9, 0.24, 14500.0, None),
     "WC-Co sintered": (600e9, 0.22, 14900.0, None),
@@ -60,7 +61,24 @@ OLD_VALUES = {
     "bronze": (110e9, 0.34, 8800.0, None),
     "alumina": (370e9, 0.22, 3900.0, None),
     "PTFE": (0.5e9, 0.46, 2200.0, None),
+    "Ti-6Al-4V": (114e9, 0.31, 4430.0, 828e6),
+    "Inconel 718": (200e9, 0.29, 8190.0, 1034e6),
+    "316L": (200e9, 0.30, 8000.0, 170e6),
+    "17-4PH": (196e9, 0.27, 7800.0, 725e6),
+    "42CrMo4": (200e9, 0.32, 7830.0, 650e6),
+    "100Cr6": (210e9, 0.30, 7810.0, 2030e6),
+    "Al 7075-T6": (71e9, 0.33, 2800.0, 460e6),
+    "Al 6082-T6": (70e9, 0.30, 2700.0, 240e6),
+    "CuZn39Pb3": (97e9, 0.31, 8470.0, 220e6),
+    "CuBe": (131e9, 0.30, 8360.0, 860e6),
+    "silicon nitride": (310e9, 0.27, 3200.0, None),
+    "PEEK": (4.0e9, 0.40, 1300.0, 98e6),
+    "DLC": (259e9, 0.25, 2070.0, None),
+    "Cr": (235e9, 0.21, 7150.0, None),
+    "TiN": (450e9, 0.25, 5210.0, None),
 }
+# thermal conductivity [W m-1 K-1] and heat capacity [J kg-1 K-1]
+HEAT_VALUES = {"Ti-8Al-1Mo-1V": (6.0, 502.0), "steel": (50.0, 490.0)}
 
 
 def with_substrate(name: str) -> str:
@@ -112,8 +130,11 @@ def test_always_records_are_plausible_and_name_their_sources():
         assert MATERIALS[name].strength is None
 
 
-def test_exact_old_materials_keep_their_values():
-    for name, (*elastic, strength) in OLD_VALUES.items():
+def test_exact_materials_keep_the_values_that_were_compared_with_sources():
+    assert list(MATERIALS) == list(VALUES)
+    for name, (*elastic, strength) in VALUES.items():
         record = MATERIALS[name]
         assert [record.young, record.poisson, record.density] == elastic
         assert (record.strength and record.strength.strength) == strength
+    heat = {name: record.heat[:2] for name, record in MATERIALS.items() if record.heat is not None}
+    assert heat == HEAT_VALUES

@@ -62,7 +62,8 @@ MATERIALS: dict[str, MaterialRecord] = {
         young=121e9,
         poisson=0.32,
         density=4370.0,
-        source="Handbook values of the mill-annealed near-alpha alloy at 20 degC.",
+        source="MatWeb MTA816, annealed for 8 h at 790 degC; AZoM gives 117 GPa, Timet 131 GPa "
+        "(19e6 psi) after duplex annealing.",
         other_names=("Ti-8-1-1",),
         strength=YieldStrength(
             930e6,
@@ -70,9 +71,9 @@ MATERIALS: dict[str, MaterialRecord] = {
             "is 828 MPa.",
         ),
         heat=ThermalProperties(
-            conductivity=7.0,
-            heat_capacity=526.0,
-            source="Handbook values of the alloy; the volumetric heat capacity is 2.3e6 J/m3/K.",
+            conductivity=6.0,
+            heat_capacity=502.0,
+            source="MatWeb MTA816; Timet gives 5.98 W/m/K at 24 degC.",
         ),
     ),
     "WC-Co": MaterialRecord(
@@ -107,10 +108,11 @@ MATERIALS: dict[str, MaterialRecord] = {
         young=193e9,
         poisson=0.29,
         density=8000.0,
-        source="Handbook values of austenitic steel 304 at 20 degC.",
+        source="Data sheets of austenitic steel 304 at 20 degC; they give 193 to 200 GPa.",
         other_names=("304", "AISI 304", "1.4301", "X5CrNi18-10"),
         strength=YieldStrength(
-            205e6, "ASTM A240: minimum yield strength of annealed 304; a typical value is 310 MPa."
+            205e6,
+            "ASTM A240: minimum yield strength of annealed 304; AK Steel gives a typical value of 290 MPa.",
         ),
     ),
     "cast iron": MaterialRecord(
@@ -141,22 +143,23 @@ MATERIALS: dict[str, MaterialRecord] = {
         young=370e9,
         poisson=0.22,
         density=3900.0,
-        source="Handbook values of dense sintered ceramic with 99.5 % Al2O3.",
+        source="Data sheets of sintered ceramic with 99.5 % Al2O3; NIST gives 416 GPa and 3984 kg/m3 "
+        "without pores.",
         other_names=("Al2O3", "aluminium oxide", "aluminum oxide"),
     ),
     "PTFE": MaterialRecord(
         young=0.5e9,
         poisson=0.46,
         density=2200.0,
-        source="Handbook values of the unfilled polymer at 20 degC; Young's modulus is "
-        "0.4-0.6 GPa; this material creeps.",
+        source="Callister, Materials Science and Engineering, appendix B: 0.40 to 0.55 GPa, and "
+        "Poisson's ratio; data sheets of the unfilled polymer give 2130 to 2200 kg/m3; this material creeps.",
         other_names=("Teflon",),
     ),
     "Ti-6Al-4V": MaterialRecord(
         young=114e9,
         poisson=0.31,
         density=4430.0,
-        source="Data sheets of annealed grade 5 (AMS 4928); MIL-HDBK-5J, table 5.4.1.0, gives 110 GPa "
+        source="Data sheets of annealed grade 5 (AMS 4928); MIL-HDBK-5J, tables 5.4.1.0, give 110 GPa "
         "for sheet and 117 GPa for bar.",
         other_names=("Ti64", "Ti grade 5", "titanium grade 5", "3.7165", "3.7164", "TA6V"),
         strength=YieldStrength(
@@ -203,15 +206,15 @@ MATERIALS: dict[str, MaterialRecord] = {
         other_names=("AISI 630", "630", "1.4542", "X5CrNiCuNb16-4", "UNS S17400"),
         strength=YieldStrength(
             725e6,
-            "ASTM A564, type 630: minimum in condition H1150; H1150-M has 520 MPa, H1025 1000 MPa "
-            "and H900 1170 MPa.",
+            "ASTM A564, type 630: minimum in condition H1150; H1025 has 1000 MPa and H900 "
+            "1170 MPa; H1150-M, aged twice, has less than H1150.",
         ),
     ),
     "42CrMo4": MaterialRecord(
         young=200e9,
         poisson=0.32,
         density=7830.0,
-        source="MIL-HDBK-5J, section 2.3.1, low-alloy steels such as AISI 4140: 29.0e6 psi and "
+        source="MIL-HDBK-5J, section 2.3.1, low-alloy steels such as AISI 4130: 29.0e6 psi and "
         "0.283 lb/in3; European data sheets give 190 to 210 GPa.",
         other_names=("4140", "AISI 4140", "SAE 4140", "1.7225", "42CrMoS4", "SCM440"),
         strength=YieldStrength(
@@ -241,8 +244,8 @@ MATERIALS: dict[str, MaterialRecord] = {
         other_names=("7075", "7075-T6", "7075-T651", "Al 7075", "EN AW-7075", "AA 7075", "3.4365"),
         strength=YieldStrength(
             460e6,
-            "EN 485-2: minimum of plates of 6 to 12.5 mm; thick plates have less; a typical value "
-            "is 503 MPa.",
+            "EN 485-2: minimum of plates of 6 to 12.5 mm; plates of more than 50 mm have less; a "
+            "typical value is 503 MPa.",
         ),
     ),
     "Al 6082-T6": MaterialRecord(
@@ -271,8 +274,8 @@ MATERIALS: dict[str, MaterialRecord] = {
         young=131e9,
         poisson=0.30,
         density=8360.0,
-        source="Materion, Guide to High Performance Alloys, alloy 25 after age hardening: 19e6 psi and "
-        "0.302 lb/in3.",
+        source="Data sheets of C17200 (alloy 25) after age hardening: 19e6 psi and 0.302 lb/in3; others "
+        "give 0.298 lb/in3, and Poisson's ratios of 0.285 to 0.33.",
         other_names=(
             "C17200",
             "CuBe2",
@@ -283,28 +286,30 @@ MATERIALS: dict[str, MaterialRecord] = {
             "CW101C",
         ),
         strength=YieldStrength(
-            960e6,
-            "Materion, alloy 25 strip in temper TF00 (age hardened without cold work): minimum; "
-            "solution annealed strip has about 200 MPa.",
+            860e6,
+            "ASTM B196, bar up to 76 mm in temper TF00 (age hardened without cold work): minimum, "
+            "125 ksi; solution annealed bar (TB00) has 140 MPa.",
         ),
     ),
     "silicon nitride": MaterialRecord(
         young=310e9,
         poisson=0.27,
         density=3200.0,
-        source="SKF, materials of super-precision bearings: Young's modulus and density of dense balls; makers "
-        "give 300 to 320 GPa. Poisson's ratio: middle of the makers' values, 0.25 to 0.29.",
+        source="SKF, brochure on hybrid bearings: Young's modulus and density of dense balls; makers give 300 "
+        "to 315 GPa, and Poisson's ratios of 0.26 to 0.27.",
         other_names=("Si3N4",),
     ),
     "PEEK": MaterialRecord(
         young=4.0e9,
         poisson=0.40,
         density=1300.0,
-        source="Victrex PEEK 450G, data sheet (ISO 527, 23 degC); older editions give 3.5 to 3.7 GPa; "
-        "this material creeps.",
+        source="Victrex PEEK 450G, data sheet (ISO 527, 23 degC), as other tables quote it; for unfilled PEEK, others "
+        "give 3.6 GPa and 1320 kg/m3. Poisson's ratio: typical value. This material creeps.",
         other_names=("PEEK 450G", "Victrex PEEK"),
         strength=YieldStrength(
-            98e6, "Victrex PEEK 450G, data sheet: tensile strength at yield, ISO 527."
+            98e6,
+            "Victrex PEEK 450G, data sheet (ISO 527), as other tables quote it; for unfilled PEEK, others "
+            "give 90 to 100 MPa.",
         ),
     ),
     "DLC": MaterialRecord(
