@@ -95,6 +95,16 @@ def test_always_the_readme_is_short():
     assert len(text("README.md").splitlines()) <= 150
 
 
+def test_always_the_guide_is_short_and_each_page_begins_with_its_question_and_ends_with_links():
+    pages = {path.name: path.read_text("utf-8").rstrip("\n") for path in GUIDE.glob("*.md")}
+    words = {name: len(page.split()) for name, page in pages.items()}
+    assert max(words.values()) <= 1500 and sum(words.values()) <= 8000, words
+    for name, page in pages.items():
+        first, last = page.splitlines()[0], page.split("\n\n")[-1]
+        assert first.startswith("# ") and first.endswith("?"), name
+        assert last.startswith("See also: ") and "](" in last, name
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_always_every_link_leads_somewhere(page):
     for link in re.findall(r"\]\(([^)]+)\)|<img src=\"([^\"]+)\"", text(page)):

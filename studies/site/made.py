@@ -142,8 +142,11 @@ def about(effect: str) -> str:
 
 
 def guide_files() -> list:
-    """Return the pages of the guide, whose tables have a sentence for each law, drive and method."""
-    return sorted((ROOT / "patchfem/scene/guide").glob("*.md"))
+    """Return the pages of the guide and of the theory, whose tables have a sentence for each law, drive and method."""
+    return [
+        *sorted((ROOT / "patchfem/scene/guide").glob("*.md")),
+        Path(__file__).parent / "theory.md",
+    ]
 
 
 @cache
