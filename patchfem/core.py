@@ -334,6 +334,17 @@ class SineDrive:
         return self.acceleration * np.sin(self.omega * np.asarray(t, float))
 
 
+class ErrorCauses(NamedTuple):
+    """Parts of the error of a measure, and how fast it falls with the time step.
+
+    - parts: error by what is coarser in a comparison run, such as "steps" or "mesh" (`response.coarser`).
+    - order: observed order of convergence in the time step; None if it is not known.
+    """
+
+    parts: dict
+    order: float | None = None
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Measure:
     """Number that a run computes, with its unit and its numerical error.
@@ -347,6 +358,7 @@ class Measure:
     - text: definition of the measure.
     - reason: reason why the value is None.
     - engine: method that computed the value; "" for the engine of the run.
+    - causes: parts of the error; None if they are not known.
     """
 
     value: float | None
@@ -356,6 +368,7 @@ class Measure:
     text: str = ""
     reason: str = ""
     engine: str = ""
+    causes: ErrorCauses | None = None
 
     def error_ratio(self, tolerance: float) -> float:
         """Return the numerical error divided by the error that a tolerance allows.

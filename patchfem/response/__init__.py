@@ -12,7 +12,6 @@ PUBLIC = {
     "coarser": (
         "CoarserRuns",
         "estimate_errors",
-        "find_open_kinds",
         "make_spatial_coarsening",
     ),
     "decay_curve": (
@@ -34,6 +33,7 @@ PUBLIC = {
         "SUM_ROUND_OFF",
         "absolute_change",
         "add_errors",
+        "add_stated_errors",
         "coarser_errors",
         "convergence_error",
         "convergence_errors",
@@ -42,6 +42,7 @@ PUBLIC = {
         "friction_errors",
         "merged_cell_errors",
         "signed_change",
+        "split_errors",
         "step_errors",
         "total_error",
     ),
@@ -139,7 +140,6 @@ PUBLIC = {
         "stick_fraction",
     ),
     "run_events": (
-        "add_uncertainty",
         "find_stick_intervals",
         "is_all_stuck",
         "join_logs",

@@ -3,7 +3,7 @@
 In: a ladder, i.e. the list of `CoarserRuns` of an engine (coarser in time, in space, in modes
 or in the sum over bonds), and a function that solves a variant. Each `CoarserRuns` names its
 runs and the rule that turns their measures into an error (`errors`). A run that several of them
-need is solved once. Out: errors by measure name.
+need is solved once. Out: what is coarser, with errors by measure name.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
-from .errors import coarser_errors, observed_orders
+from .errors import coarser_errors
 
 
 class CoarserRuns(NamedTuple):
@@ -44,7 +44,7 @@ class StepRun(NamedTuple):
     values: dict
 
 
-def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | None = None) -> tuple:
+def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict) -> tuple:
     """Solve coarser runs, and estimate from them the errors of the measures by kind of run.
 
     Parameters
@@ -54,16 +54,16 @@ def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | Non
     fine : dict
         Measures of the run itself by name.
     ladder : sequence of CoarserRuns
-    solved_runs : dict, optional
+    solved_runs : dict
         Runs by variant that are solved already; the new ones are added.
 
     Returns
     -------
-    errors : list of dict
+    errors : list of (str, dict)
+        What is coarser, and errors by measure name, for each entry of the ladder.
     seconds : float
     """
     begin = perf_counter()
-    solved_runs = {} if solved_runs is None else solved_runs
 
     def solve_values(variant) -> dict:
         """Return the measures with given settings, solving them on the first call."""
@@ -74,35 +74,8 @@ def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict | Non
     errors = []
     for coarser in ladder:
         reference = fine if coarser.beside is None else solve_values(coarser.beside)
-        errors.append(coarser.rule(reference, *map(solve_values, coarser.runs)))
+        errors.append((coarser.of, coarser.rule(reference, *map(solve_values, coarser.runs))))
     return errors, perf_counter() - begin
-
-
-def find_open_kinds(kinds, errors, runs) -> dict:
-    """Sum the errors of measures by kind of coarser run, and compute the observed orders.
-
-    Parameters
-    ----------
-    kinds : sequence of str
-        What each entry of the ladder makes coarser; "end" for a run that does not end exactly at
-        the requested time.
-    errors : sequence of dict
-        Errors by measure name, one dict per kind.
-    runs : sequence of dict
-        Measures of the run, and of those with half and a quarter of its steps; fewer for a method
-        without steps.
-
-    Returns
-    -------
-    dict
-        "parts": errors by kind and name; "orders": observed orders by name.
-    """
-    parts: dict = {}
-    for kind, errors_by_name in zip(kinds, errors, strict=True):
-        sums = parts.setdefault(kind, {})
-        for name, error in errors_by_name.items():
-            sums[name] = sums.get(name, 0.0) + error
-    return {"parts": parts, "orders": observed_orders(*runs) if len(runs) == 3 else {}}
 
 
 def make_spatial_coarsening(coarser, beside=None, of: str = "mesh") -> CoarserRuns:

@@ -9,12 +9,13 @@ declares. No factor belongs to a single measure, law or scene. tests/README.md s
 the errors of random scenes holds.
 """
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Measure
+from ..core import ErrorCauses, Measure
 from .rows import error_floor, find_definition
 
 # Roache's safety factor for two runs; it covers runs that are too coarse to show the order.
@@ -243,14 +244,14 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
     return {name: direct.get(name, fraction * abs(value)) for name, value in values.items()}
 
 
-def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
+def observed_orders(*values: dict) -> dict:
     """Return the observed convergence order [1] of each measure in the time step, at most 2.
 
     Parameters
     ----------
-    fine, half, quarter : dict
+    values : dict
         Measures by name of runs with some number of steps per cycle, with a half and with a quarter
-        of it.
+        of it; fewer runs show no order.
 
     Returns
     -------
@@ -258,6 +259,9 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
         Orders by name. A measure whose change falls with an order below MIN_OBSERVED_ORDER, or that a run
         does not have, is left out: more steps are not known to make it more accurate.
     """
+    if len(values) < 3:
+        return {}
+    fine, half, quarter = values
     last = absolute_change(fine, half)
     before = absolute_change(half, quarter)
     orders = {}
@@ -270,19 +274,23 @@ def observed_orders(fine: dict, half: dict, quarter: dict) -> dict:
 
 
 def add_errors(
-    values: dict, *errors: dict, min_relative_error: float = 0.0, size: float = np.inf
+    values: dict,
+    errors=(),
+    step_values=(),
+    *,
+    min_relative_error: float = 0.0,
+    size: float = np.inf,
 ) -> dict:
     """Combine values and errors to measures, and add a relative error to each.
 
-    The summed errors of a measure are its parts plus `min_relative_error` of the value. The error
-    of a measure that a coarse run does not have is its absolute value.
+    The error of a measure is the sum of its parts plus `min_relative_error` of the value.
 
     Parameters
     ----------
     values : dict
         Values by name.
-    errors : dict
-        Errors by name; the dicts are added.
+    errors, step_values
+        See `split_errors`.
     min_relative_error : float
         Fraction of the value that is added [1].
     size : float
@@ -290,12 +298,58 @@ def add_errors(
     """
     out = {}
     amplitude = values.get("relative_displacement_amplitude", 0.0)
+    for name, causes in split_errors(values, errors, step_values).items():
+        value = float(values[name])
+        error = total_error(name, value, causes.parts.values(), min_relative_error, amplitude)
+        floor = float(error_floor(name, size))
+        out[name] = Measure(value, find_definition(name).unit, float(error), floor, causes=causes)
+    return out
+
+
+def split_errors(values: dict, errors, step_values=()) -> dict:
+    """Return the ErrorCauses of measures by name, in which the parts of each cause are summed.
+
+    The part of a measure that a coarse run does not have is its absolute value.
+
+    Parameters
+    ----------
+    values : dict
+        Values by name.
+    errors : sequence of (str, dict)
+        What is coarser, and errors by name (`coarser.estimate_errors`).
+    step_values : sequence of dict
+        Values of the run and of its coarser runs in time, fine to coarse.
+    """
+    orders = observed_orders(*step_values)
+    causes = {}
     for name, value in values.items():
-        parts = [errors_by_name.get(name, abs(value)) for errors_by_name in errors]
-        error = total_error(name, value, parts, min_relative_error, amplitude)
-        out[name] = Measure(
-            float(value), find_definition(name).unit, float(error), float(error_floor(name, size))
-        )
+        parts: dict = {}
+        for cause, errors_by_name in errors:
+            parts[cause] = parts.get(cause, 0.0) + errors_by_name.get(name, abs(value))
+        causes[name] = ErrorCauses(parts, orders.get(name))
+    return causes
+
+
+def add_stated_errors(measures: dict, stated_errors: dict, end_errors: dict) -> dict:
+    """Add the errors that a run itself states to the errors of its measures.
+
+    Parameters
+    ----------
+    measures : dict
+        Measure by name.
+    stated_errors : dict
+        Errors by name.
+    end_errors : dict
+        The part of them that is due to an end of the run beside the requested end.
+    """
+    out = dict(measures)
+    for name, measure in measures.items():
+        causes = measure.causes
+        if causes is not None and end_errors:
+            causes = causes._replace(parts=causes.parts | {"end": end_errors.get(name, 0.0)})
+        if measure.error is not None:
+            error = measure.error + stated_errors.get(name, 0.0)
+            out[name] = replace(measure, error=error, causes=causes)
     return out
 
 

@@ -86,7 +86,7 @@ def divide_steps(time, slide, speed) -> Steps:
     """
     step = np.diff(time)
     share = np.tile(np.arange(1, N_SUBSTEPS + 1) / N_SUBSTEPS, (step.size, 1))
-    turns, at = find_reversal_steps(time, slide, speed)
+    turns, at, _ = find_reversal_steps(time, slide, speed)
     middle = np.clip(at, 1 / N_SUBSTEPS, 1 - 1 / N_SUBSTEPS)[:, None]
     half = np.arange(1, N_SUBSTEPS // 2 + 1) / (N_SUBSTEPS // 2)
     share[turns] = np.column_stack([middle * half, middle + (1 - middle) * half])

@@ -4,6 +4,8 @@ In: a `Response` of the last cycles. Out: values by name; `rows` has their names
 definitions. The samples of an exact run and of a march are treated alike.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ..core import Response
@@ -325,18 +327,30 @@ def peak_sampling_errors(window: Response, climbs: bool = False) -> dict:
     return out
 
 
-def find_reversal_steps(time, position, rate) -> tuple:
-    """Return the steps in which a rate changes its sign, and the fractions of these steps.
+class StepReversals(NamedTuple):
+    """Reversals of a motion inside time steps.
+
+    - step (r,): indices of the steps.
+    - fraction (r,): fractions of the steps at which they lie [1].
+    - position (r,): positions there [m].
+    """
+
+    step: np.ndarray
+    fraction: np.ndarray
+    position: np.ndarray
+
+
+def find_reversal_steps(time, position, rate) -> StepReversals:
+    """Find the steps in which a rate changes its sign, on the cubics through samples and rates.
 
     Parameters
     ----------
     time, position, rate : (k,)
-        Samples of time [s], position [m] and rate [m/s]; the cubic through both is used.
+        Samples of time [s], position [m] and rate [m/s].
 
     Returns
     -------
-    tuple
-        Indices of the steps, and fractions of the step [1].
+    StepReversals
     """
     step = np.diff(time)
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
@@ -348,7 +362,8 @@ def find_reversal_steps(time, position, rate) -> tuple:
     # The cubic has zero slope where p + 2 two s + 3 three s^2 = 0; this form of the root avoids
     # cancellation if the cubic is nearly a parabola.
     root = np.sqrt(np.maximum(two**2 - 3 * three * p, 0.0))
-    return k, np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
+    s = np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
+    return StepReversals(k, s, position[k] + s * (p + s * (two + s * three)))
 
 
 def measure_half_range(time, position, rate) -> float:
@@ -359,15 +374,8 @@ def measure_half_range(time, position, rate) -> float:
     time, position, rate : (k,)
         Samples of time [s], position [m] and rate [m/s].
     """
-    h = np.diff(time)
-    k, s = find_reversal_steps(time, position, rate)
-    p = rate[k] * h[k]
-    q = rate[k + 1] * h[k]
-    rise = position[k + 1] - position[k]
-    two = 3 * rise - 2 * p - q
-    three = p + q - 2 * rise
-    every = np.concatenate([position, position[k] + s * (p + s * (two + s * three))])
-    return float(every.max() - every.min()) / 2
+    reversals = find_reversal_steps(time, position, rate)
+    return float(np.ptp(np.concatenate([position, reversals.position]))) / 2
 
 
 def window_amplitudes(extremes, window: int) -> np.ndarray:

@@ -92,11 +92,7 @@ def find_missing_secant(values) -> dict:
         return {}
     if stick_fraction.value <= TABLE["stick_fraction"].floor + (stick_fraction.error or 0.0):
         return {}
-    return {
-        "secant_stiffness": replace(
-            secant, value=None, error=None, reason=STICKS_AT_REVERSAL_REASON
-        )
-    }
+    return {"secant_stiffness": _remove_value(secant, STICKS_AT_REVERSAL_REASON)}
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
@@ -126,6 +122,11 @@ def _make_missing_measure(name: str, reason: str) -> Measure:
     return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
+def _remove_value(measure: Measure, reason: str) -> Measure:
+    """Return a measure whose value is replaced by the reason why there is none."""
+    return replace(measure, value=None, error=None, reason=reason)
+
+
 def find_missing_drift(values, drive) -> dict:
     """Return the drift without a value if the drive is not periodic.
 
@@ -136,16 +137,14 @@ def find_missing_drift(values, drive) -> dict:
     if drift is None or is_periodic(drive):
         return {}
     reason = BEATS_REASON if hasattr(drive, "beat") else APERIODIC_REASON
-    return {"drift_per_cycle": replace(drift, value=None, error=None, reason=reason)}
+    return {"drift_per_cycle": _remove_value(drift, reason)}
 
 
 def find_missing_unbounded(values) -> dict:
     """Return all measures except the load without values if no bounded motion exists."""
-    out = {}
-    for name, measure in values.items():
-        out[name] = replace(measure, error=None)
-        if name != "normal_load":
-            out[name] = replace(out[name], value=None, reason=UNBOUNDED_REASON)
+    out = {name: _remove_value(measure, UNBOUNDED_REASON) for name, measure in values.items()}
+    if "normal_load" in values:
+        out["normal_load"] = replace(values["normal_load"], error=None)
     return out
 
 
@@ -182,10 +181,7 @@ def find_missing_loops(values, window, drive) -> dict:
             area = values[name]
             if area.value < -max(area.error or 0.0, area.floor):
                 open_names.append(name)
-    return {
-        name: replace(values[name], value=None, error=None, reason=OPEN_LOOP_REASON)
-        for name in open_names
-    }
+    return {name: _remove_value(values[name], OPEN_LOOP_REASON) for name in open_names}
 
 
 def _reason_for_missing_phase(values, drive) -> str:

@@ -35,9 +35,6 @@ from .measures import (
 )
 from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
 
-# For engines that compute measures from samples only.
-NO_INTEGRATED_MEASURES = IntegratedMeasures()
-
 
 @dataclass(frozen=True, eq=False)
 class LastCycles:
@@ -74,7 +71,7 @@ class LastCycles:
     load: float | None
     stiffness: float
     sine: bool
-    integrated: IntegratedMeasures = NO_INTEGRATED_MEASURES
+    integrated: IntegratedMeasures = field(default_factory=IntegratedMeasures)
     loop: tuple | None = None
     ledger: np.ndarray | None = None
     known: dict = field(default_factory=dict)

@@ -4,8 +4,6 @@ In: the window of a run, its drive, and the EventLog of the exact engine if ther
 `Events`, stick intervals, and the ringing during stick.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..dynamics.events import event_list as listed
@@ -198,16 +196,6 @@ def measure_ringing_in_sticks(
     return ringing.measure_ringing(
         window.time, window.acceleration, spans, last.omega if last.amplitude else 0.0
     )
-
-
-def add_uncertainty(measures: dict, stated_errors: dict | None) -> dict:
-    """Add errors that a run itself states to the errors of its measures."""
-    return {
-        name: replace(m, error=m.error + (stated_errors or {}).get(name, 0.0))
-        if m.error is not None
-        else m
-        for name, m in measures.items()
-    }
 
 
 def is_all_stuck(window, max_stick_slip: float) -> bool:

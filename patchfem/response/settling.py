@@ -105,11 +105,10 @@ def extrapolate_steady_amplitude(amplitudes, phasors) -> tuple:
 
     (None, None) if no bounded limit can be estimated.
     """
-    return _unpack_single(
-        extrapolate_steady_amplitudes(
-            np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None]
-        )
+    estimates = extrapolate_steady_amplitudes(
+        np.asarray(amplitudes, float)[None], np.asarray(phasors, complex)[None]
     )
+    return tuple(None if np.isnan(number) else float(number) for (number,) in estimates)
 
 
 def extrapolate_steady_amplitudes(a, p) -> tuple:
@@ -186,11 +185,6 @@ def plane_map_remainders(p) -> np.ndarray:
     # Both eigenvalues of the map lie inside the unit circle.
     known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)
     return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
-
-
-def _unpack_single(estimate: tuple) -> tuple:
-    """Return value and error of a single motion as floats, with None for NaN."""
-    return tuple(None if np.isnan(one[0]) else float(one[0]) for one in estimate)
 
 
 def window_amplitude_means(extremes, window: int) -> tuple:

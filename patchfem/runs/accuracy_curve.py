@@ -100,13 +100,9 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
         coarser.append(make_setting(run.steps, distances))
     if coarser[-1].error * NO_EFFECT_RATIO < present.error:
         return None
-    open_kinds = result.extra["left_open"]
-    expected = make_setting(2 * present.steps, _expect_errors(errors, open_kinds))
-    other_errors = {
-        kind: part.get(expected.measure, 0.0)
-        for kind, part in open_kinds["parts"].items()
-        if kind != "steps"
-    }
+    expected = make_setting(2 * present.steps, _expect_errors(measures))
+    other_errors = dict(measures[expected.measure].causes.parts)
+    other_errors.pop("steps", None)
     cause = max(other_errors, key=other_errors.get, default="")
     finer = expected if expected.error <= NO_EFFECT_RATIO * present.error else None
     return AccuracyCurve(coarser, present, finer, expected.measure, cause, tolerance)
@@ -124,11 +120,11 @@ def _select_measures(measures: dict, step_runs) -> dict:
     return main or shared
 
 
-def _expect_errors(errors: dict, open_kinds: dict) -> dict:
+def _expect_errors(measures: dict) -> dict:
     """Predict the errors of all measures for a run with twice as many steps."""
-    step_errors = open_kinds["parts"].get("steps", {})
     expected = {}
-    for name, error in errors.items():
-        reduction = 1 - 2.0 ** -open_kinds["orders"].get(name, MIN_ORDER)
-        expected[name] = error - min(step_errors.get(name, 0.0), error) * reduction
+    for name, measure in measures.items():
+        parts, order = measure.causes
+        reduction = 1 - 2.0 ** -(order or MIN_ORDER)
+        expected[name] = measure.error - min(parts.get("steps", 0.0), measure.error) * reduction
     return expected

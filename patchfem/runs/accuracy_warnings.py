@@ -317,25 +317,17 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
 
 def _find_main_error_kind(finding: Finding, name: str) -> str:
     """Return the kind of discretization (such as the mesh) with the largest error contribution."""
-    parts = finding.extra.get("left_open")
-    if parts is not None:
-        return max(
-            parts["parts"], key=lambda kind: parts["parts"][kind].get(name, 0.0), default="own"
-        )
-    # the results of a batch, or of a run without error estimate, state no parts of their errors
-    if finding.extra.get("steps_per_cycle") or finding.extra.get("steps"):
-        return "steps"
-    return "own" if finding.patch is None else "mesh"
+    causes = finding.measures[name].causes
+    if causes is not None:
+        return max(causes.parts, key=causes.parts.get, default="own")
+    # a batch states neither the causes nor the settings of a patch that slips in part
+    return "mesh" if finding.patch is not None and not finding.extra else "own"
 
 
 def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
     """Return the advice to use the steps per cycle that the order of convergence requires."""
     model = finding.model
-    parts = finding.extra.get("left_open") or {
-        "parts": {"steps": {name: 1.0}},
-        "orders": {name: 2.0},
-    }
-    order = parts["orders"].get(name)
+    parts, order = finding.measures[name].causes
     exact = ""
     if (
         model.kind == "rig"
@@ -347,11 +339,10 @@ def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
             exact = f"leave out accuracy.steps_per_cycle and {exact}"
     if order is None:
         return f"{_describe_missing_order(name, steps)}{_remedy_without_order(model, steps, excess, exact)}"
-    total = sum(part.get(name, 0.0) for part in parts["parts"].values())
-    of_steps = parts["parts"].get("steps", {}).get(name, 1.0)
+    total = sum(parts.values())
     allowed = total / excess[name]
-    target = max(allowed - (total - of_steps), MIN_STEP_ERROR_FRACTION * allowed)
-    halvings = max(1, ceil(log2(of_steps / target) / order))
+    target = max(allowed - (total - parts["steps"]), MIN_STEP_ERROR_FRACTION * allowed)
+    halvings = max(1, ceil(log2(parts["steps"] / target) / order))
     if exact and halvings > MAX_HALVINGS and not name.startswith(RINGING_PREFIX):
         return exact
     return (

@@ -80,7 +80,7 @@ def coverage(count, seed, finest=12800):
         }
         errors = step_errors(runs[400], runs[200], runs[100], steps=400)
         truth = absolute_change(runs[400], runs[finest])
-        for name, measure in add_errors(runs[400], errors).items():
+        for name, measure in add_errors(runs[400], [("steps", errors)]).items():
             if name in truth and name != "energy_balance":
                 held.append(truth[name] <= measure.error + measure.floor)
     return float(np.mean(held))
@@ -201,16 +201,16 @@ def test_exact_errors_depend_on_the_kind_of_measure():
     for its error; a drift is a difference of means with digits of the amplitude."""
     values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
     parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
-    found = {
-        name: one.error for name, one in add_errors(values, parts, min_relative_error=1e-9).items()
-    }
+    errors = [("steps", parts)]
+    measures = add_errors(values, errors, min_relative_error=1e-9)
+    found = {name: measure.error for name, measure in measures.items()}
     assert found == {
         NAME: pytest.approx(1e-6 + 2e-12, rel=1e-12),
         "slip_start_phase": np.pi / 2,
         "energy_balance": 4e-9,
         "drift_per_cycle": pytest.approx(1e-15 + 1e-9 * 2e-3 + 1e-21, rel=1e-9),
     }
-    least = add_errors(values, parts)["drift_per_cycle"].error
+    least = add_errors(values, errors)["drift_per_cycle"].error
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
 
 

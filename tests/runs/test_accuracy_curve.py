@@ -7,6 +7,7 @@ from types import SimpleNamespace as Fake
 import pytest
 
 import patchfem as pf
+from patchfem.core import ErrorCauses
 from patchfem.export.drawing.accuracy import accuracy_caption
 from patchfem.runs import compute_accuracy_curve
 
@@ -90,12 +91,13 @@ def test_exact_the_caption_names_what_limits_after_twice_the_steps():
         Fake(steps=steps, seconds=steps / 400, values=row)
         for steps, row in zip((400, 200, 100), values, strict=True)
     ]
-    parts = {"steps": {"loop_area": 0.01}, "mesh": {"absolute_acceleration_peak": 0.0095}}
+    by_steps = ErrorCauses({"steps": 0.01, "mesh": 0.0}, 2.0)
+    by_mesh = ErrorCauses({"steps": 0.0, "mesh": 0.0095})
     measures = {
-        "loop_area": Fake(value=1.0, error=0.01, floor=0.0),
-        "absolute_acceleration_peak": Fake(value=1.0, error=0.0095, floor=0.0),
+        "loop_area": Fake(value=1.0, error=0.01, floor=0.0, causes=by_steps),
+        "absolute_acceleration_peak": Fake(value=1.0, error=0.0095, floor=0.0, causes=by_mesh),
     }
-    extra = {"step_runs": step_runs, "left_open": {"parts": parts, "orders": {"loop_area": 2.0}}}
+    extra = {"step_runs": step_runs}
     plan = Fake(model=Fake(accuracy=Fake(tolerance=0.01)))
     curve = compute_accuracy_curve(Fake(extra=extra, measures=measures, plan=plan))
     assert curve.finer is None

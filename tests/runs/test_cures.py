@@ -6,7 +6,7 @@ from remedies import drawn, ran, remedies_of, verdict
 from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
 
 from patchfem import build, run
-from patchfem.core import Measure
+from patchfem.core import ErrorCauses, Measure
 from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
 
 SHAKEN = POINT + NONLOCAL + MODE + DRIVE
@@ -69,9 +69,11 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
 )
 def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""
-    measures = {name: Measure(1.0, "1", error) for name, error in wide.items()}
-    left = {"parts": {"steps": wide}, "orders": dict.fromkeys(wide, 2.0)}
-    seen = Finding(build(SHAKEN + FEW), measures, None, {"steps_per_cycle": 16, "left_open": left})
+    measures = {
+        name: Measure(1.0, "1", error, causes=ErrorCauses({"steps": error}, 2.0))
+        for name, error in wide.items()
+    }
+    seen = Finding(build(SHAKEN + FEW), measures, None, {"steps_per_cycle": 16})
     assert tolerance_warnings(seen) == [first]
 
 

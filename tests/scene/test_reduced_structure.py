@@ -110,7 +110,7 @@ def test_exact_all_modes_kept_are_the_whole_matrices(folder):
             np.testing.assert_allclose(
                 small.measures[name].value, one.value, rtol=1e-6, atol=one.floor, err_msg=name
             )
-    assert "reduced" not in small.extra["left_open"]["parts"]
+    assert "reduced" not in small.measures["relative_displacement_amplitude"].causes.parts
 
 
 def test_exact_no_more_modes_are_proposed_than_there_are(folder):

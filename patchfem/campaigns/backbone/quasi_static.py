@@ -124,8 +124,8 @@ def _compute_from_bench_loops(joint: Joint, amplitudes) -> Curve:
     moved_areas = []
     for slide in slides:
         settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
-        changes = estimate_pass_errors(settled.model, patches, settled.run, settled.steps)[0]
-        measures = add_errors(settled.run.values, *changes, min_relative_error=MIN_FLOOR)
+        changes = estimate_pass_errors(settled.model, patches, settled.run, settled.steps)
+        measures = add_errors(settled.run.values, changes.errors, min_relative_error=MIN_FLOOR)
         stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
         stiffness_error, area_error = np.add(errors, settled.change)

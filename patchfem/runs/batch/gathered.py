@@ -24,8 +24,13 @@ from ...dynamics.march.lane_rows import LANES, N_PIECE_MODES, N_POINTS
 from ...effects import is_bond_list, law_has_trait
 from ...model.model import Model
 from ...response import run_events
-from ...response.coarser import find_open_kinds
-from ...response.errors import FrictionScale, coarser_errors, friction_errors, step_errors
+from ...response.errors import (
+    FrictionScale,
+    coarser_errors,
+    friction_errors,
+    split_errors,
+    step_errors,
+)
 from ...response.measures import energy_balance
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
@@ -250,7 +255,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     half = march(2, fine_points, rings)
     quarter = march(4, fine_points, rings)
     coarse = march(4, [case.coarse for case in cases], rings)
-    runs, parts = _estimate_run_errors(models, cases, (fine, half, quarter, coarse), steps)
+    runs, causes = _estimate_run_errors(models, cases, (fine, half, quarter, coarse), steps)
     settings = {"engine": MARCH.name, "steps_per_cycle": steps, "window_cycles": window}
     results, runs_singly, _ = assemble_results(models, runs, settings)
     runs_singly |= runs.stuck | runs.lost
@@ -272,16 +277,14 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
             "quadrature": "recursion",
             "interface_nodes": int(case.patch.x.size),
         }
-        step_values = [
-            {name: float(column[index]) for name, column in evaluated.values.items()}
-            for evaluated in (fine, half, quarter)
-        ]
-        extra = results.numerics[index] | {
-            "cycles": rig.drive.cycles,
-            "left_open": find_open_kinds(ERROR_KINDS, parts[index], step_values),
-        }
         pressed.add_patch_results(
-            results, index, models[index], case, float(fine.reach[index]), extra
+            results,
+            index,
+            models[index],
+            case,
+            float(fine.reach[index]),
+            extra=results.numerics[index] | {"cycles": rig.drive.cycles},
+            causes=causes[index],
         )
     return _MarchedCases(results, runs_singly, needs_more_steps)
 
@@ -393,19 +396,19 @@ def _estimate_run_errors(
         others = {MAIN_MEASURE: amplitude, "energy_balance": energy_balance(run.energies)}
         columns.append(run.values | others)
     errors = {name: np.zeros(len(models)) for name in columns[0]}
-    parts = []
+    causes = []
     for case, (model, pressed_case) in enumerate(zip(models, cases)):
         values, half, quarter, coarse = (select_known_values(run, case) for run in columns)
         kinds = (
             step_errors(values, half, quarter, steps=steps),
             coarser_errors(quarter, coarse, order=2.0),
             _reduction_errors(values, pressed_case.fine, model, fine.energies["passed"][case]),
-            fine.stated_errors[case],
+            dict.fromkeys(values, 0.0) | fine.stated_errors[case],
         )
-        parts.append(kinds)
-        for name, value in values.items():
-            coarse_errors = [kind.get(name, abs(value)) for kind in kinds[:3]]
-            errors[name][case] = sum(coarse_errors) + kinds[3].get(name, 0.0)
+        kind_errors = zip(ERROR_KINDS, kinds, strict=True)
+        causes.append(split_errors(values, list(kind_errors), (values, half, quarter)))
+        for name in values:
+            errors[name][case] = sum(causes[-1][name].parts.values())
     ends = np.arange(cycles - 1, -1, -window)[::-1]
     max_slip = MAX_STICKING_SLIP * np.array([case.fine.case.length for case in cases])
     runs = Runs(
@@ -422,7 +425,7 @@ def _estimate_run_errors(
         MARCH.max_balance_error,
         again=False,
     )
-    return runs, parts
+    return runs, causes
 
 
 def _reduction_errors(values: dict, points: _GatheredPoints, model: Model, work: float) -> dict:

@@ -5,8 +5,10 @@ Out: `CaseResults`. Patches that share their pieces are pressed together (`runs.
 others as in single runs. A case that a batch cannot finish is run by itself.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from time import perf_counter
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +25,8 @@ from ..rig.motion_warnings import law_warnings
 from ..rig.numerics import choose_numerics
 from . import one_by_one, patches
 from .case_results import CaseResults
+
+NONE: Mapping = MappingProxyType({})  # no settings, and no causes of errors
 
 
 class PressedCase(NamedTuple):
@@ -132,7 +136,9 @@ def add_patch_results(
     model: Model,
     pressed: PressedCase,
     slide: float,
-    extra: dict | None = None,
+    *,
+    extra: Mapping = NONE,
+    causes: Mapping = NONE,
 ) -> None:
     """Add the static measures and the notes of the solved patch to a case, as a single run does.
 
@@ -145,11 +151,16 @@ def add_patch_results(
     pressed : PressedCase
     slide : float
         Largest slide [m].
-    extra : dict, optional
+    extra : Mapping
         Details of the run for the warnings of large errors (`accuracy_warnings.Finding`).
+    causes : Mapping
+        ErrorCauses of the measures of the motion by name.
     """
     slides = np.array([slide])
-    motion = results.known_measures(case)
+    motion = {
+        name: replace(measure, causes=causes.get(name))
+        for name, measure in results.known_measures(case).items()
+    }
     outcome = judge_outcome_on_piece(
         Outcome(results.outcome[case]), model.patch, pressed.patch, slides
     )
@@ -157,7 +168,7 @@ def add_patch_results(
     results.fill(case, pressed.measures)
     drift = {name: motion[name] for name in ("drift_per_cycle",) if name in motion}
     motion.pop("normal_load", None)
-    finding = Finding(model, pressed.measures | motion, pressed.patch, extra or {})
+    finding = Finding(model, pressed.measures | motion, pressed.patch, extra)
     warnings = [
         *pressed.warnings,
         *model.rig.structure.notes,

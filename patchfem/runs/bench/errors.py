@@ -16,7 +16,6 @@ from ...response.coarser import (
     CoarserRuns,
     StepRun,
     estimate_errors,
-    find_open_kinds,
     make_spatial_coarsening,
 )
 from ...response.errors import (
@@ -58,15 +57,13 @@ class CoarsePass(NamedTuple):
 class PassErrors(NamedTuple):
     """Errors of the measures of a bench, estimated from coarser computations.
 
-    - errors: errors by measure name, one dict per kind.
+    - errors: what is coarser, and errors by measure name (`coarser.estimate_errors`).
     - seconds: CPU seconds.
-    - open_kinds: see `coarser.find_open_kinds`.
     - step_runs: StepRuns of the bench and of its coarser computations in time, fine to coarse.
     """
 
     errors: list
     seconds: float
-    open_kinds: dict
     step_runs: list
 
 
@@ -98,16 +95,13 @@ def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -
     ladder = list_coarse_passes(model, patches, fine_run, steps)
     coarse_passes = {}
     errors, seconds = estimate_errors(solve, fine_run.values, ladder, coarse_passes)
-    kinds = [coarser.of for coarser in ladder]
     if bond_sum_error(model, fine_run.engine):
-        errors = [*errors, _estimate_bond_sum_errors(model, fine_run)]
-        kinds = [*kinds, "bonds"]
+        errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
     step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
     for coarse_pass in ladder[0].runs:
         values = coarse_passes[coarse_pass].values
         step_runs.append(StepRun(coarse_pass.steps, cpu_seconds[coarse_pass], values))
-    open_kinds = find_open_kinds(kinds, errors, [run.values for run in step_runs])
-    return PassErrors(errors, seconds, open_kinds, step_runs)
+    return PassErrors(errors, seconds, step_runs)
 
 
 def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:

@@ -53,12 +53,13 @@ def run_prescribed(inputs: RunInputs) -> Result:
     options = PassOptions(None, inputs.say, inputs.progress)
     fine = bench.run(model, patch, steps, frames, watch=options)
     inputs.seconds["bench"] = fine.seconds
-    coarse_passes = PassErrors([], 0.0, None, [])
+    coarse_passes = PassErrors([], 0.0, [])
     if inputs.estimate:
         patches = [patch, *(mesh for mesh in inputs.coarse if mesh is not None)]
         coarse_passes = estimate_pass_errors(model, patches, fine, steps, inputs.say)
         inputs.seconds["error"] = coarse_passes.seconds
-    measures = add_errors(fine.values, *coarse_passes.errors, min_relative_error=1e-10)
+    step_values = [run.values for run in coarse_passes.step_runs]
+    measures = add_errors(fine.values, coarse_passes.errors, step_values, min_relative_error=1e-10)
     warnings = [
         *inputs.warnings,
         *_warn_of_bond_law(model),
@@ -80,7 +81,6 @@ def run_prescribed(inputs: RunInputs) -> Result:
         "engine": fine.engine.name,
         "steps": steps,
         "notes": [*_note_on_growth(model, fine), *note_on_groove_slope(model, patch)],
-        "left_open": coarse_passes.open_kinds,
         "step_runs": coarse_passes.step_runs,
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):

@@ -13,6 +13,7 @@ from ...effects import law_has_trait
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
 from ...response.decay_curve import DecayCurve
+from ...response.errors import add_stated_errors
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
@@ -102,7 +103,8 @@ def add_outcome(run: CoupledRun) -> CoupledRun:
         solution = replace(solution, outcome=Outcome.NOT_CONVERGED, message=message)
         run = replace(run, solution=solution)
     rig = run.model.rig
-    measures = run_events.add_uncertainty(run.measures, solution.stated_errors)
+    end_errors = solution.extra.get("late", {})
+    measures = add_stated_errors(run.measures, solution.stated_errors, end_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
     outcome, measures = judge_outcome(

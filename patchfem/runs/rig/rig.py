@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...response.coarser import find_open_kinds
 from ...response.errors import add_errors
 from ...response.reasons import find_missing_unbounded
 from ...response.rows import set_final_floors
@@ -138,12 +137,17 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
     while True:
         time_runs = engine.coarser_in_time(model, numerics)
         errors = [*runner.estimate(time_runs, solution), *space_errors]
+        coarser_runs = [*time_runs, *space_runs]
+        step_runs = runner.list_step_runs(numerics, solution, coarser_runs)
         measures = add_errors(
-            solution.values, *errors, min_relative_error=engine.min_relative_error, size=size
+            solution.values,
+            errors,
+            [run.values for run in step_runs],
+            min_relative_error=engine.min_relative_error,
+            size=size,
         )
         if numerics.pairs and not are_errors_met(measures, model.accuracy.tolerance):
             return run_refined(inputs, numerics.finer())
-        coarser_runs = [*time_runs, *space_runs]
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
@@ -157,11 +161,8 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         inputs.seconds["march"] = solution.seconds
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
-    extra = solution.extra
-    left_open = _split_errors_by_cause(solution, coarser_runs, errors, runner.solutions)
-    step_runs = runner.list_step_runs(numerics, solution, coarser_runs)
-    solution = replace(solution, extra=extra | {"left_open": left_open, "step_runs": step_runs})
-    measures |= compute_curve_measures(extra, runner.solutions.values())
+    measures |= compute_curve_measures(solution.extra, runner.solutions.values())
+    solution = replace(solution, extra=solution.extra | {"step_runs": step_runs})
     return RefinedRun(numerics, solution, measures)
 
 
@@ -233,27 +234,3 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
     if solution.levels:
         level_results = levels.add_level_errors(solution.levels, used, solutions)
     return replace(solution, levels=level_results, coarser=tuple(pairs))
-
-
-def _split_errors_by_cause(
-    solution: Solution, coarser_runs: list, errors: list, solutions: dict
-) -> dict:
-    """Split the errors of measures by cause, and return the observed orders of convergence.
-
-    Parameters
-    ----------
-    solution : Solution
-    coarser_runs : list of CoarserRuns
-    errors : list of dict
-        Errors by measure name of each of them.
-    solutions : dict
-        Solution of each coarser run by its Numerics.
-    """
-    kinds = [kind.of for kind in coarser_runs]
-    if late := solution.extra.get("late"):
-        kinds.append("end")
-        errors = [*errors, late]
-    step_runs = [solution.values]
-    if coarser_runs and coarser_runs[0].of == "steps":
-        step_runs += [solutions[halved].values for halved in coarser_runs[0].runs]
-    return find_open_kinds(kinds, errors, step_runs)

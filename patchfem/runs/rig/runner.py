@@ -79,7 +79,7 @@ class Runner:
         return solution
 
     def estimate(self, coarser_runs: list, solution: Solution) -> list:
-        """Estimate the errors of a run, with one dict of errors per kind of coarser run."""
+        """Estimate the errors of a run (see `coarser.estimate_errors`)."""
         errors, seconds = estimate_errors(
             lambda numerics: self._solve_coarser(numerics, solution),
             solution.values,

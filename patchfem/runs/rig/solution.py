@@ -66,7 +66,7 @@ class Solution:
     log: object = None
     notes: tuple = ()
     held: float = 0.0
-    stated_errors: dict | None = None
+    stated_errors: dict = field(default_factory=dict)
     errors: dict | None = None
     summed: object = None
     coarser: tuple = ()
