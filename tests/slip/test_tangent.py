@@ -1,4 +1,4 @@
-"""Tangential stiffness of unlike pieces that stick: the Schur complement of their compliance, and alike pieces."""
+"""Stick stiffness of two bodies of different materials, with normal-tangential coupling."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from patchfem.elasticity import interface_compliance, make_piece
 from patchfem.mesh import graded_grid
 
 
-def unlike_pieces() -> tuple:
-    """(compliance of a coated piece on a soft one, coupling (m, m) of normal and tangential forces [m/N])."""
+def dissimilar_bodies() -> tuple:
+    """Return the compliance of a coated body on a soft one, and the coupling of normal and
+    tangential forces (m, m) [m/N]."""
     grids = (
         graded_grid(LENGTH, HEIGHT, LENGTH / 60, COATING),
         graded_grid(LENGTH, 4e-3, LENGTH / 60),
@@ -29,23 +30,29 @@ def unlike_pieces() -> tuple:
     return pieces, (low[2] - high[2]) / WIDTH
 
 
-def test_exact_stiffness_is_that_of_the_pieces_less_what_closing_gives_way():
-    pieces, coupling = unlike_pieces()
+def test_exact_coupled_stiffness_agrees_with_schur_complement():
+    """The stick stiffness of dissimilar bodies agrees within 1e-11 with the Schur complement of
+    their compliance, and exceeds the stiffness without coupling."""
+    pieces, coupling = dissimilar_bodies()
     active = np.random.default_rng(4).random(len(coupling)) < 0.6
-    here = np.ix_(active, active)
-    cross = coupling[here]
-    one = np.ones(active.sum())
-    schur = pieces.tangential[here] - cross.T @ np.linalg.solve(pieces.normal[here], cross)
-    found = coupled_stiffness(pieces, coupling, active)
-    assert found == pytest.approx(np.linalg.solve(schur, one).sum(), rel=1e-11)
-    assert found > (1 + 1e-6) * tangential_stiffness(pieces.tangential, active)
+    contact = np.ix_(active, active)
+    contact_coupling = coupling[contact]
+    ones = np.ones(active.sum())
+    schur = pieces.tangential[contact] - contact_coupling.T @ np.linalg.solve(
+        pieces.normal[contact], contact_coupling
+    )
+    stiffness = coupled_stiffness(pieces, coupling, active)
+    assert stiffness == pytest.approx(np.linalg.solve(schur, ones).sum(), rel=1e-11)
+    assert stiffness > (1 + 1e-6) * tangential_stiffness(pieces.tangential, active)
 
 
-def test_exact_alike_pieces_and_no_contact():
+def test_exact_coupled_stiffness_in_limiting_cases():
+    """Without coupling the stiffness is that of similar bodies within 1e-12; without contact it is
+    zero."""
     pair = coated_pair(60)
-    none = 0 * pair.normal
+    no_coupling = 0 * pair.normal
     active = np.arange(pair.interface.x.size) < 40
-    assert coupled_stiffness(pair, none, active) == pytest.approx(
+    assert coupled_stiffness(pair, no_coupling, active) == pytest.approx(
         tangential_stiffness(pair.tangential, active), rel=1e-12
     )
-    assert coupled_stiffness(pair, none, 0 > np.ones(active.size)) == 0.0
+    assert coupled_stiffness(pair, no_coupling, 0 > np.ones(active.size)) == 0.0

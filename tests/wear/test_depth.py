@@ -1,4 +1,4 @@
-"""Implicit wear jumps: volume, shape and stability against closed forms and exact transients."""
+"""Implicit wear steps: worn volume, shape and stability against closed forms and exact transients."""
 
 from functools import cache
 
@@ -17,30 +17,32 @@ from patchfem.wear.depth import solve_jump
 LOAD, KAPPA, PATH = 116.0, 1e-14, 40e-6
 
 
-def critical_jump(compliance, rate, active, held: str = "load", places=None) -> float:
-    """Longest stable jump [cycles] of the explicit Euler method: 2 over the fastest rate at which pressure evens out.
+def critical_step(compliance, rate, active, prescribed: str = "load", positions=None) -> float:
+    """Return the longest stable step of the explicit Euler method [cycles]: 2 / the fastest rate of
+    the pressure.
 
-    compliance (m, m) [m/N]; rate (m,) [m/N] of `rates`; active (m,) bool: nodes in contact; held: "load", "moment"
-    (load and moment are given, which wants places (m,) [m]) or "approach". inf where nothing wears.
+    `compliance` is (m, m) [m/N], `rate` (m,) [m/N] the wear rates, `active` (m,) bool marks nodes
+    in contact. `prescribed` is "load", "moment" (load and moment, which needs `positions` (m,) [m])
+    or "approach". The result is inf where nothing wears.
     """
-    chosen = np.flatnonzero(np.asarray(active) & (np.asarray(rate) > 0))
+    wearing = np.flatnonzero(np.asarray(active) & (np.asarray(rate) > 0))
     touching = np.flatnonzero(active)
-    if not chosen.size:
+    if not wearing.size:
         return np.inf
     stiff = np.linalg.inv(compliance[np.ix_(touching, touching)])
-    if held != "approach":
-        rigid = np.ones((touching.size, 1))
-        if held == "moment":
-            rigid = np.column_stack([rigid, np.asarray(places)[touching]])
-        push = stiff @ rigid
-        stiff = stiff - push @ np.linalg.solve(rigid.T @ push, push.T)
-    root = np.sqrt(np.asarray(rate)[touching])
-    fastest = np.linalg.eigvalsh(root[:, None] * stiff * root[None, :])[-1]
-    return float(2 / fastest) if fastest > 0 else np.inf
+    if prescribed != "approach":
+        rigid_motions = np.ones((touching.size, 1))
+        if prescribed == "moment":
+            rigid_motions = np.column_stack([rigid_motions, np.asarray(positions)[touching]])
+        forces = stiff @ rigid_motions
+        stiff = stiff - forces @ np.linalg.solve(rigid_motions.T @ forces, forces.T)
+    root_rate = np.sqrt(np.asarray(rate)[touching])
+    largest_rate = np.linalg.eigvalsh(root_rate[:, None] * stiff * root_rate[None, :])[-1]
+    return float(2 / largest_rate) if largest_rate > 0 else np.inf
 
 
-def pressing(compliance, x, gap, load=LOAD):
-    """The pieces under a load with the rotation held."""
+def make_contact_solver(compliance, x, gap, load=LOAD):
+    """Return a function that solves the contact under a normal load with prevented rotation."""
 
     def press(worn, softening):
         return solve_forces(compliance + np.diag(softening), x, gap + worn, np.array([load]))[0]
@@ -49,34 +51,37 @@ def pressing(compliance, x, gap, load=LOAD):
 
 
 @cache
-def flat():
-    """Flat bare blocks: (press, compliance, area, rate of even slip, critical jump)."""
+def flat_contact():
+    """Return contact solver, compliance, areas, wear rates and critical step of two flat uncoated
+    blocks."""
     pair = bare_pair(32)
     area = pair.interface.weight
     c = np.array(pair.normal)
     rate = wear_rates(KAPPA, np.full(area.size, PATH), area)
     return (
-        pressing(c, pair.interface.x, np.zeros(area.size)),
+        make_contact_solver(c, pair.interface.x, np.zeros(area.size)),
         c,
         area,
         rate,
-        critical_jump(c, rate, np.ones(area.size, bool)),
+        critical_step(c, rate, np.ones(area.size, bool)),
     )
 
 
-def evolved(asked, tolerance=1e-3, count=None):
-    """(last state, number of jumps) of a whole wear run."""
-    state = start_wear(asked)
+def run_wear(problem, tolerance=1e-3, count=None):
+    """Return the last state and the number of steps of a complete wear run."""
+    state = start_wear(problem)
     jumps = 0
-    while state.cycle < asked.cycles:
-        state = take_jump(asked, state, tolerance, count)
+    while state.cycle < problem.cycles:
+        state = take_jump(problem, state, tolerance, count)
         jumps = jumps + 1
     return state, jumps
 
 
 @pytest.mark.parametrize("multiple", [0.1, 1, 10, 100, 1000])
-def test_exact_volume_and_no_checkerboard_at_any_jump(multiple):
-    press, _, area, rate, critical = flat()
+def test_exact_volume_without_pressure_oscillation_at_any_step(multiple):
+    """The worn volume is exact within 1e-12 and the pressure does not oscillate from node to node,
+    for steps up to 1000 times the explicit stability limit."""
+    press, _, area, rate, critical = flat_contact()
     depth = np.zeros(area.size)
     before = np.diff(press(depth, depth) / area, 2)
     for count in range(1, 11):
@@ -88,21 +93,24 @@ def test_exact_volume_and_no_checkerboard_at_any_jump(multiple):
 
 
 def punch_transient(force, compliance, rate, cycles):
-    """Return the change of depth [m] and the force [N] after some cycles of even wear while all nodes touch.
+    """Return the change of depth [m] and the force [N] after some cycles of wear under a uniform
+    slide.
 
-    f' = -Q diag(rate) f, with Q the stiffness at prescribed load, and depth' = diag(rate) f.
+    All nodes touch. The equations are f' = -Q diag(rate) f, with Q the stiffness at prescribed
+    load, and depth' = diag(rate) f; the matrix exponential solves them.
     """
-    one = np.ones(rate.size)
+    ones = np.ones(rate.size)
     stiff = np.linalg.inv(compliance)
-    stiff = stiff - np.outer(stiff @ one, one @ stiff) / (one @ stiff @ one)
+    stiff = stiff - np.outer(stiff @ ones, ones @ stiff) / (ones @ stiff @ ones)
     worn_per_force = np.diag(rate)
     matrix = np.block([[0 * stiff, worn_per_force], [0 * stiff, -stiff @ worn_per_force]])
     solution = expm(cycles * matrix) @ np.concatenate([0 * force, force])
     return solution[: rate.size], solution[rate.size :]
 
 
-def test_order_two_against_the_exact_transient_of_a_punch():
-    press, c, area, rate, critical = flat()
+def test_order_two_for_transient_of_punch():
+    """The pressure of a wearing punch converges with order two to the exact transient."""
+    press, c, area, rate, critical = flat_contact()
     cycles = 6 * critical
     zero = np.zeros(area.size)
     errors = []
@@ -116,30 +124,32 @@ def test_order_two_against_the_exact_transient_of_a_punch():
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.1)
 
 
-def test_order_a_jump_grows_as_its_true_error_allows():
-    """The method of order two may lengthen a jump by (tolerance / error)**(1/3), times 0.9 for safety."""
-    press, c, area, rate, critical = flat()
+def test_order_step_size_follows_true_error():
+    """The controller changes a step by 0.9 (tolerance / error)**(1/3), where the error agrees with
+    the true one within 1 %."""
+    press, c, area, rate, critical = flat_contact()
     tolerance = 1e-7
     path = np.full(area.size, PATH)
-    asked = WearProblem(press, lambda worn: path, area, KAPPA, 100 * critical)
-    before = take_jump(asked, start_wear(asked), tolerance)
+    problem = WearProblem(press, lambda worn: path, area, KAPPA, 100 * critical)
+    previous = take_jump(problem, start_wear(problem), tolerance)
     for _ in range(5):
-        state = take_jump(asked, before, tolerance)
-        length = state.cycle - before.cycle
-        exact = before.depth + punch_transient(before.force, c, rate, length)[0]
+        state = take_jump(problem, previous, tolerance)
+        length = state.cycle - previous.cycle
+        exact = previous.depth + punch_transient(previous.force, c, rate, length)[0]
         error = np.abs(state.depth - exact).max() / state.depth.max()
         assert (0.9 * length / state.length) ** 3 == pytest.approx(error / tolerance, rel=0.01)
-        before = state
+        previous = state
 
 
-def test_exact_pressure_times_path_is_even_under_uneven_slip():
-    """A yawing pad: p s = constant, the classical p ~ 1/s."""
+def test_exact_steady_pressure_is_inverse_to_sliding_distance():
+    """Under a non-uniform sliding distance s the pressure of a yawing pad tends to the classical p
+    ~ 1/s, within 1e-11."""
     pair = bare_pair(32)
     x = pair.interface.x
     area = pair.interface.weight
     width = pair.interface.width
     path = PATH * (1.5 + x / x[-1])
-    press = pressing(np.array(pair.normal), x, 0 * x)
+    press = make_contact_solver(np.array(pair.normal), x, 0 * x)
     rate = wear_rates(KAPPA, path, area)
     depth = 0 * x
     for _ in range(60):
@@ -149,8 +159,9 @@ def test_exact_pressure_times_path_is_even_under_uneven_slip():
     )
 
 
-def test_exact_tilted_pad_on_springs():
-    """Contact grows as sqrt(1/k + kappa s) until it is full; the error is at most a cell."""
+def test_exact_contact_fraction_of_tilted_pad_on_springs():
+    """The contact of a tilted pad on springs grows as sqrt(1/k + kappa s) until it is full, within
+    one cell."""
     length = 10e-3
     width = 10e-3
     angle = 1e-4
@@ -158,7 +169,7 @@ def test_exact_tilted_pad_on_springs():
     count = 1000
     x = (np.arange(count) + 0.5) / count * length - length / 2
     area = np.full(count, length / count * width)
-    press = pressing(np.diag(1 / (stiffness * area)), x, angle * x)
+    press = make_contact_solver(np.diag(1 / (stiffness * area)), x, angle * x)
     rate = wear_rates(KAPPA, np.full(count, PATH), area)
     depth = np.zeros(count)
     cycles = 0.0
@@ -170,15 +181,15 @@ def test_exact_tilted_pad_on_springs():
     assert exact > 0.9
 
 
-def crowned(cells=100, radius=0.05):
-    """Coated pieces, one of them crowned, under gross slip for 135 723 cycles."""
+def crowned_problem(cells=100, radius=0.05):
+    """Return a wear problem of coated bodies with a crown, in gross slip for 135 723 cycles."""
     pair = coated_pair(cells)
     x = pair.interface.x
     area = pair.interface.weight
-    even = np.full(x.size, PATH)
+    path = np.full(x.size, PATH)
     return WearProblem(
-        pressing(np.array(pair.normal), x, x**2 / 2 / radius),
-        lambda worn: even,
+        make_contact_solver(np.array(pair.normal), x, x**2 / 2 / radius),
+        lambda worn: path,
         area,
         1e-13,
         135723.0,
@@ -186,48 +197,61 @@ def crowned(cells=100, radius=0.05):
 
 
 @pytest.mark.slow
-def test_always_automatic_jumps_meet_the_tolerance():
-    asked = crowned()
+def test_always_automatic_steps_meet_tolerance():
+    """With automatic steps the stated error covers the true error and meets the tolerance, and the
+    worn volume is exact within 1e-12."""
+    problem = crowned_problem()
     counts = []
-    fine, _ = evolved(asked, 1e-6)
+    fine, _ = run_wear(problem, 1e-6)
     for tolerance in (1e-2, 1e-3, 1e-4):
-        state, count = evolved(asked, tolerance)
+        state, count = run_wear(problem, tolerance)
         counts.append(count)
         assert np.abs(state.depth - fine.depth).max() <= max(state.error, 1e-12 * fine.depth.max())
         assert state.error <= tolerance * state.depth.max()
-        assert state.depth @ asked.area == pytest.approx(
+        assert state.depth @ problem.area == pytest.approx(
             worn_volume(1e-13, LOAD, PATH * 135723), rel=1e-12
         )
     assert counts == sorted(counts)
 
 
-def test_exact_worn_hertz_contact_at_two_paths():
-    """Half-planes under gross slip. Where the worn parabola alone would be 2.207 and 3.891 wide (over Hertz' a0), an
-    independent half-space program found 2.315 and 3.959, and 1.060 and 1.023 of the mean pressure."""
+def test_exact_worn_hertz_contact_agrees_with_half_space_program():
+    """The worn Hertz contact in gross slip agrees with an independent half-space program at two
+    sliding distances. Relative to the Hertz half-width, that program gave 2.315 and 3.959 (2.207
+    and 3.891 for the worn parabola alone), and peaks of 1.060 and 1.023 of the mean pressure."""
     width = 10e-3
     radius = 0.05
-    line = 1e5
+    line_load = 1e5
     young = 121e9
-    half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
-    grid = refined_middle(5 * half, half / 10, 40 * half, 20 * half, 1.2)
-    nn, _, _ = interface_compliance(
-        make_piece(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
+    hertz_width = hertz_half_width(line_load, radius, young / (1 - 0.32**2) / 2)
+    mesh = refined_middle(
+        5 * hertz_width, hertz_width / 10, 40 * hertz_width, 20 * hertz_width, 1.2
     )
-    x = grid.x
-    area = grid.tributary_lengths() * width
-    press = pressing(2 * nn / width, x, x**2 / 2 / radius, line * width)
-    even = np.ones(x.size)
-    for alone, wide, peak in ((2.207, 2.315, 1.060), (3.891, 3.959, 1.023)):
-        path = (alone * half) ** 3 / (1.5 * radius * line)
-        assert worn_crown_half_width(1.0, line, path, radius) == pytest.approx(alone * half)
-        state, _ = evolved(WearProblem(press, lambda worn: even, area, 1.0, path), 3e-3)
-        # an edge lies somewhere in the cell behind its last node
-        found = np.ptp(x[state.force > 0]) / 2 + half / 20
-        assert found / half == pytest.approx(wide, abs=0.05)
-        assert (state.force / area).max() / (line / 2 / found) == pytest.approx(peak, abs=0.03)
+    nn, _, _ = interface_compliance(
+        make_piece(mesh.x, mesh.depth, mesh.coating_rows, bare((young, 0.32)))
+    )
+    x = mesh.x
+    area = mesh.tributary_lengths() * width
+    press = make_contact_solver(2 * nn / width, x, x**2 / 2 / radius, line_load * width)
+    uniform_path = np.ones(x.size)
+    for parabola_width, expected_width, expected_peak in (
+        (2.207, 2.315, 1.060),
+        (3.891, 3.959, 1.023),
+    ):
+        path = (parabola_width * hertz_width) ** 3 / (1.5 * radius * line_load)
+        assert worn_crown_half_width(1.0, line_load, path, radius) == pytest.approx(
+            parabola_width * hertz_width
+        )
+        state, _ = run_wear(WearProblem(press, lambda worn: uniform_path, area, 1.0, path), 3e-3)
+        # the edge of the contact lies inside the element next to the last node in contact
+        width_found = np.ptp(x[state.force > 0]) / 2 + hertz_width / 20
+        assert width_found / hertz_width == pytest.approx(expected_width, abs=0.05)
+        assert (state.force / area).max() / (line_load / 2 / width_found) == pytest.approx(
+            expected_peak, abs=0.03
+        )
 
 
-def test_exact_wear_coefficient_zero_changes_nothing():
-    asked = crowned(40)
-    still, _ = evolved(WearProblem(asked.press, asked.path, asked.area, 0.0, 1000.0))
-    assert not still.depth.any() and still.error == 0.0
+def test_exact_zero_wear_coefficient_causes_no_wear():
+    """With a wear coefficient of zero the depth and its stated error are exactly zero."""
+    problem = crowned_problem(40)
+    end, _ = run_wear(WearProblem(problem.press, problem.path, problem.area, 0.0, 1000.0))
+    assert not end.depth.any() and end.error == 0.0
