@@ -1,4 +1,4 @@
-"""The model of a scene: frozen, made once, all that a run takes; parts of it exchanged without a scene."""
+"""The model of a scene: its parts are immutable, can be replaced, and contain all that a run needs."""
 
 from dataclasses import FrozenInstanceError, astuple, fields, is_dataclass, replace
 
@@ -48,8 +48,8 @@ RUNS = {
 }
 
 
-def seen(result) -> tuple:
-    """All of a result but its times, as text, so that two results compare bit by bit."""
+def comparable_result(result) -> tuple:
+    """Return everything of a result except its computing times, in a form that compares bit by bit."""
     response = result.response
     histories = (
         []
@@ -59,16 +59,18 @@ def seen(result) -> tuple:
             for name in ("time", "slide", "force", "slip")
         ]
     )
-    measured = {name: repr(astuple(measure)) for name, measure in result.measures.items()}
-    stated = result.plan.as_json() | {"seconds": None, "compile_seconds": None}
-    return result.outcome, measured, result.warnings, histories, stated
+    measure_values = {name: repr(astuple(measure)) for name, measure in result.measures.items()}
+    plan_values = result.plan.as_json() | {"seconds": None, "compile_seconds": None}
+    return result.outcome, measure_values, result.warnings, histories, plan_values
 
 
 # ---- the model itself
 
 
 @pytest.mark.parametrize("text, kind", KINDS.values(), ids=KINDS)
-def test_always_a_model_of_every_kind_is_frozen(text, kind):
+def test_always_models_of_all_kinds_are_immutable(text, kind):
+    """The model of every kind of scene contains the parts of the scene, and no field of them can be
+    set."""
     model = build(loads(text))
     assert model.kind == kind
     assert (model.rig is not None, model.slide is not None) == (
@@ -91,7 +93,8 @@ def test_always_a_model_of_every_kind_is_frozen(text, kind):
 
 
 @pytest.mark.parametrize("text, kind", KINDS.values(), ids=KINDS)
-def test_always_a_model_keeps_the_scene_it_came_from(text, kind):
+def test_always_model_keeps_text_of_its_scene(text, kind):
+    """A model keeps the text of its scene, and its resolved text gives the same model again."""
     scene = loads(text, "a.toml")
     source = build(scene).source
     assert (source.text, source.title, source.effects) == (
@@ -107,7 +110,9 @@ def test_always_a_model_keeps_the_scene_it_came_from(text, kind):
     )
 
 
-def test_exact_the_resolved_text_has_what_follows_from_other_keys():
+def test_exact_resolved_text_contains_derived_values():
+    """The resolved text contains the rest speed derived from other keys, but no element size that
+    the tolerance determines."""
     for text in (PATCH, PATCH + COULOMB + SHORT):
         assert loads(build(loads(text)).source.resolved).contact.element_size is None, (
             "the tolerance chooses it"
@@ -120,8 +125,9 @@ def test_exact_the_resolved_text_has_what_follows_from_other_keys():
     )
 
 
-def test_always_the_speed_of_a_released_rig_can_be_written():
-    """Several modes in rest at t = 0: the speed to expect is a number of numpy, which a text does not take."""
+def test_always_resolved_text_contains_speed_of_released_rig():
+    """The resolved text of a released rig with several modes contains its rest speed, which is a
+    NumPy number and must be converted to a float."""
     modes = "".join(
         f'[[structure.mode]]\nname = "m{k}"\nfrequency = "{f} Hz"\ndamping = 0.01\nslide = {s}\n'
         for k, (f, s) in enumerate([(120, 1.0), (300, 0.3)])
@@ -135,42 +141,47 @@ def test_always_the_speed_of_a_released_rig_can_be_written():
     assert loads(model.source.resolved).friction.rest_speed == model.bonds.rest_speed
 
 
-# ---- runs of it
+# ---- runs of a model
 
 
 @pytest.mark.parametrize("text, sets", RUNS.values(), ids=RUNS)
-def test_exact_the_run_of_a_model_is_the_run_of_its_scene(text, sets):
+def test_exact_run_of_model_equals_run_of_scene(text, sets):
+    """The runs of a scene, of its model and of its plan give bit-identical results."""
     scene = loads(text, sets=sets)
     model = build(scene)
-    ours = run(model)
-    want = run(scene)
-    assert seen(ours) == seen(want) == seen(run(plan(model)))
-    assert ours.plan.model is model and ours.measures
+    result = run(model)
+    expected = run(scene)
+    assert (
+        comparable_result(result)
+        == comparable_result(expected)
+        == comparable_result(run(plan(model)))
+    )
+    assert result.plan.model is model and result.measures
 
 
 def with_load(model, size: float):
-    """The model under another load [N]."""
+    """Return the model with another normal load [N]."""
     if model.patch is not None:
         return replace(model, patch=model.patch.with_loading(load=size))
     return replace(model, point=replace(model.point, load=size))
 
 
 def with_tilt(model, angle: float):
-    """The model under another tilt [rad]."""
+    """Return the model with another tilt [rad]."""
     ((name, tilt),) = model.patch.gap.shapes
     shapes = ((name, tilt.model_copy(update={"angle": angle})),)
     return replace(model, patch=replace(model.patch, gap=replace(model.patch.gap, shapes=shapes)))
 
 
-def with_size(model, size: float):
-    """The model on another mesh [m]."""
+def with_element_size(model, size: float):
+    """Return the model with another element size [m]."""
     return replace(model, patch=model.patch.with_element_size(size))
 
 
 CHANGES = {
     "load": (with_load, 200.0, "contact.load=200 N"),
     "gap": (with_tilt, 5e-5, "contact.tilt.angle=0.05 mrad"),
-    "mesh": (with_size, 4e-4, "contact.element_size=0.4 mm"),
+    "mesh": (with_element_size, 4e-4, "contact.element_size=0.4 mm"),
 }
 
 
@@ -185,25 +196,30 @@ CHANGES = {
     ],
     ids=["patch", "rig", "soft patch on a rig"],
 )
-def test_exact_an_exchanged_part_is_the_scene_with_that_set(text, sets, change):
-    exchanged, value, one = CHANGES[change]
-    before = build(loads(text, sets=sets))
-    ours = run(exchanged(before, value))
-    want = run(loads(text, sets=[*sets, one]))
-    assert seen(ours) == seen(want) != seen(run(before))
+def test_exact_replaced_part_equals_changed_scene_key(text, sets, change):
+    """A model with a replaced load, gap or mesh gives the results of the scene in which that key is
+    set."""
+    replace_part, value, setting = CHANGES[change]
+    original = build(loads(text, sets=sets))
+    result = run(replace_part(original, value))
+    expected = run(loads(text, sets=[*sets, setting]))
+    assert (
+        comparable_result(result) == comparable_result(expected) != comparable_result(run(original))
+    )
 
 
-def test_exact_another_law_is_the_scene_with_that_set():
-    """The first interface of the rig and the law of the model are one law in two places: both are exchanged."""
+def test_exact_replaced_friction_equals_changed_scene_keys():
+    """A model with a replaced friction law gives the results of the scene with these keys. The law
+    is replaced in the model and in the first interface of the rig, which both refer to it."""
     text = SMALL_PATCH + SHEAR + COULOMB + SHORT
     sets = ["accuracy.steps_per_cycle=100"]
-    before = build(loads(text, sets=sets))
-    less = before.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
-    friction = before.rig.friction
-    interfaces = (replace(friction.interfaces[0], numbers=less),)
-    other = replace(before.rig, friction=replace(friction, interfaces=interfaces))
-    ours = run(replace(before, friction=less, rig=other))
-    assert seen(ours) == seen(
+    original = build(loads(text, sets=sets))
+    smaller_friction = original.friction.model_copy(update={"static": 0.2, "kinetic": 0.2})
+    friction = original.rig.friction
+    interfaces = (replace(friction.interfaces[0], numbers=smaller_friction),)
+    changed_rig = replace(original.rig, friction=replace(friction, interfaces=interfaces))
+    result = run(replace(original, friction=smaller_friction, rig=changed_rig))
+    assert comparable_result(result) == comparable_result(
         run(loads(text, sets=[*sets, "friction.static=0.2", "friction.kinetic=0.2"]))
     )
 
@@ -215,40 +231,43 @@ STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
 
 
 @pytest.mark.parametrize(
-    "text, key, line, says",
+    "text, key, line, expected",
     [
         (STILL, "drive.kind", 'kind = "base"', "the drive excites no mode"),
         (TINY, "", "", "GB of memory are needed"),
     ],
     ids=["a key of a run", "a size"],
 )
-def test_refuses_with_file_and_line_once_whoever_asks(text, key, line, says):
-    """The same sentence from the scene, its model and its plan; file and line of the key once, at the beginning."""
+def test_refuses_scene_with_file_and_line_stated_once(text, key, line, expected):
+    """Scene, model and plan raise the same message, which begins with the file and the line of the
+    key."""
     where = f"a.toml:{line_of(text, line)}: {key}: " if key else "a.toml: "
     scene = loads(text, "a.toml")
     messages = set()
-    for act in (lambda: run(scene), lambda: run(build(scene)), lambda: run(plan(scene))):
+    for call in (lambda: run(scene), lambda: run(build(scene)), lambda: run(plan(scene))):
         with pytest.raises(PatchfemError) as caught:
-            act()
+            call()
         messages.add(str(caught.value))
         assert caught.value.key is None and isinstance(caught.value, Missing) == (text == TINY)
     [message] = messages
-    assert message.startswith(where) and message.count("a.toml") == 1 and says in message
+    assert message.startswith(where) and message.count("a.toml") == 1 and expected in message
 
 
-def test_refuses_what_no_model_can_be_made_of_with_file_and_line_once():
+def test_refuses_invalid_model_with_file_and_line_stated_once():
+    """An error that appears when the model is built names the file and the line of its table once."""
     text = (
         POINT + GROWING + '[friction.temperature]\nsurface = "1 K"\nreference = "293.15 K"\n'
         'rest_activation = "2500 K"\nslip_activation = "1500 K"\n' + TRIANGLE
     )
-    for act in (build, plan, run):
+    for call in (build, plan, run):
         with pytest.raises(PatchfemError, match="rest_growth would be about 1e-") as caught:
-            act(loads(text, "a.toml"))
+            call(loads(text, "a.toml"))
         where = f"a.toml:{line_of(text, '[friction.temperature]')}: friction.temperature: "
         assert str(caught.value).startswith(where) and str(caught.value).count("a.toml") == 1
 
 
-def test_refuses_a_key_of_a_set_with_the_file_alone():
+def test_refuses_overridden_key_with_file_name_only():
+    """An error about a key that was set outside the file names the file without a line number."""
     sets = [
         "drive.kind=base",
         "drive.frequency=143 Hz",
@@ -262,7 +281,9 @@ def test_refuses_a_key_of_a_set_with_the_file_alone():
     assert str(caught.value).count("a.toml") == 1
 
 
-def test_exact_the_frequency_of_a_model_of_two_masses_is_that_of_its_eigenproblem():
+def test_exact_first_frequency_of_two_masses_agrees_with_eigenvalue():
+    """The first natural frequency of a chain of two masses agrees with its closed form within
+    1e-12."""
     text = """[structure]
 masses = ["1 kg", "2 kg"]
 spring = [{between = [1, 0], stiffness = "9 N/m"}, {between = [2, 1], stiffness = "9 N/m"}]
@@ -272,7 +293,7 @@ frequency = "1 Hz"
 acceleration = "1 m/s^2"
 cycles = 3
 """
-    found = build(loads(text, "a.toml")).rig
-    assert found.first_mode.frequency == pytest.approx(
+    rig = build(loads(text, "a.toml")).rig
+    assert rig.first_mode.frequency == pytest.approx(
         3 / (2 * np.pi) * np.sqrt((5 - 17**0.5) / 4), rel=1e-12
     )

@@ -1,4 +1,7 @@
-"""A small share of every campaign, always; the whole: `python tests/support/torture --campaign NAME --share 1`."""
+"""A small fraction of the trials of every campaign.
+
+All trials of a campaign run with `python tests/support/torture --campaign NAME --share 1`.
+"""
 
 import os
 
@@ -23,33 +26,37 @@ ALWAYS = {
     "hostile": 0.008,
 }
 SEED = 4
-SEEDS = {"energy": 25}  # tanh, elastic-plastic and bonds: no loop that no other test compiles
+SEEDS = {"energy": 25}  # this seed draws only laws whose loops other tests compile as well
 
 
-def held(names, share, seed):
-    said = []
-    rows = torture(run_command, share, names, seed, None, said.append)
-    assert not said, "\n".join(said)
+def run_trials(names, fraction, seed):
+    """Run a fraction of the trials of campaigns and return their rows; fail if any message is
+    reported."""
+    messages = []
+    rows = torture(run_command, fraction, names, seed, None, messages.append)
+    assert not messages, "\n".join(messages)
     return rows
 
 
 @pytest.fixture(scope="module", autouse=True)
 def warm_once(tmp_path_factory):
-    """What the driver does before its first campaign, once for all of them."""
+    """Compile and import before the first campaign, once for all of them."""
     driver.warm(run_command, tmp_path_factory.mktemp("warm"))
-    kept = driver.warm
-    driver.warm = lambda command, place: None
+    original_warm = driver.warm
+    driver.warm = lambda command, folder: None
     yield
-    driver.warm = kept
+    driver.warm = original_warm
 
 
 @pytest.mark.parametrize("name", ALWAYS)
-def test_always_holds_a_share(name):
-    (row,) = held([name], ALWAYS[name], SEEDS.get(name, SEED))
+def test_always_sample_of_campaign_passes(name):
+    """A small sample of every campaign finds no fault and has the requested number of trials."""
+    (row,) = run_trials([name], ALWAYS[name], SEEDS.get(name, SEED))
     assert row.tried == max(1, round(ALWAYS[name] * CAMPAIGNS[name].size))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CAMPAIGNS)
-def test_always_holds_a_fiftieth(name):
-    held([name], 0.02, 2)
+def test_always_two_percent_of_campaign_pass(name):
+    """Two percent of the trials of every campaign find no fault."""
+    run_trials([name], 0.02, 2)

@@ -1,4 +1,4 @@
-"""The attacks find what is planted: a driver that lets a fault pass would say that everything holds."""
+"""The torture driver detects planted faults, so that a passing campaign means something."""
 
 import faulthandler
 import json
@@ -16,14 +16,18 @@ from torture.trial import Trial, Wrong, alone, captured
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 
 
-def attacked(tmp_path, command, work=lambda trial: trial.run("run", "x.toml"), patience=0.02):
-    """What is said of a command under one trial."""
+def run_trial(tmp_path, command, work=lambda trial: trial.run("run", "x.toml"), patience=0.02):
+    """Return the message of the driver about a command under one trial; if there is no fault."""
     return alone(
-        work, lambda tell: Trial(np.random.default_rng(0), tmp_path, command, tell, patience), 20.0
+        work,
+        lambda report: Trial(np.random.default_rng(0), tmp_path, command, report, patience),
+        20.0,
     )
 
 
-def says(text, code=2):
+def make_printing_command(text, code=2):
+    """Return a command that prints a text on stderr and returns an exit code."""
+
     def command(words):
         print(text, file=sys.stderr)
         return code
@@ -31,52 +35,68 @@ def says(text, code=2):
     return command
 
 
-def dies(words):
+def crash(words):
+    """Stop the process by a segmentation fault."""
     faulthandler.disable()
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
-def spins(words):
+def loop_for_a_minute(words):
+    """Use 60 CPU seconds, which is longer than a trial may take."""
     end = time.process_time() + 60
     while time.process_time() < end:
         pass
 
 
-def raises(words):
+def raise_error(words):
+    """Raise an exception that the command does not handle."""
     raise ValueError("no word of this was meant for a person")
 
 
 PLANTED = {
-    "a traceback": (raises, "exit code 1: Traceback"),
-    "an internal fault": (says("patchfem: internal fault, please report it", 1), "exit code 1"),
-    "a code of no meaning": (says("something went wrong here", 7), "exit code 7"),
-    "a crash": (dies, "crash by signal 11"),
-    "no end": (spins, "hang"),
-    "a raw warning": (says("x.py:3: RuntimeWarning: overflow encountered", 0), "RuntimeWarning"),
-    "no word": (says("no", 2), "without a helpful line"),
-    "a line of 3000": (says("x" * 3000), "a line of 3000 characters"),
-    "an escape": (says("title \x1b[31m of a file"), "control character"),
+    "a traceback": (raise_error, "exit code 1: Traceback"),
+    "an internal fault": (
+        make_printing_command("patchfem: internal fault, please report it", 1),
+        "exit code 1",
+    ),
+    "a code of no meaning": (make_printing_command("something went wrong here", 7), "exit code 7"),
+    "a crash": (crash, "crash by signal 11"),
+    "no end": (loop_for_a_minute, "hang"),
+    "a raw warning": (
+        make_printing_command("x.py:3: RuntimeWarning: overflow encountered", 0),
+        "RuntimeWarning",
+    ),
+    "no word": (make_printing_command("no", 2), "without a helpful line"),
+    "a line of 3000": (make_printing_command("x" * 3000), "a line of 3000 characters"),
+    "an escape": (make_printing_command("title \x1b[31m of a file"), "control character"),
 }
 
 
 @pytest.mark.parametrize("fault", PLANTED)
-def test_always_found(tmp_path, fault):
-    command, said = PLANTED[fault]
-    found = attacked(tmp_path, command)
-    assert said in found and found.endswith("[patchfem run x.toml]")
+def test_always_planted_faults_are_detected(tmp_path, fault):
+    """The driver reports each planted fault together with the command line that caused it."""
+    command, expected = PLANTED[fault]
+    message = run_trial(tmp_path, command)
+    assert expected in message and message.endswith("[patchfem run x.toml]")
 
 
-def test_exact_silence_for_a_refusal_in_words(tmp_path):
-    assert attacked(tmp_path, says("scene.toml:3: drive.wavform: unknown key")) == ""
+def test_exact_clear_refusal_is_no_fault(tmp_path):
+    """A refusal with a clear message is not reported as a fault."""
+    assert (
+        run_trial(tmp_path, make_printing_command("scene.toml:3: drive.wavform: unknown key")) == ""
+    )
 
 
-def test_always_names_a_trial_that_fails_itself(tmp_path):
-    assert attacked(tmp_path, says("", 0), lambda trial: 1 / 0).startswith(
+def test_always_error_inside_trial_is_reported(tmp_path):
+    """An exception in the code of a trial is reported as a failure of the trial."""
+    assert run_trial(tmp_path, make_printing_command("", 0), lambda trial: 1 / 0).startswith(
         "the trial itself failed: ZeroDivisionError"
     )
 
 
-def test_always_both_streams_are_kept(tmp_path):
+def test_always_stdout_and_stderr_are_captured(tmp_path):
+    """The driver captures output of Python and of C code, on both streams, and the exit code."""
+
     def command(words):
         os.write(2, b"from C\n")
         print("from Python")
@@ -85,19 +105,20 @@ def test_always_both_streams_are_kept(tmp_path):
     assert captured(command, []) == (3, "from Python\n", "from C\n")
 
 
-def summary(folder, **more):
+def write_summary(folder, **changes):
+    """Write the summary.json of a run with some changed entries and return the folder."""
     folder.mkdir(exist_ok=True)
-    told = {
+    content = {
         "outcome": "steady",
         "warnings": [],
         "measures": {"energy_balance": {"value": 1e-12}},
-    } | more
-    (folder / "summary.json").write_text(json.dumps(told))
+    } | changes
+    (folder / "summary.json").write_text(json.dumps(content))
     return folder
 
 
 @pytest.mark.parametrize(
-    "more, said",
+    "changes, expected",
     [
         ({"measures": {"energy_balance": {"value": 1e-3}}}, "steady with an energy balance"),
         ({"measures": {"loop_area": {"value": float("nan")}}}, "NaN in JSON"),
@@ -105,29 +126,33 @@ def summary(folder, **more):
         ({"outcome": "not_converged"}, "without a warning"),
     ],
 )
-def test_refuses_a_summary(tmp_path, more, said):
-    assert results.whole(summary(tmp_path / "good"))["outcome"] == "steady"
-    with pytest.raises(Wrong, match=said):
-        results.whole(summary(tmp_path / "bad", **more))
+def test_refuses_inconsistent_summary(tmp_path, changes, expected):
+    """A summary that contradicts itself or contains NaN is refused with a message that says why."""
+    assert results.whole(write_summary(tmp_path / "good"))["outcome"] == "steady"
+    with pytest.raises(Wrong, match=expected):
+        results.whole(write_summary(tmp_path / "bad", **changes))
 
 
-def test_refuses_a_number_that_is_none(tmp_path):
+def test_refuses_nan_in_result_file(tmp_path):
+    """A result file with NaN is refused, and the message names the variable."""
     for name, values in (("good", [1.0, 2.0]), ("bad", [1.0, np.nan])):
-        with h5py.File(summary(tmp_path / name) / "result.nc", "w") as file:
+        with h5py.File(write_summary(tmp_path / name) / "result.nc", "w") as file:
             file.create_group("deep")["x"] = values
     results.whole(tmp_path / "good")
     with pytest.raises(Wrong, match="deep/x holds 1 of 2 values"):
         results.whole(tmp_path / "bad")
 
 
-def test_refuses_what_is_left_behind(tmp_path):
+def test_refuses_leftover_files(tmp_path):
+    """A partial results folder that remains after a run is refused."""
     (tmp_path / "out.partial").mkdir()
     with pytest.raises(Wrong, match=r"out\.partial"):
         results.left_over(tmp_path)
 
 
-def test_always_a_trial_has_the_same_numbers_again():
-    """They depend on its campaign, seed and index, not on what ran before it."""
+def test_always_random_numbers_of_trial_are_reproducible():
+    """The random numbers of a trial depend only on its campaign, seed and index, not on earlier
+    trials."""
     trials = [("grammar", 5, 0), ("grammar", 5, 1), ("grammar", 6, 0), ("scenes", 5, 0)]
     first = [driver.random_numbers(*trial).random() for trial in trials]
     assert len(set(first)) == 4

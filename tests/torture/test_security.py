@@ -1,4 +1,5 @@
-"""What a file, a name or a scene must never bring about: code that runs, a call over the network, a file elsewhere."""
+"""Files, names and scenes never cause code execution, network access or files outside the results
+folder."""
 
 import ast
 import re
@@ -13,7 +14,7 @@ from torture.hostile import Planted
 import patchfem
 
 HOUSE = Path(__file__).parents[2]
-CODE = {"eval", "exec", "compile", "__import__"}  # built-ins that make code of text
+CODE = {"eval", "exec", "compile", "__import__"}  # built-in functions that turn text into code
 UNSAFE = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "code", "codeop"}
 NETWORK = {
     "socket",
@@ -32,67 +33,71 @@ NETWORK = {
 WORDS = re.compile(
     rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|np\.load\(|allow_pickle|shell|\bos\."
 )
-# the name of the shell whose completions are written
+# uses that were reviewed; `shell` is the name of the shell whose completions are written
 HARMLESS = {
     (
         "compiled.cache_files",
         "pickle",
-    ),  # numba's own form of machine code, in a folder that is the user's own
+    ),  # numba's format of machine code, in a folder of the user
     ("compiled", "compile()"),
-    ("compiled", "exec()"),  # a loop of the package with its law put in
+    ("compiled", "exec()"),  # a loop of the package in which its friction law is inserted
     ("compiled.no_jit", "compile()"),
-    ("compiled.no_jit", "exec()"),  # a module of the package as it is written
+    ("compiled.no_jit", "exec()"),  # an unchanged module of the package
     ("__main__", "shell=shell"),
 }
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 
 
-def found_in(name: str, text: str) -> set:
-    """What a module has that no module may have, but for HARMLESS; only what has a word of it is parsed."""
-    out = set()
+def find_unsafe_code(name: str, text: str) -> set:
+    """Return the unsafe imports and calls in the text of a module that HARMLESS does not list. A
+    module is parsed only if its text contains a suspicious word."""
+    findings = set()
     for node in syntax_nodes(text) if WORDS.search(text) else ():
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = (
-                [one.name for one in node.names]
+                [finding.name for finding in node.names]
                 if isinstance(node, ast.Import)
                 else [node.module or ""]
                 if not node.level
                 else []
             )
-            out |= {one for one in names if one.split(".")[0] in UNSAFE | NETWORK}
+            findings |= {finding for finding in names if finding.split(".")[0] in UNSAFE | NETWORK}
         elif (
             isinstance(node, ast.Attribute)
             and node.attr in ("system", "popen")
             and ast.unparse(node.value) == "os"
         ):
-            out.add(f"os.{node.attr}")
+            findings.add(f"os.{node.attr}")
         elif (
             isinstance(node, ast.keyword)
             and node.arg in ("allow_pickle", "shell")
             and not (isinstance(node.value, ast.Constant) and node.value.value is False)
         ):
-            out.add(f"{node.arg}={ast.unparse(node.value)}")
+            findings.add(f"{node.arg}={ast.unparse(node.value)}")
         elif isinstance(node, ast.Call):
             if isinstance(node.func, ast.Name) and node.func.id in CODE:
-                out.add(f"{node.func.id}()")
+                findings.add(f"{node.func.id}()")
             if (
                 isinstance(node.func, ast.Attribute)
                 and node.func.attr == "load"
                 and ast.unparse(node.func.value) == "np"
-                and "allow_pickle" not in [one.arg for one in node.keywords]
+                and "allow_pickle" not in [finding.arg for finding in node.keywords]
             ):
-                out.add("np.load without allow_pickle=False")
-    return {one for one in out if (name, one) not in HARMLESS}
+                findings.add("np.load without allow_pickle=False")
+    return {finding for finding in findings if (name, finding) not in HARMLESS}
 
 
-def test_always_no_code_from_data_and_no_network():
+def test_always_sources_contain_no_unsafe_code():
+    """No module of the package executes data as code or imports a network library."""
     assert not {
-        name: found for name, text in sources(HOUSE).items() if (found := found_in(name, text))
+        name: findings
+        for name, text in sources(HOUSE).items()
+        if (findings := find_unsafe_code(name, text))
     }
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, finding",
     [
         ("eval('1')", "eval()"),
         ("import pickle as p", "pickle"),
@@ -104,61 +109,66 @@ def test_always_no_code_from_data_and_no_network():
         ("os.system('x')", "os.system"),
     ],
 )
-def test_always_sees_what_there_is(text, said):
-    assert found_in("planted", text) == {said}
-    assert found_in("planted", FINE) == set()
+def test_always_unsafe_code_is_detected(text, finding):
+    """The scan of the sources finds each planted unsafe call or import, and nothing in safe code."""
+    assert find_unsafe_code("planted", text) == {finding}
+    assert find_unsafe_code("planted", FINE) == set()
 
 
-def test_always_writes_only_into_its_folder(tmp_path):
-    """A title, a mode, a value of a sweep and a profile's name that lead upwards: nothing is written beside -o."""
+def test_always_commands_write_only_into_output_folder(tmp_path):
+    """The commands write no file outside the folder given by -o, even if a title or a value of a
+    sweep contains `../`."""
     (tmp_path / "work").mkdir()
     scene = tmp_path / "work" / "scene.toml"
     scene.write_text('title = "../../escaped"\n' + BENCH, "utf-8")
-    before = {path for path in tmp_path.rglob("*")}
+    old_paths = {path for path in tmp_path.rglob("*")}
     out = tmp_path / "work" / "out"
-    swept = cli(
+    sweep = cli(
         "sweep", scene, "--over", "title=../../escaped,/escaped", "-o", out / "swept", "-j", "1"
     )
-    assert swept.code in (0, 2), swept.err
+    assert sweep.code in (0, 2), sweep.err
     assert cli("run", scene, "-o", out / "run", "--no-page").code == 0
     assert cli("export", out / "run", "-o", out / "histories.csv").code == 0
-    new = {path for path in tmp_path.rglob("*")} - before
-    assert new and all(path.is_relative_to(out) for path in new)
+    new_paths = {path for path in tmp_path.rglob("*")} - old_paths
+    assert new_paths and all(path.is_relative_to(out) for path in new_paths)
     assert not Path("/escaped").exists()
 
 
-def test_always_pages_escape_what_came_from_files(tmp_path):
-    """A title, a mode's name and a level of a warning are text on the page; the browser's view of it stands in
-    tests/export/pages."""
-    mark = "</script><img src=x onerror=alert(1)>"  # data in a script is text unless it ends the script
+def test_always_pages_escape_text_of_scenes(tmp_path):
+    """A title and a mode name with HTML markup appear as escaped text on the page. The same page in
+    a browser is tested in tests/export/pages."""
+    markup = "</script><img src=x onerror=alert(1)>"  # harmless in a script unless it closes it
     scene = tmp_path / "scene.toml"
     drive = '[drive]\nkind = "base"\nfrequency = "100 Hz"\nacceleration = "5 m/s^2"\ncycles = 3\n'
-    scene.write_text(f'title = "{mark}"\n' + MODE.replace('"axial"', f'"{mark}"') + drive, "utf-8")
+    scene.write_text(
+        f'title = "{markup}"\n' + MODE.replace('"axial"', f'"{markup}"') + drive, "utf-8"
+    )
     assert cli("run", scene, "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "&lt;img src=x" in page
-    outside = re.sub(r"<script.*?</script>", "", page, flags=re.S)
-    assert "<img src=x" not in outside
+    page_without_scripts = re.sub(r"<script.*?</script>", "", page, flags=re.S)
+    assert "<img src=x" not in page_without_scripts
 
 
-def test_always_a_pickle_under_any_ending_is_text(tmp_path, monkeypatch):
+def test_always_pickles_are_never_loaded(tmp_path, monkeypatch):
+    """A pickle with the suffix of any supported file is refused with a message and is not executed."""
     import pickle
 
     monkeypatch.chdir(tmp_path)
-    for ending in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml"):
-        Path(f"x.{ending}").write_bytes(pickle.dumps(Planted()))
-        words = (
-            ["check", f"x.{ending}"]
-            if ending == "toml"
-            else ["profile", f"x.{ending}", "--units", "um,um"]
+    for suffix in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml"):
+        Path(f"x.{suffix}").write_bytes(pickle.dumps(Planted()))
+        arguments = (
+            ["check", f"x.{suffix}"]
+            if suffix == "toml"
+            else ["profile", f"x.{suffix}", "--units", "um,um"]
         )
-        answer = cli(*words)
-        assert answer.code in (2, 4) and answer.err.strip(), (ending, answer)
+        answer = cli(*arguments)
+        assert answer.code in (2, 4) and answer.err.strip(), (suffix, answer)
     assert sorted(path.suffix for path in tmp_path.iterdir()) == sorted(
-        f".{one}" for one in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml")
+        f".{suffix}" for suffix in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml")
     )
 
 
-def test_exact_the_house_is_the_installed_one():
-    """The scan reads the sources that run."""
+def test_exact_scanned_sources_are_the_installed_package():
+    """The scanned source folder contains the package that is imported."""
     assert Path(patchfem.__file__).parents[1] == HOUSE
