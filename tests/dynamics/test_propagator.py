@@ -1,4 +1,4 @@
-"""One step of the march: maps, what the drive adds, energies of the step, against DOP853 and closed forms."""
+"""The propagator of one time step: matrices, forcing and energies against DOP853 and closed forms."""
 
 from math import pi
 
@@ -27,20 +27,22 @@ DRIVES = {
 }
 
 
-def basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
+def make_basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
+    """Return a modal basis with modal mass 2 by default."""
     return basis_of(omega, zeta, slide, base, mass=mass, damping=damping)
 
 
-def coupled():
-    """Three coordinates, one of them rigid, coupled by damping."""
+def coupled_basis():
+    """Return three modes, one of them rigid, with a coupled damping matrix."""
     root = np.array([[1.0, 0.4, -0.3], [0.0, 0.7, 0.5], [0.0, 0.0, 0.2]])
-    return basis(
+    return make_basis(
         [W, 0.0, 2.3 * W], [0.0] * 3, (1.0, -0.5, 0.3), (0.6, 0.5, -0.2), 1.3, 40.0 * root.T @ root
     )
 
 
-def by_dop853(modes, drive, start, state, force, dt):
-    """(z, z') after dt, work of the drive and viscous loss [J] meanwhile, from `state` at time `start`."""
+def integrate_step(modes, drive, start, state, force, dt):
+    """Return the state after dt, the work of the drive and the viscous loss [J], by DOP853 from a
+    state at time `start`."""
     n = modes.omega.size
     d = modes.damping_matrix
 
@@ -56,96 +58,112 @@ def by_dop853(modes, drive, start, state, force, dt):
             modes.mass * v @ d @ v,
         ]
 
-    done = solve_ivp(rate, (0, dt), [*state, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18)
-    return done.y[: 2 * n, -1], done.y[2 * n, -1], done.y[2 * n + 1, -1]
+    solution = solve_ivp(rate, (0, dt), [*state, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18)
+    return solution.y[: 2 * n, -1], solution.y[2 * n, -1], solution.y[2 * n + 1, -1]
 
 
-def by_step(modes, prop, drive, number, state, force):
-    """The same by the coefficients of step `number`, in NumPy; also the slide increment by reach and beta."""
+def propagate_step(modes, propagator, drive, number, state, force):
+    """Return the same values and the slide increment from the coefficients of step `number`, in
+    NumPy."""
     n = modes.omega.size
-    row = prop.tables(drive, number, 1)[0]
+    coefficients = propagator.tables(drive, number, 1)[0]
     push = -modes.slide * force / modes.mass
     x = np.concatenate([state, push])
-    if prop.dense.size:
-        new = prop.dense @ x + row[: 2 * n]
-        quadratic = x @ prop.dense_loss @ x
+    if propagator.dense.size:
+        new = propagator.dense @ x + coefficients[: 2 * n]
+        quadratic = x @ propagator.dense_loss @ x
     else:
         z = state[:n]
         v = state[n:]
-        zz, zv, vz, vv = prop.free
+        zz, zv, vz, vv = propagator.free
         new = np.concatenate(
-            [zz * z + zv * v + prop.push[0] * push, vz * z + vv * v + prop.push[1] * push]
+            [
+                zz * z + zv * v + propagator.push[0] * push,
+                vz * z + vv * v + propagator.push[1] * push,
+            ]
         )
-        new += row[: 2 * n]
+        new += coefficients[: 2 * n]
         quadratic = np.sum(
-            prop.loss[0] * z * z
-            + prop.loss[1] * z * v
-            + prop.loss[2] * v * v
-            + prop.loss[3] * z * push
-            + prop.loss[4] * v * push
-            + prop.loss[5] * push * push
+            propagator.loss[0] * z * z
+            + propagator.loss[1] * z * v
+            + propagator.loss[2] * v * v
+            + propagator.loss[3] * z * push
+            + propagator.loss[4] * v * push
+            + propagator.loss[5] * push * push
         )
-    work = row[2 * n : 5 * n] @ x + row[8 * n]
-    lost = row[5 * n : 8 * n] @ x + row[8 * n + 1] + quadratic
-    moved = prop.reach[0] @ state + row[8 * n + 3] - prop.beta[0, 0] * force
-    return new, work, lost, moved
+    work = coefficients[2 * n : 5 * n] @ x + coefficients[8 * n]
+    loss = coefficients[5 * n : 8 * n] @ x + coefficients[8 * n + 1] + quadratic
+    slide_increment = (
+        propagator.reach[0] @ state + coefficients[8 * n + 3] - propagator.beta[0, 0] * force
+    )
+    return new, work, loss, slide_increment
 
 
 @pytest.mark.share(0, 3, 6, 9, 13, 16, 19, 22, 25, 28, 31, 34, 38, 41, 44, 47)
 @pytest.mark.parametrize("drive", DRIVES)
 @pytest.mark.parametrize("kind", [*MODES, "coupled"])
 @pytest.mark.parametrize("steps", [40, 4])
-def test_exact_step_against_dop853(kind, drive, steps):
+def test_exact_step_agrees_with_dop853(kind, drive, steps):
+    """State, work, viscous loss and slide increment of a step agree with DOP853 within 1e-8, for
+    every kind of mode and drive."""
     drive = DRIVES[drive]
-    modes = coupled() if kind == "coupled" else basis(*MODES[kind], (0.7,), (0.9,))
-    prop = make_propagator(modes, drive, steps)
+    modes = coupled_basis() if kind == "coupled" else make_basis(*MODES[kind], (0.7,), (0.9,))
+    propagator = make_propagator(modes, drive, steps)
     n = modes.omega.size
     number = 7
     state = np.concatenate([2e-5 * np.cos(np.arange(n)), -0.013 * np.sin(1 + np.arange(n))])
-    want, work, lost = by_dop853(modes, drive, number * prop.dt, state, 31.0, prop.dt)
-    new, w, d, moved = by_step(modes, prop, drive, number, state, 31.0)
-    assert new == pytest.approx(want, rel=2e-9, abs=1e-10 * np.abs(want).max())
-    scale = modes.mass * 5 * G_N * np.abs(state[n:]).max() * prop.dt
-    assert w == pytest.approx(work, rel=1e-8, abs=1e-9 * scale)
-    assert d == pytest.approx(lost, rel=1e-8, abs=1e-9 * scale)
-    assert moved == pytest.approx(modes.slide @ (want[:n] - state[:n]), rel=1e-8, abs=1e-14)
+    expected, work, loss = integrate_step(
+        modes, drive, number * propagator.dt, state, 31.0, propagator.dt
+    )
+    new, step_work, step_loss, slide_increment = propagate_step(
+        modes, propagator, drive, number, state, 31.0
+    )
+    assert new == pytest.approx(expected, rel=2e-9, abs=1e-10 * np.abs(expected).max())
+    scale = modes.mass * 5 * G_N * np.abs(state[n:]).max() * propagator.dt
+    assert step_work == pytest.approx(work, rel=1e-8, abs=1e-9 * scale)
+    assert step_loss == pytest.approx(loss, rel=1e-8, abs=1e-9 * scale)
+    assert slide_increment == pytest.approx(
+        modes.slide @ (expected[:n] - state[:n]), rel=1e-8, abs=1e-14
+    )
 
 
-def test_exact_recorded_line_and_levels():
-    """A straight recorded signal pushes a rigid mode by a t^3/6; a level scales the sine's own table."""
-    rigid = basis(0.0, 0.0, mass=1.0)
+def test_exact_forcing_of_linear_record_and_levels():
+    """A linear recorded signal moves a rigid mode by a t^3/6 within 1e-12, and the forcing of a
+    drive level is that of the sine times a factor."""
+    rigid = make_basis(0.0, 0.0, mass=1.0)
     line = RecordedDrive(np.array([0.0, 10.0]), np.array([0.0, 30.0]), 0.5)
-    prop = make_propagator(rigid, line, 5)
-    added = prop.tables(line, 0, 1)[0]
-    np.testing.assert_allclose(added[:2], [-3 * 0.1**3 / 6, -3 * 0.1**2 / 2], rtol=1e-12)
+    propagator = make_propagator(rigid, line, 5)
+    forcing = propagator.tables(line, 0, 1)[0]
+    np.testing.assert_allclose(forcing[:2], [-3 * 0.1**3 / 6, -3 * 0.1**2 / 2], rtol=1e-12)
     sine = SineDrive(4.0, W)
-    two = make_levels([4.0, 6.0], W, 3)
-    prop = make_propagator(coupled(), sine, 20)
-    own = prop.tables(sine, 0, 20)
-    np.testing.assert_allclose(prop.tables(two, 40, 20), own, rtol=0, atol=1e-13)
+    levels = make_levels([4.0, 6.0], W, 3)
+    propagator = make_propagator(coupled_basis(), sine, 20)
+    sine_table = propagator.tables(sine, 0, 20)
+    np.testing.assert_allclose(propagator.tables(levels, 40, 20), sine_table, rtol=0, atol=1e-13)
     np.testing.assert_allclose(
-        prop.tables(two, 60, 20)[:, :6], 1.5 * own[:, :6], rtol=0, atol=1e-13
+        propagator.tables(levels, 60, 20)[:, :6], 1.5 * sine_table[:, :6], rtol=0, atol=1e-13
     )
 
 
-def as_dense(prop):
-    """(z, z') after a step and the loss in it, as matrices on (z, z', acceleration), coupled or not."""
-    if prop.dense.size:
-        return prop.dense, prop.dense_loss
-    zz, zv, vz, vv = (np.diag(part) for part in prop.free)
-    a, b, c, d, e, f = (np.diag(part) for part in prop.loss)
-    return np.block([[zz, zv, np.diag(prop.push[0])], [vz, vv, np.diag(prop.push[1])]]), np.block(
-        [[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]]
-    )
+def dense_step_matrices(propagator):
+    """Return the matrices of (z, z') after a step and of the viscous loss, for the vector (z, z',
+    acceleration)."""
+    if propagator.dense.size:
+        return propagator.dense, propagator.dense_loss
+    zz, zv, vz, vv = (np.diag(part) for part in propagator.free)
+    a, b, c, d, e, f = (np.diag(part) for part in propagator.loss)
+    return np.block(
+        [[zz, zv, np.diag(propagator.push[0])], [vz, vv, np.diag(propagator.push[1])]]
+    ), np.block([[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]])
 
 
 @pytest.mark.parametrize(
     "modes",
     [
-        *(basis(W, zeta) for zeta in (30.0, 1e3, 1e6, 1e9)),
-        basis([1.0, 3e4 * W], [0.1, 0.2], (1, 1), (1, 1)),
+        *(make_basis(W, zeta) for zeta in (30.0, 1e3, 1e6, 1e9)),
+        make_basis([1.0, 3e4 * W], [0.1, 0.2], (1, 1), (1, 1)),
         *(
-            basis(
+            make_basis(
                 [0.0, 3.0],
                 [0, 0],
                 (1, 1),
@@ -156,53 +174,58 @@ def as_dense(prop):
         ),
     ],
 )
-def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
-    """Energy at the end = at the start + work of a constant force - viscous loss, for every state: a quadratic form."""
-    step, loss = as_dense(make_propagator(modes, SineDrive(1.0, W), 100))
+def test_exact_energy_balance_of_step_with_stiff_modes(modes):
+    """The energy of a step is balanced within 1e-13 for every initial state, even if the step is
+    long compared with the time constants. Energy at the end, energy at the start, work and loss are
+    compared as quadratic forms."""
+    step, loss = dense_step_matrices(make_propagator(modes, SineDrive(1.0, W), 100))
     n = modes.omega.size
     energy = 0.5 * modes.mass * np.diag([*modes.omega**2, *np.ones(n)])
-    begun = np.zeros((3 * n, 3 * n))
+    start_energy = np.zeros((3 * n, 3 * n))
     work = np.zeros((3 * n, 3 * n))
-    begun[: 2 * n, : 2 * n] = energy
+    start_energy[: 2 * n, : 2 * n] = energy
     work[2 * n :] = modes.mass * (step[:n] - np.eye(2 * n, 3 * n)[:n])
-    miss = step.T @ energy @ step - begun + (loss + loss.T) / 2 - (work + work.T) / 2
-    assert np.abs(miss).max() < 1e-13 * max(np.abs(begun).max(), np.abs(work).max())
+    imbalance = step.T @ energy @ step - start_energy + (loss + loss.T) / 2 - (work + work.T) / 2
+    assert np.abs(imbalance).max() < 1e-13 * max(np.abs(start_energy).max(), np.abs(work).max())
 
 
-def test_exact_doubled_step_is_the_step_itself(monkeypatch):
-    """The same step by Gauss points and by doubling a short one, where both can: coupled modes or not."""
-    for modes in (basis([W, 5 * W], [0.003, 0.4], (1, 1), (1, 0.5)), coupled()):
+def test_exact_step_by_doubling_equals_direct_step(monkeypatch):
+    """A propagator that is computed by repeated doubling of a short step agrees with Gauss
+    quadrature over the whole step, within 1e-12."""
+    for modes in (make_basis([W, 5 * W], [0.003, 0.4], (1, 1), (1, 0.5)), coupled_basis()):
         drive = SweepDrive(120.0, 180.0, 0.05, 5 * G_N)
         direct = make_propagator(modes, drive, 300)
         monkeypatch.setattr("patchfem.dynamics.propagator.MAX_RATE_TIME", 0.0)
-        # ports that are named: nothing kept is taken
-        made = make_propagator(modes, drive, 300, modes.interfaces)
+        # with explicit interfaces the cache is not used
+        doubled = make_propagator(modes, drive, 300, modes.interfaces)
         monkeypatch.undo()
         for name in ("free", "push", "dense", "reach", "beta", "loss", "dense_loss"):
-            one = getattr(direct, name)
-            other = getattr(made, name)
+            expected = getattr(direct, name)
+            found = getattr(doubled, name)
             assert (
-                np.abs(one - other).max(initial=0.0) <= 1e-12 * np.abs(one).max(initial=0.0) + 1e-15
+                np.abs(expected - found).max(initial=0.0)
+                <= 1e-12 * np.abs(expected).max(initial=0.0) + 1e-15
             ), name
-        one = direct.tables(drive, 3, 5)
-        other = made.tables(drive, 3, 5)
-        assert np.all(np.abs(one - other).max(axis=0) <= 1e-10 * np.abs(one).max(axis=0))
+        expected = direct.tables(drive, 3, 5)
+        found = doubled.tables(drive, 3, 5)
+        assert np.all(np.abs(expected - found).max(axis=0) <= 1e-10 * np.abs(expected).max(axis=0))
 
 
-def test_exact_the_same_steps_are_made_once():
-    """The runs that show an error march the same steps again; steps, modes or a drive of their own are made anew."""
-    modes = basis(*MODES["damped"])
+def test_exact_propagators_are_cached():
+    """A propagator is computed once for the same step, modes and drive, and again if one of them
+    changes. Large propagators are not cached."""
+    modes = make_basis(*MODES["damped"])
     drive = DRIVES["sine"]
     first = make_propagator(modes, drive, 100)
     assert make_propagator(modes, drive, 100) is first
     for other in (
         make_propagator(modes, drive, 50),
-        make_propagator(basis(W, 0.01), drive, 100),
+        make_propagator(make_basis(W, 0.01), drive, 100),
         make_propagator(modes, SineDrive(G_N, 2 * pi * 75), 100),
     ):
         assert other is not first and not np.array_equal(other.free, first.free)
     np.testing.assert_array_equal(
         make_propagator(modes, drive, 100, modes.interfaces).free, first.free
     )
-    many = basis(np.full(40, W), np.full(40, 0.01), np.ones(40), np.ones(40))
-    assert make_propagator(many, drive, 100) is not make_propagator(many, drive, 100)
+    large_basis = make_basis(np.full(40, W), np.full(40, 0.01), np.ones(40), np.ones(40))
+    assert make_propagator(large_basis, drive, 100) is not make_propagator(large_basis, drive, 100)

@@ -1,4 +1,4 @@
-"""A march that is interrupted goes on to the same bits: every kind of run, at its first state and on the way."""
+"""An interrupted time integration is resumed with bit-identical results, for every kind of run."""
 
 import json
 import os
@@ -62,29 +62,30 @@ RIGS = {
 
 
 @pytest.fixture
-def often(monkeypatch):
-    """Marches keep their state after every second cycle; the list has a number per state."""
+def save_counter(monkeypatch):
+    """Save the state of marches after every second cycle; the list has one entry per saved state."""
     monkeypatch.setattr(march_run, "MAX_CYCLES_AT_ONCE", 2)
     saved = []
     save = checkpoint.save_checkpoint
 
-    def counted(*of):
+    def save_and_count(*arguments):
         saved.append(1)
-        save(*of)
-        if len(saved) == often.stop:
+        save(*arguments)
+        if len(saved) == save_counter.stop:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(checkpoint, "MIN_WRITE_INTERVAL", 0.0)
     monkeypatch.setattr(checkpoint, "MAX_WRITE_FRACTION", np.inf)
-    monkeypatch.setattr(checkpoint, "save_checkpoint", counted)
-    often = type("Often", (), {"saved": saved, "stop": 0})()
-    return often
+    monkeypatch.setattr(checkpoint, "save_checkpoint", save_and_count)
+    save_counter = type("Often", (), {"saved": saved, "stop": 0})()
+    return save_counter
 
 
-def same(one, two) -> None:
+def assert_same_results(first, second) -> None:
+    """Assert that the result files of two runs are identical."""
     with (
-        xr.open_dataset(one / "result.nc", engine="h5netcdf") as a,
-        xr.open_dataset(two / "result.nc", engine="h5netcdf") as b,
+        xr.open_dataset(first / "result.nc", engine="h5netcdf") as a,
+        xr.open_dataset(second / "result.nc", engine="h5netcdf") as b,
     ):
         assert a.sizes["time"] > 100
         xr.testing.assert_identical(a, b)
@@ -95,86 +96,95 @@ def same(one, two) -> None:
     "kind",
     [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "bonds that grow")) for kind in RIGS],
 )
-def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, kind, monkeypatch):
+def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind, monkeypatch):
+    """A run that is interrupted four times and resumed gives the same result file as an
+    uninterrupted run, and leaves no state file."""
     share_one_loop(monkeypatch)
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS[kind], "utf-8")
-    words = ("run", scene, "--no-page", "-o")
-    assert cli(*words, tmp_path / "whole").code == 0
-    count = len(often.saved)
-    assert count >= 15 and sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml", "whole"]
+    command = ("run", scene, "--no-page", "-o")
+    assert cli(*command, tmp_path / "whole").code == 0
+    n_saves = len(save_counter.saved)
+    assert n_saves >= 15 and sorted(path.name for path in tmp_path.iterdir()) == [
+        "scene.toml",
+        "whole",
+    ]
     out = tmp_path / "out"
     partial = tmp_path / "out.partial"
-    for stop in (1, count // 3, 1, count // 4):  # each counts from where the one before it stopped
-        often.saved.clear()
-        often.stop = stop
-        answer = cli(*words, out, *["--resume"] * partial.is_dir())
+    for stop in (1, n_saves // 3, 1, n_saves // 4):  # counted from the previous interruption
+        save_counter.saved.clear()
+        save_counter.stop = stop
+        answer = cli(*command, out, *["--resume"] * partial.is_dir())
         assert answer.code == 130 and "out.partial, add --resume to the command" in answer.err, (
             answer.err
         )
-        assert partial.is_dir() and all(is_state(one.name) for one in partial.iterdir())
-    often.saved.clear()
-    often.stop = 0
-    assert cli(*words, out, "--resume").code == 0 and 0 < len(often.saved) < count
-    same(out, tmp_path / "whole")
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
-    assert not any(is_state(one.name) for one in out.iterdir())
+        assert partial.is_dir() and all(is_state(path.name) for path in partial.iterdir())
+    save_counter.saved.clear()
+    save_counter.stop = 0
+    assert cli(*command, out, "--resume").code == 0 and 0 < len(save_counter.saved) < n_saves
+    assert_same_results(out, tmp_path / "whole")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
+    assert not any(is_state(path.name) for path in out.iterdir())
 
 
-def test_refuses_the_state_of_another_march(tmp_path, often):
+def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
+    """A saved state of another scene or a damaged one is refused with a message. A complete run is
+    reported as complete."""
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS["one slide"], "utf-8")
-    words = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
-    answer = cli(*words)
+    command = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
+    answer = cli(*command)
     assert (
         answer.code == 2
         and "out: this folder contains no interrupted run; run without --resume" in answer.err
     )
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
-    often.stop = 5
-    assert cli(*words[:-1]).code == 130
-    often.stop = 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
+    save_counter.stop = 5
+    assert cli(*command[:-1]).code == 130
+    save_counter.stop = 0
     state = tmp_path / "out.partial" / "march_1.npz"
     for change in ("friction.static=0.31", "drive.cycles=20", "accuracy.steps_per_cycle=80"):
-        answer = cli(*words, "--set", change)
+        answer = cli(*command, "--set", change)
         assert answer.code == 2 and "belongs to another scene or to another version" in answer.err
     data = state.read_bytes()
-    for harm in (data[:-100], b"", b"PK nothing", data[:2000]):
-        state.write_bytes(harm)
-        answer = cli(*words)
+    for damaged in (data[:-100], b"", b"PK nothing", data[:2000]):
+        state.write_bytes(damaged)
+        answer = cli(*command)
         assert (
             answer.code == 2 and "cannot be read" in answer.err and "without --resume" in answer.err
         )
     state.write_bytes(data)
-    assert cli(*words).code == 0
-    answer = cli(*words)  # once: "out.partial: this folder contains no interrupted run"
+    assert cli(*command).code == 0
+    answer = cli(*command)  # the message must not refer to out.partial, which no longer exists
     assert (
         answer.code == 0
         and "out: this run is already complete" in answer.err
         and ".partial" not in answer.err
     )
-    assert json.loads(cli(*words, "--json").out) == json.loads(
+    assert json.loads(cli(*command, "--json").out) == json.loads(
         (tmp_path / "out" / "summary.json").read_text("utf-8")
     )
-    answer = cli(*words, "--set", "friction.static=0.31")
+    answer = cli(*command, "--set", "friction.static=0.31")
     assert (
         answer.code == 2
         and "out: this folder contains no interrupted run but a complete run of" in answer.err
     )
     scene.write_text(BENCH, "utf-8")
-    answer = cli(*words)
+    answer = cli(*command)
     assert answer.code == 2 and "integrated in time" in answer.err
 
 
-def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
+def test_always_run_continues_without_disk_space_for_its_state(tmp_path, save_counter):
+    """A run continues if the disk has no space for its state, and fails only when it writes its
+    results."""
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS["one slide"], "utf-8")
-    often.stop = 5
+    save_counter.stop = 5
     with limited(5000):
         answer = cli("run", scene, "--no-page", "-o", tmp_path / "out")
-    # not for its state, which it does without
+    # the results do not fit; the missing state alone does not end the run
     assert answer.code == 4 and "result.nc: not enough space" in answer.err
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
 
 
 @pytest.mark.share(0)
@@ -183,11 +193,12 @@ def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
     [
         signal.SIGTERM,
         signal.SIGKILL,
-        *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGHUP, signal.SIGINT)),
+        *(pytest.param(path, marks=pytest.mark.slow) for path in (signal.SIGHUP, signal.SIGINT)),
     ],
 )
-def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
-    """In a process of its own that marches every cycle; one that is killed says nothing and leaves its state too."""
+def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
+    """A run in its own process that is ended by a signal leaves its state and can be resumed. After
+    SIGKILL it prints nothing, and after the other signals one line."""
     scene = tmp_path / "scene.toml"
     out = tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
@@ -196,22 +207,22 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
         "from patchfem.dynamics.march import run; run.PERIODIC_TOL = -1.0; "
         "from patchfem.__main__ import main; main()"
     )
-    words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]
-    run = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
-    while not (tmp_path / "out.partial" / "march_1.npz").is_file() and run.poll() is None:
+    command = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    while not (tmp_path / "out.partial" / "march_1.npz").is_file() and process.poll() is None:
         time.sleep(0.005)
-    run.send_signal(number)
-    said = run.communicate()[1]
-    left = {one.name for one in tmp_path.iterdir()} - {"scene.toml"}
+    process.send_signal(number)
+    message = process.communicate()[1]
+    remaining = {path.name for path in tmp_path.iterdir()} - {"scene.toml"}
     if number == signal.SIGKILL:
-        assert run.returncode == -9 and left == {"out.partial", ".out.writer"}
+        assert process.returncode == -9 and remaining == {"out.partial", ".out.writer"}
     else:
-        assert run.returncode == 130 and left == {"out.partial"}
-        assert said.strip().startswith("interrupted; no file was replaced; ")
+        assert process.returncode == 130 and remaining == {"out.partial"}
+        assert message.strip().startswith("interrupted; no file was replaced; ")
         assert (
-            said.strip().endswith("out.partial, add --resume to the command")
-            and len(said.splitlines()) == 1
+            message.strip().endswith("out.partial, add --resume to the command")
+            and len(message.splitlines()) == 1
         )
     assert cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
-    assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "out"}
     assert os.path.getsize(out / "result.nc") > 10_000

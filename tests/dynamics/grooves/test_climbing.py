@@ -1,4 +1,5 @@
-"""Laws with memory along the flanks of grooves: their NumPy twin, Coulomb's law as the limit, the law itself, order."""
+"""Friction laws with memory on the flanks of grooves: a NumPy version, limiting cases and order of
+convergence."""
 
 from itertools import pairwise
 
@@ -31,47 +32,56 @@ LAWS = {
 }
 
 
-def marched(law, grooves, steps, cycles=6):
-    done = march(BASIS, DRIVE, ClimbingModel(grooves, LOAD, law), cycles, steps, window=3)
-    assert done.outcome is None and energy_balance(done.ledger) < 1e-11
-    return float(done.amplitudes[-1, 1])
+def march_amplitude(law, grooves, steps, cycles=6):
+    """Return the largest displacement in the last cycle of a march; its energy balance is checked."""
+    result = march(BASIS, DRIVE, ClimbingModel(grooves, LOAD, law), cycles, steps, window=3)
+    assert result.outcome is None and energy_balance(result.ledger) < 1e-11
+    return float(result.amplitudes[-1, 1])
 
 
-def twin(law, grooves, slide):
-    """Force and energy lost (k - 1,) of the steps of a slow slide: the NumPy law over the path along the flank under
-    the normal force R = N sqrt(1 + t^2) + f t, half of whose change comes before the motion."""
+def solve_with_numpy_law(law, grooves, slide):
+    """Return the mean force and the energy loss of the steps of a slow slide, (k - 1,) each, with
+    the NumPy law.
+
+    The law acts on the path along the flank under the normal force R = N sqrt(1 + t^2) + f t. Half
+    of the change of R is applied before the motion of a step.
+    """
     slope = grooves.slope
     normal = np.array([LOAD * np.hypot(1, slope(slide[0]))])
     state = law.start(normal)
-    held = 0.0
+    force = 0.0
     forces = []
     losses = []
     for q, end in pairwise(slide):
-        dq = end - q
-        inner = 0.5 * (q + end) + 0.5 * dq * np.array([-np.sqrt(0.6), 0, np.sqrt(0.6)])
-        path = np.array([5, 8, 5]) / 18 @ np.hypot(1, slope(inner)) * dq
+        increment = end - q
+        inner = 0.5 * (q + end) + 0.5 * increment * np.array([-np.sqrt(0.6), 0, np.sqrt(0.6)])
+        path = np.array([5, 8, 5]) / 18 @ np.hypot(1, slope(inner)) * increment
         after = normal
         for _ in range(100):
-            half = 0.5 * (normal + after)
-            before = law.press(state, normal, half)
-            step = law.step(before.state, path, half, half, 1.0)
-            pulled = float(step.mean[0])
-            last = np.clip(2 * pulled - held, -MU * after[0], MU * after[0])
-            old = after
-            after = np.array([LOAD * np.hypot(1, slope(end)) + last * slope(end)])
-            if abs(after - old)[0] < 1e-13 * LOAD:
+            mean_normal = 0.5 * (normal + after)
+            pressed = law.press(state, normal, mean_normal)
+            step = law.step(pressed.state, path, mean_normal, mean_normal, 1.0)
+            mean_force = float(step.mean[0])
+            end_force = np.clip(2 * mean_force - force, -MU * after[0], MU * after[0])
+            previous = after
+            after = np.array([LOAD * np.hypot(1, slope(end)) + end_force * slope(end)])
+            if abs(after - previous)[0] < 1e-13 * LOAD:
                 break
-        final = law.press(step.state, half, after)
-        forces.append((LOAD * float(grooves.height_difference(q, end)) + pulled * path) / dq)
-        losses.append(float((before.dissipated + step.dissipated + final.dissipated)[0]))
-        state = final.state
+        released = law.press(step.state, mean_normal, after)
+        forces.append(
+            (LOAD * float(grooves.height_difference(q, end)) + mean_force * path) / increment
+        )
+        losses.append(float((pressed.dissipated + step.dissipated + released.dissipated)[0]))
+        state = released.state
         normal = after
-        held = float(law.traction(final.state)[0])
+        force = float(law.traction(released.state)[0])
     return np.array(forces), np.array(losses)
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_a_slow_slide_by_the_numpy_law(law):
+def test_exact_slow_slide_agrees_with_numpy_law(law):
+    """Force and loss on a slow slide over grooves agree with the NumPy version of the law within
+    1e-9 and 1e-7."""
     grooves = Grooves(80e-6, 7.5e-6, 0.4)
     slide = 30e-6 * np.sin(np.linspace(0, 7.3, 101))
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
@@ -79,9 +89,11 @@ def test_exact_a_slow_slide_by_the_numpy_law(law):
     energies = np.zeros((101, 2))
     contact = model.build()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
-    mean, lost = twin(LAWS[law][1](2e-6), grooves, slide)
-    np.testing.assert_allclose(forces[:-1, 1], mean, rtol=1e-9, atol=1e-9 * LOAD)
-    np.testing.assert_allclose(energies[:-1, 0], lost, rtol=1e-7, atol=1e-12 * lost.sum())
+    expected_force, expected_loss = solve_with_numpy_law(LAWS[law][1](2e-6), grooves, slide)
+    np.testing.assert_allclose(forces[:-1, 1], expected_force, rtol=1e-9, atol=1e-9 * LOAD)
+    np.testing.assert_allclose(
+        energies[:-1, 0], expected_loss, rtol=1e-7, atol=1e-12 * expected_loss.sum()
+    )
     work = forces[:-1, 1] @ np.diff(slide)
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-9
@@ -89,69 +101,77 @@ def test_exact_a_slow_slide_by_the_numpy_law(law):
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_always_short_bonds_are_coulombs_law_on_the_flank(law):
-    """The amplitude goes to that of the exact stops and releases; what rings on the bonds dies out with them."""
+def test_always_short_bonds_converge_to_coulomb_friction(law):
+    """With ever shorter bonds the amplitude converges to that of Coulomb friction, and differs by
+    less than 3 % at the shortest length."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3)
-    true = march(
+    limit = march(
         BASIS, DRIVE, make_model(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3
     ).amplitudes[-1, 1]
-    far, near, last = (
-        abs(marched(LAWS[law][0](length), grooves, steps) - true)
+    long, medium, short = (
+        abs(march_amplitude(LAWS[law][0](length), grooves, steps) - limit)
         for length, steps in ((4e-7, 1000), (1e-7, 2000), (2.5e-8, 4000))
     )
-    assert far > 2 * near and near > 1.5 * last and last < 0.03 * true
+    assert long > 2 * medium and medium > 1.5 * short and short < 0.03 * limit
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_flat_grooves_are_the_law_itself(law):
-    """Flanks of a slope of 1e-12 and the law of rigs without grooves."""
+def test_exact_flat_grooves_equal_law_without_grooves(law):
+    """Grooves with a slope of 1e-12 give the amplitude of the law without grooves within 1e-9."""
     model = (
         element_model(ElasticPlastic(MU, 1e-6).element(LOAD))
         if law == "elastic-plastic"
         else points_model(Bonds(MU, 1e-6), [1.0], [LOAD])
     )
-    alone = march(BASIS, DRIVE, model, 6, 200, window=3).amplitudes[-1, 1]
-    assert marched(LAWS[law][0](1e-6), Grooves(80e-6, 1e-17), 200) == pytest.approx(alone, rel=1e-9)
+    expected = march(BASIS, DRIVE, model, 6, 200, window=3).amplitudes[-1, 1]
+    assert march_amplitude(LAWS[law][0](1e-6), Grooves(80e-6, 1e-17), 200) == pytest.approx(
+        expected, rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("lifted", [0.0, 0.5])
 @pytest.mark.parametrize("law", LAWS)
-def test_order_two_in_the_step(law, lifted):
+def test_order_two_in_step_size(law, lifted):
+    """The amplitude converges with order two in the step, with and without a lifted mass."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3, lifted)
-    values = [marched(LAWS[law][0](2e-6), grooves, steps, 3) for steps in (200, 400, 800, 1600)]
+    values = [
+        march_amplitude(LAWS[law][0](2e-6), grooves, steps, 3) for steps in (200, 400, 800, 1600)
+    ]
     changes = np.abs(np.diff(values))
     assert changes[0] / changes[2] > 6 and changes[2] < 2e-4 * abs(values[-1])
 
 
-def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
+def test_always_lifted_mass_that_leaves_grooves_is_reported():
+    """A run in which the lifted mass loses contact with the grooves has the outcome LEAVES_GROOVES."""
     model = ClimbingModel(
         Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, make_elastic_plastic_law(MU, 1e-6)
     )
-    done = march(BASIS, SineDrive(400.0, 2 * np.pi * 143), model, 5, 100)
-    assert done.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in done.message
+    result = march(BASIS, SineDrive(400.0, 2 * np.pi * 143), model, 5, 100)
+    assert result.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in result.message
 
 
-def test_order_two_a_lifted_mass_that_starts_with_a_speed():
-    """Next to no friction, no drive: the motion of the exact steps without any."""
+def test_order_two_for_lifted_mass_with_initial_speed():
+    """With nearly no friction and no drive, the motion of a lifted mass with an initial speed
+    converges with order two to the motion without friction."""
     grooves = Grooves(80e-6, 7.5e-6, 0.4, 0.5)
     start = InitialState(np.array([10e-6]), np.array([0.02]))
-    still = SineDrive(0.0, DRIVE.omega)
-    true = march(
-        BASIS, still, make_model(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
+    no_drive = SineDrive(0.0, DRIVE.omega)
+    reference = march(
+        BASIS, no_drive, make_model(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
     ).response.slide
     coarse, fine = (
         np.abs(
             march(
                 BASIS,
-                still,
+                no_drive,
                 ClimbingModel(grooves, LOAD, make_elastic_plastic_law(1e-9, 1e-6)),
                 1,
-                100 * part,
+                100 * factor,
                 start=start,
-            ).response.slide[::part]
-            - true
+            ).response.slide[::factor]
+            - reference
         ).max()
-        for part in (4, 8)
+        for factor in (4, 8)
     )
-    assert fine < 3e-4 * np.abs(true).max() and coarse > 3.8 * fine
+    assert fine < 3e-4 * np.abs(reference).max() and coarse > 3.8 * fine

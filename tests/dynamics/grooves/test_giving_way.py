@@ -1,4 +1,5 @@
-"""Points behind shear modes over grooves: rigid pieces, flat ground, one spring before all points, books, a scene."""
+"""Contact points with shear compliance on grooves: limiting cases, reference solutions, energy
+balances and a scene."""
 
 from types import SimpleNamespace
 
@@ -20,9 +21,9 @@ from patchfem.slip import jenkins_set
 from patchfem.slip.shear_modes import shear_modes
 
 LOAD, MU, LENGTH, COUNT = 115.65, 0.4, 1e-6, 12
-PLACES = np.linspace(-1, 1, COUNT)
-SHARE = np.exp(PLACES) / np.exp(PLACES).sum()
-GIVING = 5e-9 * np.exp(-2 * np.abs(PLACES[:, None] - PLACES))
+POSITIONS = np.linspace(-1, 1, COUNT)
+LOAD_FRACTION = np.exp(POSITIONS) / np.exp(POSITIONS).sum()
+COMPLIANCE = 5e-9 * np.exp(-2 * np.abs(POSITIONS[:, None] - POSITIONS))
 LAWS = {
     "elastic-plastic": make_elastic_plastic_law(MU, LENGTH),
     "bonds": make_bonds_law(Bonds(MU, LENGTH)),
@@ -30,7 +31,8 @@ LAWS = {
 GROOVES = Grooves(80e-6, 7.5e-6, 0.3)
 
 
-def march_slides(model, slide):
+def follow_slide(model, slide):
+    """Return the forces (k, 3) and energies (k, 2) of a model along a prescribed slide."""
     forces = np.zeros((slide.size, 3))
     energies = np.zeros((slide.size, 2))
     contact = model.build()
@@ -38,78 +40,95 @@ def march_slides(model, slide):
     return forces, energies
 
 
-def giving(law, grooves, compliance, share=SHARE):
-    modes = shear_modes(compliance, MU * LOAD * share, LENGTH, share.size)
-    return ClimbingModel(grooves, LOAD, law, modes, tuple(share))
+def make_compliant_model(law, grooves, compliance, load_fraction=LOAD_FRACTION):
+    """Return a climbing model with all shear modes of a compliance [m/N]."""
+    modes = shear_modes(compliance, MU * LOAD * load_fraction, LENGTH, load_fraction.size)
+    return ClimbingModel(grooves, LOAD, law, modes, tuple(load_fraction))
 
 
-def wave(steps):
+def sine_slide(steps):
+    """Return a sinusoidal slide in a number of steps [m]."""
     return 20e-6 * np.sin(np.linspace(0, 7.3, steps + 1))
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_pieces_that_hardly_give_way_are_one_point(law):
+def test_exact_stiff_bodies_equal_single_point(law):
+    """Points on nearly rigid bodies give the forces of a single point within 1e-6 of the load."""
     soft, rigid = (
-        march_slides(model, wave(200))[0]
+        follow_slide(model, sine_slide(200))[0]
         for model in (
-            giving(LAWS[law], GROOVES, 1e-8 * GIVING),
+            make_compliant_model(LAWS[law], GROOVES, 1e-8 * COMPLIANCE),
             ClimbingModel(GROOVES, LOAD, LAWS[law]),
         )
     )
     np.testing.assert_allclose(soft[:-1], rigid[:-1], rtol=0, atol=1e-6 * LOAD)
 
 
-def test_exact_on_flat_ground_they_are_the_exact_set_of_elements():
-    """Flanks of a slope of 1e-12: the force at the end of every step."""
-    found = jenkins_set(GIVING, MU * LOAD * SHARE, LENGTH)
-    exact = march_slides(jenkins_model(found.stiffness, found.yield_displacement), wave(200))[0]
-    here = march_slides(giving(LAWS["elastic-plastic"], Grooves(80e-6, 1e-17), GIVING), wave(200))[
-        0
-    ]
-    np.testing.assert_allclose(here[:-1, 0], exact[:-1, 0], rtol=0, atol=1e-10 * LOAD)
+def test_exact_flat_grooves_equal_parallel_elements():
+    """On grooves with a slope of 1e-12 the force agrees with that of exact parallel elements within
+    1e-10 of the load."""
+    elements = jenkins_set(COMPLIANCE, MU * LOAD * LOAD_FRACTION, LENGTH)
+    expected = follow_slide(
+        jenkins_model(elements.stiffness, elements.yield_displacement), sine_slide(200)
+    )[0]
+    forces = follow_slide(
+        make_compliant_model(LAWS["elastic-plastic"], Grooves(80e-6, 1e-17), COMPLIANCE),
+        sine_slide(200),
+    )[0]
+    np.testing.assert_allclose(forces[:-1, 0], expected[:-1, 0], rtol=0, atol=1e-10 * LOAD)
 
 
-def spring_before_all(grooves, slide, stiffness):
-    """Force against the slide of one elastic-plastic point behind one spring [N/m] along the flank, by small explicit
-    steps: f = K (s - l), l the path of the point, f = mu R/eps times what of l is elastic, |f| <= mu R."""
+def integrate_single_spring(grooves, slide, stiffness):
+    """Return the force of one elastic-plastic point behind a spring [N/m], by small explicit steps.
+
+    The spring acts along the flank: f = K (s - l), where l is the path of the point, f = mu R/eps
+    times the elastic part of l, and |f| <= mu R.
+    """
     force = np.zeros(slide.size)
-    along = 0.0
-    springs = LOAD * np.hypot(1, grooves.slope(slide[0]))
+    tangential = 0.0
+    bond_load = LOAD * np.hypot(1, grooves.slope(slide[0]))
     force[0] = LOAD * grooves.slope(slide[0])
     for i in range(1, slide.size):
         t = float(grooves.slope(slide[i]))
         path = np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (
             slide[i] - slide[i - 1]
         )
-        normal = LOAD * np.hypot(1, t) + along * t
-        springs = max(springs, normal)
-        own = MU * springs / LENGTH
-        tried = along + path * own * stiffness / (own + stiffness)
+        normal = LOAD * np.hypot(1, t) + tangential * t
+        bond_load = max(bond_load, normal)
+        bond_stiffness = MU * bond_load / LENGTH
+        trial = tangential + path * bond_stiffness * stiffness / (bond_stiffness + stiffness)
         limit = MU * normal
-        if abs(tried) > limit:  # springs above the load go with the path that slips
-            tried = np.copysign(limit, tried)
-            slips = abs(path - (tried - along) * (1 / stiffness + 1 / own))
-            springs = normal + (springs - normal) * np.exp(-slips / LENGTH)
-        along = tried
-        force[i] = LOAD * t + along * np.hypot(1, t)
+        if abs(trial) > limit:  # bonds above the current load vanish with the slip path
+            trial = np.copysign(limit, trial)
+            slip = abs(path - (trial - tangential) * (1 / stiffness + 1 / bond_stiffness))
+            bond_load = normal + (bond_load - normal) * np.exp(-slip / LENGTH)
+        tangential = trial
+        force[i] = LOAD * t + tangential * np.hypot(1, t)
     return force
 
 
-def test_exact_one_spring_before_all_points_by_small_steps():
+def test_exact_common_spring_agrees_with_explicit_steps():
+    """The force of points behind one common spring agrees with small explicit steps within 0.2 %."""
     steps = 400
-    fine = 40
+    refinement = 40
     for stiffness in (2e7, 2e8):
-        model = giving(LAWS["elastic-plastic"], GROOVES, np.full((COUNT, COUNT), 1 / stiffness))
-        here = march_slides(model, wave(steps))[0][:, 0]
-        true = spring_before_all(GROOVES, wave(steps * fine), stiffness)[::fine]
-        np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
+        model = make_compliant_model(
+            LAWS["elastic-plastic"], GROOVES, np.full((COUNT, COUNT), 1 / stiffness)
+        )
+        forces = follow_slide(model, sine_slide(steps))[0][:, 0]
+        expected = integrate_single_spring(GROOVES, sine_slide(steps * refinement), stiffness)[
+            ::refinement
+        ]
+        np.testing.assert_allclose(
+            forces[:-1], expected[:-1], rtol=0, atol=2e-3 * np.abs(expected).max()
+        )
 
 
-def coulomb(grooves, tolerance, compliance=GIVING):
-    """Coulomb's law at the points."""
-    ones = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
+def make_coulomb_model(grooves, tolerance, compliance=COMPLIANCE):
+    """Return a climbing model with Coulomb friction at the points."""
+    bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
     patch = SimpleNamespace(
-        pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance
+        pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION), pieces=bodies, giving=compliance
     )
     return climbing.with_shear_modes(
         climbing.make_model(grooves, LOAD, make_elastic_plastic_law(MU, 0.0), None),
@@ -120,21 +139,27 @@ def coulomb(grooves, tolerance, compliance=GIVING):
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
-def test_exact_coulombs_points_on_flat_ground_are_their_exact_elements(tolerance):
-    """Flanks of a slope of 1e-12, strokes at which some points slip and all do: to 0.17 of the tolerance."""
-    found = jenkins_set(GIVING, MU * LOAD * SHARE)
+def test_exact_coulomb_points_on_flat_grooves_equal_elements(tolerance):
+    """Coulomb points on flat grooves agree with their exact elements within 0.17 of the tolerance,
+    in partial and in gross slip."""
+    elements = jenkins_set(COMPLIANCE, MU * LOAD * LOAD_FRACTION)
     slide = np.concatenate(
         [np.linspace(0, 1, 40), np.linspace(1, -0.8, 60)[1:], np.linspace(-0.8, 3, 90)[1:]]
     )
-    slide *= found.yield_displacement.max()
-    exact = march_slides(jenkins_model(found.stiffness, found.yield_displacement), slide)[0]
-    here = march_slides(coulomb(Grooves(80e-6, 1e-17), tolerance), slide)[0]
-    assert np.abs(here[:-1, 0] - exact[:-1, 0]).max() < 0.17 * tolerance * MU * LOAD
+    slide *= elements.yield_displacement.max()
+    expected = follow_slide(jenkins_model(elements.stiffness, elements.yield_displacement), slide)[
+        0
+    ]
+    forces = follow_slide(make_coulomb_model(Grooves(80e-6, 1e-17), tolerance), slide)[0]
+    assert np.abs(forces[:-1, 0] - expected[:-1, 0]).max() < 0.17 * tolerance * MU * LOAD
 
 
-def coulombs_points(grooves, slide, compliance):
-    """Force against the slide of Coulomb points behind a compliance [m/N] along the flank: at the end of every step
-    the forces f are those of least f C f/2 - f (path - slip) with |f| <= mu share R, by Gauss and Seidel."""
+def solve_coulomb_points(grooves, slide, compliance):
+    """Return the force of Coulomb points with a compliance [m/N] along a slide over grooves.
+
+    At the end of every step the forces f minimise f C f/2 - f (path - slip) subject to |f| <= mu R
+    times the load fraction, by the Gauss-Seidel method.
+    """
     force = np.full(slide.size, LOAD * grooves.slope(slide[0]))
     f = np.zeros(COUNT)
     slip = np.zeros(COUNT)
@@ -145,66 +170,75 @@ def coulombs_points(grooves, slide, compliance):
             slide[i] - slide[i - 1]
         )
         for _ in range(400):
-            old = f.copy()
-            bound = MU * SHARE * (LOAD * np.hypot(1, t) + f.sum() * t)
+            previous = f.copy()
+            limit = MU * LOAD_FRACTION * (LOAD * np.hypot(1, t) + f.sum() * t)
             for k in range(COUNT):
-                tried = f[k] + (path - slip[k] - compliance[k] @ f) / compliance[k, k]
-                f[k] = min(max(tried, -bound[k]), bound[k])
-            if np.abs(f - old).max() < 1e-9 * LOAD:
+                trial = f[k] + (path - slip[k] - compliance[k] @ f) / compliance[k, k]
+                f[k] = min(max(trial, -limit[k]), limit[k])
+            if np.abs(f - previous).max() < 1e-9 * LOAD:
                 break
         slip = path - compliance @ f
         force[i] = LOAD * t + f.sum() * np.hypot(1, t)
     return force
 
 
-def test_exact_coulombs_points_on_the_flank_by_least_energy():
-    """Soft pieces, of which some points slip over most of a stroke of a quarter of a wave."""
-    soft = 40 * GIVING
+def test_exact_coulomb_points_on_grooves_minimise_energy():
+    """The force of Coulomb points on soft bodies agrees with the minimum of the energy within 0.2
+    %, during partial slip over grooves."""
+    compliance = 40 * COMPLIANCE
     slide = 20e-6 * np.sin(np.linspace(0, 7.3, 401))
-    true = coulombs_points(GROOVES, slide, soft)
-    here = march_slides(coulomb(GROOVES, 1e-3, soft), slide)[0][:, 0]
-    np.testing.assert_allclose(here[:-1], true[:-1], rtol=0, atol=2e-3 * np.abs(true).max())
+    expected = solve_coulomb_points(GROOVES, slide, compliance)
+    forces = follow_slide(make_coulomb_model(GROOVES, 1e-3, compliance), slide)[0][:, 0]
+    np.testing.assert_allclose(
+        forces[:-1], expected[:-1], rtol=0, atol=2e-3 * np.abs(expected).max()
+    )
     rigid = LOAD * GROOVES.force_ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
-    # far from pieces that are rigid
-    assert np.abs(rigid - true[1:-1]).max() > 0.5 * np.abs(true).max()
+    # the compliance matters: rigid bodies give another force
+    assert np.abs(rigid - expected[1:-1]).max() > 0.5 * np.abs(expected).max()
 
 
-def test_exact_the_books_of_coulombs_points_close():
-    forces, energies = march_slides(coulomb(GROOVES, 1e-3), wave(200))
-    work = forces[:-1, 1] @ np.diff(wave(200))
+def test_exact_energy_balance_of_coulomb_points():
+    """For Coulomb points on grooves the energy is balanced within 1e-9 on a prescribed slide, and
+    within 1e-11 in a march."""
+    forces, energies = follow_slide(make_coulomb_model(GROOVES, 1e-3), sine_slide(200))
+    work = forces[:-1, 1] @ np.diff(sine_slide(200))
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-9
     )
     basis = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
-    done = march(
+    result = march(
         basis,
         SineDrive(49.0, 2 * np.pi * 143),
-        coulomb(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3),
+        make_coulomb_model(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3),
         4,
         200,
         window=3,
     )
-    assert done.outcome is None and energy_balance(done.ledger) < 1e-11
+    assert result.outcome is None and energy_balance(result.ledger) < 1e-11
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_the_books_close(law):
-    """On a given slide and in a march, with a mass that rises."""
-    forces, energies = march_slides(giving(LAWS[law], GROOVES, GIVING), wave(200))
-    work = forces[:-1, 1] @ np.diff(wave(200))
+def test_exact_energy_balance_with_shear_modes(law):
+    """For laws with memory the energy is balanced on a prescribed slide and in a march with a
+    lifted mass."""
+    forces, energies = follow_slide(
+        make_compliant_model(LAWS[law], GROOVES, COMPLIANCE), sine_slide(200)
+    )
+    work = forces[:-1, 1] @ np.diff(sine_slide(200))
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-10
     )
     assert energies[:-1, 0].min() >= -1e-15 * work
     basis = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
-    model = giving(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), GIVING)
-    done = march(basis, SineDrive(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
-    assert done.outcome is None and energy_balance(done.ledger) < 1e-11
+    model = make_compliant_model(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), COMPLIANCE)
+    result = march(basis, SineDrive(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
+    assert result.outcome is None and energy_balance(result.ledger) < 1e-11
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
-def test_exact_frames_of_a_scene_sum_up_to_its_force(law):
-    """Tractions of a bench and of a rig, climb included, over the area."""
+def test_exact_tractions_of_scene_sum_to_friction_force(law):
+    """In a bench and in a rig the integral of the shear stress over the area is the friction force,
+    including the force of the grooves, within 1e-6."""
     text = f"""
 [contact]
 length = "12.7 mm"
@@ -228,14 +262,14 @@ steps_per_cycle = 100
         'damping = 0.003\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 5\n'
     )
     for motion in (slide, rig):
-        found = pf.run(load(text + motion))
-        area = found.patch.pieces.interface.weight
-        tau = found.fields["shear_stress"]
-        time = found.fields["time"]
-        force = np.interp(time, found.response.time, found.response.force)
+        result = pf.run(load(text + motion))
+        area = result.patch.pieces.interface.weight
+        tau = result.fields["shear_stress"]
+        time = result.fields["time"]
+        force = np.interp(time, result.response.time, result.response.force)
         np.testing.assert_allclose(tau[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115.65)
         assert (
-            np.isfinite(found.fields["slip"]).all()
-            and found.measures["energy_balance"].value < 1e-10
+            np.isfinite(result.fields["slip"]).all()
+            and result.measures["energy_balance"].value < 1e-10
         )
-        assert any("are the same for all points" in note for note in found.extra["notes"])
+        assert any("are the same for all points" in note for note in result.extra["notes"])

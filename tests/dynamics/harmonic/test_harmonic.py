@@ -1,4 +1,5 @@
-"""Harmonic balance against closed forms, direct marching, dense linear algebra and energy."""
+"""Harmonic balance against closed forms, time integration, dense linear algebra and energy
+balances."""
 
 import numpy as np
 import pytest
@@ -29,7 +30,7 @@ from patchfem.friction import Bonds
 from patchfem.friction.bonds.recursion import advance_bonds
 
 DRIVE = SineDrive(1.0, 1.0)
-# DOP853 at 1e-12, D = 0.8, xi = 0.003
+# peaks by DOP853 with a tolerance of 1e-12 for friction limit 0.8 and damping ratio 0.003, by stiffness
 PEAKS = {
     10: 0.249538145,
     100: 0.285786312,
@@ -37,10 +38,11 @@ PEAKS = {
 }
 
 
-def harmonics(seed, count, size=1.0):
+def random_harmonics(seed, count, scale=1.0):
+    """Return random Fourier coefficients of a slide with a dominant first harmonic."""
     rng = np.random.default_rng(seed)
-    x = (rng.normal(size=count + 1) + 1j * rng.normal(size=count + 1)) * 0.3 * size
-    x[0] = 0.1 * size * rng.normal()
+    x = (rng.normal(scale=count + 1) + 1j * rng.normal(scale=count + 1)) * 0.3 * scale
+    x[0] = 0.1 * scale * rng.normal()
     x[1] *= 3
     return x
 
@@ -50,43 +52,47 @@ def harmonics(seed, count, size=1.0):
 
 @settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6), st.integers(1, 6), st.floats(0.05, 3.0))
-def test_always_elements_follow_the_plain_loop(seed, count, size):
-    """Samples and true turning points in order, two turns, one element at a time."""
+def test_always_elements_agree_with_sequential_loop(seed, count, size):
+    """Sampled forces of parallel elements agree within 1e-12 with a loop over samples and reversals
+    in order, one element at a time."""
     k, w = many(17, 3.0, 1.0)
-    track = SampledSlide(harmonics(seed, count, size), 1.0, 64)
-    angles, places, cells, _ = track.turning_points
+    slide = SampledSlide(random_harmonics(seed, count, size), 1.0, 64)
+    angles, turning_slides, cells, _ = slide.turning_points
     order = np.argsort(
         np.concatenate([np.arange(64), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
     )
-    cycle = np.concatenate([track.q, places])[order]
+    cycle = np.concatenate([slide.q, turning_slides])[order]
     forces = plain_jenkins(np.tile(cycle, 2), k, w)[0][cycle.size :]
-    found = Jenkins(k, w).sample(track)
-    assert found.force == pytest.approx(forces[order < 64], abs=1e-12)
-    fine = evaluate_series(track.x, 65536)
-    assert angles.size >= 2 and places.max() == pytest.approx(fine.max(), abs=1e-6 * np.ptp(fine))
+    sampled = Jenkins(k, w).sample(slide)
+    assert sampled.force == pytest.approx(forces[order < 64], abs=1e-12)
+    fine = evaluate_series(slide.x, 65536)
+    assert angles.size >= 2 and turning_slides.max() == pytest.approx(
+        fine.max(), abs=1e-6 * np.ptp(fine)
+    )
 
 
 @settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6), st.integers(1, 5), st.floats(0.05, 3.0))
-def test_always_bonds_follow_the_recursion(seed, count, size):
-    """Turn after turn of friction.recursion.advance until the stretch repeats."""
-    track = SampledSlide(harmonics(seed, count, size), 1.0, 32)
-    _, places, cells, _ = track.turning_points
+def test_always_bonds_agree_with_recursion(seed, count, size):
+    """Sampled forces of bonds agree within 1e-10 with the recursion of friction.bonds, repeated
+    until it is periodic."""
+    slide = SampledSlide(random_harmonics(seed, count, size), 1.0, 32)
+    _, turning_slides, cells, _ = slide.turning_points
     order = np.argsort(
         np.concatenate([np.arange(32), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
     )
-    cycle = np.concatenate([track.q, places])[order]
+    cycle = np.concatenate([slide.q, turning_slides])[order]
     law = Bonds(0.3, 0.4)
     state = np.array([[1.0], [0.0], [0.0]])
-    last = cycle[-1]
+    previous = cycle[-1]
     for _ in range(int(10 / np.abs(np.diff(cycle)).sum()) + 3):
         forces = []
         for q in cycle:
-            state = advance_bonds(state, np.array([q - last]), np.ones(1), law.length)[0]
-            last = q
+            state = advance_bonds(state, np.array([q - previous]), np.ones(1), law.length)[0]
+            previous = q
             forces.append(law.static / law.length * state[1, 0])
-    found = bonds(0.3, 0.4).sample(track)
-    assert found.force == pytest.approx(np.array(forces)[order < 32], abs=1e-10)
+    sampled = bonds(0.3, 0.4).sample(slide)
+    assert sampled.force == pytest.approx(np.array(forces)[order < 32], abs=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -100,22 +106,24 @@ def test_always_bonds_follow_the_recursion(seed, count, size):
     ],
     ids=lambda law: type(law).__name__,
 )
-def test_exact_slopes_are_the_derivative_of_the_forces(law):
+def test_exact_derivatives_of_forces_agree_with_differences(law):
+    """The derivatives of the forces with respect to the slide and the frequency agree with central
+    differences within 1e-7."""
     group = LawGroup(sdof(), law, 4096)
-    q = harmonics(3, 5)[None]
-    fold = group(q, 1.3)
-    v = pack_harmonics(harmonics(3, 5)[None])
+    q = random_harmonics(3, 5)[None]
+    result = group(q, 1.3)
+    v = pack_harmonics(random_harmonics(3, 5)[None])
     eps = 1e-6
 
     def force(x, omega=1.3):
         return group(unpack_harmonics(x, 1), omega).force[0]
 
-    found = np.stack(
+    expected = np.stack(
         [(force(v + d) - force(v - d)) / (2 * eps) for d in eps * np.eye(v.size)], axis=1
     )
-    assert fold.slope[0] == pytest.approx(found, abs=1e-7)
-    if fold.rate is not None:
-        assert fold.rate[0] == pytest.approx(
+    assert result.slope[0] == pytest.approx(expected, abs=1e-7)
+    if result.rate is not None:
+        assert result.rate[0] == pytest.approx(
             (force(v, 1.3 + eps) - force(v, 1.3 - eps)) / (2 * eps), abs=1e-8
         )
 
@@ -123,8 +131,8 @@ def test_exact_slopes_are_the_derivative_of_the_forces(law):
 # ---- the balance
 
 
-def dense(modes, omega, level, spring):
-    """Modal phasors of the linear structure with a spring at the slide."""
+def solve_linear_modes(modes, omega, level, spring):
+    """Return the modal phasors of the linear structure with a spring at the interface."""
     a = (
         np.diag(modes.omega**2)
         - omega**2 * np.eye(modes.omega.size)
@@ -135,62 +143,69 @@ def dense(modes, omega, level, spring):
 
 
 @pytest.mark.parametrize("omega", [0.7, 1.0, 2.3, 5.0])
-def test_exact_linear_limits(omega):
-    """Elements that never yield are a spring; without force nothing is left; coupled damping too."""
+def test_exact_limiting_cases_agree_with_linear_response(omega):
+    """Elements that never yield act as a spring, and elements without strength have no effect, also
+    with coupled damping."""
     c = np.diag(0.04 * np.arange(1, 6)) + 0.02
     for damping in (None, c):
         modes = five(damping)
-        found = find_point(
+        point = find_point(
             modes, SineDrive(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3
         )
-        assert found.modal[1] == pytest.approx(dense(modes, omega, 2.0, 3.5), rel=1e-10)
-        assert np.abs(found.modal[[0, 2, 3]]).max() < 1e-12
-        free = find_point(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
-        assert free.modal[1] == pytest.approx(dense(modes, omega, 2.0, 0.0), rel=1e-7)
+        assert point.modal[1] == pytest.approx(
+            solve_linear_modes(modes, omega, 2.0, 3.5), rel=1e-10
+        )
+        assert np.abs(point.modal[[0, 2, 3]]).max() < 1e-12
+        weak = find_point(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
+        assert weak.modal[1] == pytest.approx(solve_linear_modes(modes, omega, 2.0, 0.0), rel=1e-7)
 
 
-def test_exact_a_mode_without_stiffness_or_damping():
-    """A rigid mode and an undamped one at its own frequency have no receptance and need none."""
-    one = np.ones(2)
-    modes = basis_of([0.0, 1.0], 0.0, [1.0, 0.6], one, one, mass=1.5)
+def test_exact_rigid_and_undamped_modes_agree_with_linear_response():
+    """Rigid modes and undamped modes at their natural frequency have no receptance. The balance
+    agrees with the linear response within 1e-10, and with a march if friction acts."""
+    ones = np.ones(2)
+    modes = basis_of([0.0, 1.0], 0.0, [1.0, 0.6], ones, ones, mass=1.5)
     for omega in (0.8, 1.0):
-        found = find_point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
-        assert found.modal[1] == pytest.approx(dense(modes, omega, 1.0, 2.0), rel=1e-10)
-        assert np.abs(found.modal[0]).max() < 1e-12
-    shaken = find_point(
+        point = find_point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
+        assert point.modal[1] == pytest.approx(
+            solve_linear_modes(modes, omega, 1.0, 2.0), rel=1e-10
+        )
+        assert np.abs(point.modal[0]).max() < 1e-12
+    frictional = find_point(
         modes, SineDrive(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4
     )
     check_cycle(
-        modes, SineDrive(1.0, 1.0), shaken, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4
+        modes, SineDrive(1.0, 1.0), frictional, np.array([0.5, 3.0]), np.array([1e9, 0.4]), 5e-4
     )
 
 
-def test_exact_the_jacobian_of_the_balance():
-    """Against central differences: a rigid mode, coupled damping, two rows, a law of the rate; over x, omega, level."""
-    one = np.ones(3)
+def test_exact_jacobian_of_balance_agrees_with_differences():
+    """The derivatives of the residual with respect to the coefficients, frequency and level agree
+    with central differences within 1e-7."""
+    ones = np.ones(3)
     c = 0.1 * np.eye(3) + 0.05
-    faces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
+    interfaces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
     for damping in (None, c):
-        modes = basis_of([0.0, 1.0, 3.0], 0.02, faces, one, one, mass=1.3, damping=damping)
+        modes = basis_of([0.0, 1.0, 3.0], 0.02, interfaces, ones, ones, mass=1.3, damping=damping)
         group = LawGroup(
             modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024
         )
         balance = HarmonicBalance(modes, group.rows, group)
         x = np.random.default_rng(4).normal(size=balance.count_unknowns(1.1, 3)) * 0.5
-        here = balance.evaluate(x, 1.1, 0.7, 3)
+        result = balance.evaluate(x, 1.1, 0.7, 3)
 
         def residual(v, omega=1.1, level=0.7, balance=balance):
             return balance.evaluate(v, omega, level, 3).residual
 
         eps = 1e-6
-        found = np.stack(
+        expected = np.stack(
             [(residual(x + d) - residual(x - d)) / (2 * eps) for d in eps * np.eye(x.size)], axis=1
         )
-        assert here.jacobian == pytest.approx(found, abs=1e-7)
-        assert here.by_omega == pytest.approx(
+        assert result.jacobian == pytest.approx(expected, abs=1e-7)
+        assert result.by_omega == pytest.approx(
             (residual(x, 1.1 + eps) - residual(x, 1.1 - eps)) / (2 * eps), abs=1e-7
         )
-        assert here.by_level == pytest.approx(
+        assert result.by_level == pytest.approx(
             (residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9
         )
 
@@ -198,95 +213,110 @@ def test_exact_the_jacobian_of_the_balance():
 # ---- against marching
 
 
-def check_cycle(modes, drive, found, k, w, near, steps=4000):
-    """March one cycle from the state the balance gives: it must follow it and come back."""
-    response = make_cycle_response(found, modes, drive, steps)
+def check_cycle(modes, drive, point, k, w, tolerance, steps=4000):
+    """March one cycle from the state of the balance; assert that it follows the balance and is
+    periodic."""
+    response = make_cycle_response(point, modes, drive, steps)
     path = np.tile(response.slide[:-1], 2)
     stretch = plain_jenkins(np.append(path, path[0]), k, w)[1]
     start = np.concatenate([response.modal[0], response.modal_rate[0]])
-    rows, forces = march(modes, drive, k, w, start, stretch, steps)
+    states, forces = march(modes, drive, k, w, start, stretch, steps)
     n = modes.omega.size
     scale = np.abs(response.modal).max()
-    assert np.abs(rows[:, :n] - response.modal).max() < near * scale
+    assert np.abs(states[:, :n] - response.modal).max() < tolerance * scale
     assert (
-        np.abs(rows[:, n:] - response.modal_rate).max()
-        < 3 * near * np.abs(response.modal_rate).max()
+        np.abs(states[:, n:] - response.modal_rate).max()
+        < 3 * tolerance * np.abs(response.modal_rate).max()
     )
-    assert np.abs(forces - response.force).max() < 10 * near * np.abs(forces).max()
+    assert np.abs(forces - response.force).max() < 10 * tolerance * np.abs(forces).max()
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("omega", [0.7, 1.2, 2.45])
-def test_exact_a_hundred_elements_and_five_modes_march(omega):
+def test_exact_five_modes_with_many_elements_agree_with_march(omega):
+    """The balance of five modes with many elements agrees with a march of one cycle within 2e-4."""
     modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
-    found = find_point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
-    assert found.error < 1e-4 and np.ptp(evaluate_series(found.coefficients, 512)) > 4 * w.min()
-    check_cycle(modes, drive, found, k, w, 2e-4)
+    point = find_point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
+    assert point.error < 1e-4 and np.ptp(evaluate_series(point.coefficients, 512)) > 4 * w.min()
+    check_cycle(modes, drive, point, k, w, 2e-4)
 
 
 @pytest.mark.share(0, 1, 2, 3)
 @pytest.mark.parametrize(
-    "stiffness, tolerance, near",
+    "stiffness, tolerance, max_error",
     [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5), (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)],
 )
-def test_exact_peaks_at_resonance(stiffness, tolerance, near):
-    found = find_point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
-    miss = abs(found.amplitude([1.0]) / PEAKS[stiffness] - 1)
-    assert miss < near and miss < found.error < tolerance
+def test_exact_peaks_at_resonance_agree_with_dop853(stiffness, tolerance, max_error):
+    """Peaks at resonance agree with values by DOP853 within the tolerance, and the stated error
+    covers the difference."""
+    point = find_point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
+    error = abs(point.amplitude([1.0]) / PEAKS[stiffness] - 1)
+    assert error < max_error and error < point.error < tolerance
 
 
 @pytest.mark.parametrize("omega", [0.6, 1.0, 1.7])
-def test_always_work_in_is_what_is_lost(omega):
-    """Parseval: base work = viscous loss + the loop's area, per cycle, from three independent sums."""
+def test_always_work_of_drive_equals_losses(omega):
+    """The work of the base per cycle equals the viscous loss plus the area of the loop, within
+    2e-4, from three independent sums."""
     modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
-    found = find_point(modes, drive, Jenkins(k, w), harmonics=15)
-    r = make_cycle_response(found, modes, drive, 2000)
+    point = find_point(modes, drive, Jenkins(k, w), harmonics=15)
+    response = make_cycle_response(point, modes, drive, 2000)
     dt = drive.period / 2000
-    base = -modes.mass * dt * np.sum((r.modal_rate @ modes.base * drive.values(r.time))[:-1])
+    base = (
+        -modes.mass
+        * dt
+        * np.sum((response.modal_rate @ modes.base * drive.values(response.time))[:-1])
+    )
     viscous = (
         modes.mass
         * dt
-        * np.einsum("ti,ij,tj->", r.modal_rate[:-1], modes.damping_matrix, r.modal_rate[:-1])
+        * np.einsum(
+            "ti,ij,tj->", response.modal_rate[:-1], modes.damping_matrix, response.modal_rate[:-1]
+        )
     )
-    slip = np.sum((r.force * r.slide_rate)[:-1]) * dt
+    slip = np.sum((response.force * response.slide_rate)[:-1]) * dt
     assert slip > 0.05 * base and base == pytest.approx(viscous + slip, rel=2e-4)
-    book = find_cycle_energies(found, modes)
-    assert [book[n] for n in ("work_in", "viscous", "friction")] == pytest.approx(
+    energies = find_cycle_energies(point, modes)
+    assert [energies[n] for n in ("work_in", "viscous", "friction")] == pytest.approx(
         [base, viscous, slip], rel=2e-4
     )
-    assert book["balance"] < 1e-9
+    assert energies["balance"] < 1e-9
 
 
-def test_order_of_what_is_cut_off():
-    """Smooth: spectral. Elements: the slide's harmonics fall like k^-4, so the error like H^-3 or better."""
+def test_order_of_truncation_error():
+    """The truncation error falls exponentially for a smooth law. For elements, where the harmonics
+    of the slide fall like k^-4, it falls like H^-3 or faster."""
     modes = sdof(0.05)
     drive = SineDrive(1.0, 0.5)
-    best = find_point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
+    reference = find_point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
     errors = [
-        abs(find_point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / best - 1)
+        abs(
+            find_point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / reference - 1
+        )
         for h in (3, 9, 15)
     ]
     assert errors[0] > 1e-4 and errors[1] < 1e-2 * errors[0] and errors[2] < 1e-2 * errors[1]
     group = LawGroup(modes, Jenkins([2.0], [0.3]), 8192)
-    best = find_point(modes, drive, group, harmonics=255)
-    y = evaluate_series(best.coefficients[0], 1024)
+    reference = find_point(modes, drive, group, harmonics=255)
+    y = evaluate_series(reference.coefficients[0], 1024)
     errors = []
     for h in (9, 19, 39, 79):
-        here = find_point(modes, drive, group, harmonics=h)
-        errors.append(np.abs(evaluate_series(here.coefficients[0], 1024) - y).max())
+        point = find_point(modes, drive, group, harmonics=h)
+        errors.append(np.abs(evaluate_series(point.coefficients[0], 1024) - y).max())
     order = -np.polyfit(np.log([9, 19, 39, 79]), np.log(errors), 1)[0]
     assert 2.7 < order < 4.5
 
 
-def test_exact_both_rows_of_a_group():
-    """Slide and output with their own laws; the two forces act where they should: reciprocal linear check."""
+def test_exact_laws_on_two_interfaces_agree_with_linear_response():
+    """Springs at the slide and at the output agree with the linear response within 1e-10, and the
+    receptance is symmetric."""
     modes = five()
     laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
-    found = find_point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
+    point = find_point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
     a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.damping_matrix
     for row, k in ((modes.slide, 1.5), (modes.output, 0.7)):
         a = a + np.outer(row, row) * k / modes.mass
-    assert found.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
+    assert point.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
     balance = make_balance(modes, make_group(modes, laws), 64)
     receptance = balance.faces @ balance.get_linear_part(1.9, 3).inverse @ balance.faces.T
     assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
@@ -297,21 +327,26 @@ def test_exact_both_rows_of_a_group():
     [bonds(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
     ids=lambda law: type(law).__name__,
 )
-def test_exact_other_laws_obey_the_equation_of_motion(law):
-    """The accelerations of the harmonics against those the law's own force gives."""
+def test_exact_balance_satisfies_equation_of_motion(law):
+    """The accelerations of the harmonics agree with the equation of motion for the force of the
+    law, within 2e-3."""
     modes = sdof(0.05)
     drive = SineDrive(1.0, 1.2)
-    found = find_point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
-    r = make_cycle_response(found, modes, drive, 512)
-    k = np.arange(found.modal.shape[0])[:, None]
-    accel = evaluate_series((-((1.2 * k) ** 2) * found.modal).T, 512)
-    assert r.acceleration[:-1] - drive.values(r.time[:-1]) == pytest.approx(accel[0], abs=2e-3)
+    point = find_point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
+    response = make_cycle_response(point, modes, drive, 512)
+    k = np.arange(point.modal.shape[0])[:, None]
+    accel = evaluate_series((-((1.2 * k) ** 2) * point.modal).T, 512)
+    assert response.acceleration[:-1] - drive.values(response.time[:-1]) == pytest.approx(
+        accel[0], abs=2e-3
+    )
 
 
 # ---- refusals
 
 
-def test_refuses_what_cannot_be_balanced():
+def test_refuses_laws_that_cannot_be_balanced():
+    """Rigid friction, breakaway friction, missing interfaces and invalid elements are refused with
+    a message."""
     modes = sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
         find_point(modes, DRIVE, coulomb_model(1.0, 1.0))
@@ -328,14 +363,17 @@ def test_refuses_what_cannot_be_balanced():
 
 
 @pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
-def test_exact_rows_that_depend_on_others_are_left_out_at_any_size(size):
+def test_exact_dependent_interfaces_are_removed_at_any_scale(size):
+    """Of three interfaces one of which depends on the others, two remain, and all three are
+    reconstructed within 1e-14, at any scale."""
     rows = size * np.array([[1.0, 0.5, 0, 0, 0.2], [0, 1.0, 0.1, 0, 0], [2.0, 2.0, 0.1, 0, 0.4]])
     balance = HarmonicBalance(five(), rows, None)
     assert balance.lift.shape == (3, 2) and balance.faces.shape == (2, 5)
     np.testing.assert_allclose(balance.lift @ balance.faces, rows, rtol=0, atol=1e-14 * size)
 
 
-def test_refuses_to_call_an_unbalanced_motion_steady():
+def test_refuses_motion_that_does_not_converge():
+    """Newton's method raises an error if it does not converge in the given number of steps."""
     modes = sdof()
     group = LawGroup(modes, Jenkins([10.0], [0.08]), 256)
     balance = make_balance(modes, group, 256)

@@ -1,4 +1,4 @@
-"""Steady motions by balance against runs of scenes, at 40 frequencies, and in hard cases."""
+"""Steady motions by harmonic balance against runs of scenes, sweeps, and difficult cases."""
 
 import numpy as np
 import pytest
@@ -34,11 +34,12 @@ DRIVE = SineDrive(1.0, 1.0)
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
-def test_exact_measures_of_a_run_of_a_scene(law):
-    """The last ten of 300 cycles of a marched run at 5 g and the measures of the balance."""
+def test_exact_measures_agree_with_marched_scene(law):
+    """The measures of the balance agree within 2e-3 with a scene that is marched for 300 cycles at
+    5 g."""
     scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
     result = run(plan(scene), estimate=False)
-    found = result.measures
+    measures = result.measures
     modes = result.plan.model.rig.modes
     drive = result.plan.model.rig.drive.signal
     limit = 0.3 * LOAD
@@ -48,19 +49,22 @@ def test_exact_measures_of_a_run_of_a_scene(law):
         Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else bonds(limit, 20e-6),
         tolerance=1e-5,
     )
-    r = make_cycle_response(p, modes, drive, 1000)
+    response = make_cycle_response(p, modes, drive, 1000)
     dt = np.full(1001, drive.period / 1000)
     dt[[0, -1]] /= 2
-    q, f = (compute_harmonic(r.time, dt, v, drive.omega) for v in (r.slide, r.force))
-    work = float(dt @ (r.force * r.slide_rate))
-    mine = {
+    q, f = (
+        compute_harmonic(response.time, dt, v, drive.omega)
+        for v in (response.slide, response.force)
+    )
+    work = float(dt @ (response.force * response.slide_rate))
+    values = {
         "relative_displacement_amplitude": p.amplitude(modes.output),
-        "absolute_acceleration_peak": compute_acceleration_peak(r),
-        "friction_force_peak": np.abs(r.force).max(),
-        **compute_slip_measures(r, drive, 1000),
-        **interface_loop(np.ptp(r.slide) / 2, q, f, work, modes.mass * modes.omega[0] ** 2),
+        "absolute_acceleration_peak": compute_acceleration_peak(response),
+        "friction_force_peak": np.abs(response.force).max(),
+        **compute_slip_measures(response, drive, 1000),
+        **interface_loop(np.ptp(response.slide) / 2, q, f, work, modes.mass * modes.omega[0] ** 2),
     }
-    for name, near in (
+    for name, tolerance in (
         ("relative_displacement_amplitude", 1e-3),
         ("absolute_acceleration_peak", 2e-3),
         ("friction_force_peak", 1e-3),
@@ -69,12 +73,12 @@ def test_exact_measures_of_a_run_of_a_scene(law):
         ("equivalent_stiffness", 2e-3),
         ("equivalent_damping", 2e-3),
     ):
-        assert mine[name] == pytest.approx(found[name].value, rel=near), name
+        assert values[name] == pytest.approx(measures[name].value, rel=tolerance), name
 
 
-def test_exact_many_interfaces_on_few_modes():
-    """Thirty interfaces, five modes: the same as a march with thirty forces would need; checked by energy and by the
-    equation of motion on the samples."""
+def test_exact_thirty_interfaces_on_five_modes():
+    """The motion of five modes with thirty interfaces satisfies the energy balance within 1e-3 and
+    the equation of motion within 2 %."""
     rng = np.random.default_rng(2)
     faces = rng.normal(size=(30, 5)) * np.array([1.0, 0.5, 0.4, 0.3, 0.2])
     base = five()
@@ -83,48 +87,62 @@ def test_exact_many_interfaces_on_few_modes():
     drive = SineDrive(1.0, 0.9)
     p = find_point(modes, drive, laws, tolerance=1e-4)
     assert p.coefficients.shape[0] == 30 and p.error < 1e-4
-    r = make_cycle_response(p, modes, drive, 1024)
+    response = make_cycle_response(p, modes, drive, 1024)
     forces = make_group(modes, laws).compute_forces(p.coefficients, drive.omega, 1024)
     dt = drive.period / 1024
-    slip = sum((forces[i] * (r.modal_rate[:-1] @ faces[i])).sum() for i in range(30)) * dt
-    viscous = modes.mass * dt * ((r.modal_rate[:-1] ** 2) @ (2 * modes.zeta * modes.omega)).sum()
-    work = -modes.mass * dt * ((r.modal_rate @ modes.base) * drive.values(r.time))[:-1].sum()
+    slip = sum((forces[i] * (response.modal_rate[:-1] @ faces[i])).sum() for i in range(30)) * dt
+    viscous = (
+        modes.mass * dt * ((response.modal_rate[:-1] ** 2) @ (2 * modes.zeta * modes.omega)).sum()
+    )
+    work = (
+        -modes.mass
+        * dt
+        * ((response.modal_rate @ modes.base) * drive.values(response.time))[:-1].sum()
+    )
     assert slip > 0 and work == pytest.approx(slip + viscous, rel=1e-3)
     k = np.arange(p.modal.shape[0])[:, None]
     accel = evaluate_series((-((drive.omega * k) ** 2) * p.modal).T, 1024)
-    push = -np.outer(modes.base, drive.values(r.time[:-1])) - faces.T @ forces / modes.mass
-    rest = (
-        push
-        - (2 * modes.zeta * modes.omega * r.modal_rate[:-1] + modes.omega**2 * r.modal[:-1]).T
+    acceleration_sum = (
+        -np.outer(modes.base, drive.values(response.time[:-1])) - faces.T @ forces / modes.mass
+    )
+    residual = (
+        acceleration_sum
+        - (
+            2 * modes.zeta * modes.omega * response.modal_rate[:-1]
+            + modes.omega**2 * response.modal[:-1]
+        ).T
         - accel
     )
-    assert np.sqrt((rest**2).mean()) < 2e-2 * np.sqrt((accel**2).mean())
+    assert np.sqrt((residual**2).mean()) < 2e-2 * np.sqrt((accel**2).mean())
 
 
-def test_always_a_sweep_finds_what_cold_starts_find():
+def test_always_sweep_agrees_with_single_points():
+    """The amplitudes of a sweep agree within 3e-4 with points that are computed without a start
+    value."""
     modes = sdof(0.01)
     law = Jenkins([4.0, 1.0], [0.05, 0.5])
     values = np.linspace(0.12, 0.4, 15)
-    swept = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
-    assert swept.ended == "listed" and swept.values == pytest.approx(values)
-    for p in swept.points:
-        cold = find_point(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
-        assert p.amplitude([1.0]) == pytest.approx(cold.amplitude([1.0]), rel=3e-4)
+    sweep = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
+    assert sweep.ended == "listed" and sweep.values == pytest.approx(values)
+    for p in sweep.points:
+        expected = find_point(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
+        assert p.amplitude([1.0]) == pytest.approx(expected.amplitude([1.0]), rel=3e-4)
 
 
-def test_exact_regimes():
-    """Slides of a given swing through elements that slip at 0.1 and 0.5."""
+def test_exact_regimes_of_slide_amplitudes():
+    """Slides of three amplitudes through elements that yield at 0.1 and 0.5 have the regimes stuck,
+    partial slip and slides."""
     modes = sdof(0.0)
     law = Jenkins([1.0, 1.0], [0.1, 0.5])
-    for amplitude, want in (
+    for amplitude, expected in (
         (0.05, ("stuck", 0.0)),
         (0.3, ("partial slip", 0.1 / 0.6)),
         (0.6, ("slides", 1.0)),
     ):
-        # swing amplitude*2 without dynamics: far below resonance with a stiff spring the slide is level/stiffness
+        # far below resonance with a stiff spring the slide amplitude is level/stiffness
         p = find_point(modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
-        name, share = find_regime(p)
-        assert (name, share) == (want[0], pytest.approx(want[1]))
+        name, fraction = find_regime(p)
+        assert (name, fraction) == (expected[0], pytest.approx(expected[1]))
     assert find_regime(find_point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
     assert (
         find_regime(find_point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0]
@@ -137,8 +155,9 @@ def test_exact_regimes():
 
 
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
-def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit, bounded):
-    """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
+def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bounded):
+    """An undamped mode at resonance has a bounded motion if the friction limit exceeds pi/4 of the
+    drive. Below, no motion balances, and the message names the reason."""
     modes = sdof(0.0)
     law = Jenkins([20.0], [limit / 20.0])
     if not bounded:
@@ -148,19 +167,26 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
             find_point(modes, DRIVE, law)
         return
     p = find_point(modes, DRIVE, law, tolerance=1e-4)
-    assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # the whole drive of the first harmonic
-    r = make_cycle_response(p, modes, DRIVE, 4000)
+    assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # friction balances the first harmonic of the drive
+    response = make_cycle_response(p, modes, DRIVE, 4000)
     k = np.array([20.0])
     w = np.array([limit / 20.0])
-    stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
-    rows, _ = march(
-        modes, DRIVE, k, w, np.array([r.modal[0, 0], r.modal_rate[0, 0]]), stretch, 4000
+    stretch = plain_jenkins(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
+    states, _ = march(
+        modes,
+        DRIVE,
+        k,
+        w,
+        np.array([response.modal[0, 0], response.modal_rate[0, 0]]),
+        stretch,
+        4000,
     )
-    assert np.abs(rows[:, 0] - r.modal[:, 0]).max() < 3e-4 * np.abs(r.modal).max()
+    assert np.abs(states[:, 0] - response.modal[:, 0]).max() < 3e-4 * np.abs(response.modal).max()
 
 
-def test_refuses_a_tolerance_that_no_ladder_reaches():
-    """A nearly rigid element at resonance: 255 harmonics are not enough for 1e-9, and it is said."""
+def test_refuses_tolerance_beyond_maximum_harmonics():
+    """For a nearly rigid element 255 harmonics do not reach a tolerance of 1e-12, and the error
+    states the remaining one."""
     with pytest.raises(NotConverged, match="the motion still has an error"):
         find_point(
             sdof(0.05), SineDrive(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12

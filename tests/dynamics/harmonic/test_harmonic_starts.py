@@ -1,4 +1,4 @@
-"""Starts of the balance that lie close together."""
+"""Start values of the harmonic balance that lie close together."""
 
 import numpy as np
 import pytest
@@ -10,13 +10,14 @@ from patchfem.dynamics.harmonic.laws import Jenkins
 
 
 @pytest.mark.slow
-def test_exact_three_motions_near_the_end_of_the_upper_branch():
-    """Two of them 8 % apart: between neighbours of the scan."""
+def test_exact_all_three_motions_near_fold_are_found():
+    """Near the end of the upper branch two stable motions and one unstable motion are found,
+    although two of them differ by only 8 %."""
     w = 2 * np.pi * 143
     mass = 0.884
     limit = 0.3 * 26 * 4.4482216152605
     modes = basis_of(w, 0.003, mass=mass)
     laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
     for hertz in np.linspace(147.2, 147.6, 5):
-        found = find_branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)
-        assert [p.stable for p in found] == [True, False, True], hertz
+        points = find_branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)
+        assert [p.stable for p in points] == [True, False, True], hertz
