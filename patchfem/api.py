@@ -129,10 +129,12 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
     """
 
     def strip_file_and_line(message: Any) -> Any:
+        """Remove the location at the start of the lines of a message."""
         return LOCATION_PATTERN.sub("", message) if isinstance(message, str) else message
 
     @wraps(function)
     def call_with_short_errors(*args: Any, **keywords: Any) -> Any:
+        """Call the function, and shorten the messages of its errors."""
         try:
             return function(*args, **keywords)
         except PatchfemError as error:
@@ -149,6 +151,7 @@ def _reject_removed_options(function: Callable) -> Callable:
 
     @wraps(function)
     def check_options_and_call(*args: Any, **keywords: Any) -> Any:
+        """Call the function unless one of the keywords is a removed option."""
         verb = function.__name__
         for name in keywords:
             if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):

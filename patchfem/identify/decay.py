@@ -171,6 +171,7 @@ def _refine_poles(time, value, poles) -> _RefinedPoles:
     """Minimize the residual of a decay fit over its poles, from starting poles (2n,)."""
 
     def compute_jacobian(poles) -> np.ndarray:
+        """Compute the derivatives of the residual with respect to the poles."""
         columns = _compute_columns(time, poles)
         return _compute_derivatives(time, columns, project_data(columns, value))
 

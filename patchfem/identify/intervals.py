@@ -262,6 +262,7 @@ def _follow_profile(
         return _IntervalEnd(fit.u[i], True)
 
     def evaluate(step: float, nearby_point) -> tuple:
+        """Return the excess growth at a step of value i, and the point of its minimum."""
         point = nearby_point.copy()
         point[i] = fit.u[i] + sign * step
         descent = fit.descend(fit.model, point, others)

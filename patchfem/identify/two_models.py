@@ -126,6 +126,7 @@ class TwoModels:
         )
 
         def model(values) -> np.ndarray:
+            """Return the cheap values, corrected to agree with the expensive ones at u."""
             out = expensive_value + ratio * (self.cheap(values) - cheap_value)
             return out if slopes is None else out + slopes @ (self.space.unit(values) - u)
 

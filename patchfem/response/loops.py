@@ -217,7 +217,10 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
 def interface_loops(amplitude, q, f, work, stiffness) -> dict:
     """Return the measures of one friction loop, or of n loops as columns (n,).
 
-    The parameters are those of `interface_loop`, numbers or (n,).
+    Parameters
+    ----------
+    amplitude, q, f, work, stiffness
+        See `interface_loop`; numbers or (n,).
     """
     moves = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
     energy = 2 * np.pi * stiffness * np.square(amplitude)

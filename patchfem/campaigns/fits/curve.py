@@ -195,6 +195,7 @@ class CurveModel:
         return _compute_curve(model, self.distinct, method)[:, self.rows]
 
     def _compute(self, values: tuple, method: str) -> np.ndarray:
+        """Compute the curve for values of the free keys, and report the progress."""
         if self.say and perf_counter() - self.last_progress >= PROGRESS_SECONDS:
             self.last_progress = perf_counter()
             elapsed = self.last_progress - self.begin
@@ -436,6 +437,7 @@ def _nearest_rows(amplitudes, others) -> np.ndarray:
 
 
 def _list_amplitudes(amplitudes) -> str:
+    """Return the first amplitudes as text, with their units."""
     listed = ", ".join(
         format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED_AMPLITUDES]
     )

@@ -80,6 +80,7 @@ class FittedLoop:
         return self._rms(self.held_out) if self.held_out.any() else None
 
     def _rms(self, rows) -> float:
+        """Return the root mean square of the residual in some rows."""
         residual = self.model - self.loop.reading
         return float(np.sqrt(np.mean(residual[rows] ** 2)))
 

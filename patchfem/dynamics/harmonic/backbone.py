@@ -163,7 +163,12 @@ class FreeBalance:
     def follow_to_amplitude(self, x, start: float, target: float) -> np.ndarray:
         """Follow a free motion from one amplitude to another by natural continuation.
 
-        x: unknowns (N,) at the amplitude `start` [m]; target: the other amplitude [m].
+        Parameters
+        ----------
+        x : (N,) ndarray
+            Unknowns at the amplitude `start`.
+        start, target : float
+            First and last amplitude [m].
 
         Raises
         ------

@@ -94,6 +94,7 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
     stride = n_samples // samples
 
     def cycle(values):
+        """Return the samples of one cycle, whose last sample repeats the first one."""
         selected = values[..., ::stride]
         return np.concatenate([selected, selected[..., :1]], axis=-1).T
 

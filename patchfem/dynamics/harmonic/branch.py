@@ -122,6 +122,7 @@ class CurveNumerics(NamedTuple):
 
 
 def _check_values(parameter_values, subject: str, noun: str) -> np.ndarray:
+    """Return drive levels or frequencies as an array; PatchfemError unless they are positive."""
     values = np.asarray(parameter_values, float)
     if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
         raise PatchfemError(f"{subject} needs two or more positive {noun}")
@@ -140,6 +141,7 @@ def _trace_branch(
 
 
 def _solve_points(modes, drives, group, parameter, numerics: CurveNumerics) -> Branch:
+    """Find the motion at each drive, starting from the motion at the previous one."""
     points = []
     last = numerics.start
     for drive in drives:
@@ -187,6 +189,7 @@ def _trace_with_harmonics(modes, drives, group, parameter, h, first, max_step) -
         x = change_harmonic_count(balance, first.coefficients, first.unknowns, first.harmonics, h)
 
         def evaluate_equations(v, p, balance=balance):
+            """Evaluate the equations and their derivatives at a point of the curve."""
             if is_frequency:
                 return differentiate_by_frequency(balance, v, p, drives[0].acceleration, h)
             return differentiate_by_level(balance, v, drives[0].omega, p, h)

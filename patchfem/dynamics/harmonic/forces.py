@@ -60,6 +60,7 @@ class LawGroup:
         copy = self.with_samples(self.samples)
 
         def replace_elements(law):
+            """Return a law with changed elements if it has any."""
             if isinstance(law, Jenkins):
                 return Jenkins(*change(law.stiffness, law.limit_slide))
             return law
@@ -185,6 +186,7 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     k = np.arange(1, h + 1)
 
     def derivative_by_omega(jacobians, change):
+        """Return the derivative of the forces by omega for changes of the harmonics."""
         parts = np.concatenate([np.zeros((rows, 1)), change.real, change.imag], axis=1)
         return np.einsum("ikl,il->ik", jacobians, parts)
 
@@ -225,6 +227,7 @@ def _sum_laws(laws: list, name: str) -> np.ndarray | None:
 
 @lru_cache(maxsize=16)
 def _coefficient_positions(h: int) -> tuple:
+    """Return the positions of the sums and differences of harmonics up to h, (h + 1, h + 1) each."""
     row = np.arange(h + 1)[:, None]
     column = np.arange(h + 1)[None, :]
     return row - column + 2 * h, row + column + 2 * h

@@ -241,7 +241,14 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     def march(divisor: int, points: list, searched=None) -> _EvaluatedMarch:
         """Integrate and evaluate the cases with a given fraction of the time steps.
 
-        searched: which cases (n,) are searched for ringing; None: all.
+        Parameters
+        ----------
+        divisor : int
+            Fraction of the time steps, as 1/divisor.
+        points : list
+            Contact points of the cases, on the mesh of the run or on the coarser one.
+        searched : (n,) of bool, optional
+            Cases that are searched for ringing; None: all.
         """
         lane_cases = [gathered.case for gathered in points]
         marched = lanes.march(

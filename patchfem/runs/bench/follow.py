@@ -83,7 +83,15 @@ def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathRespo
     energies = np.zeros((slide.size, 2))
 
     def follow_block(contact, begin: int, end: int) -> int:
-        """Compute the samples of a block and return the number of steps that did not converge."""
+        """Compute the samples of a block and return the number of steps that did not converge.
+
+        Parameters
+        ----------
+        contact
+            Contact at the start of the block, which the computation changes.
+        begin, end : int
+            First and last sample.
+        """
         block = slice(begin, end + 1)
         return loops.follow_path(
             slide[block].copy(),

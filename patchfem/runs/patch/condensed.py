@@ -195,7 +195,13 @@ def shared_pair(patch_model, level: int) -> Pair:
 def cache_pairs(patch_model, meshes, pairs) -> None:
     """Store the condensed pieces of new shared meshes in the cache, level by level.
 
-    patch_model: one of the patches that share the meshes.
+    Parameters
+    ----------
+    patch_model : PatchModel
+        One of the patches that share the meshes.
+    meshes : SharedMeshes
+    pairs : sequence of Pair
+        Condensed pieces, fine to coarse.
     """
     for level, pair in enumerate(pairs):
         store.store_result(

@@ -28,7 +28,18 @@ MAX_DECADES = 6
 def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
     """Solve the contact on a mesh file whose edges are halved a given number of times.
 
-    The coarser patches are those of `solve_with_coarser`.
+    Parameters
+    ----------
+    patch_model : PatchModel
+    level : int
+        Number of halvings.
+    estimate : bool
+        Whether the coarser meshes are solved as well.
+
+    Returns
+    -------
+    tuple
+        Patches as in `solve_with_coarser`.
     """
     bodies = make_piece_meshes(patch_model)
     for _ in range(level):
@@ -90,7 +101,21 @@ def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
-    """Solve the contact of a patch on given condensed pieces, from the finest to the coarsest."""
+    """Solve the contact of a patch on given condensed pieces.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    pairs : sequence of Pair
+        Fine to coarse.
+    estimate : bool
+        Whether the coarser pieces are used as well.
+
+    Returns
+    -------
+    tuple
+        Patches as in `solve_with_coarser`.
+    """
     return _pad_to_three(
         press_patch(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
     )
@@ -237,10 +262,16 @@ def solve_static_ladder(
 ) -> tuple:
     """Solve the patch of a bench with partial slip on the meshes of a static run.
 
-    The patches are ordered from fine to coarse.
+    Parameters
+    ----------
+    patch_model, tolerance, estimate, fresh
+        See `solve_on_ladder`.
 
-    Return () if the mesh is prescribed or shared with other cases, or if the patch is solved
-    already.
+    Returns
+    -------
+    tuple
+        Patches, fine to coarse; () if the mesh is prescribed or shared with other cases, or if the
+        patch is solved already.
     """
     if (
         not patch_model.interface.partial_slip

@@ -224,7 +224,18 @@ def strain_warnings(
 
 
 def exceeds_small_strains(patch_model, largest_pressure, approach):
-    """Return whether the strains of one patch, or of any of many, may cause a warning."""
+    """Return whether the strains of one patch, or of any of many, may cause a warning.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    largest_pressure, approach : float or (q,)
+        Largest pressure [Pa] and approach [m].
+
+    Returns
+    -------
+    bool or (q,) of bool
+    """
     if not patch_model.mesh.is_automatic:
         return np.ones(np.shape(largest_pressure), bool)
     return (

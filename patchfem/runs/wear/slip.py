@@ -371,7 +371,14 @@ def flank_slip_path(model, patch, slide, vertical, local, tau) -> tuple:
 
 
 def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
-    """Return the slip path of each node from frames of slip and shear stress."""
+    """Return the slip path of each node from frames of slip and shear stress.
+
+    Parameters
+    ----------
+    model : Model
+    patch : Patch
+    frames : Frames
+    """
     count = len(frames.slip)
 
     def path(indices) -> np.ndarray:

@@ -45,7 +45,10 @@ def compute_motions(
 ) -> tuple[CaseResults, np.ndarray]:
     """Compute the motions of solved patches in lanes, and find cases that need a single run.
 
-    The parameters are those of `sheared.compute_motions`.
+    Parameters
+    ----------
+    models, pressed_cases, say
+        See `sheared.compute_motions`.
     """
     fine = [case.fine.groups[0] for case in pressed_cases]
     coarse = [case.coarse.groups[0] for case in pressed_cases]
