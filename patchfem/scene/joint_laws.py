@@ -88,8 +88,8 @@ JOINT_LAWS = (
         "coulomb",
         ("[contact.shear]", "[contact.asperities]"),
         "slip that begins at the edges, from the stiffness of the pieces and of their rough faces",
-        "theories of rough contact differ, and the run prints their range; the pieces are plane, and nothing beyond "
-        "them gives way",
+        "theories of rough contact differ (the run prints their range); the model is "
+        "two-dimensional, and everything outside the pieces is rigid",
         "joint_laws/rough-plates",
     ),
     JointLaw(
@@ -98,8 +98,8 @@ JOINT_LAWS = (
         "coulomb",
         ("[contact.shear]",),
         "slip that begins at the edges, from the stiffness of the pieces",
-        "the faces are smooth, so the joint is too stiff where they are rough; the pieces are plane, and nothing beyond "
-        "them gives way",
+        "the faces are smooth, so the joint is too stiff where they are rough; the model is "
+        "two-dimensional, and everything outside the pieces is rigid",
         "joint",
     ),
     JointLaw(
@@ -107,9 +107,9 @@ JOINT_LAWS = (
         ("loss", "force-limit"),
         "elastic-plastic",
         ("stiffness",),
-        "loop area of law nonlocal to 1 % from an amplitude of 2.5 bond lengths",
-        "dissipates nothing up to one bond length; the force just after a reversal is wrong (rms 14 % of the friction "
-        "limit at 3 bond lengths)",
+        "loop area within 1 % of that of law nonlocal at amplitudes above 2.5 bond lengths",
+        "no dissipation at amplitudes up to one bond length; the force just after a reversal is wrong (rms error 14 % of "
+        "the friction limit at an amplitude of 3 bond lengths)",
         "joint_laws/elastic-plastic",
     ),
     JointLaw(
@@ -118,8 +118,8 @@ JOINT_LAWS = (
         "nonlocal",
         ("bond_length",),
         "smooth loops at amplitudes of about one bond length",
-        "small loops do not close; creeps by 0.27 bond lengths per cycle under a force of 0.4 to "
-        "0.6 of the limit, unless `breakaway` is set",
+        "small loops do not close; the joint creeps by 0.27 bond lengths per cycle under a force "
+        "of 0.4 to 0.6 of the limit, unless `breakaway` is set",
         "joint_laws/nonlocal",
     ),
     JointLaw(
@@ -139,7 +139,7 @@ JOINT_LAWS = (
         ("kinetic", "stribeck_speed", "stiffness", "micro_damping", "viscous"),
         "friction that falls with the speed: growth from steady sliding, and stick-slip",
         "no ageing; no squeal by coupling of modes, because the load is constant; small loops do not "
-        "close; creeps under a mean force",
+        "close; the joint creeps under a mean force",
         "joint_laws/lugre",
     ),
     JointLaw(
@@ -147,7 +147,7 @@ JOINT_LAWS = (
         ("squeal", "force-limit"),
         "coulomb",
         ("kinetic",),
-        "stick-slip from a coefficient that is lower in slip; exact between events",
+        "stick-slip from a coefficient that is lower in slip; the motion is exact between events",
         "friction does not fall with the speed, so no vibration grows from steady sliding",
         "joint_laws/stick-slip",
     ),
@@ -156,9 +156,9 @@ JOINT_LAWS = (
         ("force-limit", "loss"),
         "coulomb",
         (),
-        "loop area too large by 1 % at an amplitude of 100 bond lengths, by less above",
-        "no stiffness and no loss before slip; the force is wrong after each reversal (rms 34 % of the friction limit at "
-        "100 bond lengths)",
+        "loop area too large by 1 % at an amplitude of 100 bond lengths, and by less at larger ones",
+        "no stiffness and no loss before slip; the force is wrong after each reversal (rms error 34 % of the friction limit "
+        "at an amplitude of 100 bond lengths)",
         "joint_laws/coulomb",
     ),
     JointLaw(
@@ -167,7 +167,7 @@ JOINT_LAWS = (
         "tanh",
         ("reference_speed",),
         "the force is the friction limit times tanh(speed / reference_speed)",
-        "never sticks: creeps under any force; no stiffness before slip; friction does not fall with the speed",
+        "never sticks, so the joint creeps under any force; no stiffness before slip; friction does not fall with the speed",
         "joint_laws/tanh",
     ),
     JointLaw(
