@@ -132,7 +132,8 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
     assert high.error < 1e-3 * high.amplitude and low.error < 1e-3 * low.amplitude
 
     def next_maximum(amplitude: float) -> float:
-        """Return the next maximum of the displacement after a slide from -amplitude to amplitude."""
+        """Return the next maximum of the displacement after a slide from -amplitude to
+        amplitude."""
         stretches = np.minimum(yield_slides, amplitude)
 
         def along(t, y):

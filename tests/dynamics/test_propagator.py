@@ -1,4 +1,5 @@
-"""The propagator of one time step: matrices, forcing and energies against DOP853 and closed forms."""
+"""The propagator of one time step: matrices, forcing and energies against DOP853 and closed
+forms."""
 
 from math import pi
 

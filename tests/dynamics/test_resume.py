@@ -63,7 +63,8 @@ RIGS = {
 
 @pytest.fixture
 def save_counter(monkeypatch):
-    """Save the state of marches after every second cycle; the list has one entry per saved state."""
+    """Save the state of marches after every second cycle; the list has one entry per saved
+    state."""
     monkeypatch.setattr(march_run, "MAX_CYCLES_AT_ONCE", 2)
     saved = []
     save = checkpoint.save_checkpoint

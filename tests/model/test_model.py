@@ -1,4 +1,5 @@
-"""The model of a scene: its parts are immutable, can be replaced, and contain all that a run needs."""
+"""The model of a scene: its parts are immutable, can be replaced, and contain all that a run
+needs."""
 
 from dataclasses import FrozenInstanceError, astuple, fields, is_dataclass, replace
 
@@ -49,7 +50,8 @@ RUNS = {
 
 
 def comparable_result(result) -> tuple:
-    """Return everything of a result except its computing times, in a form that compares bit by bit."""
+    """Return everything of a result except its computing times, in a form that compares bit by
+    bit."""
     response = result.response
     histories = (
         []
@@ -254,7 +256,8 @@ def test_refuses_scene_with_file_and_line_stated_once(text, key, line, expected)
 
 
 def test_refuses_invalid_model_with_file_and_line_stated_once():
-    """An error that appears when the model is built names the file and the line of its table once."""
+    """An error that appears when the model is built names the file and the line of its table
+    once."""
     text = (
         POINT + GROWING + '[friction.temperature]\nsurface = "1 K"\nreference = "293.15 K"\n'
         'rest_activation = "2500 K"\nslip_activation = "1500 K"\n' + TRIANGLE

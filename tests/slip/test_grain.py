@@ -78,7 +78,8 @@ def test_exact_nodes_of_flat_contact_are_not_spread():
 
 
 def test_exact_spreading_applies_only_to_parallel_elements():
-    """A joint with Coulomb friction uses parallel elements; a joint with nonlocal bonds does not."""
+    """A joint with Coulomb friction uses parallel elements; a joint with nonlocal bonds does
+    not."""
     text = pf.new("joint")
     assert uses_parallel_elements(build(loads(text, "joint.toml")))
     bonds = text.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')

@@ -24,7 +24,8 @@ CLIMBED = (BENCH + '[normal.grooves]\nwavelength = "80 um"\namplitude = "7 um"\n
 @pytest.mark.parametrize("scene", [WORN, CLIMBED], ids=["wear", "grooves"])
 @pytest.mark.parametrize("setting", ["accuracy = 1e308\n", 'accuracy = "exact"\n'])
 def test_refuses_accuracy_that_is_not_a_table(tmp_path, setting, scene):
-    """A number or a string under the key `accuracy` is refused with a message that names the key."""
+    """A number or a string under the key `accuracy` is refused with a message that names the
+    key."""
     assert "accuracy: " in refusal_message(tmp_path, setting + scene)
 
 

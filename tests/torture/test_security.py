@@ -110,7 +110,8 @@ def test_always_sources_contain_no_unsafe_code():
     ],
 )
 def test_always_unsafe_code_is_detected(text, finding):
-    """The scan of the sources finds each planted unsafe call or import, and nothing in safe code."""
+    """The scan of the sources finds each planted unsafe call or import, and nothing in safe
+    code."""
     assert find_unsafe_code("planted", text) == {finding}
     assert find_unsafe_code("planted", FINE) == set()
 
@@ -151,7 +152,8 @@ def test_always_pages_escape_text_of_scenes(tmp_path):
 
 
 def test_always_pickles_are_never_loaded(tmp_path, monkeypatch):
-    """A pickle with the suffix of any supported file is refused with a message and is not executed."""
+    """A pickle with the suffix of any supported file is refused with a message and is not
+    executed."""
     import pickle
 
     monkeypatch.chdir(tmp_path)

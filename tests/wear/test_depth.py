@@ -1,4 +1,5 @@
-"""Implicit wear steps: worn volume, shape and stability against closed forms and exact transients."""
+"""Implicit wear steps: worn volume, shape and stability against closed forms and exact
+transients."""
 
 from functools import cache
 

@@ -76,7 +76,8 @@ def as_python(tmp_path_factory):
 
 @pytest.mark.parametrize("number", range(len(CASES)))
 def test_exact_the_same_motion_as_compiled(as_python, number):
-    """To 1e-11 of its size: the compiler may add in another order, and a motion that rubs doubles such differences."""
+    """To 1e-11 of its size: the compiler may add in another order, and a motion that rubs
+    doubles such differences."""
     python = as_python[number]
     compiled = motion_of(*CASES[number])
     assert python["events"] == compiled["events"] and python["events"][0] > 12

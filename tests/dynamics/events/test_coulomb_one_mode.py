@@ -1,4 +1,5 @@
-"""Coulomb friction on one mode or two masses: closed forms, printed numbers, 40-digit arithmetic and DOP853."""
+"""Coulomb friction on one mode or two masses: closed forms, printed numbers, 40-digit arithmetic
+and DOP853."""
 
 from math import pi, sqrt
 
@@ -53,7 +54,8 @@ def swing(result, last=10):
     ],
 )
 def test_exact_printed_amplitudes(friction, zeta, ratio, cycles, amplitude, rel):
-    """Numbers of the report and of 40-digit marching; where the block never rests also the closed form of sliding."""
+    """Numbers of the report and of 40-digit marching; where the block never rests also the
+    closed form of sliding."""
     run = driven(friction, zeta, ratio, cycles)
     assert swing(run) == pytest.approx(amplitude, rel=rel)
     if cycles >= 900:
@@ -96,7 +98,8 @@ def test_exact_the_run_ends_where_the_travel_is_passed():
 
 
 def test_figure_16_two_masses():
-    """Two unit masses joined by a unit spring: sin(1.14 t) drives the first one, friction acts on the second one."""
+    """Two unit masses joined by a unit spring: sin(1.14 t) drives the first one, friction acts
+    on the second one."""
     h = sqrt(0.5)
     modes = basis_of([0.0, sqrt(2)], 0.0, [h, -h], (-h, -h))
     phases = run(modes, SineDrive(1.0, 1.14), 3.0, 3.0, 400.0)
@@ -153,7 +156,8 @@ def test_exact_slight_friction(zeta):
 
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.5])
 def test_exact_rigid_block_that_slides(friction):
-    """No spring: v' = a sin - f sgn(v), half stroke sqrt(1 - (pi f/2)^2) a/omega^2 while f < a/sqrt(1 + pi^2/4)."""
+    """No spring: v' = a sin - f sgn(v), half stroke sqrt(1 - (pi f/2)^2) a/omega^2 while f <
+    a/sqrt(1 + pi^2/4)."""
     result = driven(friction, 0.0, 1.3, 80, omega=0.0)
     low, high = result.amplitudes[-1]
     assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2) ** 2), rel=1e-12)
@@ -172,7 +176,8 @@ def test_exact_a_million_cycles_without_drift(cycles, monkeypatch):
 
 @pytest.mark.parametrize("cycles", [3000, pytest.param(100_000, marks=pytest.mark.slow)])
 def test_exact_a_growing_motion_that_never_repeats(cycles):
-    """No damping, D below pi/4: the energy of every cycle stays counted, at speeds that grow with the cycles."""
+    """No damping, D below pi/4: the energy of every cycle stays counted, at speeds that grow
+    with the cycles."""
     done = driven(0.5, 0.0, cycles=cycles)
     top = np.abs(done.amplitudes).max(axis=1)
     assert not done.repeats and energy_balance(done.ledger) < 1e-11

@@ -1,4 +1,5 @@
-"""Shooting on the event map against printed numbers, long runs, finite differences and perturbed runs."""
+"""Shooting on the event map against printed numbers, long runs, finite differences and perturbed
+runs."""
 
 from math import pi, sqrt
 
@@ -37,7 +38,8 @@ def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
     ],
 )
 def test_exact_amplitudes_at_resonance(d, zeta, wanted, regime):
-    """Printed numbers, or the closed form of two stops, whose condition near pi/4 is that of a square root."""
+    """Printed numbers, or the closed form of two stops, whose condition near pi/4 is that of a
+    square root."""
     found = steady(basis_of(1.0, zeta), SineDrive(1.0, 1.0), d, d)
     assert found.regime == regime
     if regime == "unbounded":

@@ -95,7 +95,8 @@ def test_exact_steps_and_sines_in_turn_against_dop853():
 
 
 def test_order_dependent_interfaces_against_a_march():
-    """Three interfaces between two coordinates: dependent when stuck together; a march with impulses closes in."""
+    """Three interfaces between two coordinates: dependent when stuck together; a march with
+    impulses closes in."""
     rng = np.random.default_rng(9)
     modes = random_basis(rng, 2, 3)
     static = rng.uniform(0.3, 1.0, 3)
@@ -182,7 +183,8 @@ def test_exact_slides_do_not_move_in_stick():
 
 @pytest.mark.parametrize("joined", [False, True])
 def test_exact_two_interfaces_that_stop_together(joined):
-    """Two equal blocks, each on its own spring, move as one does alone; also with a third interface between them."""
+    """Two equal blocks, each on its own spring, move as one does alone; also with a third
+    interface between them."""
     faces = [[1, 0], [0, 1], [1, -1]] if joined else [[1, 0], [0, 1]]
     modes = basis_of([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
     drive = SineDrive(1.0, 1.1)
@@ -223,7 +225,8 @@ def test_exact_three_dependent_interfaces(middle):
 
 
 def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
-    """One coordinate, three interfaces of limits 1, 2, 3: nothing moves below 6; above, all slip at once."""
+    """One coordinate, three interfaces of limits 1, 2, 3: nothing moves below 6; above, all slip
+    at once."""
     modes = basis_of(1.0, 0.0, [[1.0], [1.0], [1.0]])
     limit = np.array([1.0, 2.0, 3.0])
     assert not simulate(modes, SineDrive(5.999999, 0.7), limit, limit, 3).response.slide.any()
@@ -241,7 +244,8 @@ def test_exact_dependent_stick_holds_up_to_the_sum_of_limits():
 
 @pytest.mark.parametrize("count", [7, 16])
 def test_exact_many_interfaces_stop_and_slip_together(count):
-    """Equal blocks: seven, more than are tried one by one, and sixteen, more than whose combinations are tried."""
+    """Equal blocks: seven, more than are tried one by one, and sixteen, more than whose
+    combinations are tried."""
     modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
     drive = SineDrive(1.0, 1.1)
     many = simulate(modes, drive, 0.5, 0.5, 6, 6)
@@ -252,7 +256,8 @@ def test_exact_many_interfaces_stop_and_slip_together(count):
 
 
 def choice_at_rest(seed, n, faces, ratio):
-    """Require that accelerations agree with the signs of slip and forces with their limits, of faces that all rest."""
+    """Require that accelerations agree with the signs of slip and forces with their limits, of
+    faces that all rest."""
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces)
     static = rng.uniform(0.1, 1.0, faces)
@@ -282,12 +287,14 @@ def choice_at_rest(seed, n, faces, ratio):
 
 @given(st.integers(0, 10**6), st.integers(5, 16), st.floats(0.3, 1.0))
 def test_always_interfaces_that_rest_at_once_satisfy_the_law(seed, faces, ratio):
-    """Up to 16 independent interfaces; up to 8 that depend on each other, of which every combination is tried."""
+    """Up to 16 independent interfaces; up to 8 that depend on each other, of which every
+    combination is tried."""
     choice_at_rest(seed, max(8, faces) if faces > 8 or seed % 2 else 4, faces, ratio)
 
 
 def test_always_a_combination_that_is_not_found_is_refused():
-    """Sixteen interfaces of eight modes: a right answer, or a refusal that names the method to use."""
+    """Sixteen interfaces of eight modes: a right answer, or a refusal that names the method to
+    use."""
     refused = 0
     for seed in range(10):
         try:
@@ -304,7 +311,8 @@ FREE = drives.make_release(2 * pi)
 
 
 def test_exact_belt():
-    """Mass on a spring on a belt of speed 0.1, static 1, kinetic 0.6; the belt is a coordinate of near endless mass."""
+    """Mass on a spring on a belt of speed 0.1, static 1, kinetic 0.6; the belt is a coordinate
+    of near endless mass."""
     tiny = 1e-8
     speed = 0.1
     modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
@@ -414,7 +422,8 @@ def test_refuses_kinetic_friction_out_of_range(kinetic):
 
 
 def test_exact_coordinates_stay_on_the_stuck_slide():
-    """The coordinates move on while the interface sticks; their slide stays where it stopped, over 300 cycles."""
+    """The coordinates move on while the interface sticks; their slide stays where it stopped,
+    over 300 cycles."""
     h = sqrt(0.5)
     modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
     one, rows = rows_of(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)

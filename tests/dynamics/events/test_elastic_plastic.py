@@ -1,4 +1,5 @@
-"""Runs from yield to yield against DOP853 with every element restarted, known amplitudes, energies."""
+"""Runs from yield to yield against DOP853 with every element restarted, known amplitudes,
+energies."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,5 @@
-"""Periodic motions by the map from yield to yield: closed form, long runs, finite differences, energies and limits."""
+"""Periodic motions by the map from yield to yield: closed form, long runs, finite differences,
+energies and limits."""
 
 from dataclasses import replace
 
@@ -85,7 +86,8 @@ def test_exact_one_element_in_closed_form(ratio, limit):
     ],
 )
 def test_exact_random_rigs_against_long_runs(seed, cycles):
-    """The symmetric motion has the amplitude and the rates of a long run, also if it starts from an early cycle."""
+    """The symmetric motion has the amplitude and the rates of a long run, also if it starts from
+    an early cycle."""
     modes, drive, k, y = random_rig(seed, 200)
     group = [make_elements(k, y)]
     found = steady(modes, drive, group)
@@ -185,7 +187,8 @@ def test_refuses_what_does_not_repeat():
 
 
 def test_exact_a_last_step_that_forgets_a_turn_ends_the_search():
-    """Newton's last step may leave a turning place that the period behind it slips past: the point before it counts."""
+    """Newton's last step may leave a turning place that the period behind it slips past: the
+    point before it counts."""
     r = np.random.default_rng(1068)
     count = int(np.exp(r.uniform(0, np.log(40))))
     omega = r.choice([0.0, 1.0, np.exp(r.uniform(-1, 2))])

@@ -1,4 +1,5 @@
-"""The event engine under sweeps and recorded signals: against DOP853 with events, closed forms and energy."""
+"""The event engine under sweeps and recorded signals: against DOP853 with events, closed forms
+and energy."""
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ def record(seed, rows=40, end=30.0):
 
 
 def agrees(modes, drive, static, ratio, end, count):
-    """Events and states of a run against DOP853 with events; count: stretches of the drive that it meets."""
+    """Events and states of a run against DOP853 with events; count: stretches of the drive that
+    it meets."""
     n = modes.omega.size
     wanted = run_reference(
         modes, stretches(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n)

@@ -1,4 +1,5 @@
-"""What instruments see of a periodic motion, against the marched period; a start of other elements."""
+"""What instruments see of a periodic motion, against the marched period; a start of other
+elements."""
 
 from dataclasses import replace
 
@@ -17,7 +18,8 @@ GROUP = [make_elements([2.0, 1.0], [0.1, 0.3])]
 
 
 def first_harmonic(window, omega):
-    """2/T int y exp(-i omega t) of the displacement by Simpson's rule on its cubics, from samples alone."""
+    """2/T int y exp(-i omega t) of the displacement by Simpson's rule on its cubics, from
+    samples alone."""
     t = window.time
     y = window.output
     v = window.output_rate
@@ -47,7 +49,8 @@ def test_exact_readings_are_those_of_a_marched_period(seed):
 
 
 def test_exact_a_start_of_other_elements_counts_as_none():
-    """A memory speaks of so many elements: one of four is no start for two, nor one of two for four."""
+    """A memory speaks of so many elements: one of four is no start for two, nor one of two for
+    four."""
     drive = SineDrive(1.0, 1.0)
     four = [make_elements([2.0, 1.0, 0.5, 0.2], [0.1, 0.3, 0.4, 0.6])]
     for mine, other in ((GROUP, four), (four, GROUP)):

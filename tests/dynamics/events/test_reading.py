@@ -1,4 +1,5 @@
-"""What the last cycles show, against the same series sampled at Gauss points, closed forms and fits to samples."""
+"""What the last cycles show, against the same series sampled at Gauss points, closed forms and
+fits to samples."""
 
 import numpy as np
 import pytest
@@ -59,7 +60,8 @@ def test_exact_secant_stiffness_where_the_slide_turns_at_the_border_of_a_cycle(o
 @pytest.mark.parametrize("drive", [SineDrive(1.5, 1.3), SineDrive(1.5, 0.4)])
 @pytest.mark.parametrize("many", [False, True])
 def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
-    """Integrals, harmonics, drift and ranges off `dense_kernels.evaluate_rows` at 16 Gauss points of every piece."""
+    """Integrals, harmonics, drift and ranges off `dense_kernels.evaluate_rows` at 16 Gauss
+    points of every piece."""
     modes, groups = (
         several() if many else (basis(1.0, 0.05), [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2])])
     )
@@ -139,7 +141,8 @@ def test_exact_releases_are_those_of_the_log():
 
 
 def test_exact_a_run_in_brief_shows_what_the_run_shows():
-    """One that has not settled to the last bit; one that repeats, of which few cycles are read, to round-off."""
+    """One that has not settled to the last bit; one that repeats, of which few cycles are read,
+    to round-off."""
     for modes, groups in (several(), (basis(1.0, 0.05), [make_elements([1.0], [0.3])])):
         for cycles, same in ((24, 0.0), (400, 1e-12)):
             drive = SineDrive(1.5, 1.3)
@@ -167,7 +170,8 @@ def test_exact_a_run_in_brief_shows_what_the_run_shows():
 
 
 def test_exact_ring_of_an_element_that_holds():
-    """In closed form, as a fit to the samples finds it, at the frequency of mode and element together."""
+    """In closed form, as a fit to the samples finds it, at the frequency of mode and element
+    together."""
     modes = basis(1.0, 0.02)
     drive = SineDrive(1.0, 0.31)
     done = histories.simulate(modes, drive, [make_elements([60.0], [0.02])], 20, window=4)

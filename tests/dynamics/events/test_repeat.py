@@ -1,4 +1,5 @@
-"""A motion that has become periodic is counted on: against the same run in parts, which do not know each other."""
+"""A motion that has become periodic is counted on: against the same run in parts, which do not
+know each other."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from patchfem.structure.drives import make_levels
 
 
 def case(modes: int, faces: int, elements: int) -> tuple:
-    """(ModalBasis, drive, Elements of every interface) of a damped rig that settles within 250 cycles."""
+    """(ModalBasis, drive, Elements of every interface) of a damped rig that settles within 250
+    cycles."""
     rows = np.linspace(0.6, 1.0, faces * modes).reshape(faces, modes)
     rows[:, 1::2] *= -1
     basis = basis_of(
@@ -26,7 +28,8 @@ def case(modes: int, faces: int, elements: int) -> tuple:
 
 
 def in_parts(modes, drive, groups, cycles: int, each: int) -> list:
-    """PieceRuns of `each` cycles one after the other, each without a state of the cycle before its first."""
+    """PieceRuns of `each` cycles one after the other, each without a state of the cycle before
+    its first."""
     out = []
     state = (None, None)
     for _ in range(cycles // each):
@@ -39,7 +42,8 @@ def in_parts(modes, drive, groups, cycles: int, each: int) -> list:
 
 @pytest.mark.parametrize("shape", [(1, 1, 1), (1, 1, 24), (2, 1, 3), (3, 2, 4)])
 def test_exact_a_motion_that_repeats_is_counted_on(shape):
-    """Extremes, energies and events are those of runs of 4 cycles, too few to be told of; few cycles are marched."""
+    """Extremes, energies and events are those of runs of 4 cycles, too few to be told of; few
+    cycles are marched."""
     modes, drive, groups = case(*shape)
     progress = []
     run = histories.simulate(modes, drive, groups, 4000, 4, progress=progress.append)
@@ -84,7 +88,8 @@ def test_exact_a_motion_that_repeats_is_counted_on(shape):
 
 
 def test_exact_a_level_that_follows_ends_the_repeating():
-    """Levels of 300 cycles: those of the first repeat, and what follows is the run in parts of one level each."""
+    """Levels of 300 cycles: those of the first repeat, and what follows is the run in parts of
+    one level each."""
     modes, _, groups = case(1, 1, 3)
     both = histories.simulate(modes, make_levels([1.5, 2.5], 1.3, 300), groups, 600, 5)
     first = histories.simulate(modes, SineDrive(1.5, 1.3), groups, 300, 5)

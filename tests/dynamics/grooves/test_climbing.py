@@ -33,7 +33,8 @@ LAWS = {
 
 
 def march_amplitude(law, grooves, steps, cycles=6):
-    """Return the largest displacement in the last cycle of a march; its energy balance is checked."""
+    """Return the largest displacement in the last cycle of a march; its energy balance is
+    checked."""
     result = march(BASIS, DRIVE, ClimbingModel(grooves, LOAD, law), cycles, steps, window=3)
     assert result.outcome is None and energy_balance(result.ledger) < 1e-11
     return float(result.amplitudes[-1, 1])
@@ -143,7 +144,8 @@ def test_order_two_in_step_size(law, lifted):
 
 
 def test_always_lifted_mass_that_leaves_grooves_is_reported():
-    """A run in which the lifted mass loses contact with the grooves has the outcome LEAVES_GROOVES."""
+    """A run in which the lifted mass loses contact with the grooves has the outcome
+    LEAVES_GROOVES."""
     model = ClimbingModel(
         Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, make_elastic_plastic_law(MU, 1e-6)
     )

@@ -108,7 +108,8 @@ def integrate_single_spring(grooves, slide, stiffness):
 
 
 def test_exact_common_spring_agrees_with_explicit_steps():
-    """The force of points behind one common spring agrees with small explicit steps within 0.2 %."""
+    """The force of points behind one common spring agrees with small explicit steps within 0.2
+    %."""
     steps = 400
     refinement = 40
     for stiffness in (2e7, 2e8):

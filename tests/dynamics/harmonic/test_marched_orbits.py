@@ -1,4 +1,5 @@
-"""Periodic motions by shooting on a march: against a linear mode and the map of the event engine."""
+"""Periodic motions by shooting on a march: against a linear mode and the map of the event
+engine."""
 
 import numpy as np
 import pytest

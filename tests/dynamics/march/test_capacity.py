@@ -1,4 +1,5 @@
-"""A list of bonds that fills up grows and goes on, in a march, beside springs and along a given slide."""
+"""Lists of bonds whose arrays are enlarged during a march, beside springs and along a prescribed
+slide."""
 
 from dataclasses import replace
 
@@ -21,14 +22,18 @@ LAWS = {
 LIMIT = 0.4 * 98.0665
 
 
-def model_of(law, entries):
-    made = bond_list_model(law, LIMIT, np.inf, 0.0)
+def make_model(law, entries):
+    """Return the model of a bond list with arrays for a number of entries."""
+    original = bond_list_model(law, LIMIT, np.inf, 0.0)
     return replace(
-        made, fields=made.fields | {"bondlist": np.zeros((len(made.fields["bondlist"]), entries))}
+        original,
+        fields=original.fields
+        | {"bondlist": np.zeros((len(original.fields["bondlist"]), entries))},
     )
 
 
-def marched(model, frames=0):
+def march_model(model, frames=0):
+    """Return a march of three cycles at 5 g."""
     return march(
         one_mode(OMEGA, 0.01, 1.0),
         SineDrive(5 * 9.80665, OMEGA),
@@ -42,42 +47,50 @@ def marched(model, frames=0):
 
 @pytest.mark.share(0, 1, 2)
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("beside", [False, True])
-def test_exact_a_march_whose_list_grows_is_that_with_room_from_the_start(law, beside):
-    """Every strip is kept, so the list fills up within a cycle: it goes back, takes twice the capacity and goes on."""
+@pytest.mark.parametrize("with_spring", [False, True])
+def test_exact_enlarged_list_equals_large_list(law, with_spring):
+    """A march whose list fills up within a cycle goes back, doubles the arrays and continues; the
+    results are bit-identical to those with large arrays."""
 
     def model(entries):
-        alone = model_of(LAWS[law], entries)
+        patch = make_model(LAWS[law], entries)
         return (
-            JointsModel(alone, (make_cubic_spring(1, 1e10),), np.ones((2, 1)), LIMIT)
-            if beside
-            else alone
+            JointsModel(patch, (make_cubic_spring(1, 1e10),), np.ones((2, 1)), LIMIT)
+            if with_spring
+            else patch
         )
 
-    few, many = (
-        marched(model(entries), frames=4) for entries in (3 if law == "printed" else 40, 20_000)
+    growing, large = (
+        march_model(model(entries), frames=4) for entries in (3 if law == "printed" else 40, 20_000)
     )
-    assert many.ledger["strips"] > (6 if law == "printed" else 200)
-    assert np.array_equal(few.response.slide, many.response.slide)
-    assert np.array_equal(few.window.force, many.window.force) and few.ledger == many.ledger
+    assert large.ledger["strips"] > (6 if law == "printed" else 200)
+    assert np.array_equal(growing.response.slide, large.response.slide)
+    assert (
+        np.array_equal(growing.window.force, large.window.force) and growing.ledger == large.ledger
+    )
 
 
-def test_refuses_more_entries_than_the_stated_limit(monkeypatch):
+def test_refuses_list_longer_than_limit(monkeypatch):
+    """A list that exceeds the largest number of entries is refused with a message that names the
+    key to change."""
     monkeypatch.setattr(capacity, "MAX_ENTRIES", 100)
     with pytest.raises(
         Missing, match=r"grew beyond 100 entries \(0 MB\) at step \d+; raise accuracy.tail"
     ):
-        marched(model_of(LAWS["stretch"], 40))
+        march_model(make_model(LAWS["stretch"], 40))
 
 
-def test_exact_a_bench_whose_list_grows_is_that_with_room_from_the_start(monkeypatch):
+def test_exact_enlarged_list_of_bench_equals_large_list(monkeypatch):
+    """A bench whose list is enlarged has the same forces and energies, bit by bit."""
     from patchfem.friction.bonds import list_numbers
 
     text = (
         '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n'
         '[slide]\nkind = "sine"\namplitude = "40 um"\nfrequency = "10 Hz"\n[accuracy]\nquadrature = "direct"\n'
     )
-    one = bench.run(build(text), None, 400)
+    large = bench.run(build(text), None, 400)
     monkeypatch.setattr(list_numbers, "list_capacity", lambda *_: 50)
-    two = bench.run(build(text), None, 400)
-    assert np.array_equal(one.force, two.force) and np.array_equal(one.ledger, two.ledger)
+    growing = bench.run(build(text), None, 400)
+    assert np.array_equal(large.force, growing.force) and np.array_equal(
+        large.ledger, growing.ledger
+    )

@@ -1,4 +1,5 @@
-"""Forced inlining of compiled functions: numba hands the option on to all functions that the marked one calls."""
+"""Forced inlining of compiled functions, which numba extends to all functions that the marked one
+calls."""
 
 import ast
 from pathlib import Path
@@ -8,7 +9,7 @@ import pytest
 import patchfem
 
 MARCH = Path(patchfem.__file__).parent / "dynamics" / "march"
-# Their contacts are solved without lists of bonds: the march of many rigs side by side, and that of shear modes.
+# The marches of many rigs in lanes and of shear modes use contacts without lists of bonds.
 SIMPLE_CONTACTS = ("lanes_kernels", "passing_kernels")
 MODULES = sorted(path for path in MARCH.glob("*_kernels.py") if path.stem not in SIMPLE_CONTACTS)
 
@@ -24,8 +25,9 @@ def find_inlined_functions(tree) -> list:
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: path.stem)
-def test_always_the_solution_of_a_contact_is_not_inlined(path):
-    """Inlined at all calls, the solution for a list of bonds has four million lines of LLVM code."""
+def test_always_contact_solution_is_not_inlined(path):
+    """No function with forced inlining calls the solution of a contact, which for a list of bonds
+    would give four million lines of LLVM code."""
     for function in find_inlined_functions(ast.parse(path.read_text("utf-8"))):
         calls = {
             ast.unparse(node.func) for node in ast.walk(function) if isinstance(node, ast.Call)

@@ -1,4 +1,5 @@
-"""Many interfaces and nonlinear springs in one march: against single contacts, closed forms and DOP853."""
+"""Several interfaces and nonlinear springs in one march: against single contacts, closed forms and
+DOP853."""
 
 import numpy as np
 import pytest
@@ -31,8 +32,12 @@ OMEGA = 2 * np.pi * 143
 DRIVE = SineDrive(49.0, OMEGA)
 
 
-def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
-    """Unit masses in a row, springs (i + 1,) from the base to the first and on to the next; the last one end free."""
+def make_chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
+    """Return the modes of unit masses in a row.
+
+    Spring i connects mass i to the mass before it, spring 0 to the base; the last mass has a free
+    end.
+    """
     n = len(stiffness)
     k = np.zeros((n, n))
     for i, s in enumerate(stiffness):
@@ -59,23 +64,28 @@ def chain(stiffness, mass=1.0, zeta=0.0, faces=None, base=1.0):
     )
 
 
-def coulomb(port, static, kinetic):
+def coulomb_joint(port, static, kinetic):
+    """Return a joint with Coulomb friction."""
     return Joint(port, Coulomb(kinetic, static).element(1.0))
 
 
-def elastic_plastic(port, limit, length):
+def elastic_plastic_joint(port, limit, length):
+    """Return an elastic-plastic joint with a friction limit and a length."""
     return Joint(port, ElasticPlastic(limit, length).element(1.0))
 
 
-def bonds(port, law, load):
+def bonds_joint(port, law, load):
+    """Return a joint with bonds under a load."""
     return Joint(port, points_element(law, [1.0], [load]))
 
 
-def rate(port, limit, speed):
+def tanh_joint(port, limit, speed):
+    """Return a joint with the tanh law."""
     return Joint(port, TanhLaw(limit, speed).element(1.0))
 
 
-def one(omega=OMEGA, zeta=0.003):
+def single_mode(omega=OMEGA, zeta=0.003):
+    """Return the basis of a single mode."""
     return basis_of(omega, zeta)
 
 
@@ -83,22 +93,22 @@ LAW = Bonds(
     0.4, 2e-6, ratio=0.6, rest_growth=0.3, slip_growth=0.4e-6, rest_speed=1e-5, breakaway=0.1
 )
 PAIRS = {
-    "coulomb": (coulomb_model(39.0, 30.0), lambda: coulomb(0, 39.0, 30.0)),
+    "coulomb": (coulomb_model(39.0, 30.0), lambda: coulomb_joint(0, 39.0, 30.0)),
     "elastic-plastic": (
         jenkins_model([39.0 / 2e-6], [2e-6]),
-        lambda: elastic_plastic(0, 39.0, 2e-6),
+        lambda: elastic_plastic_joint(0, 39.0, 2e-6),
     ),
-    "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds(0, LAW, 98.0)),
-    "tanh": (rate_model(39.0, 1e-3), lambda: rate(0, 39.0, 1e-3)),
+    "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds_joint(0, LAW, 98.0)),
+    "tanh": (rate_model(39.0, 1e-3), lambda: tanh_joint(0, 39.0, 1e-3)),
     "list": (
         bond_list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0),
         None,
-    ),  # which is a patch alone
+    ),  # this law exists for patches only
 }
 
 
 @pytest.mark.parametrize(
-    "law, beside",
+    "law, as_patch",
     [
         ("elastic-plastic", False),
         ("bonds", False),
@@ -109,16 +119,16 @@ PAIRS = {
         pytest.param("bonds", True, marks=pytest.mark.slow),
     ],
 )
-def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
-    """Among joints and, beside a spring of no strength, as the patch: patches of other laws differ by the law alone,
-    and each is a loop to compile; that of a list grows in test_room."""
+def test_exact_single_joint_agrees_with_single_contact(law, as_patch):
+    """A single element as a joint, or as a patch beside a spring of nearly zero stiffness, agrees
+    with the loop for a single contact within 1e-8 of the slide."""
     model, element = PAIRS[law]
-    alone = march(one(), DRIVE, model, 6, 100, window=6)
-    others = []
+    expected = march(single_mode(), DRIVE, model, 6, 100, window=6)
+    results = []
     if element is not None:
         joint = JointsModel(None, (element(),), np.ones((1, 1)), 49.0, ALL)
-        others.append(march(one(), DRIVE, joint, 6, 100, window=6))
-    if beside:
+        results.append(march(single_mode(), DRIVE, joint, 6, 100, window=6))
+    if as_patch:
         patch = JointsModel(
             model,
             (make_interlocking_spring(0, 1e-9, 1.0),),
@@ -126,20 +136,22 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
             49.0,
             ALL if law == "coulomb" else (),
         )
-        others.append(march(one(), DRIVE, patch, 6, 100, window=6))
-    scale = np.abs(alone.response.slide).max()
-    for other in others:
-        assert other.outcome is None
-        assert other.response.slide == pytest.approx(alone.response.slide, abs=1e-8 * scale)
-        same = np.abs(other.window.force - alone.window.force) <= 1e-5 * 39.0
-        # its reaction in stick is read otherwise
-        assert np.mean(same) >= (0.7 if law == "coulomb" else 1.0)
-        assert other.ledger["friction"] == pytest.approx(alone.ledger["friction"], rel=1e-7)
-        assert other.response.extra["ledger"][0, -1] == pytest.approx(
-            alone.response.extra["ledger"][0, -1], rel=1e-7
+        results.append(march(single_mode(), DRIVE, patch, 6, 100, window=6))
+    scale = np.abs(expected.response.slide).max()
+    for result in results:
+        assert result.outcome is None
+        assert result.response.slide == pytest.approx(expected.response.slide, abs=1e-8 * scale)
+        is_close = np.abs(result.window.force - expected.window.force) <= 1e-5 * 39.0
+        # with Coulomb friction the reaction in stick is computed in another way
+        assert np.mean(is_close) >= (0.7 if law == "coulomb" else 1.0)
+        assert result.ledger["friction"] == pytest.approx(expected.ledger["friction"], rel=1e-7)
+        assert result.response.extra["ledger"][0, -1] == pytest.approx(
+            expected.response.extra["ledger"][0, -1], rel=1e-7
         )
-        near = np.abs(other.window.acceleration - alone.window.acceleration) <= 2e-4
-        assert np.mean(near) >= (0.7 if law == "coulomb" else 1.0)
+        is_close_acceleration = (
+            np.abs(result.window.acceleration - expected.window.acceleration) <= 2e-4
+        )
+        assert np.mean(is_close_acceleration) >= (0.7 if law == "coulomb" else 1.0)
 
 
 @pytest.mark.parametrize(
@@ -150,66 +162,72 @@ def test_exact_one_element_is_the_contact_of_its_own_loop(law, beside):
     ],
     ids=["duffing", "pendulum"],
 )
-def test_exact_potential_springs_keep_their_energy_and_find_their_period(element, period):
-    """Undamped free motion from 1: k_3 q^3 alone, and interlocking peaks as a pendulum; order two, 30 cycles."""
+def test_exact_nonlinear_springs_conserve_energy_and_period(element, period):
+    """An undamped cubic spring and a pendulum conserve their energy within 1e-9, and their period
+    converges with order two to the closed form."""
     start = InitialState(np.array([1.0]), np.zeros(1))
     errors = []
     for steps in (20, 100, 500):
         model = JointsModel(None, (element,), np.ones((1, 1)), 1.0, ALL)
-        got = march(
-            one(0.0, 0.0), make_release(2 * np.pi), model, 30, steps, window=30, start=start
+        result = march(
+            single_mode(0.0, 0.0), make_release(2 * np.pi), model, 30, steps, window=30, start=start
         )
-        assert got.outcome is None
-        assert got.ledger["work_in"] == pytest.approx(got.ledger["stored"], rel=1e-9)
-        r = got.response
-        cross = np.flatnonzero((r.slide[:-1] > 0) & (r.slide[1:] <= 0))
-        times = r.time[cross] - r.slide[cross] * np.diff(r.time)[cross] / np.diff(r.slide)[cross]
+        assert result.outcome is None
+        assert result.ledger["work_in"] == pytest.approx(result.ledger["stored"], rel=1e-9)
+        r = result.response
+        crossings = np.flatnonzero((r.slide[:-1] > 0) & (r.slide[1:] <= 0))
+        times = (
+            r.time[crossings]
+            - r.slide[crossings] * np.diff(r.time)[crossings] / np.diff(r.slide)[crossings]
+        )
         errors.append(abs(np.diff(times).mean() / period - 1))
         assert errors[-1] < 5 / steps**2
     assert np.log(errors[0] / errors[2]) / np.log(25) == pytest.approx(2.0, abs=0.1)
 
 
-def by_dop853(modes, drive, elements, duration, at):
-    """Elastic-plastic elements as (port row, k, limit length): modal coordinates at times (k,)."""
+def integrate_by_dop853(modes, drive, elements, duration, times):
+    """Return the modal coordinates at given times for elastic-plastic elements (row, stiffness,
+    yield slide)."""
     n = modes.omega.size
     rows = np.array([row for row, _, _ in elements])
-    k, most = (np.array(part) for part in zip(*[(k, most) for _, k, most in elements]))
+    k, limit = (np.array(part) for part in zip(*[(k, limit) for _, k, limit in elements]))
 
     def rate_of(t, y):
         z = y[:n]
         v = y[n : 2 * n]
         s = y[2 * n :]
         slip = rows @ v
-        push = (
+        acceleration = (
             -modes.base * drive.values(np.array([t]))[0]
-            - rows.T @ (k * np.clip(s, -most, most)) / modes.mass
+            - rows.T @ (k * np.clip(s, -limit, limit)) / modes.mass
         )
-        held = (np.abs(s) >= most) & (s * slip > 0)
+        is_slipping = (np.abs(s) >= limit) & (s * slip > 0)
         return [
             *v,
-            *(push - modes.damping_matrix @ v - modes.omega**2 * z),
-            *np.where(held, 0.0, slip),
+            *(acceleration - modes.damping_matrix @ v - modes.omega**2 * z),
+            *np.where(is_slipping, 0.0, slip),
         ]
 
-    done = solve_ivp(
+    solution = solve_ivp(
         rate_of,
         (0, duration),
         np.zeros(2 * n + len(elements)),
         "DOP853",
         rtol=1e-9,
         atol=1e-12,
-        t_eval=at,
+        t_eval=times,
         max_step=duration / 4000,
     )
-    return done.y[:n].T
+    return solution.y[:n].T
 
 
-def test_order_three_masses_with_three_unlike_interfaces():
-    """Interfaces 1-0, 2-1 and 3-2 of elastic-plastic friction on a free-free chain: order two, against DOP853."""
-    modes = chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
+def test_order_two_for_chain_with_three_interfaces():
+    """A free-free chain of three masses with elastic-plastic interfaces converges with order two to
+    a solution by DOP853."""
+    modes = make_chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
     drive = SineDrive(1.0, 1.3)
     laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
-    truth = by_dop853(
+    reference = integrate_by_dop853(
         modes,
         drive,
         [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)],
@@ -218,28 +236,29 @@ def test_order_three_masses_with_three_unlike_interfaces():
     )
     model = JointsModel(
         None,
-        tuple(elastic_plastic(p, f, e) for p, (f, e) in enumerate(laws)),
+        tuple(elastic_plastic_joint(p, f, e) for p, (f, e) in enumerate(laws)),
         modes.interfaces,
         1.0,
         ALL,
     )
     errors = []
     for steps in (100, 200, 400, 800):
-        got = march(modes, drive, model, 2, steps, window=2)
-        assert got.outcome is None
-        z = got.response.modal[:: steps // 25]
-        errors.append(np.abs(z - truth).max())
-        assert energy_balance(got.ledger) <= 1e-10
-    assert errors[-1] < 2e-5 * np.abs(truth).max()
+        result = march(modes, drive, model, 2, steps, window=2)
+        assert result.outcome is None
+        z = result.response.modal[:: steps // 25]
+        errors.append(np.abs(z - reference).max())
+        assert energy_balance(result.ledger) <= 1e-10
+    assert errors[-1] < 2e-5 * np.abs(reference).max()
     assert np.log2(errors[0] / errors[-1]) / 3 == pytest.approx(2.0, abs=0.25)
 
 
 def march_random_chain(seed):
-    """March a random chain of 2-4 masses with mixed laws and springs; return the result and the limits."""
+    """March a random chain of 2 to 4 masses with mixed laws and springs; return the result and the
+    friction limits."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 5))
     faces = np.eye(n) if rng.random() < 0.5 else np.eye(n) - np.eye(n, k=-1)
-    modes = chain(
+    modes = make_chain(
         rng.uniform(0.0, 5.0, n) * (rng.random(n) > 0.2), zeta=rng.uniform(0, 0.1), faces=faces
     )
     limit = rng.uniform(0.05, 2.0, n)
@@ -247,10 +266,10 @@ def march_random_chain(seed):
     kinds = [rng.choice(["coulomb", "ep", "bonds", "tanh"]) for _ in range(n)]
     kinetic = limit * rng.choice([0.3, 1.0], n)
     makers = {
-        "coulomb": lambda p: coulomb(p, limit[p], kinetic[p]),
-        "ep": lambda p: elastic_plastic(p, limit[p], length[p]),
-        "bonds": lambda p: bonds(p, Bonds(0.5, length[p]), 2 * limit[p]),
-        "tanh": lambda p: rate(p, limit[p], length[p]),
+        "coulomb": lambda p: coulomb_joint(p, limit[p], kinetic[p]),
+        "ep": lambda p: elastic_plastic_joint(p, limit[p], length[p]),
+        "bonds": lambda p: bonds_joint(p, Bonds(0.5, length[p]), 2 * limit[p]),
+        "tanh": lambda p: tanh_joint(p, limit[p], length[p]),
     }
     elements = [makers[kind](p) for p, kind in enumerate(kinds)]
     elements += [
@@ -263,59 +282,71 @@ def march_random_chain(seed):
 
 
 @given(st.integers(0, 10_000))
-def test_always_energy_closes_and_friction_only_takes(seed):
-    """Every step has a solution, the balance closes to round-off, and no law exceeds its limit."""
-    got, limit = march_random_chain(seed)
-    assert got.outcome is None
-    book = got.ledger
-    assert energy_balance(book) <= 1e-9
-    assert np.diff(got.response.extra["ledger"][2]).min() >= -1e-12 * (
-        book["power"] + book["peak_stored"]
+def test_always_random_chains_balance_energy(seed):
+    """For random chains every step has a solution, the energy is balanced within 1e-9, friction
+    only dissipates, and no force exceeds its limit."""
+    result, limit = march_random_chain(seed)
+    assert result.outcome is None
+    energies = result.ledger
+    assert energy_balance(energies) <= 1e-9
+    assert np.diff(result.response.extra["ledger"][2]).min() >= -1e-12 * (
+        energies["power"] + energies["peak_stored"]
     )
-    forces = np.abs(got.response.extra["forces"]).max(axis=0)
+    forces = np.abs(result.response.extra["forces"]).max(axis=0)
     assert np.all(forces <= limit * (1 + 1e-9))
 
 
-# Kinetic below static friction: block descent alternated between stick and slip.
+# seeds with kinetic below static friction where block descent alternated between stick and slip
 STICK_OR_SLIP = [134, 173, 242, 319, 388, 514, 641, 667, 672, 677, 744, 817, 863, 905, 917, 960]
-STEEP_LAWS = [1025, 1854, 2651, 3069, 4822]  # Newton's method alternated between two states
+STEEP_LAWS = [
+    1025,
+    1854,
+    2651,
+    3069,
+    4822,
+]  # seeds where Newton's method alternated between two states
 
 
 @pytest.mark.parametrize("seed", STICK_OR_SLIP + STEEP_LAWS)
-def test_random_chains_whose_solution_was_hard_to_find_converge(seed):
-    """Each of these chains had a step whose states of stick and slip were not found."""
+def test_always_difficult_random_chains_converge(seed):
+    """Chains in which a step was once not solved, because the states of stick and slip were not
+    found, converge."""
     assert march_random_chain(seed)[0].outcome is None
 
 
 @pytest.mark.parametrize(
-    "seed, faces, modes, coupled",
+    "seed, n_interfaces, n_modes, coupled",
     [(3, 2, 3, False), (1, 3, 2, True)],
     ids=["two faces", "three faces of two modes"],
 )
-def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces, modes, coupled):
-    """Stops and releases of faces that feel each other, one of them held by the others, against the exact engine."""
+def test_order_two_for_coupled_stops_with_kinetic_below_static(
+    seed, n_interfaces, n_modes, coupled
+):
+    """Amplitudes of coupled interfaces with stops and releases converge to those of the event
+    engine by a factor of at least 4 per fourfold number of steps."""
     rng = np.random.default_rng(seed)
-    rows = rng.uniform(-1, 1, (faces, modes))
-    root = rng.normal(size=(modes, modes))
-    limit = rng.uniform(0.1, 0.5, faces)
+    rows = rng.uniform(-1, 1, (n_interfaces, n_modes))
+    root = rng.normal(size=(n_modes, n_modes))
+    limit = rng.uniform(0.1, 0.5, n_interfaces)
     basis = basis_of(
-        np.sort(rng.uniform(0.5, 4.0, modes)),
+        np.sort(rng.uniform(0.5, 4.0, n_modes)),
         0.02,
         rows,
-        rng.uniform(-1, 1, modes),
+        rng.uniform(-1, 1, n_modes),
         damping=0.05 * root @ root.T if coupled else None,
     )
     drive = SineDrive(1.0, 0.8)
     errors = []
-    truth = simulate(basis, drive, limit, 0.4 * limit, 5, 5)
+    reference = simulate(basis, drive, limit, 0.4 * limit, 5, 5)
     model = JointsModel(
-        None, tuple(coulomb(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL
+        None, tuple(coulomb_joint(k, f, 0.4 * f) for k, f in enumerate(limit)), rows, 1.0, ALL
     )
     for steps in (400, 1600, 6400):
-        got = march(basis, drive, model, 5, steps, window=5)
-        assert got.outcome is None and energy_balance(got.ledger) <= 1e-11
-        assert got.response.extra["ledger"][3, -1] == 0.0
+        result = march(basis, drive, model, 5, steps, window=5)
+        assert result.outcome is None and energy_balance(result.ledger) <= 1e-11
+        assert result.response.extra["ledger"][3, -1] == 0.0
         errors.append(
-            np.abs(got.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max()
+            np.abs(result.amplitudes - reference.amplitudes).max()
+            / np.abs(reference.amplitudes).max()
         )
     assert errors[0] < 1e-3 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4

@@ -1,10 +1,11 @@
-"""Bonds behind shear modes in lanes against the march of each case by itself, and what is read off their samples."""
+"""Bonds behind shear modes in lanes, side by side, against the march of each case and the measures
+of single runs."""
 
 import numpy as np
 import pytest
 from march_paths import OMEGA
 from modal_bases import basis_of
-from test_march_loop import half_plane
+from test_march_loop import half_plane_compliance
 
 from patchfem.core import Response, SineDrive
 from patchfem.dynamics import points_model
@@ -17,9 +18,9 @@ from patchfem.slip.shear_modes import shear_modes
 
 ONE = basis_of(OMEGA, 0.05)
 TWO = basis_of(OMEGA * np.array([1.0, 0.9]), 0.05, [1.0, 0.2], np.ones(2), [1.0, -0.5])
-PUSHES, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
+ACCELERATIONS, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
 LAW, DRIVE = Bonds(0.4, 1e-6), SineDrive(1.0, OMEGA)
-BOOKS = {
+LEDGER_NAMES = {
     "work_in": "work_in",
     "viscous": "viscous",
     "power": "power",
@@ -32,122 +33,135 @@ BOOKS = {
 }
 
 
-def patch(points: int = 6):
-    """(area (p,), pressure (p,), modes) of a patch that a tilt presses harder at one end."""
-    compliance, x = half_plane(points, 1e-7)
+def tilted_patch(points: int = 6):
+    """Return area (p,), pressure (p,) and shear modes of a patch with a higher pressure at one
+    end."""
+    compliance, x = half_plane_compliance(points, 1e-7)
     area = np.full(points, 1 / points)
     sigma = 60.0 * (1 + 0.8 * x)
     return area, sigma, shear_modes(compliance, LAW.static * area * sigma, LAW.length, 2)
 
 
-def both(basis, cycles: int = CYCLES) -> tuple:
-    """(lanes of a case per push, march of each by itself)."""
-    area, sigma, modes = patch()
+def march_both_ways(basis, cycles: int = CYCLES) -> tuple:
+    """Return the lanes with one case per acceleration, and the march of each case by itself."""
+    area, sigma, modes = tilted_patch()
     cases = [
-        lanes.PointsCase(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
-        for push in PUSHES
+        lanes.PointsCase(
+            LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, acceleration
+        )
+        for acceleration in ACCELERATIONS
     ]
     return lanes.march(basis, DRIVE, cases, cycles, STEPS, WINDOW), [
         march(
             basis,
-            SineDrive(push, OMEGA),
+            SineDrive(acceleration, OMEGA),
             points_model(LAW, area, sigma, modes),
             cycles,
             STEPS,
             WINDOW,
         )
-        for push in PUSHES
+        for acceleration in ACCELERATIONS
     ]
 
 
 @pytest.fixture(scope="module")
-def pairs() -> tuple:
-    return both(TWO)
+def two_mode_marches() -> tuple:
+    """Return lanes and single marches of two modes."""
+    return march_both_ways(TWO)
 
 
-def near(one, other, rel: float = 1e-12):
-    np.testing.assert_allclose(one, other, rtol=rel, atol=rel * np.abs(other).max())
+def assert_close(found, expected, rel: float = 1e-12):
+    """Assert that two arrays agree within a relative tolerance of the largest value."""
+    np.testing.assert_allclose(found, expected, rtol=rel, atol=rel * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("basis", [ONE, TWO], ids=["one mode", "two modes"])
-def test_exact_lanes_take_the_steps_of_a_march(basis):
-    """Sticking, slipping and dragging cases side by side; to what Newton's last step leaves, 1e-9 of the limit."""
-    found, alone = both(basis)
-    assert not found.bad.any()
-    for k, one in enumerate(alone):
-        near(found.extremes[k], one.amplitudes, 1e-7)
-        near(found.phasors[k], one.phasors, 1e-7)
-        near(found.force[:, k], one.window.force, 1e-7)
-        near(found.slip[:, k], one.window.slip, 1e-6)
-        near(found.z[:, :, k], one.window.modal, 1e-7)
-        near(found.worked[k], one.window_work, 1e-7)
-        ledger = one.response.extra["ledger"][:, -1]
-        near(found.book["gone"][k], ledger[2], 1e-7)
-        assert found.book["created"][k] <= 1e-9 * ledger[2] >= ledger[3]
-        for mine, name in BOOKS.items():
-            assert found.book[mine][k] == pytest.approx(one.ledger[name], rel=1e-7), name
-        gap = found.book["work_in"][k] - sum(
-            found.book[name][k] for name in ("stored", "lost", "viscous")
+def test_exact_lanes_agree_with_single_marches(basis):
+    """Cases that stick, slip partially and slip fully in lanes agree with single marches within
+    1e-7; the difference is the remaining residual of Newton's method."""
+    batch, marches = march_both_ways(basis)
+    assert not batch.bad.any()
+    for k, single in enumerate(marches):
+        assert_close(batch.extremes[k], single.amplitudes, 1e-7)
+        assert_close(batch.phasors[k], single.phasors, 1e-7)
+        assert_close(batch.force[:, k], single.window.force, 1e-7)
+        assert_close(batch.slip[:, k], single.window.slip, 1e-6)
+        assert_close(batch.z[:, :, k], single.window.modal, 1e-7)
+        assert_close(batch.worked[k], single.window_work, 1e-7)
+        ledger = single.response.extra["ledger"][:, -1]
+        assert_close(batch.book["gone"][k], ledger[2], 1e-7)
+        assert batch.book["created"][k] <= 1e-9 * ledger[2] >= ledger[3]
+        for lane_name, name in LEDGER_NAMES.items():
+            assert batch.book[lane_name][k] == pytest.approx(single.ledger[name], rel=1e-7), name
+        imbalance = batch.book["work_in"][k] - sum(
+            batch.book[name][k] for name in ("stored", "lost", "viscous")
         )
-        assert abs(gap) < 1e-9 * found.book["power"][k]
+        assert abs(imbalance) < 1e-9 * batch.book["power"][k]
 
 
-def test_exact_a_case_does_not_hang_on_those_beside_it():
-    area, sigma, modes = patch()
+def test_exact_case_does_not_depend_on_other_lanes():
+    """A case among 40 others agrees with the same case alone within 1e-11."""
+    area, sigma, modes = tilted_patch()
     cases = [
-        lanes.PointsCase(LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, push)
-        for push in np.geomspace(5.0, 300.0, 40)
-    ]
-    many, one = (lanes.march(TWO, DRIVE, part, 4, STEPS, 1) for part in (cases, cases[17:18]))
-    near(many.extremes[17], one.extremes[0], 1e-11)
-    assert many.extremes.shape == (40, 4, 2)
-
-
-def test_exact_what_is_read_off_samples_side_by_side(pairs):
-    """Each as the readers of one run have it, of the same samples."""
-    found, alone = pairs
-    seen = Samples(found, TWO, OMEGA, np.array(PUSHES), STEPS, WINDOW)
-    book = {"peak_stored": found.book["peak"]} | found.book
-    values = seen.values(book, np.full(4, 1e5), np.full(4, 60.0))
-    for k, one in enumerate(alone):
-        w = one.window
-        drive = SineDrive(PUSHES[k], OMEGA)
-        here = Response(
-            w.time,
-            found.z[:, :, k],
-            found.rate[:, :, k],
-            seen.slide[:, k],
-            seen.speed[:, k],
-            found.z[:, :, k] @ TWO.output,
-            found.rate[:, :, k] @ TWO.output,
-            seen.acceleration()[:, k],
-            w.base_acceleration,
-            found.force[:, k],
-            found.slip[:, k],
+        lanes.PointsCase(
+            LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, acceleration
         )
-        near(here.acceleration, w.acceleration, 1e-7)
-        turns = loops.find_reversals(
-            w.time, here.slide, here.slide_rate, here.force, drive.period, "slide"
+        for acceleration in np.geomspace(5.0, 300.0, 40)
+    ]
+    batch, single = (lanes.march(TWO, DRIVE, part, 4, STEPS, 1) for part in (cases, cases[17:18]))
+    assert_close(batch.extremes[17], single.extremes[0], 1e-11)
+    assert batch.extremes.shape == (40, 4, 2)
+
+
+def test_exact_batch_measures_agree_with_single_measures(two_mode_marches):
+    """The measures of samples in lanes agree within 1e-9 with the measures of single runs from the
+    same samples."""
+    batch, marches = two_mode_marches
+    samples = Samples(batch, TWO, OMEGA, np.array(ACCELERATIONS), STEPS, WINDOW)
+    energies = {"peak_stored": batch.book["peak"]} | batch.book
+    values = samples.values(energies, np.full(4, 1e5), np.full(4, 60.0))
+    for k, single in enumerate(marches):
+        window = single.window
+        drive = SineDrive(ACCELERATIONS[k], OMEGA)
+        response = Response(
+            window.time,
+            batch.z[:, :, k],
+            batch.rate[:, :, k],
+            samples.slide[:, k],
+            samples.speed[:, k],
+            batch.z[:, :, k] @ TWO.output,
+            batch.rate[:, :, k] @ TWO.output,
+            samples.acceleration()[:, k],
+            window.base_acceleration,
+            batch.force[:, k],
+            batch.slip[:, k],
+        )
+        assert_close(response.acceleration, window.acceleration, 1e-7)
+        reversals = loops.find_reversals(
+            window.time, response.slide, response.slide_rate, response.force, drive.period, "slide"
         )
         loop = loops.interface_loop(
-            loops.mean_half_range(turns),
-            spectrum.motion_harmonic(w.time, here.slide, here.slide_rate, OMEGA),
-            spectrum.friction_harmonic(here, TWO, drive),
-            found.worked[k] / WINDOW,
+            loops.mean_half_range(reversals),
+            spectrum.motion_harmonic(window.time, response.slide, response.slide_rate, OMEGA),
+            spectrum.friction_harmonic(response, TWO, drive),
+            batch.worked[k] / WINDOW,
             1e5,
         )
         expected = (
             {
-                "absolute_acceleration_peak": measures.compute_acceleration_peak(here),
+                "absolute_acceleration_peak": measures.compute_acceleration_peak(response),
                 "drift_per_cycle": loops.mean_drift(
-                    w.time, here.slide, here.slide_rate, drive.period
+                    window.time, response.slide, response.slide_rate, drive.period
                 ),
-                "secant_stiffness": loops.secant_stiffness(turns),
+                "secant_stiffness": loops.secant_stiffness(reversals),
             }
-            | measures.compute_slip_measures(here, drive, STEPS)
-            | spectrum.harmonic_measures(*spectrum.odd_harmonics(here, drive))
+            | measures.compute_slip_measures(response, drive, STEPS)
+            | spectrum.harmonic_measures(*spectrum.odd_harmonics(response, drive))
             | loop
         )
         for name, value in expected.items():
-            size = np.abs(here.slide).max() if name == "drift_per_cycle" else abs(value)
-            assert values[name][k] == pytest.approx(value, abs=1e-9 * size), (name, PUSHES[k])
+            size = np.abs(response.slide).max() if name == "drift_per_cycle" else abs(value)
+            assert values[name][k] == pytest.approx(value, abs=1e-9 * size), (
+                name,
+                ACCELERATIONS[k],
+            )

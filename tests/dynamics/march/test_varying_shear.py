@@ -1,4 +1,5 @@
-"""Pieces that give way in shear under a contact whose load and set change: a dense march, limits, energy."""
+"""Bodies with shear compliance under a varying load and contact area: a march of all nodes, limits,
+energy."""
 
 import numpy as np
 import pytest
@@ -32,27 +33,35 @@ from patchfem.slip.shear_modes import shear_modes
 SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": FirstOrderBonds(Bonds(0.3, 1e-6))}
 
 
-def giving(x, depth: float = 3e-8) -> np.ndarray:
-    """A tangential compliance [m/N] like that of pieces with a skin."""
+def exponential_compliance(x, depth: float = 3e-8) -> np.ndarray:
+    """Return a tangential compliance (m, m) [m/N] like that of coated bodies."""
     return depth * (0.5 * np.exp(-np.abs(x[:, None] - x) / 2e-3) + 0.3 * np.eye(x.size))
 
 
-def reduced(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3):
-    """Shear modes on the nodes of contact sets, as many as there are nodes where no count is given."""
+def reduce_to_shear_modes(sets, law, count=None, depth: float = 3e-8, tolerance: float = 1e-3):
+    """Return shear modes of the nodes of contact sets; with `count` None as many modes as nodes."""
     force = sets.reference.forces(0.0, 0.0)
     count = sets.x.size if count is None else count
     return varying_load.choose_shear_modes(
-        giving(sets.x, depth), law, force, np.ones(force.size), count or None, tolerance
+        exponential_compliance(sets.x, depth),
+        law,
+        force,
+        np.ones(force.size),
+        count or None,
+        tolerance,
     )
 
 
-def dense(basis, drive, law, sets, response, steps: int) -> tuple:
-    """Slides, friction forces and energy lost by a march on the nodes themselves: displacements u (m,) of the pieces
-    behind the stiffness C^-1, bench laws, a general root finder; the nodal forces from heave and turn of a run."""
-    p = make_propagator(basis, drive, steps)
-    table = p.tables(drive, 0, steps)
-    beta = p.beta[0, 0]
-    stiff = np.linalg.inv(giving(sets.x))
+def march_all_nodes(basis, drive, law, sets, response, steps: int) -> tuple:
+    """Return slides, friction forces and nodal loads of a march with all nodes as unknowns.
+
+    The displacements u (m,) of the bodies act on the stiffness C^-1. Bench laws and a general root
+    finder are used; heave and rotation are taken from a run.
+    """
+    propagator = make_propagator(basis, drive, steps)
+    table = propagator.tables(drive, 0, steps)
+    beta = propagator.beta[0, 0]
+    stiffness = np.linalg.inv(exponential_compliance(sets.x))
     motion = zip(-response.extra["heave"], response.extra["turn"])
     loads = np.array(
         [
@@ -67,57 +76,61 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     forces = [0.0]
     bonds = isinstance(law, FirstOrderBonds)
 
-    def moved(state, xi, load):
-        """(mean tractions, state) after the slides xi (m,)."""
+    def slide_nodes(state, xi, load):
+        """Return the mean tractions and the state after the slides xi (m,)."""
         if not bonds:
-            step = law.step(state, xi, load, load, p.dt)
+            step = law.step(state, xi, load, load, propagator.dt)
             return step.mean, step.state
         out, mean, _, _ = advance_bonds(state.bonds, xi, load, 1e-6)
         kept = np.where(load > 0, out, state.bonds)
         return 0.3 / 1e-6 * np.where(load > 0, mean, 0.0), state._replace(bonds=kept)
 
     for i in range(len(loads) - 1):
-        middle = (loads[i] + loads[i + 1]) / 2
-        ready = law.press(state, loads[i], middle).state
-        row = table[i % steps]
-        rest = (
-            p.free[0, 0] * z + p.free[1, 0] * v + row[0],
-            p.free[2, 0] * z + p.free[3, 0] * v + row[1],
+        mean_load = (loads[i] + loads[i + 1]) / 2
+        pressed = law.press(state, loads[i], mean_load).state
+        forcing = table[i % steps]
+        free_motion = (
+            propagator.free[0, 0] * z + propagator.free[1, 0] * v + forcing[0],
+            propagator.free[2, 0] * z + propagator.free[3, 0] * v + forcing[1],
         )
 
-        def miss(y, ready=ready, middle=middle, free=rest[0] - z, u=u):
-            mean = moved(ready, 1e-6 * (y[0] - y[1:]), middle)[0]
+        def residual(y, pressed=pressed, mean_load=mean_load, free=free_motion[0] - z, u=u):
+            mean = slide_nodes(pressed, 1e-6 * (y[0] - y[1:]), mean_load)[0]
             return np.append(
-                (1e-6 * y[0] - free) / beta + mean.sum(), stiff @ (u + 0.5e-6 * y[1:]) - mean
+                (1e-6 * y[0] - free) / beta + mean.sum(), stiffness @ (u + 0.5e-6 * y[1:]) - mean
             )
 
-        y = 1e-6 * root(miss, np.zeros(u.size + 1), tol=1e-14).x
-        state = law.press(moved(ready, y[0] - y[1:], middle)[1], middle, loads[i + 1]).state
+        y = 1e-6 * root(residual, np.zeros(u.size + 1), tol=1e-14).x
+        state = law.press(
+            slide_nodes(pressed, y[0] - y[1:], mean_load)[1], mean_load, loads[i + 1]
+        ).state
         u = u + y[1:]
 
-        def away(y, state=state, load=loads[i + 1], u=u):
-            return stiff @ (u + 1e-6 * y) - law.traction(moved(state, -1e-6 * y, load)[1])
+        def spring_back_residual(y, state=state, load=loads[i + 1], u=u):
+            return stiffness @ (u + 1e-6 * y) - law.traction(slide_nodes(state, -1e-6 * y, load)[1])
 
-        y_back = 1e-6 * root(away, np.zeros(u.size), tol=1e-14).x
-        state = moved(state, -y_back, loads[i + 1])[1]
+        y_back = 1e-6 * root(spring_back_residual, np.zeros(u.size), tol=1e-14).x
+        state = slide_nodes(state, -y_back, loads[i + 1])[1]
         u = u + y_back
-        accel = -(rest[0] - z - y[0]) / beta / MASS
-        z = rest[0] + p.push[0, 0] * accel
-        v = rest[1] + p.push[1, 0] * accel
+        accel = -(free_motion[0] - z - y[0]) / beta / MASS
+        z = free_motion[0] + propagator.push[0, 0] * accel
+        v = free_motion[1] + propagator.push[1, 0] * accel
         slides.append(z)
         forces.append(law.traction(state).sum())
     return np.array(slides), np.array(forces), loads
 
 
 @pytest.mark.parametrize("name", ["plastic", "bonds"])
-def test_exact_all_modes_are_the_nodes_themselves(name):
-    """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
+def test_exact_all_shear_modes_agree_with_march_of_nodes(name):
+    """With all shear modes the slide and the force agree with a march of all nodes, while the
+    contact opens and closes. The differences are below 1e-8 of the slide and 1e-7 of the friction
+    limit."""
     basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
     drive = SineDrive(120.0, 2 * np.pi * 143)
     sets = crowned()
     law = LAWS[name]
     steps = 60
-    done = varying_load.march(
+    result = varying_load.march(
         basis,
         drive,
         sets,
@@ -126,31 +139,36 @@ def test_exact_all_modes_are_the_nodes_themselves(name):
         steps,
         1,
         start=InitialState([0, 5e-7, 5e-7], [0, 0, 0]),
-        shear=reduced(sets, law),
+        shear=reduce_to_shear_modes(sets, law),
     )
     single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
-    slides, forces, loads = dense(single, drive, SOFT[name], sets, done.response, steps)
-    r = done.response
-    touching = (loads > 0).sum(axis=1)
-    assert touching.min() < 10 and touching.max() == 21 and np.abs(r.force).max() > 0.9 * 0.3 * LOAD
-    assert r.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
-    assert r.force == pytest.approx(forces, abs=1e-7 * 0.3 * LOAD)
-    assert done.outcome is None and balance(done, basis) <= 1e-11
+    slides, forces, loads = march_all_nodes(single, drive, SOFT[name], sets, result.response, steps)
+    response = result.response
+    n_contact = (loads > 0).sum(axis=1)
+    assert (
+        n_contact.min() < 10
+        and n_contact.max() == 21
+        and np.abs(response.force).max() > 0.9 * 0.3 * LOAD
+    )
+    assert response.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
+    assert response.force == pytest.approx(forces, abs=1e-7 * 0.3 * LOAD)
+    assert result.outcome is None and balance(result, basis) <= 1e-11
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["plastic", "bonds", "growing"])
-def test_exact_a_still_load_is_the_march_on_the_preload(name):
-    """normal = 1e-9: bonds as by shear modes of the preloaded set, elastic-plastic as by its exact parallel elements.
-    The two differ by what springs back, which falls with the square of the step, to 3e-8 at 3200 steps a cycle."""
+def test_exact_nearly_constant_load_agrees_with_preloaded_march(name):
+    """Under a nearly constant load the slide agrees within 1e-6 with a march under the preload,
+    with shear modes or exact parallel elements. The difference comes from the spring-back at the
+    end of each step and falls with the square of the step."""
     basis = modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
     drive = SineDrive(40.0, 2 * np.pi * 300)
     sets = crowned()
     law = LAWS[name]
     force = sets.reference.forces(0.0, 0.0)
-    soft = giving(crowned().x)
+    compliance = exponential_compliance(crowned().x)
     if name == "plastic":
-        group = jenkins_set(soft, 0.3 * force, 1e-6)
+        group = jenkins_set(compliance, 0.3 * force, 1e-6)
         model = models.jenkins_model(group.stiffness, group.yield_displacement)
     else:
         bonds = {
@@ -158,23 +176,29 @@ def test_exact_a_still_load_is_the_march_on_the_preload(name):
             "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5),
         }
         model = models.points_model(
-            bonds[name], np.ones(21), force, shear_modes(soft, 0.3 * force, 1e-6, 21)
+            bonds[name], np.ones(21), force, shear_modes(compliance, 0.3 * force, 1e-6, 21)
         )
-    want = plain.march(basis, drive, model, 3, 1600, 3).response
-    got = varying_load.march(basis, drive, sets, law, 3, 1600, 3, shear=reduced(sets, law)).response
-    assert np.abs(got.force).max() > 0.7 * 0.3 * LOAD and 3e-6 < np.abs(got.slide).max() < 2e-5
-    assert got.slide == pytest.approx(want.slide, abs=1e-6 * np.abs(want.slide).max())
-    assert got.force == pytest.approx(want.force, abs=5e-6 * 0.3 * LOAD)
+    expected = plain.march(basis, drive, model, 3, 1600, 3).response
+    response = varying_load.march(
+        basis, drive, sets, law, 3, 1600, 3, shear=reduce_to_shear_modes(sets, law)
+    ).response
+    assert (
+        np.abs(response.force).max() > 0.7 * 0.3 * LOAD
+        and 3e-6 < np.abs(response.slide).max() < 2e-5
+    )
+    assert response.slide == pytest.approx(expected.slide, abs=1e-6 * np.abs(expected.slide).max())
+    assert response.force == pytest.approx(expected.force, abs=5e-6 * 0.3 * LOAD)
 
 
-def test_exact_pieces_spring_back_when_they_part():
-    """In flight the pieces hold nothing: no force, no energy, no coordinate; what they held is booked as lost."""
+def test_exact_separated_bodies_store_no_energy():
+    """During lift-off the bodies store no energy; the energy that they stored is counted as
+    loss."""
     for name in ("plastic", "bonds"):
-        done, gap = march_with_lift_off(name, reduced(crowned(), LAWS[name]))
-        stored, _, created = done.response.extra["ledger"][1:]
-        apart = done.response.extra["normal_load"] == 0
-        assert stored[apart].max() <= 1e-20 * stored.max()
-        assert gap <= 1e-11 and done.outcome is None and created[-1] == 0
+        result, imbalance = march_with_lift_off(name, reduce_to_shear_modes(crowned(), LAWS[name]))
+        stored, _, created = result.response.extra["ledger"][1:]
+        is_separated = result.response.extra["normal_load"] == 0
+        assert stored[is_separated].max() <= 1e-20 * stored.max()
+        assert imbalance <= 1e-11 and result.outcome is None and created[-1] == 0
 
 
 @given(
@@ -184,45 +208,53 @@ def test_exact_pieces_spring_back_when_they_part():
     st.sampled_from([2, 6, 21]),
     st.sampled_from([1e-9, 3e-8, 1.5e-7]),
 )
-def test_always_pieces_that_give_way_create_nothing(name, seed, steps, count, depth):
-    """Random modes, starts, drives and reductions, coarse steps, bouncing."""
-    shear = reduced(crowned(), LAWS[name], count, depth)
+def test_always_shear_compliance_creates_no_energy(name, seed, steps, count, depth):
+    """No energy is created for random modes, initial states, drives and numbers of shear modes,
+    with coarse steps and lift-off."""
+    shear = reduce_to_shear_modes(crowned(), LAWS[name], count, depth)
     check_energy_of_random_march(name, seed, steps, shear)
 
 
 @pytest.mark.parametrize("count", [0, 6])
-def test_exact_a_fork_goes_on_by_itself(count):
-    """The twin of a run, forked after a cycle and marched after the run itself went on: the same samples."""
+def test_exact_forked_march_equals_original_march(count):
+    """A copy of a march continues with the same samples within 1e-13, after the original has
+    continued."""
     law = LAWS["bonds"]
     drive = SineDrive(60.0, 2 * np.pi * 143)
-    shear = reduced(crowned(), law, count) if count else None
+    shear = reduce_to_shear_modes(crowned(), law, count) if count else None
     run = plain.start_run(
         MIXED, drive, varying_load.make_model(MIXED, law, crowned(), None, shear), 200
     )
     run.march_cycle(200, 0, [])
-    twin = run.fork(drive)
+    copy = run.fork(drive)
     first = run.march_cycle(200, 0, [])[1]
-    second = twin.march_cycle(200, 0, [])[1]
+    second = copy.march_cycle(200, 0, [])[1]
     assert np.abs(first - second).max() <= 1e-13 * np.abs(first).max() and np.ptp(first[:, 0]) > 0
 
 
-def test_refuses_shear_beside_a_set_valued_law():
+def test_refuses_shear_modes_with_unsuitable_laws():
+    """Shear modes are refused with Coulomb friction and the tanh law, and if they do not include
+    every node."""
     law = LAWS["plastic"]
-    for other in ("coulomb", "tanh"):
+    for other_law in ("coulomb", "tanh"):
         with pytest.raises(PatchfemError, match="elastic-plastic"):
             varying_load.make_model(
                 modes([100.0], [1.0], [1.0], [0.0]),
-                LAWS[other],
+                LAWS[other_law],
                 crowned(),
-                shear=reduced(crowned(), law, 4),
+                shear=reduce_to_shear_modes(crowned(), law, 4),
             )
-    few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
+    few_modes = shear_modes(
+        exponential_compliance(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4
+    )
     with pytest.raises(PatchfemError, match="include every node"):
-        varying_load.make_model(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
+        varying_load.make_model(
+            modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few_modes
+        )
 
 
 @pytest.mark.parametrize("name", ["plastic", "bonds"])
-def test_order_two_of_pieces_that_give_way(name):
-    """Slide, heave and pitch in every mode, sets that change; what springs back at the end of a step does not lower the
-    order."""
-    check_order_two(name, 800, 0.45, reduced(crowned(), LAWS[name], 8))
+def test_order_two_with_shear_modes(name):
+    """With modes that combine slide, heave and pitch and a varying contact the march converges with
+    order two; the spring-back at the end of a step does not reduce the order."""
+    check_order_two(name, 800, 0.45, reduce_to_shear_modes(crowned(), LAWS[name], 8))

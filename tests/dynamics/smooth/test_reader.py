@@ -44,7 +44,8 @@ def make_step_parts(slide, slip=None, count: int = 61):
 
 
 def test_exact_integrals_and_peaks_agree_with_closed_form():
-    """Peak, harmonics, drift and mean of a known history agree with their closed forms within 1e-8."""
+    """Peak, harmonics, drift and mean of a known history agree with their closed forms within
+    1e-8."""
     omega = 2 * np.pi / PERIOD
     step_parts = make_step_parts(
         lambda t: 3 * np.cos(omega * t - 0.4) + np.sin(3 * omega * t) + 0.2 * t

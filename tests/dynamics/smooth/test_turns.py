@@ -16,7 +16,8 @@ PERIOD = 2 * np.pi / OMEGA
 
 
 def run_sine(law, acceleration: float, cycles: float) -> tuple:
-    """Return the motion under a sine of an acceleration [m s-2] and the times of its reversals [s]."""
+    """Return the motion under a sine of an acceleration [m s-2] and the times of its reversals
+    [s]."""
     run = Motion(ONE, SineDrive(acceleration, OMEGA), law, 20, 1e-9)
     run.run_to(cycles * PERIOD)
     return run, np.concatenate(run.turns)[:, 0]
