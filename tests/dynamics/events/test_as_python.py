@@ -1,4 +1,4 @@
-"""The loop of events as Python: the same motion as compiled, as long as its work is short."""
+"""The event loop as plain Python: the same motion as the compiled loop, for short runs."""
 
 import os
 import pickle
@@ -18,7 +18,7 @@ from patchfem.structure import drives
 SINE = SineDrive(1.0, 1.2)
 SWEEP = drives.SweepDrive(0.1, 0.4, 40.0, 1.0)
 CASES = (
-    # seed, modes, interfaces, kind of the interfaces, drive
+    # seed, number of modes, number of interfaces, kind of interface, drive
     (1, 1, 1, "rigid", SINE),
     (2, 1, 1, "springs", SINE),
     (3, 3, 2, "rigid", SINE),
@@ -27,7 +27,7 @@ CASES = (
     (6, 2, 1, "rigid", SWEEP),
     (7, 1, 1, "none", SINE),
 )
-# A process of its own with an empty cache: short runs do not wait for a compiler there.
+# A separate process with an empty cache, in which short runs do not wait for the compiler.
 AS_PYTHON = """\
 import pickle, sys
 sys.path[:0] = {paths!r}
@@ -39,8 +39,8 @@ with open({file!r}, "wb") as file:
 """
 
 
-def interface_of(rng, kind: str):
-    """Return the elements of an interface."""
+def make_interface(rng, kind: str):
+    """Return the elements of an interface of a given kind."""
     if kind == "none":
         return make_coulomb_elements(0.0)
     if kind == "springs":
@@ -52,7 +52,7 @@ def motion_of(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> d
     """Run 6 cycles and return the histories, the events and what is read from the last cycles."""
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n_modes, n_interfaces)
-    groups = [interface_of(rng, kind) for _ in range(n_interfaces)]
+    groups = [make_interface(rng, kind) for _ in range(n_interfaces)]
     run = histories.simulate(modes, drive, groups, 6.0, window=3)
     names = ("time", "modal", "modal_rate", "force", "slip")
     return {
@@ -63,32 +63,34 @@ def motion_of(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> d
 
 
 @pytest.fixture(scope="module")
-def as_python(tmp_path_factory):
-    """The motions of all cases in a process that does not compile."""
-    place = tmp_path_factory.mktemp("python")
-    file = place / "motions"
+def python_motions(tmp_path_factory):
+    """Return the motions of all cases, computed in a process that does not compile."""
+    folder = tmp_path_factory.mktemp("python")
+    file = folder / "motions"
     paths = [str(Path(__file__).parent), str(Path(__file__).parents[2] / "support")]
     code = AS_PYTHON.format(paths=paths, file=str(file))
-    environment = os.environ | {"PATCHFEM_CACHE": str(place)}
+    environment = os.environ | {"PATCHFEM_CACHE": str(folder)}
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)
     return pickle.loads(file.read_bytes())
 
 
 @pytest.mark.parametrize("number", range(len(CASES)))
-def test_exact_the_same_motion_as_compiled(as_python, number):
-    """To 1e-11 of its size: the compiler may add in another order, and a motion that rubs
-    doubles such differences."""
-    python = as_python[number]
+def test_exact_python_motion_agrees_with_compiled_motion(python_motions, number):
+    """The motion in plain Python agrees with the compiled one within 1e-11 of its size. A compiler
+    may change the order of sums, and friction amplifies such differences."""
+    python = python_motions[number]
     compiled = motion_of(*CASES[number])
     assert python["events"] == compiled["events"] and python["events"][0] > 12
     for name, values in python["histories"].items():
         atol = 1e-11 * max(1.0, np.abs(values).max())
         np.testing.assert_allclose(values, compiled["histories"][name], rtol=0, atol=atol)
-    for ours, theirs in zip(python["readings"], compiled["readings"]):
-        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-10)
+    for measures, expected in zip(python["readings"], compiled["readings"]):
+        np.testing.assert_allclose(measures, expected, rtol=1e-9, atol=1e-10)
 
 
-def test_always_the_cost_as_python_rises_with_what_there_is_to_do():
+def test_always_estimated_time_rises_with_problem_size():
+    """The estimated time of a cycle in Python rises with the events, elements, modes and
+    interfaces."""
     rng = np.random.default_rng(4)
     small = random_basis(rng, 1, 1)
     large = random_basis(rng, 6, 3)

@@ -1,5 +1,5 @@
-"""Shooting on the event map against printed numbers, long runs, finite differences and perturbed
-runs."""
+"""Steady motions by shooting on the event map, against published values, long runs, finite
+differences and perturbed runs."""
 
 from math import pi, sqrt
 
@@ -13,14 +13,14 @@ from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.structure import drives
 
 
-def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
-    """Half the peak-to-peak of the last cycle of a run."""
-    low, high = simulate(modes, drive, static, kinetic, cycles, 1, start=begin).amplitudes[-1]
+def run_amplitude(modes, drive, static, kinetic, cycles, start=None):
+    """Return half the peak-to-peak displacement in the last cycle of a run."""
+    low, high = simulate(modes, drive, static, kinetic, cycles, 1, start=start).amplitudes[-1]
     return (high - low) / 2
 
 
 @pytest.mark.parametrize(
-    "d, zeta, wanted, regime",
+    "friction, zeta, expected, regime",
     [
         (0.8, 0.003, 0.28704671337871602595, "2 stops"),
         (0.8, 0.0, 0.29943104174842751488, "2 stops"),
@@ -37,41 +37,43 @@ def amplitude_of_run(modes, drive, static, kinetic, cycles, begin=None):
         (0.6, 0.0, np.inf, "unbounded"),
     ],
 )
-def test_exact_amplitudes_at_resonance(d, zeta, wanted, regime):
-    """Printed numbers, or the closed form of two stops, whose condition near pi/4 is that of a
-    square root."""
-    found = steady(basis_of(1.0, zeta), SineDrive(1.0, 1.0), d, d)
-    assert found.regime == regime
+def test_exact_resonance_amplitudes_agree_with_published_values(friction, zeta, expected, regime):
+    """Amplitudes at resonance agree within 2e-12 with published values, or with the closed form of
+    two stops, which is ill-conditioned near pi/4. Below pi/4 the undamped motion is unbounded."""
+    motion = steady(basis_of(1.0, zeta), SineDrive(1.0, 1.0), friction, friction)
+    assert motion.regime == regime
     if regime == "unbounded":
         return
-    rel = 2e-12 if wanted is not None else 1e-12 / (d - pi / 4)
-    assert found.amplitude == pytest.approx(
-        two_stop_amplitude(d) if wanted is None else wanted, rel=rel
+    rel = 2e-12 if expected is not None else 1e-12 / (friction - pi / 4)
+    assert motion.amplitude == pytest.approx(
+        two_stop_amplitude(friction) if expected is None else expected, rel=rel
     )
-    assert found.residual < 1e-12 and found.alone
+    assert motion.residual < 1e-12 and motion.alone
     if regime != "stuck":
-        assert np.abs(found.multipliers).max() < 1
+        assert np.abs(motion.multipliers).max() < 1
 
 
 @pytest.mark.parametrize(
     "hertz, level, amplitude", [(135, 6, 5.22698), (150, 7, 6.66151), (155, 8, 4.29575)]
 )
-def test_table_check_7_without_damping(hertz, level, amplitude):
-    found = steady(basis_of(1.0), SineDrive(level / 4, hertz / 143), 1.0, 1.0)
+def test_table_check_7_amplitudes_without_damping(hertz, level, amplitude):
+    """Amplitudes without damping agree with table check 7 of the report within 2e-6."""
+    motion = steady(basis_of(1.0), SineDrive(level / 4, hertz / 143), 1.0, 1.0)
     assert (
-        found.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6)
-        and found.regime == "sliding"
+        motion.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6)
+        and motion.regime == "sliding"
     )
 
 
 @pytest.mark.parametrize(
     "hertz, knee", [(135, 1.2466), (143, 1.2792), (150, 1.3108), (155, 1.3337)]
 )
-def test_table_check_8_knee(hertz, knee):
-    """Input over friction at which the last stop vanishes."""
+def test_table_check_8_transition_to_sliding(hertz, knee):
+    """The last stop vanishes at the ratio of drive to friction in table check 8 of the report,
+    within 1e-3."""
     regimes = [
-        steady(basis_of(1.0, 0.003), SineDrive(knee + side, hertz / 143), 1.0, 1.0).regime
-        for side in (-1e-3, 1e-3)
+        steady(basis_of(1.0, 0.003), SineDrive(knee + offset, hertz / 143), 1.0, 1.0).regime
+        for offset in (-1e-3, 1e-3)
     ]
     assert regimes == ["2 stops", "sliding"]
 
@@ -90,47 +92,51 @@ POINTS = [
 ]
 
 
-def test_exact_steady_points_against_runs():
+def test_exact_steady_amplitudes_agree_with_runs():
+    """Steady amplitudes at ten frequencies and levels agree with runs of 60 cycles within 1e-9."""
     for ratio, level in POINTS:
         modes = basis_of(1.0, 0.08)
         drive = SineDrive(level, ratio)
-        found = steady(modes, drive, 1.0, 1.0)
-        marched = amplitude_of_run(modes, drive, 1.0, 1.0, 60)
-        assert found.amplitude == pytest.approx(marched, rel=1e-9), (ratio, level)
+        motion = steady(modes, drive, 1.0, 1.0)
+        expected = run_amplitude(modes, drive, 1.0, 1.0, 60)
+        assert motion.amplitude == pytest.approx(expected, rel=1e-9), (ratio, level)
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("level, ratio, wanted", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
-def test_exact_many_stops_below_resonance(level, ratio, wanted):
-    """A slow drive: several stops per cycle, as the run counts them."""
+@pytest.mark.parametrize("level, ratio, n_stops", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
+def test_exact_number_of_stops_below_resonance(level, ratio, n_stops):
+    """A slow drive gives the same number of stops per cycle and the same amplitude as a run."""
     modes = basis_of(1.0, 0.0005)
     drive = SineDrive(level, ratio)
-    found = steady(modes, drive, 1.0, 1.0)
-    done = simulate(modes, drive, 1.0, 1.0, 80, 10)
-    stops = np.count_nonzero((done.log.kind == 0) & (done.log.time > 70 * drive.period)) / 10
-    assert found.stops == (stops,) == (wanted,) and found.regime == f"{wanted} stops"
-    low, high = done.amplitudes[-1]
-    assert found.amplitude == pytest.approx((high - low) / 2, rel=1e-10)
+    motion = steady(modes, drive, 1.0, 1.0)
+    result = simulate(modes, drive, 1.0, 1.0, 80, 10)
+    stops = np.count_nonzero((result.log.kind == 0) & (result.log.time > 70 * drive.period)) / 10
+    assert motion.stops == (stops,) == (n_stops,) and motion.regime == f"{n_stops} stops"
+    low, high = result.amplitudes[-1]
+    assert motion.amplitude == pytest.approx((high - low) / 2, rel=1e-10)
 
 
-def test_exact_two_motions_at_one_level():
-    """Kinetic below static friction: at rest it stays, kicked it goes on sliding."""
+def test_exact_stuck_and_sliding_motion_coexist():
+    """With kinetic below static friction the rig stays at rest, or slides steadily after an initial
+    impulse, at the same drive level."""
     modes = basis_of(1.0, 0.05)
     drive = SineDrive(0.9, 1.0)
     rest = steady(modes, drive, 1.0, 0.3)
     moving = steady(modes, drive, 1.0, 0.3, InitialState(np.zeros(1), np.array([8.0])))
     assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
-    wanted = 0.9 * sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
-    assert moving.amplitude == pytest.approx(wanted, rel=1e-11)
+    expected = 0.9 * sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
+    assert moving.amplitude == pytest.approx(expected, rel=1e-11)
     assert np.abs(moving.multipliers).max() < 1
 
 
-def test_refuses_drives_that_do_not_repeat():
+def test_refuses_drive_that_is_not_periodic():
+    """A drive of several levels has no steady motion and is refused."""
     with pytest.raises(PatchfemError, match="a single sine without end"):
         steady(basis_of(1.0), drives.make_levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
 
 
-def two_faces(seed=2, ratio=1.0):
+def make_two_interfaces(seed=2, ratio=1.0):
+    """Return modes, drive and friction limits of a random rig with two interfaces."""
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, 3, 2)
     static = rng.uniform(0.1, 0.3, 2)
@@ -139,18 +145,20 @@ def two_faces(seed=2, ratio=1.0):
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("seed, ratio", [(2, 1.0), (3, 0.7), (5, 1.0)])
-def test_exact_two_interfaces_against_a_run(seed, ratio):
-    modes, drive, static, kinetic = two_faces(seed, ratio)
-    found = steady(modes, drive, static, kinetic)
-    assert found.amplitude == pytest.approx(
-        amplitude_of_run(modes, drive, static, kinetic, 400), rel=1e-8
+def test_exact_two_interfaces_agree_with_run(seed, ratio):
+    """The steady motion of two interfaces has the amplitude of a run of 400 cycles and repeats
+    after one cycle."""
+    modes, drive, static, kinetic = make_two_interfaces(seed, ratio)
+    motion = steady(modes, drive, static, kinetic)
+    assert motion.amplitude == pytest.approx(
+        run_amplitude(modes, drive, static, kinetic, 400), rel=1e-8
     )
-    again = simulate(modes, drive, static, kinetic, 1, 1, start=found.start).window
+    window = simulate(modes, drive, static, kinetic, 1, 1, start=motion.start).window
     np.testing.assert_allclose(
-        again.modal[-1], found.start.z, atol=1e-11 * np.abs(again.modal).max()
+        window.modal[-1], motion.start.z, atol=1e-11 * np.abs(window.modal).max()
     )
     np.testing.assert_allclose(
-        again.modal_rate[-1], found.start.v, atol=1e-11 * np.abs(again.modal_rate).max()
+        window.modal_rate[-1], motion.start.v, atol=1e-11 * np.abs(window.modal_rate).max()
     )
 
 
@@ -158,32 +166,38 @@ def test_exact_two_interfaces_against_a_run(seed, ratio):
 @pytest.mark.parametrize(
     "seed, n, faces, ratio", [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)]
 )
-def test_exact_derivative_of_the_map(seed, n, faces, ratio):
-    """Pieces and saltations against central differences."""
+def test_exact_derivative_of_map_agrees_with_differences(seed, n, faces, ratio):
+    """The derivative of the event map, with its saltation matrices, agrees with central differences
+    within 3e-8."""
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n, faces)
     static = rng.uniform(0.2, 1.0, faces)
     x = rng.normal(size=2 * n)
     drive = SineDrive(1.0, 1.2)
     step = 1e-6
-    one = period_map(modes, drive, static, ratio * static, x)
+    mapped = period_map(modes, drive, static, ratio * static, x)
     for j in range(2 * n):
-        e = np.zeros(2 * n)
-        e[j] = step
-        ends = [period_map(modes, drive, static, ratio * static, x + s * e).end for s in (1, -1)]
-        np.testing.assert_allclose(one.slope[:, j], (ends[0] - ends[1]) / (2 * step), atol=3e-8)
+        direction = np.zeros(2 * n)
+        direction[j] = step
+        ends = [
+            period_map(modes, drive, static, ratio * static, x + s * direction).end for s in (1, -1)
+        ]
+        np.testing.assert_allclose(mapped.slope[:, j], (ends[0] - ends[1]) / (2 * step), atol=3e-8)
 
 
-def test_exact_figure_16_repeats():
+def test_exact_steady_motion_of_figure_16():
+    """The steady motion of figure 16 has two stops, and its amplitude agrees within 2e-8."""
     h = sqrt(0.5)
     modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
     drive = SineDrive(1.0, 1.14)
-    found = steady(modes, drive, 3.0, 3.0, cycles=120)
-    assert found.amplitude == pytest.approx((0.69867878 + 0.39299347) / 2, abs=2e-8)
-    assert found.regime == "2 stops"
+    motion = steady(modes, drive, 3.0, 3.0, cycles=120)
+    assert motion.amplitude == pytest.approx((0.69867878 + 0.39299347) / 2, abs=2e-8)
+    assert motion.regime == "2 stops"
 
 
-def test_exact_coinciding_events_are_told():
+def test_exact_simultaneous_events_are_reported():
+    """The steady motion states whether events of two interfaces coincide, which makes its
+    derivative invalid."""
     modes = basis_of([1.0, 1.0], 0.05, np.eye(2), (1, 1), (1, 0))
     assert not steady(modes, SineDrive(1.5, 0.9), 0.5, 0.5).alone
     assert steady(modes, SineDrive(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone

@@ -1,5 +1,5 @@
-"""Runs from yield to yield against DOP853 with every element restarted, known amplitudes,
-energies."""
+"""Runs of elastic-plastic elements from yield to yield, against DOP853, known amplitudes and energy
+balances."""
 
 import numpy as np
 import pytest
@@ -13,69 +13,76 @@ from patchfem.response import energy_balance
 from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 
-def basis(omega, zeta, slide, base, output, damping=None, faces=None):
+def make_basis(omega, zeta, slide, base, output, damping=None, faces=None):
+    """Return a modal basis with one or more interfaces."""
     return basis_of(omega, zeta, slide if faces is None else faces, base, output, damping=damping)
 
 
-ONE = basis([1.0], [0.003], [1.0], [1.0], [1.0])
+ONE = make_basis([1.0], [0.003], [1.0], [1.0], [1.0])
 
 
-def random_rig(seed, most):
-    """(modes, drive, stiffness, yield slide): rigid, overdamped and coupled ones among them."""
-    r = np.random.default_rng(seed)
-    n = int(r.integers(1, 6))
-    t = int(np.exp(r.uniform(0, np.log(most))))
-    omega = np.sort(np.exp(r.uniform(-0.7, 1.5, n)))
-    zeta = np.exp(r.uniform(np.log(0.001), np.log(0.3), n))
-    omega[0] *= r.random() > 0.2
-    zeta[-1] = r.uniform(1, 4) if r.random() < 0.2 else zeta[-1]
-    slide, base, output = (r.uniform(0.2, 1.0, n) * r.choice([-1, 1], n) for _ in range(3))
-    noise = r.normal(size=(n, n)) * 0.2
-    damping = np.diag(2 * zeta * omega) + noise @ noise.T if r.random() < 0.3 else None
-    y = np.exp(r.uniform(-3, 1, t))
-    k = np.exp(r.uniform(-1, 1.5, t))
-    k *= np.exp(r.uniform(-1.5, 0)) / (k @ y)
+def random_rig(seed, max_elements):
+    """Return modes, drive, stiffnesses and yield slides of a random rig; some are rigid, overdamped
+    or coupled."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 6))
+    t = int(np.exp(rng.uniform(0, np.log(max_elements))))
+    omega = np.sort(np.exp(rng.uniform(-0.7, 1.5, n)))
+    zeta = np.exp(rng.uniform(np.log(0.001), np.log(0.3), n))
+    omega[0] *= rng.random() > 0.2
+    zeta[-1] = rng.uniform(1, 4) if rng.random() < 0.2 else zeta[-1]
+    slide, base, output = (rng.uniform(0.2, 1.0, n) * rng.choice([-1, 1], n) for _ in range(3))
+    noise = rng.normal(size=(n, n)) * 0.2
+    damping = np.diag(2 * zeta * omega) + noise @ noise.T if rng.random() < 0.3 else None
+    y = np.exp(rng.uniform(-3, 1, t))
+    k = np.exp(rng.uniform(-1, 1.5, t))
+    k *= np.exp(rng.uniform(-1.5, 0)) / (k @ y)
     return (
-        basis(omega, zeta, slide, base, output, damping),
-        SineDrive(1.0, float(np.exp(r.uniform(-0.7, 0.7)))),
+        make_basis(omega, zeta, slide, base, output, damping),
+        SineDrive(1.0, float(np.exp(rng.uniform(-0.7, 0.7)))),
         k,
-        y * np.exp(r.uniform(-1, 0.5)),
+        y * np.exp(rng.uniform(-1, 0.5)),
     )
 
 
 @pytest.mark.share(0, 1, 2)
 @pytest.mark.parametrize(
-    ("seed", "most"), [(2, 20), (3, 20), (4, 20), *((seed, 200) for seed in range(100, 115))]
+    ("seed", "max_elements"),
+    [(2, 20), (3, 20), (4, 20), *((seed, 200) for seed in range(100, 115))],
 )
-def test_exact_random_rigs_against_dop853(seed, most):
-    modes, drive, k, y = random_rig(seed, most)
-    done = simulate(modes, drive, [make_elements(k, y)], 2, window=1)
-    want = Reference(modes, drive, [(k, y)]).go(2 * drive.period)
-    found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
-    assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
-    assert energy_balance(done.ledger) <= 1e-10
+def test_exact_random_rigs_agree_with_dop853(seed, max_elements):
+    """Final states of random rigs agree within 1e-9 with DOP853, which is restarted at each
+    yield."""
+    modes, drive, k, y = random_rig(seed, max_elements)
+    result = simulate(modes, drive, [make_elements(k, y)], 2, window=1)
+    expected = Reference(modes, drive, [(k, y)]).go(2 * drive.period)
+    state = np.concatenate([result.response.modal[-1], result.response.modal_rate[-1]])
+    assert np.abs(state - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert energy_balance(result.ledger) <= 1e-10
 
 
-def test_exact_two_interfaces_against_dop853():
+def test_exact_two_interfaces_agree_with_dop853():
+    """The final state of a rig with two interfaces agrees with DOP853 within 1e-10."""
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
-    modes = basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], [1.0, 0.2], None, faces)
+    modes = make_basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], [1.0, 0.2], None, faces)
     drive = SineDrive(1.0, 1.4)
     elements = [([2.0, 1.0], [0.1, 0.3]), ([1.5], [0.12])]
-    done = simulate(modes, drive, [make_elements(*one) for one in elements], 4, window=2)
-    want = Reference(modes, drive, elements).go(4 * drive.period)
-    found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
-    assert np.abs(found - want).max() <= 1e-10 * np.abs(want).max()
-    assert energy_balance(done.ledger) <= 1e-13
+    result = simulate(modes, drive, [make_elements(*group) for group in elements], 4, window=2)
+    expected = Reference(modes, drive, elements).go(4 * drive.period)
+    state = np.concatenate([result.response.modal[-1], result.response.modal_rate[-1]])
+    assert np.abs(state - expected).max() <= 1e-10 * np.abs(expected).max()
+    assert energy_balance(result.ledger) <= 1e-13
 
 
-def test_exact_an_output_that_turns_with_a_slide():
-    """Two interfaces, the output on one of them: both turn at one instant, again and again."""
+def test_exact_simultaneous_reversals_of_output_and_slide():
+    """A run is the same whether or not the output is the slide of an interface, so that both
+    reverse at the same instants."""
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
     drive = SineDrive(1.0, 1.4)
     groups = [make_elements([2.0], [0.1]), make_elements([1.5], [0.12])]
     runs = [
         simulate(
-            basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], output, None, faces),
+            make_basis([1.0, 2.3], [0.01, 0.02], faces[0], [1.0, 0.5], output, None, faces),
             drive,
             groups,
             30,
@@ -87,57 +94,59 @@ def test_exact_an_output_that_turns_with_a_slide():
     assert runs[1].output_amplitude == pytest.approx(2.5 * runs[0].output_amplitude, rel=1e-12)
 
 
-def test_exact_grazing_yield():
-    """A push that brings the slide just short of its yield, or just past it."""
-    stiff = 3.0
+def test_exact_slip_near_grazing_yield():
+    """A peak just below the yield slide causes no slip, and a peak just above it does."""
+    stiffness = 3.0
     zeta = 0.05
-    held = basis([2.0], [zeta / 2], [1.0], [1.0], [1.0])
+    free_modes = make_basis([2.0], [zeta / 2], [1.0], [1.0], [1.0])
     drive = SineDrive(1.0, 0.9)
     peak = np.abs(
-        simulate(held, drive, [make_elements([0.0], [1.0])], 40, window=40).window.modal
+        simulate(free_modes, drive, [make_elements([0.0], [1.0])], 40, window=40).window.modal
     ).max()
-    modes = basis([1.0], [zeta], [1.0], [1.0], [1.0])
-    exact = simulate(held, drive, [make_elements([0.0], [1.0])], 40).amplitudes
-    peak = max(peak, np.abs(exact).max())
-    for share, slips in ((1 + 1e-12, False), (1 - 1e-9, True), (1 - 1e-4, True)):
-        done = simulate(modes, drive, [make_elements([stiff], [share * peak])], 40, window=40)
-        assert bool(done.loops[0].slip_range > 0) is slips
-        assert energy_balance(done.ledger) < 1e-12
+    modes = make_basis([1.0], [zeta], [1.0], [1.0], [1.0])
+    amplitudes = simulate(free_modes, drive, [make_elements([0.0], [1.0])], 40).amplitudes
+    peak = max(peak, np.abs(amplitudes).max())
+    for ratio, slips in ((1 + 1e-12, False), (1 - 1e-9, True), (1 - 1e-4, True)):
+        result = simulate(modes, drive, [make_elements([stiffness], [ratio * peak])], 40, window=40)
+        assert bool(result.loops[0].slip_range > 0) is slips
+        assert energy_balance(result.ledger) < 1e-12
 
 
-def test_exact_snapshots_carry_the_force():
+def test_exact_snapshots_agree_with_force_and_slide():
+    """The stretches of the elements in a snapshot give its force within 1e-13, and its slide is
+    that of the samples."""
     k = np.array([1.0, 3.0, 2.0])
     y = np.array([0.2, 0.05, 0.1])
-    done = simulate(ONE, SineDrive(1.0, 0.8), [make_elements(k, y)], 5.5, window=2, frames=8)
-    assert len(done.snapshots) == 8
-    for shot in done.snapshots:
-        assert k @ shot["stretch"] == pytest.approx(shot["force"], abs=1e-13)
-        assert np.interp(shot["time"], done.window.time, done.window.slide) == pytest.approx(
-            shot["slide"], abs=1e-5
-        )
-    assert done.snapshots[-1]["time"] == pytest.approx(5.5 * 2 * np.pi / 0.8)
+    result = simulate(ONE, SineDrive(1.0, 0.8), [make_elements(k, y)], 5.5, window=2, frames=8)
+    assert len(result.snapshots) == 8
+    for snapshot in result.snapshots:
+        assert k @ snapshot["stretch"] == pytest.approx(snapshot["force"], abs=1e-13)
+        assert np.interp(
+            snapshot["time"], result.window.time, result.window.slide
+        ) == pytest.approx(snapshot["slide"], abs=1e-5)
+    assert result.snapshots[-1]["time"] == pytest.approx(5.5 * 2 * np.pi / 0.8)
 
 
-def test_exact_window_of_samples_agrees_with_the_sums():
-    done = simulate(
+def test_exact_samples_agree_with_accumulated_measures():
+    """Peak force, work, slip, harmonics and acceleration from the samples agree with the
+    accumulated measures."""
+    result = simulate(
         ONE, SineDrive(1.0, 1.0), [make_elements([6.0, 2.0], [0.05, 0.25])], 30, window=4
     )
-    window, (q, pull, work, slip, _, force) = done.window, done.loops[0]
-    for end in (
-        np.argmax(window.slide),
-        np.argmin(window.slide),
-    ):  # turning points are among the samples
+    window, (slide_harmonic, force_harmonic, work, slip, _, force) = result.window, result.loops[0]
+    # reversals are among the samples
+    for end in (np.argmax(window.slide), np.argmin(window.slide)):
         assert abs(window.slide_rate[end]) <= 1e-12 * np.abs(window.slide_rate).max()
     assert np.abs(window.force).max() == pytest.approx(force, rel=1e-14)
     assert np.trapezoid(window.force, window.slide) == pytest.approx(work, rel=1e-4)
     assert np.ptp(window.slip) == pytest.approx(slip, rel=1e-14)
-    turn = np.exp(-1j * window.time)
-    for column, want in ((window.slide, q), (window.force, pull)):
-        assert 2 * np.trapezoid(column * turn, window.time) / np.ptp(window.time) == pytest.approx(
-            want, rel=1e-4
-        )
-    assert np.abs(window.acceleration).max() == pytest.approx(done.acceleration, rel=1e-4)
-    assert done.acceleration >= np.abs(window.acceleration).max() * (1 - 1e-13)
+    rotation = np.exp(-1j * window.time)
+    for column, expected in ((window.slide, slide_harmonic), (window.force, force_harmonic)):
+        assert 2 * np.trapezoid(column * rotation, window.time) / np.ptp(
+            window.time
+        ) == pytest.approx(expected, rel=1e-4)
+    assert np.abs(window.acceleration).max() == pytest.approx(result.acceleration, rel=1e-4)
+    assert result.acceleration >= np.abs(window.acceleration).max() * (1 - 1e-13)
 
 
 SWEPT = [
@@ -161,40 +170,43 @@ SWEPT = [
     ],
     ids=["linear", "log", "displacement", "log displacement", "record"],
 )
-def test_exact_sweeps_and_records_against_dop853(drive):
-    modes = basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3])
+def test_exact_sweeps_and_records_agree_with_dop853(drive):
+    """Final states under sweeps and a recorded signal agree with DOP853 within 1e-9."""
+    modes = make_basis([1.0, 2.2], [0.02, 0.01], [1.0, 0.5], [1.0, 0.6], [1.0, 0.3])
     k = [2.0, 1.0]
     y = [0.1, 0.3]
     end = 1.1 * drive.duration
-    done = simulate(modes, drive, [make_elements(k, y)], end / drive.period, window=2)
+    result = simulate(modes, drive, [make_elements(k, y)], end / drive.period, window=2)
     reference = Reference(modes, drive, [(k, y)])
     breaks = drive.breaks if isinstance(drive, RecordedDrive) else [drive.duration]
-    for stop in (*breaks, end):  # the integrator is stopped where the formula of the drive changes
-        want = reference.go(stop)
-    found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
-    assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
-    assert energy_balance(done.ledger) <= 1e-12
+    for stop in (*breaks, end):  # DOP853 is restarted where the drive changes its formula
+        expected = reference.go(stop)
+    state = np.concatenate([result.response.modal[-1], result.response.modal_rate[-1]])
+    assert np.abs(state - expected).max() <= 1e-9 * np.abs(expected).max()
+    assert energy_balance(result.ledger) <= 1e-12
     np.testing.assert_allclose(
-        done.window.base_acceleration, drive.values(done.window.time), atol=1e-11
+        result.window.base_acceleration, drive.values(result.window.time), atol=1e-11
     )
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
-    """Two equal masses with a mode in which they part: both sets of elements turn and yield at the same instants,
-    whichever stands first, and each moves as one mass alone does; equal forces leave the other mode at rest."""
+def test_exact_simultaneous_yields_of_two_equal_masses(mirrored):
+    """Two equal masses whose elements reverse and yield at the same instants move as one mass
+    alone, in either order. Their relative mode stays at rest."""
     h = np.sqrt(0.5)
     sign = -1.0 if mirrored else 1.0
     rows = np.array([[h, h], [sign * h, -sign * h]])
-    both = basis_of([1.0, 2.3], [0.02, 0.03], rows, [1.0, 0.0], [h, h])
-    alone = basis_of(1.0, 0.02, [h], [1.0])
+    two_masses = basis_of([1.0, 2.3], [0.02, 0.03], rows, [1.0, 0.0], [h, h])
+    one_mass = basis_of(1.0, 0.02, [h], [1.0])
     k = np.array([0.4, 1.0, 0.3])
     y = np.array([0.1, 0.3, 0.8])
-    one = simulate(alone, SineDrive(1.5, 1.1), [make_elements(2 * k, y)], 40, 5)
-    two = simulate(both, SineDrive(1.5, 1.1), [make_elements(k, y)] * 2, 40, 5)
-    np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=1e-11)
-    assert np.abs(two.response.modal[:, 1]).max() < 1e-11
-    assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-11)
-    np.testing.assert_allclose([loop.work for loop in two.loops], one.loops[0].work / 2, rtol=1e-11)
-    assert two.log.count == 2 * one.log.count
-    assert energy_balance(two.ledger) < 1e-12
+    expected = simulate(one_mass, SineDrive(1.5, 1.1), [make_elements(2 * k, y)], 40, 5)
+    result = simulate(two_masses, SineDrive(1.5, 1.1), [make_elements(k, y)] * 2, 40, 5)
+    np.testing.assert_allclose(result.amplitudes, expected.amplitudes, rtol=1e-11)
+    assert np.abs(result.response.modal[:, 1]).max() < 1e-11
+    assert result.ledger["friction"] == pytest.approx(expected.ledger["friction"], rel=1e-11)
+    np.testing.assert_allclose(
+        [loop.work for loop in result.loops], expected.loops[0].work / 2, rtol=1e-11
+    )
+    assert result.log.count == 2 * expected.log.count
+    assert energy_balance(result.ledger) < 1e-12

@@ -1,4 +1,5 @@
-"""Lists of events: borders of levels, of levels against one run, the last ones kept."""
+"""Lists of events: changes of the drive level, runs level by level, and the limited number of
+stored events."""
 
 import event_run
 import numpy as np
@@ -28,12 +29,14 @@ cycles = 25
 )
 
 
-def one_mode(zeta=0.003):
+def make_mode(zeta=0.003):
+    """Return a mode with natural frequency 1."""
     return basis_of(1.0, zeta)
 
 
-def test_exact_borders_of_levels_are_listed():
-    modes = one_mode(0.05)
+def test_exact_level_changes_are_listed():
+    """The changes of the drive level are listed at their times."""
+    modes = make_mode(0.05)
     drive = make_levels([1.0, 2.0, 0.5, 1.5], 0.9, 3)
     log = event_run.simulate(modes, drive, 0.6, 0.6, 12, 2).log
     assert log.time[log.kind == event_list.DRIVE_CHANGE] == pytest.approx(
@@ -41,23 +44,27 @@ def test_exact_borders_of_levels_are_listed():
     )
 
 
-def test_exact_levels_of_a_scene_are_those_of_one_run():
-    """The scene runs level after level; the list is that of one run through all segments."""
+def test_exact_events_of_scene_levels_agree_with_single_run():
+    """The events of a scene that runs level by level agree with a single run over all levels within
+    1e-10 s."""
     result = run(plan(RIG), estimate=False)
-    found = result.extra["events"]
+    events = result.extra["events"]
     model = result.plan.model
     drive = model.rig.drive.signal
     assert isinstance(drive, PiecewiseDrive)
     limit = 0.3 * model.point.load
-    whole = convert_event_log(event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log)
-    assert found.count == whole.count and found.kind.tolist() == whole.kind.tolist()
-    assert found.time == pytest.approx(whole.time, abs=1e-10)
-    assert found.slide == pytest.approx(whole.slide, abs=1e-12, nan_ok=True)
+    expected = convert_event_log(
+        event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log
+    )
+    assert events.count == expected.count and events.kind.tolist() == expected.kind.tolist()
+    assert events.time == pytest.approx(expected.time, abs=1e-10)
+    assert events.slide == pytest.approx(expected.slide, abs=1e-12, nan_ok=True)
 
 
-def test_exact_the_last_events_are_kept_and_all_counted():
-    """Four events in each cycle of a motion that slides both ways."""
-    modes = one_mode()
+def test_exact_last_events_are_stored_and_all_are_counted():
+    """Of a long motion with four events per cycle the last MAX_EVENTS events are stored, and all
+    are counted."""
+    modes = make_mode()
     drive = SineDrive(1.0, 1.0)
     cycles = event_list.MAX_EVENTS // 4 + 20_000
     log = event_run.simulate(modes, drive, 0.8, 0.8, cycles, 2).log
@@ -70,12 +77,13 @@ def test_exact_the_last_events_are_kept_and_all_counted():
     np.testing.assert_array_equal(log.kind[-4:], log.kind[-8:-4])
 
 
-def test_exact_events_of_the_drive_at_the_onset():
-    """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
-    log = event_run.simulate(one_mode(), SineDrive(1.0, 1.0), 0.8, 0.8, 200, 2).log
-    found = convert_event_log(log)
-    release = (found.kind == 1) | (found.kind == 2)
-    stop = found.kind == 0
+def test_exact_phases_of_release_and_slip_agree_with_known_values():
+    """At D = 0.8 and a damping ratio of 0.003 the releases have the phase 0.538622 and the slips
+    last 2.472613, within 1e-6."""
+    log = event_run.simulate(make_mode(), SineDrive(1.0, 1.0), 0.8, 0.8, 200, 2).log
+    events = convert_event_log(log)
+    release = (events.kind == 1) | (events.kind == 2)
+    stop = events.kind == 0
     assert log.phase[np.flatnonzero(release)[-10:]] % np.pi == pytest.approx(0.538622, abs=1e-6)
-    assert found.time[stop][-10:] - found.time[release][-10:] == pytest.approx(2.472613, abs=1e-6)
-    assert np.abs(found.slide[stop][-10:]) == pytest.approx(0.28704671337871602595, abs=1e-12)
+    assert events.time[stop][-10:] - events.time[release][-10:] == pytest.approx(2.472613, abs=1e-6)
+    assert np.abs(events.slide[stop][-10:]) == pytest.approx(0.28704671337871602595, abs=1e-12)

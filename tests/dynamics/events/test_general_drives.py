@@ -1,5 +1,5 @@
-"""The event engine under sweeps and recorded signals: against DOP853 with events, closed forms
-and energy."""
+"""The event engine under sweeps and recorded signals: against DOP853 with events, closed forms and
+energy balances."""
 
 import numpy as np
 import pytest
@@ -18,32 +18,33 @@ FALLING_SWEEP = SweepDrive(0.3, 0.1, 20.0, 1.0, None, True)
 DISPLACEMENT_SWEEP = SweepDrive(0.4, 0.05, 25.0, 0.0, 0.6, True)
 
 
-def record(seed, rows=40, end=30.0):
+def random_record(seed, count=40, duration=30.0):
+    """Return a recorded signal with random times and values."""
     rng = np.random.default_rng(seed)
-    time = np.sort(np.concatenate([[0.0, end], rng.uniform(0, end, rows - 2)]))
-    return RecordedDrive(time, np.concatenate([[0.0], rng.normal(size=rows - 2), [0.7]]), 5.0)
+    time = np.sort(np.concatenate([[0.0, duration], rng.uniform(0, duration, count - 2)]))
+    return RecordedDrive(time, np.concatenate([[0.0], rng.normal(size=count - 2), [0.7]]), 5.0)
 
 
-def agrees(modes, drive, static, ratio, end, count):
-    """Events and states of a run against DOP853 with events; count: stretches of the drive that
-    it meets."""
+def assert_agrees_with_dop853(modes, drive, static, ratio, end, count):
+    """Assert that events and states of a run agree with DOP853 with events; `count` limits the
+    segments of the drive."""
     n = modes.omega.size
-    wanted = run_reference(
+    expected = run_reference(
         modes, stretches(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n)
     )
-    found = [p for p in run(modes, drive, static, ratio * static, end) if p.span > 1e-9]
-    assert len(found) > 4
-    times = [w[0] for w in wanted]
-    states = np.array([w[2] for w in wanted])
-    size = np.abs(states).max()
-    for phase in found:
+    phases = [p for p in run(modes, drive, static, ratio * static, end) if p.span > 1e-9]
+    assert len(phases) > 4
+    times = [w[0] for w in expected]
+    states = np.array([w[2] for w in expected])
+    scale = np.abs(states).max()
+    for phase in phases:
         k = int(np.argmin(np.abs(np.array(times) - phase.time)))
         assert abs(times[k] - phase.time) < 1e-9
         np.testing.assert_allclose(
-            [s(0.0) for s in phase.modal], states[k], rtol=0, atol=1e-9 * size
+            [s(0.0) for s in phase.modal], states[k], rtol=0, atol=1e-9 * scale
         )
     np.testing.assert_allclose(
-        [s(found[-1].span) for s in found[-1].modal], states[-1], rtol=0, atol=1e-9 * size
+        [s(phases[-1].span) for s in phases[-1].modal], states[-1], rtol=0, atol=1e-9 * scale
     )
 
 
@@ -52,47 +53,53 @@ def agrees(modes, drive, static, ratio, end, count):
     "seed, drive, limits, ratio, end",
     [(0, LINEAR_SWEEP, [0.4], 1.0, 35.0), (3, DISPLACEMENT_SWEEP, [0.15, 0.15], 0.5, 14.0)],
 )
-def test_exact_sweeps_against_dop853(seed, drive, limits, ratio, end):
+def test_exact_sweeps_agree_with_dop853(seed, drive, limits, ratio, end):
+    """Events and states under sweeps agree with DOP853 within 1e-9."""
     modes = random_basis(np.random.default_rng(seed), 2, len(limits))
-    agrees(modes, drive, np.array(limits), ratio, end, 2)
+    assert_agrees_with_dop853(modes, drive, np.array(limits), ratio, end, 2)
 
 
-def test_exact_records_against_dop853():
+def test_exact_records_agree_with_dop853():
+    """Events and states under a recorded signal agree with DOP853 within 1e-9."""
     modes = random_basis(np.random.default_rng(8), 2, 1)
-    agrees(modes, record(2, 20, 20.0), np.array([0.25]), 0.6, 24.0, 99)
+    assert_agrees_with_dop853(modes, random_record(2, 20, 20.0), np.array([0.25]), 0.6, 24.0, 99)
 
 
-def test_exact_stiff_face_slides_once_a_record_passes_its_limit():
-    """A rigid block without spring: it slips while the ramp is above the limit, in closed form."""
+def test_exact_rigid_block_under_ramp_agrees_with_closed_form():
+    """A rigid block without a spring slips while a recorded ramp exceeds its friction limit; the
+    slide agrees with the closed form within 1e-13."""
     drive = RecordedDrive(np.array([0.0, 1.0, 2.0]), np.array([0.0, -2.0, -2.0]), 1.0)
-    # from t = .5 on v = t^2 - t/2, from t = 1 on v = .5 + 1.5 (t - 1), from t = 2 on v = 2 - .5 (t - 2)
-    wanted = {0.5: 0.0, 1.0: 5 / 48, 2.0: 5 / 48 + 1.25, 6.0: 5 / 48 + 5.25, 9.0: 5 / 48 + 5.25}
-    for time, slide in wanted.items():
-        done = simulate(basis_of([0.0]), drive, 1.0, 0.5, time, 1)
-        assert done.response.slide[-1] == pytest.approx(slide, rel=1e-13)
-    # release, the end of the record, stop
-    np.testing.assert_allclose(done.log.time, [0.5, 2.0, 6.0], rtol=1e-13)
+    # v = t^2 - t/2 for 0.5 < t < 1, 0.5 + 1.5 (t - 1) for 1 < t < 2, 2 - 0.5 (t - 2) for t > 2
+    expected = {0.5: 0.0, 1.0: 5 / 48, 2.0: 5 / 48 + 1.25, 6.0: 5 / 48 + 5.25, 9.0: 5 / 48 + 5.25}
+    for time, slide in expected.items():
+        result = simulate(basis_of([0.0]), drive, 1.0, 0.5, time, 1)
+        assert result.response.slide[-1] == pytest.approx(slide, rel=1e-13)
+    # release, end of the record, stop
+    np.testing.assert_allclose(result.log.time, [0.5, 2.0, 6.0], rtol=1e-13)
 
 
-def test_exact_the_end_of_a_record_is_a_border_where_it_jumps():
-    done = simulate(basis_of([1.0]), record(4), 5.0, 5.0, 8.0, 2)
-    assert list(done.log.kind) == [DRIVE_CHANGE] and done.log.time[0] == pytest.approx(30.0)
+def test_exact_end_of_record_is_a_drive_change():
+    """The end of a record with a nonzero last value is listed as a change of the drive."""
+    result = simulate(basis_of([1.0]), random_record(4), 5.0, 5.0, 8.0, 2)
+    assert list(result.log.kind) == [DRIVE_CHANGE] and result.log.time[0] == pytest.approx(30.0)
 
 
-def test_always_the_energy_of_a_sweep_and_a_record_balances():
-    for drive in (FALLING_SWEEP, record(7)):
+def test_always_energy_is_balanced_under_sweep_and_record():
+    """Under a sweep and a recorded signal the energy is balanced within 1e-12."""
+    for drive in (FALLING_SWEEP, random_record(7)):
         modes = random_basis(np.random.default_rng(1), 3, 2)
-        done = simulate(
+        result = simulate(
             modes, drive, np.array([0.3, 0.2]), np.array([0.2, 0.2]), 40.0 / drive.period
         )
-        assert energy_balance(done.ledger) < 1e-12 and done.ledger["friction"] > 0
+        assert energy_balance(result.ledger) < 1e-12 and result.ledger["friction"] > 0
 
 
 @settings(settings.get_profile("costly"))
 @given(st.floats(0.2, 0.9), st.floats(0.05, 1.0), st.integers(0, 10**6))
-def test_always_a_record_of_a_force_never_beyond_the_limit_moves_nothing(size, start, seed):
+def test_always_record_below_limit_causes_no_slip(size, start, seed):
+    """A recorded signal that stays below the static friction limit causes no slip."""
     rng = np.random.default_rng(seed)
     value = size * rng.uniform(-1, 1, 12)
     drive = RecordedDrive(np.linspace(0, 9, 12), value, 1.0)
-    done = simulate(basis_of([1.0]), drive, 1.0, start, 10.0)
-    assert not done.response.slide.any() and done.log.count <= 1
+    result = simulate(basis_of([1.0]), drive, 1.0, start, 10.0)
+    assert not result.response.slide.any() and result.log.count <= 1
