@@ -37,8 +37,8 @@ def test_always_linear_interpolation_of_peak_meets_tolerance(zeta, ends):
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
 def test_always_smaller_tolerance_is_met_with_few_points(tolerance):
-    """Smaller tolerances are met as well, with fewer than three times the number of optimally
-    placed points, int sqrt(|y''|/(8 tolerance y)) df."""
+    """Smaller tolerances are met with fewer than three times the optimal number of points, int
+    sqrt(|y''|/(8 tolerance y)) df."""
     frequencies, samples = sample_adaptively(
         lambda f, near: (magnification(f, 3e-3),), np.linspace(120, 170, 6), tolerance
     )

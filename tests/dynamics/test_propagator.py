@@ -51,10 +51,10 @@ def integrate_step(modes, drive, start, state, force, dt):
         z = y[:n]
         v = y[n : 2 * n]
         a = float(drive.values(np.array([start + t]))[0])
-        push = -modes.base * a - modes.slide * force / modes.mass
+        acceleration = -modes.base * a - modes.slide * force / modes.mass
         return [
             *v,
-            *(push - d @ v - modes.omega**2 * z),
+            *(acceleration - d @ v - modes.omega**2 * z),
             -modes.mass * a * (modes.base @ v),
             modes.mass * v @ d @ v,
         ]
@@ -64,12 +64,12 @@ def integrate_step(modes, drive, start, state, force, dt):
 
 
 def propagate_step(modes, propagator, drive, number, state, force):
-    """Return the same values and the slide increment from the coefficients of step `number`, in
-    NumPy."""
+    """Return state, work of the drive, viscous loss and slide increment from the coefficients of
+    step `number`, in NumPy."""
     n = modes.omega.size
     coefficients = propagator.tables(drive, number, 1)[0]
-    push = -modes.slide * force / modes.mass
-    x = np.concatenate([state, push])
+    acceleration = -modes.slide * force / modes.mass
+    x = np.concatenate([state, acceleration])
     if propagator.dense.size:
         new = propagator.dense @ x + coefficients[: 2 * n]
         quadratic = x @ propagator.dense_loss @ x
@@ -79,8 +79,8 @@ def propagate_step(modes, propagator, drive, number, state, force):
         zz, zv, vz, vv = propagator.free
         new = np.concatenate(
             [
-                zz * z + zv * v + propagator.push[0] * push,
-                vz * z + vv * v + propagator.push[1] * push,
+                zz * z + zv * v + propagator.push[0] * acceleration,
+                vz * z + vv * v + propagator.push[1] * acceleration,
             ]
         )
         new += coefficients[: 2 * n]
@@ -88,9 +88,9 @@ def propagate_step(modes, propagator, drive, number, state, force):
             propagator.loss[0] * z * z
             + propagator.loss[1] * z * v
             + propagator.loss[2] * v * v
-            + propagator.loss[3] * z * push
-            + propagator.loss[4] * v * push
-            + propagator.loss[5] * push * push
+            + propagator.loss[3] * z * acceleration
+            + propagator.loss[4] * v * acceleration
+            + propagator.loss[5] * acceleration * acceleration
         )
     work = coefficients[2 * n : 5 * n] @ x + coefficients[8 * n]
     loss = coefficients[5 * n : 8 * n] @ x + coefficients[8 * n + 1] + quadratic

@@ -63,8 +63,7 @@ RIGS = {
 
 @pytest.fixture
 def save_counter(monkeypatch):
-    """Save the state of marches after every second cycle; the list has one entry per saved
-    state."""
+    """Counter of saved states; marches save their state after every second cycle."""
     monkeypatch.setattr(march_run, "MAX_CYCLES_AT_ONCE", 2)
     saved = []
     save = checkpoint.save_checkpoint

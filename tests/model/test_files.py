@@ -166,7 +166,7 @@ def test_exact_check_and_run_report_same_profile_notes(tmp_path):
     assert json.loads(cli("check", tmp_path / "scene.toml", "--json").out)["notes"] == expected
 
 
-# ------------------------------------------------------------------------------------------------------- hostile files
+# ---- hostile files
 def x3p_bomb() -> bytes:
     """Return an X3P file whose 64 MiB of zero heights are compressed to 65 KB."""
     heights = bytes(64 * 2**20)

@@ -66,7 +66,7 @@ def comparable_result(result) -> tuple:
     return result.outcome, measure_values, result.warnings, histories, plan_values
 
 
-# ---- the model itself
+# ---- models
 
 
 @pytest.mark.parametrize("text, kind", KINDS.values(), ids=KINDS)
@@ -226,7 +226,7 @@ def test_exact_replaced_friction_equals_changed_scene_keys():
     )
 
 
-# ---- messages
+# ---- error messages
 
 TINY = SMALL_PATCH.replace('"0.5 mm"', '"0.2 um"')
 STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")

@@ -57,7 +57,7 @@ def test_exact_mirrored_nodes_are_spread_like_single_nodes():
     single = [
         cyclic_work(*spread_elements(k, y), slide) - cyclic_work(k, y, slide) for slide in slides
     ]
-    for separation, tolerance in ((1e-10, 1e-6), (1e-4, 0.4)):  # the middle node stands alone
+    for separation, tolerance in ((1e-10, 1e-6), (1e-4, 0.4)):  # the middle node has no counterpart
         pairs = (
             np.append(np.repeat(k[:-1] / 2, 2), k[-1]),
             np.append((y[:-1, None] * [1.0, 1.0 + separation]).ravel(), y[-1]),

@@ -44,7 +44,7 @@ def half_plane_compliance(count: int):
 
 # without sorting passes the order is corrected by exchanges, or by removing points one by one
 @pytest.mark.parametrize(
-    ("tries", "swaps"),
+    ("max_passes", "max_exchanges"),
     [
         (shear_modes.MAX_SORTING_PASSES, shear_modes.MAX_EXCHANGES),
         (0, shear_modes.MAX_EXCHANGES),
@@ -52,17 +52,19 @@ def half_plane_compliance(count: int):
     ],
 )
 @pytest.mark.parametrize("count", [1, 2, 7, 60])
-@pytest.mark.parametrize("local", [0.0, 0.05])
-def test_exact_yield_order_agrees_with_repeated_solution(count, local, tries, swaps, monkeypatch):
+@pytest.mark.parametrize("bond_length", [0.0, 0.05])
+def test_exact_yield_order_agrees_with_repeated_solution(
+    count, bond_length, max_passes, max_exchanges, monkeypatch
+):
     """Yield slides, forces and stiffnesses agree within 1e-11 with a system that is solved again
     after every yield."""
-    monkeypatch.setattr(shear_modes, "MAX_SORTING_PASSES", tries)
-    monkeypatch.setattr(shear_modes, "MAX_EXCHANGES", swaps)
+    monkeypatch.setattr(shear_modes, "MAX_SORTING_PASSES", max_passes)
+    monkeypatch.setattr(shear_modes, "MAX_EXCHANGES", max_exchanges)
     rng = np.random.default_rng(count)
     limit = rng.uniform(0.5, 2, count)
     c = half_plane_compliance(count)
-    group = jenkins_set(c, limit, local)
-    yield_slides, rates = solve_after_each_yield(c + np.diag(local / limit), limit)
+    group = jenkins_set(c, limit, bond_length)
+    yield_slides, rates = solve_after_each_yield(c + np.diag(bond_length / limit), limit)
     assert group.yield_displacement == pytest.approx(yield_slides, rel=1e-11)
     force_matrix = -np.diff(rates, axis=0, append=np.zeros((1, count))).T
     np.testing.assert_allclose(

@@ -39,8 +39,8 @@ def run_trials(names, fraction, seed):
 
 
 @pytest.fixture(scope="module", autouse=True)
-def warm_once(tmp_path_factory):
-    """Compile and import before the first campaign, once for all of them."""
+def warm_up(tmp_path_factory):
+    """Run the warm-up of the driver once for all campaigns."""
     driver.warm(run_command, tmp_path_factory.mktemp("warm"))
     original_warm = driver.warm
     driver.warm = lambda command, folder: None

@@ -17,7 +17,8 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a fo
 
 
 def run_trial(tmp_path, command, work=lambda trial: trial.run("run", "x.toml"), patience=0.02):
-    """Return the message of the driver about a command under one trial; if there is no fault."""
+    """Return the message of the driver about a command under one trial, or an empty string if there
+    is no fault."""
     return alone(
         work,
         lambda report: Trial(np.random.default_rng(0), tmp_path, command, report, patience),
@@ -28,27 +29,27 @@ def run_trial(tmp_path, command, work=lambda trial: trial.run("run", "x.toml"), 
 def make_printing_command(text, code=2):
     """Return a command that prints a text on stderr and returns an exit code."""
 
-    def command(words):
+    def command(arguments):
         print(text, file=sys.stderr)
         return code
 
     return command
 
 
-def crash(words):
+def crash(arguments):
     """Stop the process by a segmentation fault."""
     faulthandler.disable()
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
-def loop_for_a_minute(words):
+def loop_for_a_minute(arguments):
     """Use 60 CPU seconds, which is longer than a trial may take."""
     end = time.process_time() + 60
     while time.process_time() < end:
         pass
 
 
-def raise_error(words):
+def raise_error(arguments):
     """Raise an exception that the command does not handle."""
     raise ValueError("no word of this was meant for a person")
 
@@ -97,7 +98,7 @@ def test_always_error_inside_trial_is_reported(tmp_path):
 def test_always_stdout_and_stderr_are_captured(tmp_path):
     """The driver captures output of Python and of C code, on both streams, and the exit code."""
 
-    def command(words):
+    def command(arguments):
         os.write(2, b"from C\n")
         print("from Python")
         return 3

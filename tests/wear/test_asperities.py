@@ -20,19 +20,21 @@ def make_surfaces(shape=(40, 60), seed=0):
 
 
 @pytest.mark.parametrize("stroke", [0, 1, 4, 30])
-@pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 1.0])
-def test_exact_worn_volume_is_divided_by_wear_share(stroke, share):
+@pytest.mark.parametrize("upper_share", [0.0, 0.3, 0.5, 1.0])
+def test_exact_worn_volume_is_divided_by_wear_share(stroke, upper_share):
     """Each surface loses its prescribed fraction of the worn volume, and no height rises."""
     lower, upper = make_surfaces()
-    worn = rub(lower, upper, STEP, stroke * STEP, 7 * UM, upper_share=share, bite=0.2 * UM)
-    assert (lower - worn.lower).mean() == pytest.approx((1 - share) * 7 * UM, rel=1e-12, abs=1e-20)
-    assert (upper - worn.upper).mean() == pytest.approx(share * 7 * UM, rel=1e-12, abs=1e-20)
+    worn = rub(lower, upper, STEP, stroke * STEP, 7 * UM, upper_share=upper_share, bite=0.2 * UM)
+    assert (lower - worn.lower).mean() == pytest.approx(
+        (1 - upper_share) * 7 * UM, rel=1e-12, abs=1e-20
+    )
+    assert (upper - worn.upper).mean() == pytest.approx(upper_share * 7 * UM, rel=1e-12, abs=1e-20)
     assert (worn.lower <= lower).all() and (worn.upper <= upper).all()
 
 
 def test_exact_wear_without_stroke_truncates_combined_heights():
     """Without a stroke the sum of both surfaces is truncated at the plane above which the worn
-    volume lay, in one step or in many."""
+    volume was, in one step or in many."""
     lower, upper = make_surfaces()
     heights = np.sort((lower + upper).ravel())[::-1]
     volume_above = np.cumsum(heights) - heights * np.arange(
@@ -68,8 +70,8 @@ def test_exact_hard_plane_truncates_peaks_at_any_stroke(stroke):
 
 
 def test_exact_hard_surface_leaves_its_envelope():
-    """A hard rough surface leaves its envelope over the stroke in the soft one: every point touches
-    somewhere, and no point penetrates."""
+    """A hard rough surface leaves its envelope over the stroke in the soft surface: every point of
+    the soft surface touches at some position, and none penetrates."""
     hard = make_surfaces((40, 60))[0][::6]
     worn_surface = rub(
         hard, 0 * hard, STEP, 4 * STEP, 40 * UM, upper_share=1.0, bite=40 * UM / 16 / 2000

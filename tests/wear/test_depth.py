@@ -43,7 +43,7 @@ def critical_step(compliance, rate, active, prescribed: str = "load", positions=
 
 
 def make_contact_solver(compliance, x, gap, load=LOAD):
-    """Return a function that solves the contact under a normal load with prevented rotation."""
+    """Return a function that solves the contact under a normal load without rotation."""
 
     def press(worn, softening):
         return solve_forces(compliance + np.diag(softening), x, gap + worn, np.array([load]))[0]

@@ -32,7 +32,7 @@ AS_PYTHON = """\
 import pickle, sys
 sys.path[:0] = {paths!r}
 import test_as_python
-motions = [test_as_python.motion_of(*case) for case in test_as_python.CASES]
+motions = [test_as_python.compute_motion(*case) for case in test_as_python.CASES]
 assert "numba" not in sys.modules
 with open({file!r}, "wb") as file:
     pickle.dump(motions, file)
@@ -48,8 +48,8 @@ def make_interface(rng, kind: str):
     return make_coulomb_elements(*sorted(rng.uniform(0.2, 0.6, 2), reverse=True))
 
 
-def motion_of(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> dict:
-    """Run 6 cycles and return the histories, the events and what is read from the last cycles."""
+def compute_motion(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> dict:
+    """Run 6 cycles and return the histories, the events and the measures of the last cycles."""
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, n_modes, n_interfaces)
     groups = [make_interface(rng, kind) for _ in range(n_interfaces)]
@@ -79,7 +79,7 @@ def test_exact_python_motion_agrees_with_compiled_motion(python_motions, number)
     """The motion in plain Python agrees with the compiled one within 1e-11 of its size. A compiler
     may change the order of sums, and friction amplifies such differences."""
     python = python_motions[number]
-    compiled = motion_of(*CASES[number])
+    compiled = compute_motion(*CASES[number])
     assert python["events"] == compiled["events"] and python["events"][0] > 12
     for name, values in python["histories"].items():
         atol = 1e-11 * max(1.0, np.abs(values).max())

@@ -207,7 +207,7 @@ def test_exact_energy_balance_of_growing_motion(cycles):
 
 
 @pytest.mark.parametrize(
-    "omega, decay, om",
+    "omega, decay, drive_omega",
     [
         (1.0, 0.003, 1.0),
         (1.0, 0.0, 1.0),
@@ -225,7 +225,7 @@ def test_exact_energy_balance_of_growing_motion(cycles):
         (1e-3, 1e-5, 2.0),
     ],
 )
-def test_exact_motion_agrees_with_40_digit_arithmetic(omega, decay, om):
+def test_exact_motion_agrees_with_40_digit_arithmetic(omega, decay, drive_omega):
     """The motion under a sine from an initial speed agrees within 4e-14 with high-precision
     arithmetic over four decades of time. The cases include resonance, no damping, nearly critical
     damping and no spring."""
@@ -243,8 +243,10 @@ def test_exact_motion_agrees_with_40_digit_arithmetic(omega, decay, om):
     phase = 0.9
     amplitude = 0.7
     v0 = 0.3
-    drive = PiecewiseDrive((DriveSegment(0.0, 0.2, amplitude, om, phase),), 2 * pi / om)
-    times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
+    drive = PiecewiseDrive(
+        (DriveSegment(0.0, 0.2, amplitude, drive_omega, phase),), 2 * pi / drive_omega
+    )
+    times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(drive_omega, omega, 0.1)
     motion = evaluate_motion(
         modes,
         drive,
@@ -259,7 +261,7 @@ def test_exact_motion_agrees_with_40_digit_arithmetic(omega, decay, om):
         rates = [
             -w[0] + root + mpmath.mpf(10) ** -28,
             -w[0] - root - mpmath.mpf(10) ** -28,
-            mpmath.mpc(0, om) + mpmath.mpf(10) ** -29,
+            mpmath.mpc(0, drive_omega) + mpmath.mpf(10) ** -29,
             mpmath.mpf(10) ** -27,
         ]
         for k, u in enumerate(map(float, times)):
@@ -339,9 +341,9 @@ def test_exact_segmented_drives_agree_with_dop853(drive, zeta, static, kinetic):
         (0.45029613, 0.1698178, 0.42124622, 51),
     ],
 )
-def test_exact_motions_with_long_periods_above_kinetic_friction(friction, kinetic, ratio, periods):
-    """If static friction exceeds kinetic friction, some motions are periodic only after many
-    cycles, and not after a divisor of that number."""
+def test_exact_long_periods_with_kinetic_below_static_friction(friction, kinetic, ratio, periods):
+    """With kinetic below static friction some motions have a period of many drive cycles, and no
+    shorter period."""
     result = run_case(friction, 0.05 if friction > 0.7 else 0.003, ratio, 4000, kinetic=kinetic)
     last = result.amplitudes[-2 * periods - 2 :]
     amplitude = np.abs(result.amplitudes[-periods:]).max()

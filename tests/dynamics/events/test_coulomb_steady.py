@@ -105,7 +105,8 @@ def test_exact_steady_amplitudes_agree_with_runs():
 @pytest.mark.share(0)
 @pytest.mark.parametrize("level, ratio, n_stops", [(3.0, 0.11, 4), (2.0, 0.06, 8), (2.0, 0.05, 10)])
 def test_exact_number_of_stops_below_resonance(level, ratio, n_stops):
-    """A slow drive gives the same number of stops per cycle and the same amplitude as a run."""
+    """The steady motion under a slow drive has the same number of stops per cycle and the same
+    amplitude as a long run."""
     modes = basis_of(1.0, 0.0005)
     drive = SineDrive(level, ratio)
     motion = steady(modes, drive, 1.0, 1.0)
@@ -135,7 +136,7 @@ def test_refuses_drive_that_is_not_periodic():
         steady(basis_of(1.0), drives.make_levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
 
 
-def make_two_interfaces(seed=2, ratio=1.0):
+def make_two_interface_rig(seed=2, ratio=1.0):
     """Return modes, drive and friction limits of a random rig with two interfaces."""
     rng = np.random.default_rng(seed)
     modes = random_basis(rng, 3, 2)
@@ -148,7 +149,7 @@ def make_two_interfaces(seed=2, ratio=1.0):
 def test_exact_two_interfaces_agree_with_run(seed, ratio):
     """The steady motion of two interfaces has the amplitude of a run of 400 cycles and repeats
     after one cycle."""
-    modes, drive, static, kinetic = make_two_interfaces(seed, ratio)
+    modes, drive, static, kinetic = make_two_interface_rig(seed, ratio)
     motion = steady(modes, drive, static, kinetic)
     assert motion.amplitude == pytest.approx(
         run_amplitude(modes, drive, static, kinetic, 400), rel=1e-8
@@ -164,20 +165,21 @@ def test_exact_two_interfaces_agree_with_run(seed, ratio):
 
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
-    "seed, n, faces, ratio", [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)]
+    "seed, n_modes, n_interfaces, ratio",
+    [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)],
 )
-def test_exact_derivative_of_map_agrees_with_differences(seed, n, faces, ratio):
+def test_exact_derivative_of_map_agrees_with_differences(seed, n_modes, n_interfaces, ratio):
     """The derivative of the event map, with its saltation matrices, agrees with central differences
     within 3e-8."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n, faces)
-    static = rng.uniform(0.2, 1.0, faces)
-    x = rng.normal(size=2 * n)
+    modes = random_basis(rng, n_modes, n_interfaces)
+    static = rng.uniform(0.2, 1.0, n_interfaces)
+    x = rng.normal(size=2 * n_modes)
     drive = SineDrive(1.0, 1.2)
     step = 1e-6
     mapped = period_map(modes, drive, static, ratio * static, x)
-    for j in range(2 * n):
-        direction = np.zeros(2 * n)
+    for j in range(2 * n_modes):
+        direction = np.zeros(2 * n_modes)
         direction[j] = step
         ends = [
             period_map(modes, drive, static, ratio * static, x + s * direction).end for s in (1, -1)
@@ -186,7 +188,8 @@ def test_exact_derivative_of_map_agrees_with_differences(seed, n, faces, ratio):
 
 
 def test_exact_steady_motion_of_figure_16():
-    """The steady motion of figure 16 has two stops, and its amplitude agrees within 2e-8."""
+    """The steady motion of figure 16 of the report has two stops, and its amplitude agrees with the
+    report within 2e-8."""
     h = sqrt(0.5)
     modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
     drive = SineDrive(1.0, 1.14)
@@ -196,8 +199,8 @@ def test_exact_steady_motion_of_figure_16():
 
 
 def test_exact_simultaneous_events_are_reported():
-    """The steady motion states whether events of two interfaces coincide, which makes its
-    derivative invalid."""
+    """A steady motion reports whether events of two interfaces coincide, which makes the derivative
+    of its map invalid."""
     modes = basis_of([1.0, 1.0], 0.05, np.eye(2), (1, 1), (1, 0))
     assert not steady(modes, SineDrive(1.5, 0.9), 0.5, 0.5).alone
     assert steady(modes, SineDrive(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone

@@ -42,7 +42,7 @@ def interface_slides(modes, phase, times):
 
 @pytest.mark.share(1, 2)
 @pytest.mark.parametrize(
-    "seed, n, faces, ratio, rigid",
+    "seed, n_modes, n_interfaces, ratio, rigid",
     [
         (1, 3, 2, 1.0, False),
         (2, 3, 2, 0.6, False),
@@ -51,14 +51,14 @@ def interface_slides(modes, phase, times):
         (6, 4, 3, 0.7, False),
     ],
 )
-def test_exact_coupled_systems_agree_with_dop853(seed, n, faces, ratio, rigid):
+def test_exact_coupled_systems_agree_with_dop853(seed, n_modes, n_interfaces, ratio, rigid):
     """Directions, times and states at all events of coupled systems agree with DOP853 within
     1e-10."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n, faces, True, rigid)
-    static = rng.uniform(0.2, 1.0, faces)
+    modes = random_basis(rng, n_modes, n_interfaces, True, rigid)
+    static = rng.uniform(0.2, 1.0, n_interfaces)
     drive = SineDrive(1.0, 1.2)
-    start = random_start(rng, n)
+    start = random_start(rng, n_modes)
     expected = run_reference(
         modes, drive.segments, static, ratio * static, 6 * drive.period, start.z, start.v
     )
@@ -136,14 +136,16 @@ def test_order_dependent_interfaces_agree_with_moreau_scheme():
     st.booleans(),
     st.booleans(),
 )
-def test_always_friction_law_and_energy_balance_hold(seed, n, faces, ratio, coupled, rigid):
+def test_always_friction_law_and_energy_balance_hold(
+    seed, n_modes, n_interfaces, ratio, coupled, rigid
+):
     """For random systems the energy is balanced, friction forces keep their limits, sliding forces
     oppose the slide, and stuck interfaces do not move."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n, faces, coupled, rigid)
-    static = rng.uniform(0.05, 1.5, faces)
+    modes = random_basis(rng, n_modes, n_interfaces, coupled, rigid)
+    static = rng.uniform(0.05, 1.5, n_interfaces)
     drive = SineDrive(rng.uniform(0.2, 2.0), rng.uniform(0.5, 2.0))
-    start = random_start(rng, n)
+    start = random_start(rng, n_modes)
     result = simulate(modes, drive, static, ratio * static, 4, 4, start=start)
     assert energy_balance(result.ledger) < 1e-10 and result.ledger["friction"] > 0
     speed = max(1.0, np.abs(result.response.modal_rate).max())
@@ -194,7 +196,7 @@ def test_exact_stuck_slides_are_constant():
     assert np.all(np.abs(extra["forces"]) <= static * (1 + 1e-9))
 
 
-# several interfaces at once
+# simultaneous events of several interfaces
 
 
 @pytest.mark.parametrize("joined", [False, True])
@@ -262,8 +264,8 @@ def test_exact_dependent_interfaces_slip_at_sum_of_limits():
 
 @pytest.mark.parametrize("count", [7, 16])
 def test_exact_many_interfaces_stop_and_slip_simultaneously(count):
-    """Seven or sixteen equal blocks move as one block does. Seven is more than are tried one by
-    one, and sixteen is more than those of which all combinations are tried."""
+    """Seven or sixteen equal blocks move as one block does. These numbers exceed the limits up to
+    which interfaces are tried one by one, and in all combinations."""
     modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
     drive = SineDrive(1.0, 1.1)
     result = simulate(modes, drive, 0.5, 0.5, 6, 6)
@@ -273,23 +275,23 @@ def test_exact_many_interfaces_stop_and_slip_simultaneously(count):
     assert energy_balance(result.ledger) < 1e-10
 
 
-def check_directions_at_rest(seed, n, faces, ratio):
+def check_directions_at_rest(seed, n_modes, n_interfaces, ratio):
     """Assert that accelerations agree with the slip directions and forces with their limits, for
     interfaces at rest."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n, faces)
-    static = rng.uniform(0.1, 1.0, faces)
-    z = rng.normal(size=n)
-    v = np.zeros(n)
+    modes = random_basis(rng, n_modes, n_interfaces)
+    static = rng.uniform(0.1, 1.0, n_interfaces)
+    z = rng.normal(size=n_modes)
+    v = np.zeros(n_modes)
     rows = np.asarray(modes.interfaces)
     drive = drives.PiecewiseDrive((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
     event_run, row = rows_of(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
     values = event_run.evaluate_rows(row, np.zeros(1, np.int64), np.zeros(1))[0]
-    forces = values[2 * n + 3 :: 6]
+    forces = values[2 * n_modes + 3 :: 6]
     acceleration = (
-        -(modes.omega**2) * values[:n]
-        - modes.damping_matrix @ values[n : 2 * n]
-        - modes.base * values[2 * n]
+        -(modes.omega**2) * values[:n_modes]
+        - modes.damping_matrix @ values[n_modes : 2 * n_modes]
+        - modes.base * values[2 * n_modes]
     )
     accel = rows @ (acceleration - forces @ rows / modes.mass)
     assert np.all(np.abs(forces) <= static * (1 + 1e-9))
@@ -304,10 +306,12 @@ def check_directions_at_rest(seed, n, faces, ratio):
 
 
 @given(st.integers(0, 10**6), st.integers(5, 16), st.floats(0.3, 1.0))
-def test_always_interfaces_at_rest_satisfy_friction_law(seed, faces, ratio):
+def test_always_interfaces_at_rest_satisfy_friction_law(seed, n_interfaces, ratio):
     """Up to 16 independent interfaces at rest, or up to 8 dependent ones, satisfy the friction
     law."""
-    check_directions_at_rest(seed, max(8, faces) if faces > 8 or seed % 2 else 4, faces, ratio)
+    check_directions_at_rest(
+        seed, max(8, n_interfaces) if n_interfaces > 8 or seed % 2 else 4, n_interfaces, ratio
+    )
 
 
 def test_always_unsolved_combination_is_refused():
@@ -323,7 +327,7 @@ def test_always_unsolved_combination_is_refused():
     assert 0 < refused < 10
 
 
-# starts, drives and printed numbers
+# initial states, drives and published values
 
 FREE = drives.make_release(2 * pi)
 
@@ -345,29 +349,29 @@ def test_exact_mass_on_belt_agrees_with_closed_form():
 
 
 @pytest.mark.parametrize(
-    "d, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)]
+    "friction, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)]
 )
-def test_exact_amplitude_near_onset_of_slip(d, peak):
+def test_exact_amplitude_near_onset_of_slip(friction, peak):
     """Amplitudes near the onset of slip agree with known values within 1e-11."""
-    result = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), d, d, 30, 30)
+    result = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), friction, friction, 30, 30)
     assert np.abs(result.amplitudes[-1]).max() == pytest.approx(peak, rel=1e-11)
 
 
-@pytest.mark.parametrize("miss", [1e-4, 1e-6, 1e-8, 1e-10])
-def test_exact_first_slip_tends_to_asymptotic_form(miss):
-    """Near the onset the first slip tends to 9/2 (1 - D)^2. The tolerance includes the condition
-    number of the release, eps/(1 - D)."""
-    phases = list(run(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 1 - miss, 1 - miss, pi))
+@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8, 1e-10])
+def test_exact_first_slip_tends_to_asymptotic_form(distance):
+    """At a distance 1 - D from the onset the first slip tends to 9/2 (1 - D)^2. The tolerance
+    includes the condition number of the release, eps/(1 - D)."""
+    phases = list(run(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 1 - distance, 1 - distance, pi))
     stop = next(p for p in phases[1:] if p.direction == 0)
     slip = abs(stop.modal[0](0.0))
-    assert slip == pytest.approx(4.5 * miss**2, rel=3 * sqrt(miss) + 1e-15 / miss)
-    if miss == 1e-6:
+    assert slip == pytest.approx(4.5 * distance**2, rel=3 * sqrt(distance) + 1e-15 / distance)
+    if distance == 1e-6:
         assert slip == pytest.approx(4.4988e-12, rel=2e-5)
 
 
 def test_exact_phases_after_a_million_cycles():
-    """A motion that starts from stick after a million cycles has the same events at the same phases
-    as one that starts at time zero, within 1e-14."""
+    """A motion that begins after a million cycles of stick has the same events at the same phases
+    as one that begins at time zero, within 1e-14."""
     rate = 2 * pi * 0.37
     drive = drives.make_levels([0.5, 1.25], rate, 10**6)
     modes = basis_of(rate, 0.003)
@@ -440,7 +444,9 @@ def test_refuses_start_beyond_travel():
         travel=2.0,
         start=InitialState(np.array([1.0]), np.array([3.0])),
     )
-    assert result.outcome is Outcome.EXCEEDS_TRAVEL  # 1.1 cos t + 3 sin t - 0.1 passes 2
+    assert (
+        result.outcome is Outcome.EXCEEDS_TRAVEL
+    )  # the displacement 1.1 cos t + 3 sin t - 0.1 exceeds 2
     time = result.response.time[-1]
     assert 1.1 * cos(time) + 3 * sin(time) - 0.1 == pytest.approx(2.0, rel=1e-12) and time < 1
     assert energy_balance(result.ledger) < 1e-12

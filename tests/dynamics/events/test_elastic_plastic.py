@@ -75,8 +75,8 @@ def test_exact_two_interfaces_agree_with_dop853():
 
 
 def test_exact_simultaneous_reversals_of_output_and_slide():
-    """A run is the same whether or not the output is the slide of an interface, so that both
-    reverse at the same instants."""
+    """The motion does not change if the output is the slide of an interface, so that output and
+    slide reverse simultaneously."""
     faces = np.array([[1.0, 0.4], [0.3, -1.0]])
     drive = SineDrive(1.0, 1.4)
     groups = [make_elements([2.0], [0.1]), make_elements([1.5], [0.12])]

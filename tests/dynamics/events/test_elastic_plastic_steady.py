@@ -131,7 +131,7 @@ def test_exact_two_interfaces_agree_with_long_run():
     np.testing.assert_allclose(repeated.end[0].v, motion.start.v, rtol=1e-12)
 
 
-def difference_map(period_map, drive, point, half, step):
+def derivative_by_differences(period_map, drive, point, half, step):
     """Return the derivative of a map by central differences."""
     out = []
     for k in range(point.unknowns.size):
@@ -164,7 +164,7 @@ def test_exact_derivative_of_map_agrees_with_differences(rig, half):
     )
     # between two events the map is smooth, so that central differences have second-order errors
     errors = [
-        np.abs(difference_map(period_map, drive, motion.point, half, step) - slope).max()
+        np.abs(derivative_by_differences(period_map, drive, motion.point, half, step) - slope).max()
         for step in (4e-6, 2e-6)
     ]
     assert errors[0] < 1e-6 * np.abs(slope).max()
@@ -202,7 +202,7 @@ def test_refuses_motion_that_is_not_periodic():
     with pytest.raises(PatchfemError, match="a single sine without end"):
         steady(ONE, make_levels([1.0, 2.0], 1.0, 5), group)
     free = make_basis([1.0], [0.0], [1.0], [1.0], [1.0])
-    with pytest.raises(NotConverged, match="grows from period to period"):  # 0.7 is below pi/4
+    with pytest.raises(NotConverged, match="grows from period to period"):  # limit 0.7 < pi/4
         steady(free, SineDrive(1.0, 1.0), [make_elements([20.0], [0.7 / 20])])
 
 

@@ -96,10 +96,10 @@ def test_always_energy_is_balanced_under_sweep_and_record():
 
 @settings(settings.get_profile("costly"))
 @given(st.floats(0.2, 0.9), st.floats(0.05, 1.0), st.integers(0, 10**6))
-def test_always_record_below_limit_causes_no_slip(size, start, seed):
+def test_always_record_below_limit_causes_no_slip(fraction, kinetic, seed):
     """A recorded signal that stays below the static friction limit causes no slip."""
     rng = np.random.default_rng(seed)
-    value = size * rng.uniform(-1, 1, 12)
+    value = fraction * rng.uniform(-1, 1, 12)
     drive = RecordedDrive(np.linspace(0, 9, 12), value, 1.0)
-    result = simulate(basis_of([1.0]), drive, 1.0, start, 10.0)
+    result = simulate(basis_of([1.0]), drive, 1.0, kinetic, 10.0)
     assert not result.response.slide.any() and result.log.count <= 1

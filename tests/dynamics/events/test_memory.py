@@ -14,7 +14,8 @@ from patchfem.dynamics.events.elements import (
 
 
 class SlideTracker:
-    """Elements along a prescribed slide, by the memory of the event engine and one by one."""
+    """Parallel elements along a prescribed slide, tracked by the memory of the event engine and one
+    by one."""
 
     def __init__(self, stiffness, yield_displacement):
         self.k = np.asarray(stiffness, float)

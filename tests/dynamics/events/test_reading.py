@@ -204,7 +204,7 @@ def test_exact_ringing_of_stuck_element_agrees_with_closed_form():
 
 
 def test_exact_short_sticks_have_no_ringing():
-    """If the periods of stick are short, no ringing is stated."""
+    """If the periods of stick are short, no ringing is reported."""
     result = histories.simulate(
         make_mode(1.0, 0.02), SineDrive(1.0, 1.0), [make_elements([3.0], [0.1])], 20, window=4
     )

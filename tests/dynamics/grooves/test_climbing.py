@@ -103,8 +103,8 @@ def test_exact_slow_slide_agrees_with_numpy_law(law):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_always_short_bonds_converge_to_coulomb_friction(law):
-    """With ever shorter bonds the amplitude converges to that of Coulomb friction, and differs by
-    less than 3 % at the shortest length."""
+    """As the bond length decreases, the amplitude converges to that of Coulomb friction. At the
+    shortest length the difference is below 3 %."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3)
     limit = march(
         BASIS, DRIVE, make_model(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3

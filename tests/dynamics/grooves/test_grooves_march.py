@@ -125,15 +125,15 @@ def test_exact_normal_load_and_stored_energy_agree_with_dop853(seed):
     )
 
 
-@pytest.mark.parametrize("place", [0.0, 0.1, -0.2, 0.45])
-def test_exact_breakaway_at_force_limits_of_flank(place):
+@pytest.mark.parametrize("position", [0.0, 0.1, -0.2, 0.45])
+def test_exact_breakaway_at_force_limits_of_flank(position):
     """A force just below N (t + mu)/(1 - mu t) or just above N (t - mu)/(1 + mu t) leaves the mass
     at rest, and a force just outside these limits moves it."""
     grooves = Grooves(80e-6, 5e-6)
     basis = make_mode(0.0)
     load = 100.0
     mu = 0.3
-    q = place * 80e-6
+    q = position * 80e-6
     t = flank(case_of(0)._replace(wavelength=80e-6, amplitude=5e-6, phase=0.0), q)[0]
     for direction, limit in (
         (1, load * (t + mu) / (1 - mu * t)),

@@ -37,7 +37,7 @@ STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
 
 
-# ---- following a curve
+# ---- continuation of a curve
 
 
 def test_exact_continuation_follows_circle_through_fold():
@@ -80,7 +80,7 @@ def test_refuses_start_without_nearby_branch():
         )
 
 
-# ---- the fold of the stiffened rig
+# ---- folds of the rig with a cubic spring
 
 
 def duffing_equation(drive, friction=0.0):
@@ -166,7 +166,7 @@ def test_refuses_invalid_sweep_values():
             trace_over_level(RIG, SineDrive(1.0, W), STIFF, values)
 
 
-# ---- multipliers
+# ---- Floquet multipliers
 
 
 def test_exact_multipliers_of_linear_modes_agree_with_closed_form():
@@ -233,7 +233,7 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
     assert monodromy == pytest.approx(columns, abs=2e-5)
 
 
-# ---- backbone
+# ---- backbones
 
 
 def test_exact_jacobian_of_free_balance_agrees_with_differences():

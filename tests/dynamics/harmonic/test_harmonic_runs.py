@@ -35,8 +35,8 @@ DRIVE = SineDrive(1.0, 1.0)
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
 def test_exact_measures_agree_with_marched_scene(law):
-    """The measures of the balance agree within 2e-3 with a scene that is marched for 300 cycles at
-    5 g."""
+    """The measures of the balance agree within 2e-3 with those of a scene that is integrated in
+    time for 300 cycles at 5 g."""
     scene = loads(SCENE.format(law=law), sets=["drive.cycles=300"])
     result = run(plan(scene), estimate=False)
     measures = result.measures
@@ -157,7 +157,7 @@ def test_exact_regimes_of_slide_amplitudes():
 @pytest.mark.parametrize("limit, bounded", [(0.9, True), (0.7, False)])
 def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bounded):
     """An undamped mode at resonance has a bounded motion if the friction limit exceeds pi/4 of the
-    drive. Below, no motion balances, and the message names the reason."""
+    drive. Below this threshold there is no periodic motion, and the message names the reason."""
     modes = sdof(0.0)
     law = Jenkins([20.0], [limit / 20.0])
     if not bounded:
@@ -185,8 +185,8 @@ def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bou
 
 
 def test_refuses_tolerance_beyond_maximum_harmonics():
-    """For a nearly rigid element 255 harmonics do not reach a tolerance of 1e-12, and the error
-    states the remaining one."""
+    """For a nearly rigid element 255 harmonics do not reach a tolerance of 1e-12, and the message
+    states the remaining error."""
     with pytest.raises(NotConverged, match="the motion still has an error"):
         find_point(
             sdof(0.05), SineDrive(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12

@@ -1,4 +1,4 @@
-"""Cases that are integrated side by side in lanes: against single runs, finer steps and energy
+"""Cases integrated side by side in lanes, against single runs, runs with finer steps and energy
 balances."""
 
 import numpy as np
@@ -13,7 +13,7 @@ RATE_LAWS = tuple(
     f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre")
 )
 LAWS = "rigid", "yielding", "masing", "table", *RATE_LAWS
-QUICK_SHARE = 0, 1, 2, 3, 5  # each law compiles its own loop; only one rate law is always tested
+QUICK_CASES = 0, 1, 2, 3, 5  # each law compiles its own loop; only one rate law is always tested
 
 
 def make_cases(law: str, count: int, seed: int = 1) -> run.Cases:
@@ -122,7 +122,7 @@ def test_always_steep_laws_need_no_fine_steps(law, scale, max_error):
 
 
 # each of these laws compiles its own loop
-LAWS_OF_SKIPS = (
+SKIP_LAWS = (
     "rigid",
     "yielding",
     "masing",
@@ -131,7 +131,7 @@ LAWS_OF_SKIPS = (
 )
 
 
-@pytest.mark.parametrize("law", LAWS_OF_SKIPS)
+@pytest.mark.parametrize("law", SKIP_LAWS)
 def test_exact_skipped_cycles_agree_with_marched_cycles(law):
     """A march that skips cycles of a nearly periodic motion agrees within 2e-6 with marches of
     three cycles at a time, which skip none."""
@@ -178,7 +178,7 @@ def test_exact_no_cycles_are_skipped_with_extremes_at_cycle_ends():
     np.testing.assert_allclose(history[0, -1], part[0, -1], rtol=0, atol=1e-6)
 
 
-@pytest.mark.share(*QUICK_SHARE)
+@pytest.mark.share(*QUICK_CASES)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_case_does_not_depend_on_other_lanes(law):
     """The result of a case is bit-identical in any lane, with any other cases beside it, and after
@@ -191,7 +191,7 @@ def test_exact_case_does_not_depend_on_other_lanes(law):
         np.testing.assert_array_equal(getattr(permuted, name), getattr(reference, name)[order])
 
 
-@pytest.mark.share(*QUICK_SHARE)
+@pytest.mark.share(*QUICK_CASES)
 @pytest.mark.parametrize("law", LAWS)
 def test_order_amplitudes_converge_with_order_above_three(law):
     """Between events a step is exact and events are located with fourth order, so that most
@@ -212,7 +212,7 @@ def test_order_amplitudes_converge_with_order_above_three(law):
     )
 
 
-@pytest.mark.share(*QUICK_SHARE)
+@pytest.mark.share(*QUICK_CASES)
 @pytest.mark.parametrize("law", LAWS)
 def test_always_energy_balance_improves_with_steps(law):
     """At 96 steps per cycle the energy balance of 98 % of the cases closes within 1e-4. Twice the

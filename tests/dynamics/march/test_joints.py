@@ -309,8 +309,8 @@ STEEP_LAWS = [
 
 @pytest.mark.parametrize("seed", STICK_OR_SLIP + STEEP_LAWS)
 def test_always_difficult_random_chains_converge(seed):
-    """Chains in which a step was once not solved, because the states of stick and slip were not
-    found, converge."""
+    """Random chains converge in which the states of stick and slip of one step were once not
+    found."""
     assert march_random_chain(seed)[0].outcome is None
 
 
@@ -322,8 +322,8 @@ def test_always_difficult_random_chains_converge(seed):
 def test_order_two_for_coupled_stops_with_kinetic_below_static(
     seed, n_interfaces, n_modes, coupled
 ):
-    """Amplitudes of coupled interfaces with stops and releases converge to those of the event
-    engine by a factor of at least 4 per fourfold number of steps."""
+    """For coupled interfaces with stops and releases the difference to the event engine falls by a
+    factor of at least 4 with four times the steps."""
     rng = np.random.default_rng(seed)
     rows = rng.uniform(-1, 1, (n_interfaces, n_modes))
     root = rng.normal(size=(n_modes, n_modes))

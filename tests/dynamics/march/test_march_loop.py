@@ -68,7 +68,7 @@ def test_exact_list_on_path_agrees_with_quadrature(order):
 
 
 def march_nodal_deflections(law, compliance, area, sigma, path):
-    """Return the results of the same steps and the deflections without shear modes.
+    """Return the forces and losses of each step and the final deflections, without shear modes.
 
     The nodal deflections satisfy (d_0 + d_1)/2 = C f, where f are the mean nodal forces of a step.
     """
@@ -124,8 +124,8 @@ def test_exact_shear_modes_agree_with_nodal_deflections(stiffness, step):
     assert not contact.psi[:, 24:].any() and not contact.weight[24:].any()
 
 
-@pytest.mark.parametrize("size", [3.0, 30.0])
-def test_exact_gross_slip_in_closed_form_agrees_with_solution(size):
+@pytest.mark.parametrize("level", [3.0, 30.0])
+def test_exact_gross_slip_in_closed_form_agrees_with_iteration(level):
     """Steps of gross slip that use a closed form agree within 2e-9 with steps that solve for all
     points."""
     law, compliance, x = Bonds(0.4, 1e-6), *half_plane_compliance(24, 1e-10)
@@ -135,7 +135,7 @@ def test_exact_gross_slip_in_closed_form_agrees_with_solution(size):
         law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8)
     )
     modes = one_mode(OMEGA, 0.05, 1.0)
-    drive = SineDrive(size * 9.80665, OMEGA)
+    drive = SineDrive(level * 9.80665, OMEGA)
     fast, general = (start_run(modes, drive, model, 200) for _ in range(2))
     rows = fast.march_cycle(600, 0, [])[1]
     n_closed_form = 0
@@ -152,7 +152,7 @@ def test_exact_gross_slip_in_closed_form_agrees_with_solution(size):
     assert fast.ledger[[0, 1, 3, 8]] == pytest.approx(general.ledger[[0, 1, 3, 8]], rel=1e-9)
 
 
-# ---- marches
+# ---- forced motion
 
 
 @pytest.mark.parametrize(

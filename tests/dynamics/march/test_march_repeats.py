@@ -62,12 +62,12 @@ CASES = {
 }
 
 
-def march_and_count(case: str, monkeypatch, repeats: bool, **options):
+def march_and_count(case: str, monkeypatch, extrapolates: bool, **options):
     """Return the result of a march and the fraction of its steps that were computed."""
     basis, model = CASES[case]()
     steps = []
     march_rows = marching.Run._march_rows
-    monkeypatch.setattr(marching_run, "PERIODIC_TOL", 1e-12 if repeats else -1.0)
+    monkeypatch.setattr(marching_run, "PERIODIC_TOL", 1e-12 if extrapolates else -1.0)
     monkeypatch.setattr(
         marching.Run,
         "_march_rows",
@@ -85,18 +85,28 @@ def assert_close(found, expected, tolerance: float) -> None:
     )
 
 
-@pytest.mark.parametrize("whole", [True, False])
+@pytest.mark.parametrize("keeps_samples", [True, False])
 @pytest.mark.parametrize(
     "case", [*list(CASES)[:-1], pytest.param("a changing load", marks=pytest.mark.slow)]
 )
-def test_exact_extrapolated_cycles_agree_with_complete_march(case, whole, monkeypatch):
+def test_exact_extrapolated_cycles_agree_with_complete_march(case, keeps_samples, monkeypatch):
     """Histories, extremes, phasors, energies and fields of a march that omits periodic cycles agree
     with a complete march within 1e-10."""
     extrapolated, fraction = march_and_count(
-        case, monkeypatch, True, keeps_samples=whole, frames=3, marks=(60, CYCLES) if whole else ()
+        case,
+        monkeypatch,
+        True,
+        keeps_samples=keeps_samples,
+        frames=3,
+        marks=(60, CYCLES) if keeps_samples else (),
     )
     complete, complete_fraction = march_and_count(
-        case, monkeypatch, False, keeps_samples=whole, frames=3, marks=(60, CYCLES) if whole else ()
+        case,
+        monkeypatch,
+        False,
+        keeps_samples=keeps_samples,
+        frames=3,
+        marks=(60, CYCLES) if keeps_samples else (),
     )
     assert fraction < 0.75 and complete_fraction == 1.0
     for name in ("time", "modal", "modal_rate", "slide", "force", "slip", "acceleration"):

@@ -47,25 +47,25 @@ def march_both_ways(basis, acceleration: float, cycles: float, steps: int = 80, 
 def test_exact_condensed_cycles_agree_with_complete_samples(basis, acceleration, cycles):
     """Extremes, phasors, last cycles and energies agree within 1e-12 with a march that keeps its
     samples."""
-    complete, folded = march_both_ways(basis, acceleration, cycles)
-    assert_close(folded.amplitudes, complete.amplitudes)
-    assert_close(folded.phasors, complete.phasors)
+    complete, condensed = march_both_ways(basis, acceleration, cycles)
+    assert_close(condensed.amplitudes, complete.amplitudes)
+    assert_close(condensed.phasors, complete.phasors)
     for name in ("slide", "slide_rate", "force", "slip"):
-        assert_close(getattr(folded.window, name), getattr(complete.window, name))
-    assert {name: folded.ledger[name] for name in LEDGER_NAMES} == pytest.approx(
+        assert_close(getattr(condensed.window, name), getattr(complete.window, name))
+    assert {name: condensed.ledger[name] for name in LEDGER_NAMES} == pytest.approx(
         {name: complete.ledger[name] for name in LEDGER_NAMES}, rel=1e-12
     )
-    assert folded.ledger["iterations"] == complete.ledger["iterations"]
-    ends = folded.response.extra["ledger"][:, -1], complete.response.extra["ledger"][:, -1]
+    assert condensed.ledger["iterations"] == complete.ledger["iterations"]
+    ends = condensed.response.extra["ledger"][:, -1], complete.response.extra["ledger"][:, -1]
     assert ends[0] == pytest.approx(ends[1], rel=1e-12, abs=1e-15 * complete.ledger["work_in"])
 
 
 def test_exact_sample_of_largest_slide_is_kept():
     """The sample of the largest slide before the last cycles is kept and agrees with that of a
     complete march."""
-    _, folded = march_both_ways(TWO, 49.0, 37)
+    _, condensed = march_both_ways(TWO, 49.0, 37)
     complete = march(TWO, SineDrive(49.0, OMEGA), compliant_points_model(), 37, 80, 37)
-    first = folded.response
+    first = condensed.response
     index = np.argmin(np.abs(complete.window.time - first.time[0]))
     assert index == np.argmax(np.abs(complete.window.slide[: 32 * 80 + 1]))
     for name in ("slide", "slide_rate", "force", "slip", "output"):
@@ -81,22 +81,22 @@ def test_exact_sample_of_largest_slide_is_kept():
 def test_exact_run_that_exceeds_travel_agrees_with_complete_march():
     """A run that exceeds its travel ends at the same cycle and with the same motion as a march that
     keeps its samples."""
-    complete, folded = march_both_ways(BASIS, 300.0, 37, travel=2e-4)
+    complete, condensed = march_both_ways(BASIS, 300.0, 37, travel=2e-4)
     assert (
-        folded.outcome is complete.outcome is not None
-        and folded.cycles_done == complete.cycles_done < 32
+        condensed.outcome is complete.outcome is not None
+        and condensed.cycles_done == complete.cycles_done < 32
     )
-    assert_close(folded.amplitudes, complete.amplitudes)
-    assert_close(folded.response.slide, complete.response.slide)
+    assert_close(condensed.amplitudes, complete.amplitudes)
+    assert_close(condensed.response.slide, complete.response.slide)
 
 
 def test_exact_periodic_motion_is_extrapolated():
     """A periodic motion is extrapolated: amplitudes and work agree within 1e-10, and 600 000 cycles
     take less than 50 times the CPU time of 600."""
-    complete, folded = march_both_ways(BASIS, 49.0, 600)
-    assert folded.amplitudes.shape == (600, 2) and folded.phasors.shape == (600,)
-    assert_close(folded.amplitudes, complete.amplitudes, 1e-10)
-    assert folded.ledger["work_in"] == pytest.approx(complete.ledger["work_in"], rel=1e-10)
+    complete, condensed = march_both_ways(BASIS, 49.0, 600)
+    assert condensed.amplitudes.shape == (600, 2) and condensed.phasors.shape == (600,)
+    assert_close(condensed.amplitudes, complete.amplitudes, 1e-10)
+    assert condensed.ledger["work_in"] == pytest.approx(complete.ledger["work_in"], rel=1e-10)
     seconds = {}
     for cycles in (600, 600_000):
         begin = process_time()

@@ -1,5 +1,5 @@
 """Lists of bonds behind shear modes, one list per point: equation 2.17 of the report for any order,
-in both definitions, during partial slip."""
+in both definitions of the bond force."""
 
 from itertools import pairwise
 from types import SimpleNamespace
@@ -37,7 +37,7 @@ DEFINITIONS = [
 ]
 
 
-def follow(model, path, dt=1e-3):
+def follow_path(model, path, dt=1e-3):
     """Return forces (k, 3), energies (k, 2), number of failed steps, and contact of a model along a
     path."""
     return march_paths.follow(model, path, dt)
@@ -69,12 +69,12 @@ def test_exact_points_on_rigid_bodies_equal_single_list(reading, order):
     limit."""
     law = Bonds(0.4, 1e-6, order, reading)
     path = reversing_path(80)
-    expected = follow(bond_list_model(law, LIMIT.sum(), 25.0, 0.02), path)[0]
+    expected = follow_path(bond_list_model(law, LIMIT.sum(), 25.0, 0.02), path)[0]
     model = point_lists_model(law, LIMIT, np.ones(4), RIGID, 25.0, 0.02)
-    forces, _, failed, _ = follow(model, path)
+    forces, _, failed, _ = follow_path(model, path)
     compared = (
         np.abs(path) > 1e-8
-    )  # of the place of the first bonds, which have a width behind shear
+    )  # away from the position of the first bonds, which shear modes widen
     assert failed == 0 and np.allclose(
         forces[compared, 0], expected[compared, 0], rtol=0, atol=2e-5 * LIMIT.sum()
     )
@@ -90,13 +90,13 @@ def test_exact_points_on_rigid_bodies_equal_single_list(reading, order):
     ],
 )
 def test_exact_initial_loading_behind_spring_agrees_with_closed_form(order, initial_curve):
-    """A point behind a spring is loaded along the curve P(p, s/eps) of an order p, with the slide s
-    + force/stiffness, to second order in the step. This follows from P(p + 1, x) + x^p
-    exp(-x)/Gamma(p + 1) = P(p, x); p = 0 is Coulomb friction."""
+    """A point behind a spring follows the regularised incomplete gamma function P(p, s/eps) of its
+    order p, with the slide s + force/stiffness, to second order in the step. This follows from P(p
+    + 1, x) + x^p exp(-x)/Gamma(p + 1) = P(p, x); p = 0 is Coulomb friction."""
     law = Bonds(0.4, 1e-6, order, "report")
     stiffness = 3e6
     path = np.linspace(0, 4e-6, 1601)
-    forces, _, failed, _ = follow(
+    forces, _, failed, _ = follow_path(
         point_lists_model(law, [2.0], [1.0], spring_modes(stiffness), 745.0, 0.0), path
     )
 
@@ -136,7 +136,7 @@ def test_exact_energy_balance_over_reversals(reading, order, grows):
         stiffness=np.array([1e6, 3e6, 1e7]),
         points=np.arange(4),
     )
-    forces, energies, failed, contact = follow(
+    forces, energies, failed, contact = follow_path(
         point_lists_model(law, LIMIT, np.ones(4), shape, 25.0, 0.02), path
     )
     assert failed == 0
@@ -173,7 +173,7 @@ def test_always_points_agree_with_explicit_bond_sums(reading, order, grows):
     path = reversing_path(steps)
     dt = 0.05 / steps
     model = point_lists_model(law, limit, np.ones(5), modes, 40.0, 0.01)
-    forces, _, failed, _ = follow(model, path, dt)
+    forces, _, failed, _ = follow_path(model, path, dt)
     keys = SimpleNamespace(
         static=law.static,
         kinetic=law.static * law.ratio,
@@ -203,7 +203,7 @@ def test_always_sudden_slip_dissipates_energy():
     law = Bonds(0.4, 1e-6, 1.0, "stretch", 0.1, 1e-3, 1e-7, 1e-6, 1.0)
     path = np.linspace(0, 6e-6, 301)
     model = point_lists_model(law, [2.0], [1.0], spring_modes(2e5), 30.0, 0.01)
-    forces, energies, failed, contact = follow(model, path, 1e-4)
+    forces, energies, failed, contact = follow_path(model, path, 1e-4)
     assert failed == 0
     assert_energy_balance(forces, energies, path)
     assert contact.statuses[0, STATUS.created] <= 1e-6 * contact.statuses[0, STATUS.dissipated]
@@ -228,7 +228,7 @@ def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order)
         0.01,
         lower_pressure_fields(x, sigma, 1.0),
     )
-    forces, energies, failed, contact = follow(model, path)
+    forces, energies, failed, contact = follow_path(model, path)
     numpy_law = Quadrature(law, 0.0)
     weight = LIMIT[0]
     state = numpy_law.start(sigma)
@@ -243,7 +243,7 @@ def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order)
         stored.append(weight * numpy_law.stored_energy(state).sum())
     compared = (
         np.abs(path) > 1e-8
-    )  # of the place of the first bonds, which have a width behind shear
+    )  # away from the position of the first bonds, which shear modes widen
     assert (
         failed == 0
         and contact.statuses[0, STATUS.initial_pressure]

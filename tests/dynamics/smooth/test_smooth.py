@@ -57,12 +57,12 @@ def relative_errors(
 
 
 def bond_rest_event(y, v):
-    """Return the speed above which growing bonds do not rest; its zero is a kink of the law."""
+    """Return |v| minus the rest speed of growing bonds; the law has a kink at its zero."""
     return abs(v) - GROWING.rest_speed
 
 
 def stretch_event(y, v):
-    """Return the stretch, whose zero is a kink of the Bouc-Wen law."""
+    """Return the stretch of the Bouc-Wen law; the law has a kink at its zero."""
     return y[0]
 
 
