@@ -41,7 +41,7 @@ PEAKS = {
 def random_harmonics(seed, count, scale=1.0):
     """Return random Fourier coefficients of a slide with a dominant first harmonic."""
     rng = np.random.default_rng(seed)
-    x = (rng.normal(scale=count + 1) + 1j * rng.normal(scale=count + 1)) * 0.3 * scale
+    x = (rng.normal(size=count + 1) + 1j * rng.normal(size=count + 1)) * 0.3 * scale
     x[0] = 0.1 * scale * rng.normal()
     x[1] *= 3
     return x
