@@ -62,7 +62,7 @@ def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Prof
     if step > MAX_STEP_ELEMENTS * element:
         notes += (
             f"{profile.source}: samples lie {format_length(step)} apart, but elements are only "
-            f"{format_length(element)} long; between samples the surface is taken as straight",
+            f"{format_length(element)} long; the surface between samples is interpolated",
         )
     return replace(
         profile, x=frozen_array(places[kept]), z=frozen_array(profile.z[kept]), notes=notes

@@ -113,8 +113,8 @@ def test_exact_a_trace_as_long_as_the_patch_is_centred_and_said_otherwise():
 def test_exact_coarse_samples_are_said():
     profile = place_over_patch(trace(np.linspace(-HALF, HALF, 51), np.zeros(51)), EVEN)
     assert profile.notes == (
-        "before.csv: samples lie 254 um apart, but elements are only 63.5 um long; between "
-        "samples the surface is taken as straight",
+        "before.csv: samples lie 254 um apart, but elements are only 63.5 um long; the "
+        "surface between samples is interpolated",
     )
 
 
