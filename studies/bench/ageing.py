@@ -50,7 +50,7 @@ speed = "1 mm/s"
 
 
 def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
-    """Compute the friction force before a rest, at its end and at its peak after it.
+    """Compute the friction force before a rest, at its end and at its peak after the rest.
 
     The force is divided by mu_s N; l_k = part eps_0, and the slide before the rest is steady.
 
@@ -76,7 +76,7 @@ def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
 
 
 def aged(hold, part: float):
-    """Bond length over eps_0 after a rest, in closed form."""
+    """Return the bond length after a rest, relative to eps_0, in closed form."""
     slow = steady_bond_length(SPEED, LENGTH, RATIO, REST_GROWTH, part * LENGTH) / LENGTH
     return 1 - (1 - slow) * np.exp(-REST_GROWTH * np.asarray(hold) / FLOOR)
 
@@ -87,18 +87,9 @@ def main(
     path: Path | None = FOLDER / "ageing.svg",
     steps: int = 2000,
 ) -> list:
-    """Print one row per l_k and rest: aged bond length, and force before, at the end of and after the rest.
+    """Print one row for each l_k and rest.
 
-    Parameters
-    ----------
-    holds : sequence of float
-        Durations of the rests [s].
-    parts : sequence of float
-        l_k / eps_0; the law as printed (p = 1) follows with 0.1.
-    path : Path or None
-        Picture.
-    steps : int
-        Steps of a run.
+    A row has the aged bond length, and the friction force before, at the end of and after the rest.
     """
     rows = [
         {
@@ -135,7 +126,7 @@ def main(
 
 
 def _draw(path: Path, rows: list, parts) -> None:
-    """Peaks of the stretch reading against the rest, below the closed form of the bond length."""
+    """Plot the peak of the stretch reading against the duration of the rest, with the closed form of the bond length."""
     time = 10.0 ** np.linspace(-2, 1, 121)
     with drawing(path, (6.4, 3.6)) as (_, axis):
         axis.semilogx(

@@ -47,7 +47,7 @@ tail = 1e-12
 
 
 def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -> float:
-    """Friction over load after so many bond lengths at a constant speed [m/s], ten steps each."""
+    """Return friction over load after a slide of several bond lengths at a constant speed [m/s], ten steps for each."""
     sets = [
         f"slide.speed={speed!r} m/s",
         f"slide.distance={lengths * LENGTH!r} m",
@@ -62,12 +62,12 @@ def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -
 
 
 def steady_friction(speed: float, slip: float) -> float:
-    """2.18 with the bond length of 2.11."""
+    """Return the steady friction over load by equation 2.18, with the bond length of equation 2.11."""
     return STATIC * steady_bond_length(speed, LENGTH, RATIO, REST_GROWTH, slip) / LENGTH
 
 
 def _steady_friction_of_grown_bonds(speed: float, slip: float, order: float) -> float:
-    """The same with every bond grown from zero."""
+    """Return the steady friction over load if every bond grows from zero."""
     ell = 1 / (REST_GROWTH / speed**2 + 1 / slip)
     return steady_friction(speed, slip) * growth_factor(
         ell / steady_bond_length(speed, LENGTH, RATIO, REST_GROWTH, slip), order
@@ -75,7 +75,10 @@ def _steady_friction_of_grown_bonds(speed: float, slip: float, order: float) -> 
 
 
 def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = FOLDER / "stribeck.svg") -> list:
-    """One dict per slip growth (in eps_0) and speed (in v_c): promised, stretch, (computed, G) per printed order."""
+    """Return a dict for each slip growth (in eps_0) and speed (in v_c).
+
+    It has the closed form, the stretch reading, and (computed value, G) for each printed order.
+    """
     rows = []
     for part in slips:
         slip = part * LENGTH
@@ -106,7 +109,7 @@ def main(shares=SHARES, slips=(0.1, 1.0), path: Path | None = FOLDER / "stribeck
 
 
 def _draw(path: Path, rows: list, slips) -> None:
-    """One panel per slip growth: lines are closed forms, marks are benches."""
+    """Plot friction against speed, one panel for each slip growth; lines are closed forms, markers are computed."""
     with drawing(path, (9.6, 3.4), 1, len(slips), sharey=True, squeeze=False) as (_, axes):
         for axis, part in zip(axes[0], slips):
             slip = part * LENGTH

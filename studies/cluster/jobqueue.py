@@ -18,7 +18,10 @@ JOB = {"cores": 1, "processes": 1, "memory": "2GB", "walltime": "04:00:00"}
 
 
 def main(scene: str, out: str, jobs: str, *over: str, **more):
-    """The Dataset of a sweep over "key=values" texts on so many jobs; more: of the SLURMCluster, such as account."""
+    """Run a sweep over texts "key=values" on several jobs and return its Dataset.
+
+    `more` are options of the SLURMCluster, such as account.
+    """
     with SLURMCluster(**JOB | more) as cluster:
         cluster.scale(jobs=int(jobs))
         with cluster.get_client() as client:

@@ -39,7 +39,10 @@ def drawing(
 
 
 def compact(text: str) -> str:
-    """A picture of matplotlib in half the lines: places to 0.01 pt, and a path, or a row of markers, is one line."""
+    """Shorten an SVG of matplotlib to half its lines.
+
+    Positions are rounded to 0.01 pt, and a path or a row of markers takes one line.
+    """
 
     def places(path) -> str:
         return f'd="{" ".join(re.sub(r"-?[0-9]+[.][0-9]+", lambda one: f"{float(one[0]):.2f}", path[1]).split())}"'

@@ -19,9 +19,9 @@ def _reading(reading):
 
 
 def weight_along(relative_path, order=1.0):
-    """Weight of a bond along the path (eq. 2.14, Fig. 13): x^p e^-x/p!, x = R/eps >= 0; unit area, largest at x = p.
+    """Return the weight of a bond along the path (eq. 2.14, Fig. 13).
 
-    For -1 < p < 0 it is infinite at x = 0. ValueError for p <= -1 or a path < 0.
+    It is x^p e^-x/p! with x = R/eps >= 0, has the area 1, and is largest at x = p.
     """
     x = np.asarray(relative_path, float)
     if order <= -1:
@@ -41,7 +41,7 @@ def weight_across(relative_distance):
 
 
 def growth_factor(share, order=1.0) -> float:
-    """Steady friction of bonds that grow from zero (2.10 as printed) over that of full-grown ones (2.18).
+    """Return the steady friction of bonds that grow from zero (2.10 as printed) over that of fully grown bonds (2.18).
 
     G(a; p) = int_0^inf phi_p(s/(1 - e^(-s/a))) ds, a = share = ell/eps with 1/ell = a_s/v^2 + 1/l_k: the path on which
     a bond ripens, in bond lengths. G(0; p) = 1 and G(p; p) = 1; it falls like e^-a for bonds that break unripe.

@@ -21,7 +21,7 @@ LIMIT = 1e-9  # largest relative residual that still counts as solved
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PeriodicContact:
-    """A solved period of wavy contact.
+    """Solution of one period of a wavy contact.
 
     pressure: (n,) [Pa], >= 0; gap: (n,) [m] after closing, >= 0; closing [m] of the mean planes; residuals: relative,
     recomputed from the definition.
@@ -35,7 +35,7 @@ class PeriodicContact:
 
 
 def wave_numbers(points: int, length: float) -> np.ndarray:
-    """Wave numbers k (points//2 + 1,) [1/m] of `points` equal steps of a period `length` [m], 0 first."""
+    """Return the wave numbers k (points//2 + 1,) [1/m], from 0, of a period `length` [m] with `points` equal intervals."""
     return 2 * np.pi * np.arange(points // 2 + 1) / length
 
 
@@ -99,7 +99,7 @@ def press_periodic(
     limit: int | None = None,
     tolerance: float = 1e-11,
 ) -> PeriodicContact:
-    """Contact of a period `length` [m] under `load` per width [N/m] on the gap (n,) [m] at n equal steps.
+    """Solve the contact of a period `length` [m] under `load` per width [N/m] with the gap (n,) [m] at equidistant points.
 
     compliance_k (n//2 + 1,) [m/Pa]: displacement per pressure of each wave of `wave_numbers(n, length)`, both bodies
     together. The entry for k = 0 only moves the whole face: with 0 there (half planes, whose own is infinite)
@@ -131,7 +131,10 @@ def press_periodic(
 
 
 def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tuple:
-    """Pressure (n,) [Pa], closing [m] and iterations of Polonsky and Keer's method; waves[0] = 0."""
+    """Return pressure (n,) [Pa], closing [m] and number of iterations by the method of Polonsky and Keer.
+
+    The first entry of `waves` must be 0.
+    """
     n = gap.size
     pressure = np.full(n, mean)
     direction = np.zeros(n)

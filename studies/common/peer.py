@@ -20,9 +20,9 @@ ONE_THREAD = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", 
 
 
 class Peer:
-    """A child that answers one JSON line per request. script: its file below studies/; version: of its library.
+    """Child process that answers one JSON line for each request.
 
-    Missing where its interpreter or the library is absent, NotConverged where the peer reports a failure.
+    `script` is its file below studies/, `version` that of its library.
     """
 
     def __init__(self, name: str, script: str, variable: str, default: str, remedy: str):
@@ -56,7 +56,7 @@ class Peer:
         return found
 
     def ask(self, **request) -> dict:
-        """The answer to a request of plain numbers, texts and lists."""
+        """Send a request of plain numbers, texts and lists, and return the answer."""
         try:
             self.child.stdin.write(json.dumps(request) + "\n")
             self.child.stdin.flush()
@@ -106,7 +106,7 @@ def interpolate_seconds(error: float, errors, seconds) -> tuple:
 
 
 def ratio_text(theirs: float, ours: float, sign: str) -> str:
-    """Write the ratio of two times; a bound where one of them is a bound.
+    """Format the ratio of two times, or a bound of it if one of them is a bound.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def ratio_text(theirs: float, ours: float, sign: str) -> str:
 
 
 def run(main) -> int:
-    """Exit code of a study: a named failure is a line on stderr, never a traceback."""
+    """Return the exit code of a study; a named failure is printed as one line on stderr, without a traceback."""
     try:
         main()
     except PatchfemError as error:

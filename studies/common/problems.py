@@ -61,7 +61,7 @@ def sample_motion(modes, drive, limit, cycles: float, times, start=None):
 
 
 def exact(name: str, times):
-    """Exact Response of "sdof" or "two" from rest at `times` (k,)."""
+    """Return the exact Response of the problem "sdof" or "two", which starts from rest, at `times` (k,)."""
     modes, drive, limit = {
         "sdof": (SDOF, SDOF_DRIVE, SDOF_LIMIT),
         "two": (TWO, TWO_DRIVE, TWO_LIMIT),

@@ -47,7 +47,7 @@ def load_kernels():
 
 
 def coulomb(limit: float, stick_speed: float = 0.0) -> Law:
-    """Return Coulomb's law; below the stick speed [m/s] the force is the one that holds the interface."""
+    """Return Coulomb's law; below the stick speed [m/s] the friction force is the force that keeps the interface at rest."""
     return Law(load_kernels().COULOMB, limit, stick_speed)
 
 
@@ -70,7 +70,7 @@ def elastic_plastic(limit: float, yield_displacement: float, *, as_printed: bool
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Motion:
-    """All k steps of a motion with n modes.
+    """Motion of n modes in all k steps.
 
     - `time` (k,) [s], `drive` (k,) [m s-2]
     - `z`, `v` (k, n): modal coordinates [m] and their rates [m/s]
@@ -94,7 +94,7 @@ class Motion:
 
 
 class Problem(NamedTuple):
-    """Arguments of the compiled loops: step [s], rig, drive (k,), history with its start, workspace."""
+    """Arguments of the compiled loops: step [s], rig, drive (k,), history with its initial state, and workspace."""
 
     step: float
     rig: tuple
@@ -113,7 +113,10 @@ class Problem(NamedTuple):
 def _set_up(
     modes: ModalBasis, drive, law: Law, steps: tuple, start: InitialState | None
 ) -> Problem:
-    """Return the problem of a motion from its start; steps: duration [s], steps per period of the drive."""
+    """Return the problem of a motion with its initial state.
+
+    `steps` contains the duration [s] and the steps per period of the drive.
+    """
     duration, steps_per_cycle = steps
     step = drive.period / steps_per_cycle
     count = round(duration / step) + 1
@@ -228,7 +231,7 @@ def solve_newmark(
     needs_force: bool = False,
     start: InitialState | None = None,
 ) -> Motion:
-    """Integrate by Newmark's average acceleration; `law` is Coulomb's law, `needs_force` is explained above."""
+    """Integrate by Newmark's average acceleration method with Coulomb's law."""
     problem = _set_up(modes, drive, law, steps, start)
     h = problem.step
     stiffness = h * h / 4 * np.diag(modes.omega**2)
@@ -254,7 +257,7 @@ def solve_euler(
     steps: tuple,
     start: InitialState | None = None,
 ) -> Motion:
-    """Integrate friction limit tanh(v/transition_speed) by explicit Euler steps.
+    """Integrate with the friction force limit tanh(v/transition_speed) by explicit Euler steps.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def accelerate(rig, drive, z, v, force, out):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def holding_force(rig, accel, force):
-    """Return the friction force [N] that takes the slide acceleration away, from the accelerations under `force`."""
+    """Return the friction force [N] that makes the slide acceleration zero, from the accelerations under `force`."""
     face = rig[2]
     mass = rig[4]
     return force + dot(face, accel) * mass / dot(face, face)
@@ -131,7 +131,7 @@ def duhamel_loop(rig, maps, stop, drive, law, history, residual, workspace):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def arrest(rig, v, accel, force):
-    """Take slide speed and slide acceleration away; return the force [N] that does so."""
+    """Set slide speed and slide acceleration to zero; return the friction force [N] that does so."""
     face = rig[2]
     mass = rig[4]
     square = dot(face, face)
@@ -212,7 +212,7 @@ def newmark_loop(rig, maps, drive, law, needs_force, history, workspace):
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def euler_loop(rig, h, drive, law, history, workspace):
-    """Integrate by explicit steps of h [s]: z += h z', z' += h z'', all from the start of the step."""
+    """Integrate by explicit steps of h [s]: z += h z', z' += h z'', with all rates from the start of the step."""
     z, v, force = history
     face = rig[2]
     accel = workspace[0]

@@ -15,7 +15,7 @@ FINEST = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rubbed:
-    """Two surfaces after wear, lower and upper (m, n) [m], and the cycles there and back that were computed."""
+    """Lower and upper surface (m, n) [m] after wear, and the number of strokes to and fro that were computed."""
 
     lower: np.ndarray
     upper: np.ndarray
@@ -32,7 +32,7 @@ def rub(
     upper_share: float = 0.5,
     bite: float | None = None,
 ) -> Rubbed:
-    """Let two periodic rough surfaces rub along x, from -stroke to +stroke and back, until they have lost `worn`.
+    """Rub two periodic rough surfaces along x, from -stroke to +stroke and back, until they have lost `worn`.
 
     lower, upper: heights (m, n) [m], x along the rows, each seen from outside (peaks are material), both in the
     coordinates of the patch; (1, n) are two traces. step: of the raster [m]; stroke: amplitude of the slide [m], whole
@@ -83,8 +83,11 @@ def rub(
 
 
 class _Pair:
-    """Both surfaces while they wear, and the approach at each place of the stroke and how far it
-    sank there last [m]: the start of the next search."""
+    """Both surfaces during wear.
+
+    For each position of the stroke it stores the approach and its last change [m], from which the
+    next search starts.
+    """
 
     def __init__(self, low, up, upper_share: float):
         self.low = low
@@ -95,7 +98,7 @@ class _Pair:
         self.sum = np.empty_like(low)
 
     def wear(self, place: int, depth: float) -> None:
-        """Take a mean `depth` [m] off both together with the upper piece at `place` steps, and as much at -place."""
+        """Remove a mean `depth` [m] from both surfaces with the upper piece `place` steps away, and as much at -place."""
         there, back = self.overlaps
         if place == 0:
             self.overlap(0, depth, there)
@@ -110,7 +113,7 @@ class _Pair:
         self.take(there, np.roll(self.sum, place, axis=1))
 
     def overlap(self, place: int, depth: float, out) -> None:
-        """Overlap (m, n) [m] with the upper piece at `place` into `out`; its mean is `depth`."""
+        """Write the overlap (m, n) [m] with the upper piece `place` steps away into `out`; its mean is `depth`."""
         _shifted_sum(self.up, self.low, place, self.sum)
         # the approach sinks as evenly as the pieces wear
         last, sunk = self.approach.get(place, (None, 0.0))
@@ -125,10 +128,9 @@ class _Pair:
 def _find_approach(
     heights: np.ndarray, depth: float, start: float | None, out: np.ndarray
 ) -> float:
-    """Approach D [m] at which the mean of max(heights - D, 0) is `depth` > 0; these overlaps go into `out`.
+    """Find the approach D [m] for which the mean of max(heights - D, 0) is `depth` > 0.
 
-    heights (m, n) [m]: of both pieces together; start: a guess of D. Newton's method on a convex, falling, piecewise
-    linear function: from its first step on it comes from below, never passes D, and ends after finitely many steps.
+    These overlaps are written into `out`.
     """
     approach = heights.max() - depth if start is None else start
     wanted = heights.size * depth
@@ -148,7 +150,7 @@ def _find_approach(
 
 
 def _shifted_sum(moved, fixed, by: int, out) -> None:
-    """moved(x - by) + fixed(x), periodic along the rows, into `out`."""
+    """Write moved(x - by) + fixed(x), periodic along the rows, into `out`."""
     n = moved.shape[1]
     by %= n
     np.add(fixed[:, by:], moved[:, : n - by], out=out[:, by:])
@@ -168,7 +170,7 @@ def _surfaces(lower, upper) -> tuple:
 
 
 def _reach(stroke: float, step: float, points: int) -> int:
-    """The stroke in steps."""
+    """Return the length of the stroke in steps."""
     if not (np.isfinite([stroke, step]).all() and step > 0 and stroke >= 0):
         raise PatchfemError(
             f"the stroke must be zero or more and the step must be above zero, but they are {stroke:g} "
@@ -187,10 +189,9 @@ def _reach(stroke: float, step: float, points: int) -> int:
 def periodic_amplitude(
     z: np.ndarray, step: float, axis: int, low: float = 60e-6, high: float = 110e-6
 ) -> np.ndarray:
-    """Amplitude [m] of the sine with the mean square of the waves from `low` to `high` [m] long, of every trace.
+    """Return the amplitude [m] of each trace in a band of wavelengths from `low` to `high` [m].
 
-    z: heights (m, n) [m], periodic; axis: 1 for the m traces along x, 0 for the n traces along y. Over whole periods no
-    window is needed. The root mean square of the result is that of the whole area.
+    It is the amplitude of a sine with the same mean square.
     """
     count = z.shape[axis]
     frequency = np.fft.rfftfreq(count, step)
@@ -200,7 +201,7 @@ def periodic_amplitude(
 
 
 def anisotropy(z: np.ndarray, step: float) -> dict:
-    """Ratios x over y [1] of a periodic area (m, n) [m], and its skewness: "band", "rq", "slope", "ssk".
+    """Return ratios of x to y [1] of a periodic area (m, n) [m], and its skewness: "band", "rq", "slope", "ssk".
 
     band: of the `periodic_amplitude`, root mean square over all traces; rq: of the mean root mean square height of a
     trace about its own mean; slope: of the root mean square of central differences; ssk: skewness of the area.

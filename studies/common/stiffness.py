@@ -21,7 +21,7 @@ def free_stiffness(piece):
 
 
 def make_stencil(matrix: csr_matrix, columns: int) -> np.ndarray:
-    """Stencil of an assembled stiffness whose unknowns run column by column, row by row, two per node.
+    """Return the stencil of an assembled stiffness with unknowns ordered by columns, then rows, two per node.
 
     ValueError where it couples nodes that are not neighbours.
     """
@@ -37,7 +37,7 @@ def make_stencil(matrix: csr_matrix, columns: int) -> np.ndarray:
 
 
 def make_matrix(stencil) -> csr_matrix:
-    """The stencil as a sparse matrix, unknowns column by column, row by row, two per node (along x, inward)."""
+    """Return a stencil as a sparse matrix, with unknowns ordered by columns, then rows, two per node (along x, inward)."""
     columns, rows = stencil.shape[:2]
     c, r, dc, dr = np.ogrid[:columns, :rows, -1:2, -1:2]
     there = (c + dc >= 0) & (c + dc < columns) & (r + dr >= 0) & (r + dr < rows)

@@ -95,13 +95,9 @@ def peaks(x: np.ndarray, at, heights, widths) -> Profile:
 def self_affine(
     length: float, count: int, rms: float, hurst: float, longest: float, shortest: float, seed: int
 ) -> Profile:
-    """A periodic random trace over [-length/2, length/2] with `count` even steps, first and last height alike.
+    """Return a periodic random trace over [-length/2, length/2] with `count` equal intervals.
 
-    The mean square per wave number q = 2 pi k / length goes like 1 for waves above `longest` (roll-off) and like
-    (q longest / 2 pi)^(-1 - 2 hurst) from there to `shortest`, nothing below; phases are random and even, so every
-    realisation has exactly this spectrum and exactly the `rms` [m] (mean over the period). Same seed, same heights.
-    Persson et al., J. Phys. Condens. Matter 17 (2005) R1. PatchfemError unless 0 < hurst <= 1 and
-    2 steps < shortest <= longest <= length.
+    First and last height are equal.
     """
     if not (np.isfinite([length, rms]).all() and length > 0 and rms >= 0 and count >= 4):
         raise PatchfemError(
@@ -131,7 +127,7 @@ def self_affine(
 
 
 def report_sigma(amplitude: float, amplitude_kind: str) -> float:
-    """Standard deviation [m] of the report's surface whose 80 um waves have an amplitude [m] of the kind stated.
+    """Return the standard deviation [m] of the report's surface from the amplitude [m] of its 80 um waves and its kind.
 
     amplitude_kind: "peak-to-valley": the upper quartile of the height from a peak to the next valley, 2.5 sigma in
     traces less their waves below half of 80 um (2.6 where peaks must stand out by 0.3 sigma instead); "zero-to-peak":
@@ -150,11 +146,9 @@ def report_sigma(amplitude: float, amplitude_kind: str) -> float:
 
 
 def report_density(q: np.ndarray) -> np.ndarray:
-    """Power per area of wave numbers of the report's surface before the tests, up to a factor; q (any shape) [rad/m].
+    """Return the spectral density of the report's surface before the tests, up to a factor.
 
-    0.8 exp(-(q - q0)^2 / (2 (q0 / 4)^2)), the ring of waves about q0 = 2 pi / 80 um, plus 0.2 of a self-affine part:
-    flat below q0, (q / q0)^(-2 - 2 H) above with H = 0.8, nothing beyond 2 pi / 8 um. Isotropic: q is the length of the
-    wave vector. Assumed: the report gives words and two traces only.
+    q (any shape) are wave numbers [rad/m].
     """
     ratio = np.abs(np.asarray(q, float)) * (DOMINANT / (2 * np.pi))
     ring = np.exp(-((ratio - 1) ** 2) * 8)
@@ -163,7 +157,7 @@ def report_density(q: np.ndarray) -> np.ndarray:
 
 
 def report_trace(length: float, count: int, seed: int, sigma: float = SIGMA) -> Profile:
-    """A periodic trace through the report's surface over [-length/2, length/2] with `count` even steps.
+    """Return a periodic trace of the report's surface over [-length/2, length/2] with `count` equal intervals.
 
     Its spectrum is that of a straight cut: `report_density` summed over the waves across the trace. Such a cut shows
     oblique waves longer than they are: an octave of the trace holds most height at 85 um, not at 80 um. Phases are
@@ -185,7 +179,7 @@ def report_trace(length: float, count: int, seed: int, sigma: float = SIGMA) -> 
 
 
 def report_area(shape: tuple, step: float, seed: int, sigma: float = SIGMA) -> tuple:
-    """The report's surface before the tests on a periodic raster: (x (n,), y (m,), z (m, n)) [m], isotropic.
+    """Return an isotropic area of the report's surface before the tests: (x (n,), y (m,), z (m, n)) [m].
 
     shape: (m, n), points along y and along x; the periods are m and n times the step [m]. Phases are random, every
     realisation has the spectrum `report_density` and the standard deviation `sigma` [m] over the period. Same seed,
@@ -217,7 +211,10 @@ def _check_resolution(name: str, one: float, other: float, step: float, sigma: f
 
 
 def _scale(z, sigma: float) -> np.ndarray:
-    """Heights of mean zero with this root mean square; twice, for the round-off of the first time."""
+    """Scale heights to zero mean and the given root mean square.
+
+    This is done twice because of the round-off of the first time.
+    """
     for _ in range(2):
         z = z - z.mean()
         z = z * (sigma / np.sqrt((z * z).mean()))

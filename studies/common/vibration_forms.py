@@ -13,10 +13,9 @@ COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven a
 
 
 def decay_half_cycles(start, friction) -> int:
-    """Half cycles N_0 until a released Coulomb oscillator rests: max(0, ceil((|x_0|/friction - 1)/2)).
+    """Return the number N_0 of half cycles until a released Coulomb oscillator rests.
 
-    start x_0 [m], friction F/k [m]. The report leaves N_0 in 3.11 unrounded, but (-1)^N_0 needs an integer.
-    ValueError unless friction is positive.
+    N_0 = max(0, ceil((|x_0|/friction - 1)/2)).
     """
     require_positive(friction=friction)
     return max(0, int(np.ceil((abs(start) / friction - 1) / 2)))
@@ -69,12 +68,12 @@ def decay(time, start, friction, omega):
 
 
 def bounded_input(friction):
-    """Largest base acceleration that friction alone keeps bounded at resonance, a = (4/pi) f, in the unit of f."""
+    """Return the largest base acceleration for which friction bounds the resonance: (4/pi) f, in the unit of f."""
     return friction / COULOMB_RESONANCE
 
 
 def sliding_amplitude(r, friction, damping=0.0) -> float:
-    """Return the amplitude over a/omega_n^2 of steady motion that slides without a stop (Den Hartog 1931).
+    """Return the amplitude, relative to a/omega_n^2, of a steady motion that slides without a stop (Den Hartog 1931).
 
     Without damping it is sqrt(V^2 - (U f/a)^2), V = 1/(1 - r^2), U = sin(pi/r)/(r (1 + cos(pi/r))).
     ValueError where no such motion exists (the block stops on the way: below the knee), and without damping at r = 1.
@@ -138,7 +137,7 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
 
 
 def two_stop_relation(slip):
-    """Steady motion with two stops per cycle, undamped, at resonance: (f/a, amplitude over a/omega_n^2).
+    """Return (f/a, amplitude over a/omega_n^2) of the undamped steady motion with two stops per cycle at resonance.
 
     slip in (0, pi): drive phase [rad] during which the block slides in each half cycle; release at the phase t_0, tan
     t_0 = s sin s/(sin s - s cos s). f/a runs from 1 (s = 0) to pi/4 (s = pi), the amplitude from 0 to pi/4. ValueError
@@ -157,10 +156,9 @@ def two_stop_relation(slip):
 
 
 def two_stop_amplitude(friction) -> float:
-    """Amplitude over a/omega_n^2 at resonance, undamped, for f/a: inverse of `two_stop_relation`, to 1e-7.
+    """Return the amplitude over a/omega_n^2 of the undamped motion at resonance for f/a.
 
-    0 for f/a >= 1 (the block never slips), inf below pi/4 (friction cannot bound the motion). Within 1e-4 of the onset
-    the two terms of the relation cancel; the series 9/4 d^2 (1 + 2.9 d), d = 1 - f/a, stands in.
+    This is the inverse of `two_stop_relation` within 1e-7.
     """
     if friction >= 1:
         return 0.0
@@ -180,7 +178,7 @@ def two_stop_amplitude(friction) -> float:
 
 
 def shaken_rms(omega: float, zeta: float, level: float, band: tuple) -> tuple:
-    """Return the rms of relative displacement [m] and acceleration [m/s^2] of a shaken oscillator.
+    """Return the rms of relative displacement [m] and of acceleration [m/s^2] of an oscillator under random base motion.
 
     With u = f/f_0 both are integrals of 1/((1 - u^2)^2 + (2 zeta u)^2), that of the acceleration with 1 + (2 zeta u)^2
     above it, whose antiderivatives are logarithms of the poles u = +-(1 - zeta^2)^(1/2) +- i zeta. Source: Crandall and

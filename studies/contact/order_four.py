@@ -54,7 +54,11 @@ LAYERS = ((250e9, 0.24), (121e9, 0.32))  # Pa, 1: WC-Co as sprayed on Ti-8Al-1Mo
 
 
 class Case(NamedTuple):
-    """A gap [m] of x [m], the contact interval [m] and converged approach [m], peak [Pa], normal stiffness [Pa]."""
+    """Gap [m] as a function of x [m], with converged results.
+
+    The results are the contact interval [m], approach [m], peak pressure [Pa] and normal stiffness
+    [Pa].
+    """
 
     gap: Callable[[np.ndarray], np.ndarray]
     interval: tuple[float, float]
@@ -86,10 +90,12 @@ CASES = {  # truths: elements of order 5 and 4 regraded to the edges, which agre
 
 
 class Grading(NamedTuple):
-    """Cells of c R (d/R)^exponent at the distance d < R from an edge of contact, at most c R / 2 there, of c d
-    beyond; d is taken as first R where smaller.
+    """Rule for cell sizes near an edge of the contact.
 
-    At corners, whose singularities are weaker, c is 1.5 times and first 30 times as large.
+    A cell at the distance d < R has the size c R (d/R)^exponent, at most c R/2, and c d farther
+    away; d is at least `first` R.
+
+    At corners, whose singularities are weaker, c is 1.5 times and `first` is 30 times as large.
     """
 
     c: float
@@ -98,7 +104,11 @@ class Grading(NamedTuple):
 
 
 class Run(NamedTuple):
-    """Values (approach [m], peak [Pa], stiffness [Pa]); unknowns, face nodes; CPU s in all and of three steps."""
+    """Results and cost of a run.
+
+    Results are approach [m], peak pressure [Pa] and stiffness [Pa]; costs are the numbers of
+    unknowns and face nodes, and the CPU seconds of the run and of its three steps.
+    """
 
     values: np.ndarray
     unknowns: int
@@ -110,14 +120,17 @@ class Run(NamedTuple):
 
 
 def lobatto(order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss-Lobatto points and weights on [-1, 1]: ends and zeros of P'_order, w = 2 / (p (p + 1) P_p^2)."""
+    """Return Gauss-Lobatto points and weights on [-1, 1].
+
+    The points are the ends and the zeros of P'_order; w = 2/(p (p + 1) P_p^2).
+    """
     legendre_p = legendre.Legendre.basis(order)
     points = np.concatenate([[-1.0], np.sort(legendre_p.deriv().roots().real), [1.0]])
     return points, 2 / (order * (order + 1) * legendre_p(points) ** 2)
 
 
 def matrices_1d(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass, stiffness and mixed (phi_i' phi_j) matrices of one cell [-1, 1], integrated exactly."""
+    """Return mass, stiffness and mixed (phi_i' phi_j) matrices of one cell [-1, 1], integrated exactly."""
     points, _ = lobatto(order)
     gauss, weight = legendre.leggauss(order + 1)
     coefficients = np.linalg.inv(legendre.legvander(points, order))
@@ -165,7 +178,7 @@ def cell_stiffness(order: int, ratio: np.ndarray, young: float, poisson: float) 
 
 
 def condense_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Cells condensed to the nodes of their edges, and the numbers (of (order + 1)^2) of these nodes."""
+    """Condense cells to the nodes on their edges; return the stiffness and the numbers of these nodes (of (order + 1)^2)."""
     row, column = np.divmod(np.arange((order + 1) ** 2), order + 1)
     inside = (row % order != 0) & (column % order != 0)
     keep = np.flatnonzero(~np.tile(inside, 2))
@@ -180,7 +193,10 @@ def condense_interior(cells: np.ndarray, order: int) -> tuple[np.ndarray, np.nda
 def _dissection(
     x0: int, x1: int, y0: int, y1: int, order: int, into: list[tuple[int, int, int, int]]
 ) -> None:
-    """Nested dissection of the nodes strictly inside a box of cells: boxes of nodes, separators after their halves."""
+    """Order the nodes strictly inside a box of cells by nested dissection.
+
+    Separators follow the two halves that they separate.
+    """
     if (x1 - x0 <= 1 and y1 - y0 <= 1) or x1 - x0 < 1 or y1 - y0 < 1:
         return
     if x1 - x0 >= y1 - y0:
@@ -196,7 +212,7 @@ def _dissection(
 
 
 def numbering(nx: int, ny: int, order: int) -> tuple[np.ndarray, int]:
-    """Return the place of every node in the elimination, -1 where held or condensed, and their count.
+    """Return the elimination index of every node, -1 for fixed or condensed nodes, and the number of indices.
 
     Nested dissection inside, then the free sides, the face y = 0 (row 0) last; the far row is held.
 
@@ -225,7 +241,7 @@ def numbering(nx: int, ny: int, order: int) -> tuple[np.ndarray, int]:
 def face_compliance(
     xs: np.ndarray, ys: np.ndarray, order: int
 ) -> tuple[np.ndarray, int, float, float]:
-    """Return the normal compliance (n, n) [m2/N] of a face, the unknowns, and CPU s of both steps.
+    """Return the normal compliance (n, n) [m2/N] of a face, the number of unknowns, and the CPU seconds of both steps.
 
     Parameters
     ----------
@@ -277,7 +293,7 @@ def face_compliance(
 
 
 def make_breaks(points: list[tuple[float, float, float]], grading: Grading) -> np.ndarray:
-    """Break points [m] through singular points (place, R, multiplier of the first cell), ascending in place."""
+    """Return ascending break points [m] graded to singular points (position, R, factor of the first cell)."""
     places = np.array([point[0] for point in points])
     parts = []
     for a, b in pairwise(places):
@@ -300,7 +316,7 @@ def make_breaks(points: list[tuple[float, float, float]], grading: Grading) -> n
 
 
 def grids(case: Case, grading: Grading) -> tuple[np.ndarray, np.ndarray]:
-    """Break points along the face and into the depth, graded to the edges of contact and to the corners."""
+    """Return break points along the face and in depth, graded to the edges of contact and to the corners."""
     left, right = case.interval
     radius = min(0.5 * (right - left), LENGTH / 4)
     corner = 30.0
@@ -312,7 +328,7 @@ def grids(case: Case, grading: Grading) -> tuple[np.ndarray, np.ndarray]:
 
 
 def halve_cells(breaks: np.ndarray) -> np.ndarray:
-    """Every cell cut in the middle: the nested finer grid."""
+    """Return the break points of the nested finer grid, in which every cell is halved."""
     out = np.empty(2 * len(breaks) - 1)
     out[::2] = breaks
     out[1::2] = 0.5 * (breaks[1:] + breaks[:-1])
@@ -320,7 +336,7 @@ def halve_cells(breaks: np.ndarray) -> np.ndarray:
 
 
 def face_nodes(xs: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes of the face and their lumped Gauss-Lobatto weights [m]."""
+    """Return the nodes of the face and their lumped Gauss-Lobatto weights [m]."""
     points, weights = lobatto(order)
     h = np.diff(xs)
     x = (0.5 * (xs[:-1] + xs[1:])[:, None] + 0.5 * h[:, None] * points)[:, :-1].ravel()
@@ -331,7 +347,10 @@ def face_nodes(xs: np.ndarray, order: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def unilateral(compliance: np.ndarray, gap: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
-    """Nodal forces [N/m], approach [m] and contact set under LOAD: drop tension, add overlap until the set stays."""
+    """Return nodal forces [N/m], approach [m] and contact set under LOAD.
+
+    Nodes in tension leave the set and overlapping nodes enter it until the set does not change.
+    """
     active = np.ones(len(gap), bool)
     for _ in range(100):
         a = np.flatnonzero(active)
@@ -349,10 +368,10 @@ def unilateral(compliance: np.ndarray, gap: np.ndarray) -> tuple[np.ndarray, flo
 
 
 def peak(xs: np.ndarray, order: int, pressure: np.ndarray) -> float:
-    """Largest pressure [Pa]: of the polynomials of the cells in full contact; bilinear: of lines to the ends.
+    """Return the largest pressure [Pa].
 
-    A bilinear nodal force over its weight is the pressure at the centroid of the hat, to second order, so the value at
-    an end of the piece is read off the line through the last two centroids.
+    It is that of the polynomials of cells in full contact, or of straight lines for bilinear
+    elements.
     """
     if order == 1:
         h = np.diff(xs)
@@ -370,7 +389,7 @@ def peak(xs: np.ndarray, order: int, pressure: np.ndarray) -> float:
 
 
 def solve_pair(case: Case, xs: np.ndarray, ys: np.ndarray, order: int) -> Run:
-    """Solve the pair of like pieces for approach, peak and normal stiffness.
+    """Solve a pair of equal pieces for approach, peak pressure and normal stiffness.
 
     One piece is condensed, the other is its mirror image.
 
@@ -392,7 +411,11 @@ def solve_pair(case: Case, xs: np.ndarray, ys: np.ndarray, order: int) -> Run:
 
 
 def errors(case: Case, values: np.ndarray) -> np.ndarray:
-    """Relative errors of approach, peak and stiffness; the approach over the largest closing of the gap and itself."""
+    """Return relative errors of approach, peak and stiffness.
+
+    That of the approach is relative to the larger of the approach and the largest gap inside the
+    contact.
+    """
     truth = np.array(case.truth)
     scale = abs(truth)
     scale[0] = max(scale[0], abs(case.gap(np.array(case.interval))).max())
@@ -400,7 +423,10 @@ def errors(case: Case, values: np.ndarray) -> np.ndarray:
 
 
 def extrapolate(runs: list[Run]) -> Run:
-    """Aitken's limit of three nested runs, of second order where they do not converge evenly; costs added."""
+    """Return the limit of three nested runs by Aitken's method, and the sum of their costs.
+
+    Runs that do not converge monotonically are extrapolated with second order.
+    """
     first = runs[1].values - runs[0].values
     second = runs[2].values - runs[1].values
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -415,7 +441,7 @@ def extrapolate(runs: list[Run]) -> Run:
 
 
 def _fastest_run(case: Case, xs: np.ndarray, ys: np.ndarray, order: int, times: int = 2) -> Run:
-    """The quicker of equal runs: the processor is shared."""
+    """Return the fastest of several equal runs, because the processor is shared."""
     return min((solve_pair(case, xs, ys, order) for _ in range(times)), key=lambda run: run.seconds)
 
 
@@ -430,7 +456,7 @@ GRADINGS = {
 
 
 def ladder(case: Case, method: str) -> list[tuple[float, Run]]:
-    """Largest relative error of the three measures, and the run, for every grading of a method."""
+    """Return for every grading of a method the run and the largest relative error of its three measures."""
     out = []
     for grading in GRADINGS[method]:
         xs, ys = grids(case, grading)
@@ -452,14 +478,17 @@ def ladder(case: Case, method: str) -> list[tuple[float, Run]]:
 
 
 def cheapest(found: list[tuple[float, Run]], level: float) -> tuple[float, Run] | None:
-    """The run of the fewest seconds whose error is at most the level; None where no grading reaches it."""
+    """Return the run with the fewest seconds whose error is at most `level`; None if there is none."""
     return min(
         (pair for pair in found if pair[0] <= level), key=lambda pair: pair[1].seconds, default=None
     )
 
 
 def main(names: tuple[str, ...] = ()) -> list[dict[str, object]]:
-    """Print and return a row per case, level and method: unknowns, face nodes, CPU seconds and their shares, error."""
+    """Print and return a row for each case, level and method.
+
+    A row has unknowns, face nodes, CPU seconds with their shares, and error.
+    """
     rows: list[dict[str, object]] = []
     for name in names or tuple(CASES):
         found = {method: ladder(CASES[name], method) for method in GRADINGS}

@@ -72,8 +72,11 @@ LAWS = {
 
 
 class Row(NamedTuple):
-    """A law beside the record: rms [N] of all rows, and of those that have slid half a stroke since the reversal; work
-    per cycle [J] of the law and of the record; fitted (model (k,)) and the fit itself."""
+    """Law fitted to the record.
+
+    Contains rms difference [N] over all rows and over the rows beyond half a stroke after a
+    reversal, work per cycle [J] of law and record, fitted force (k,) and the fit.
+    """
 
     law: str
     values: int
@@ -85,7 +88,7 @@ class Row(NamedTuple):
 
 
 def plateau(slide) -> np.ndarray:
-    """Rows (k,) bool that have slid half a stroke or more since the last reversal."""
+    """Return a mask (k,) of the rows that have slid half a stroke or more since the last reversal."""
     way = np.sign(np.diff(slide, prepend=slide[0]))
     out = np.zeros(slide.size, bool)
     turn = slide[0]
@@ -98,7 +101,7 @@ def plateau(slide) -> np.ndarray:
 
 
 def repeat(loop) -> tuple:
-    """Return the rows of a cycle, and the rms [N] by which two successive cycles differ, as the scatter of one."""
+    """Return the rows of a cycle, and the rms difference [N] of two successive cycles as their scatter."""
     half = loop.displacement.size // 2
     misses = [
         np.mean((loop.displacement[k:] - loop.displacement[:-k]) ** 2)
@@ -110,7 +113,7 @@ def repeat(loop) -> tuple:
 
 
 def main(file, names=tuple(LAWS)) -> list:
-    """A Row per law, fitted to a record in steady motion with an offset of the force."""
+    """Return a Row for each law, fitted to a record in steady motion with a force offset."""
     loop = read_loop(file, LOAD_UNITS)
     period, _ = repeat(loop)
     flat = plateau(loop.displacement)
@@ -141,7 +144,7 @@ def main(file, names=tuple(LAWS)) -> list:
 
 
 def draw(rows: list, path: Path) -> None:
-    """The record and the laws over the slide, and what they leave over the time."""
+    """Plot the record and the laws against the slide, and their differences against time."""
     from drawing import drawing
 
     loop = rows[0].fitted.loop

@@ -53,8 +53,7 @@ class Iwan:
 
 
 class Row(NamedTuple):
-    """Drift per cycle in bond lengths: over the second and over the last cycle; None where the block slides
-    away."""
+    """Drift per cycle in bond lengths, over the second and over the last cycle; None if the block slides away."""
 
     law: str
     case: str
@@ -63,7 +62,10 @@ class Row(NamedTuple):
 
 
 def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
-    """name -> law object of the bond laws; order 0 starts without bonds, as full-grown ones would be a Coulomb jump."""
+    """Return {name: law} of the bond laws.
+
+    Order 0 starts without bonds, because with fully grown bonds it would be a Coulomb jump.
+    """
     more, tail = (ladder.GROWTH, ", growing") if growth else ({}, "")
     out = {}
     for p in orders:
@@ -79,12 +81,12 @@ def engines(growth: bool, orders=(0.0, 0.5, 1.0, 2.0), shares=SHARES) -> dict:
 
 
 def laws_without_bonds() -> dict:
-    """Laws without bonds that answer a force."""
+    """Return the laws without bonds that respond to a given force."""
     return {"elastic-plastic": ElasticPlastic(1.0, LENGTH), "Iwan, 10 elements": Iwan(10, LENGTH)}
 
 
 def closed_form_rows(case: str) -> list:
-    """List the rows of the laws whose drift is known without a march.
+    """Return rows of the laws whose drift is known in closed form.
 
     Coulomb holds below its limit. The law tanh creeps at v_0 atanh(F/(mu N)) along straight ramps of force and load.
     Bouc-Wen (n = 2, gamma = beta, constant load) rises by the integral of 1/(1 - z^2) and returns on a line.

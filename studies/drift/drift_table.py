@@ -38,6 +38,7 @@ CYCLES = 12
 
 
 def row(name: str, engine, case: str, cycles: int = CYCLES) -> Row:
+    """Return the row of a law under the force of a case, by time steps."""
     forces, loads = CASES[case]
     pieces = 4 if len(set(forces)) > 1 and len(set(loads)) > 1 else 1
     try:
@@ -48,7 +49,10 @@ def row(name: str, engine, case: str, cycles: int = CYCLES) -> Row:
 
 
 def breakaway_cost(amplitudes=ladder.AMPLITUDES, shares=SHARES) -> dict:
-    """{(b, A/eps_0): (area error over 4 A mu_s N, rms force error)} of the elastic range against Dahl's law."""
+    """Return the errors of a law with an elastic range against Dahl's law.
+
+    They are {(b, A/eps_0): (area error over 4 A mu_s N, rms force error)}.
+    """
     out = {}
     for amplitude in amplitudes:
         dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
@@ -60,12 +64,15 @@ def breakaway_cost(amplitudes=ladder.AMPLITUDES, shares=SHARES) -> dict:
 
 
 def virgin_gap(share: float) -> float:
-    """Greatest excess of the virgin curve over 1 - exp(-x): at x = b, where the damage begins."""
+    """Return the largest excess of the virgin curve over 1 - exp(-x), which is at x = b, where the damage begins."""
     return share + np.expm1(-share)
 
 
 def main(laws=None, cases=tuple(CASES), growing: bool = True) -> dict:
-    """{(law, case): Row}, printed as a markdown table; laws: {name: law object}, all of them by default."""
+    """Print a Markdown table of all laws and cases, and return {(law, case): Row}.
+
+    `laws` is {name: law}, by default all of them.
+    """
     if laws is None:
         laws = laws_without_bonds() | engines(False) | (engines(True) if growing else {})
     out = {(found.law, case): found for case in cases for found in closed_form_rows(case)}

@@ -7,13 +7,13 @@ from patchfem.friction import Quadrature
 
 
 class OutOfReach(ArithmeticError):
-    """No slide of up to 50 bond lengths brings the law to the force."""
+    """Raised if no slide of up to 50 bond lengths brings the law to the force."""
 
 
 def slide_to_traction(
     engine, state, target: float, sigma, dt: float = 1.0, length: float = 1.0
 ) -> tuple:
-    """Find the slide [m] that brings the traction to a target in one straight step, and the state after it.
+    """Find the slide [m] that brings the traction to a target in one straight step, and the state after this step.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def slides(
     period: float = 2.0,
     length: float = 1.0,
 ):
-    """Return the slide (cycles,) [m] at the end of every cycle of a dither of force and load.
+    """Return the slide (cycles,) [m] at the end of every cycle of a periodic force and load.
 
     Force and load change together in each piece: half the load (`press`), the force, the other half.
 
@@ -110,7 +110,7 @@ def slides(
 
 
 def drift(engine, forces, loads, cycles: int = 12, **more) -> float:
-    """Return the slide [m] over the last cycle of a dither.
+    """Return the slide [m] over the last cycle of a periodic force.
 
     Parameters
     ----------

@@ -25,7 +25,10 @@ MARCHED_SHARES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 
 
 def growing(share: float, swing: float) -> float:
-    """Drift per cycle [bond lengths] at .5 +- swing with growth; nan where the block slides away."""
+    """Return the drift per cycle [bond lengths] at a force of .5 +- swing with growing bonds.
+
+    NaN if the block slides away.
+    """
     engine = FirstOrderBonds(ladder.bonds(breakaway=share, **ladder.GROWTH))
     try:
         return (
@@ -37,7 +40,7 @@ def growing(share: float, swing: float) -> float:
 
 
 def main(path: Path = FOLDER / "drift.svg", marched=MARCHED_SHARES) -> Path:
-    """Draw both panels; the file written."""
+    """Draw both panels, and return the path of the file."""
     swing = np.linspace(0, 0.4, 401)
     amplitude = 10.0 ** np.linspace(-1, 1.5, 200)
     with drawing(path, (9.6, 3.4), 1, 2) as (_, (left, right)):

@@ -43,8 +43,11 @@ from ladder_cycles import (
 
 
 class Row(NamedTuple):
-    """A rung at an amplitude [bond lengths]: loop area over 4 A mu_s N; (area, rms force) errors in shares of
-    4 A mu_s N and mu_s N against the rung above and against the stretch with the same growth."""
+    """Result of one law at an amplitude [bond lengths].
+
+    Contains loop area over 4 A mu_s N, and (area, rms force) errors, relative to 4 A mu_s N and
+    mu_s N, against the next better law and against the stretch law with the same growth.
+    """
 
     growth: str
     rung: str
@@ -55,7 +58,11 @@ class Row(NamedTuple):
 
 
 def constant(amplitude: float, print_steps: int) -> list:
-    """Rows without growth: every law against Dahl's, which is the stretch, LuGre and the constant length in one."""
+    """Return rows without growth of bonds.
+
+    Every law is compared with Dahl's law, to which the stretch law, LuGre and constant bond length
+    reduce.
+    """
     dahl = last_cycle(points(bonds()), amplitude)
     sharp = elastic_plastic(amplitude)
     report = printed_law_cycle(amplitude, 1.0, print_steps)
@@ -73,7 +80,11 @@ def constant(amplitude: float, print_steps: int) -> list:
 
 
 def growing(amplitude: float, print_steps: int) -> list:
-    """Rows with growth: constant lengths are once eps_0 with mu_s and once eps_k with mu_k (the same stiffness)."""
+    """Return rows with growth of bonds.
+
+    A constant bond length is once eps_0 with mu_s and once eps_k with mu_k, which have the same
+    stiffness.
+    """
     stretch, lugre = (last_cycle(points(law), amplitude) for law in (bonds(**GROWTH), at_once()))
     kinetic = last_cycle(points(bonds(RATIO)), amplitude)
     report = printed_law_cycle(amplitude, 1.0, print_steps, **GROWTH)
@@ -91,7 +102,7 @@ def growing(amplitude: float, print_steps: int) -> list:
 
 
 def slow_path(amplitude: float, times: float = 20.0) -> list:
-    """LuGre against the stretch where the bond length follows over l_k = eps_0 of path, at the same v_c."""
+    """Return rows of LuGre against the stretch law if the bond length follows over a path of l_k = eps_0, at equal v_c."""
     slow = GROWTH | {
         "slip_growth": times * GROWTH["slip_growth"],
         "rest_growth": GROWTH["rest_growth"] / times,
@@ -116,7 +127,7 @@ def _rows(growth, amplitude, rows, top) -> list:
 
 
 def main(amplitudes=AMPLITUDES) -> dict:
-    """{(growth, rung, amplitude): Row}, printed."""
+    """Print and return {(growth, law, amplitude): Row}."""
     out = {}
     for amplitude in amplitudes:
         steps = 200 if amplitude < 1 else 400 if amplitude < 10 else 1600

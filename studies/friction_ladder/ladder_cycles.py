@@ -28,7 +28,7 @@ AT_ONCE = 1e4  # factor on both rates of 2.10 that leaves only its steady state
 
 
 class Cycle(NamedTuple):
-    """A steady cycle: increments dq (n,) in bond lengths, path-mean force (n,) in mu_s N."""
+    """Steady cycle: slide increments (n,) in bond lengths and path-mean force (n,) in mu_s N."""
 
     dq: np.ndarray
     force: np.ndarray
@@ -38,19 +38,19 @@ class Cycle(NamedTuple):
         return float(self.force @ self.dq)
 
     def over(self, every: int) -> "Cycle":
-        """The same cycle seen in longer steps."""
+        """Return the same cycle with longer steps."""
         dq = self.dq.reshape(-1, every).sum(axis=1)
         return Cycle(dq, (self.force * self.dq).reshape(-1, every).sum(axis=1) / dq)
 
 
 def _harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.ndarray:
-    """Slide (k,) [bond lengths] of whole cycles, the last of them after at least `path` bond lengths."""
+    """Return the slide (k,) [bond lengths] of whole cycles, the last one after a path of at least `path` bond lengths."""
     cycles = 1 + int(np.ceil(path / (4 * amplitude)))
     return amplitude * np.sin(2 * np.pi * np.arange(cycles * steps + 1) / steps)
 
 
 def last_cycle(model, amplitude: float, steps: int = STEPS) -> Cycle:
-    """Last of the cycles of a model of the loops whose lengths are in metres and whose limit is in mu_s N."""
+    """Return the last cycle of a law whose lengths are in metres and whose friction limit is 1."""
     path = LENGTH * _harmonic(amplitude, steps)
     contact = model.build()
     forces = np.zeros((path.size, 3))
@@ -63,7 +63,7 @@ def last_cycle(model, amplitude: float, steps: int = STEPS) -> Cycle:
 
 
 def bonds(share: float = 1.0, **more) -> Bonds:
-    """The law with mu_s = 1 and a share of the bond length."""
+    """Return the law with mu_s = 1 and a bond length of the given share."""
     return Bonds(share, share * LENGTH, **more)
 
 
@@ -72,7 +72,7 @@ def points(law: Bonds):
 
 
 def at_once() -> Bonds:
-    """The law whose bond length is always the steady one of the speed: LuGre, z' = v - |v| z/eps_eq(v)."""
+    """Return the law whose bond length is always the steady one at the present speed: LuGre, z' = v - |v| z/eps_eq(v)."""
     fast = GROWTH | {
         "rest_growth": AT_ONCE * GROWTH["rest_growth"],
         "slip_growth": GROWTH["slip_growth"] / AT_ONCE,
@@ -125,7 +125,7 @@ def coulomb(like: Cycle, limit: float = 1.0) -> Cycle:
 
 
 def elastic_plastic(amplitude: float, share: float = 1.0) -> Cycle:
-    """One Jenkins element of stiffness mu_s N/eps_0 and the limit share mu_s N."""
+    """Return one Jenkins element with the stiffness mu_s N/eps_0 and the limit share mu_s N."""
     return last_cycle(jenkins_model([1 / LENGTH], [share * LENGTH]), amplitude)
 
 
@@ -135,7 +135,7 @@ def iwan(amplitude: float, count: int, scale: float = 1.0) -> Cycle:
 
 
 def bouc_wen(amplitude: float, power: float) -> Cycle:
-    """gamma = beta = 1/2; the mean of a step is that of its ends."""
+    """Return the Bouc-Wen law with gamma = beta = 1/2; the mean of a step is the mean of both ends."""
     steps = 200 if amplitude <= 1 else STEPS
     path = (
         _harmonic(amplitude, steps)[-2 * steps - 1 :]
@@ -147,6 +147,6 @@ def bouc_wen(amplitude: float, power: float) -> Cycle:
 
 
 def rate(like: Cycle) -> Cycle:
-    """tanh(v/v_0) with the v_0 that is nearest to `like` at this amplitude and frequency."""
+    """Return the law tanh(v/v_0) with the v_0 that is closest to `like` at this amplitude and frequency."""
     share = like.dq / np.abs(like.dq).max()
     return Cycle(like.dq, np.tanh(share / today.best_rate(share, like.force)))

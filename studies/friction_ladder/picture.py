@@ -38,7 +38,7 @@ ON = {
 
 
 def main(path: Path = FOLDER / "ladder.svg", amplitudes=AMPLITUDES) -> Path:
-    """Draw the panels and return the file that was written."""
+    """Draw the panels and return the path of the file."""
     rows = {
         (row.growth, row.rung, row.amplitude): row
         for a in amplitudes

@@ -23,13 +23,13 @@ def iwan_elements(count: int, scale: float = 1.0) -> tuple:
 
 
 def iwan_loop(amplitude, scale: float = 1.0):
-    """Steady loop area of the continuous population by Masing's rule, 8 int F - 4 A F of the virgin curve F."""
+    """Return the steady loop area of the continuous Iwan model by Masing's rule: 8 int F - 4 A F with the virgin curve F."""
     x = np.asarray(amplitude, float) / scale
     return 4 * scale * (x - 2 + np.exp(-x) * (2 + x))
 
 
 def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
-    """Integrate z of the Bouc-Wen law at the knots of a path (k, ...).
+    """Integrate z of the Bouc-Wen law at the points of a path (k, ...).
 
     dz/dq = 1 - |z|^n (beta sgn(v z) + 1 - beta) with n = power. It is exact for n = 1; other powers take Runge-Kutta
     steps of order 4 that are at most 0.05 long.
@@ -48,7 +48,10 @@ def bouc_wen(path, power: float, beta: float = 0.5) -> np.ndarray:
 
 
 def _exact(z, dq, _, beta):
-    """Seen along the motion: da = 1 + c a below zero, c = 1 - 2 beta, and 1 - a above."""
+    """Integrate along the direction of motion in closed form.
+
+    da = 1 + c a below zero with c = 1 - 2 beta, and da = 1 - a above zero.
+    """
     way = np.sign(dq)
     left = np.abs(dq)
     c = 1 - 2 * beta
@@ -78,7 +81,7 @@ def _runge_kutta(z, dq, power, beta):
 
 
 def best_rate(share, wanted) -> float:
-    """Fit v_0, over the greatest speed, so that tanh(share/v_0) is nearest to `wanted` (k,) in rms.
+    """Return v_0, relative to the largest speed, for which tanh(share/v_0) is closest to `wanted` (k,) in the rms.
 
     `share` (k,) are the speeds over the greatest speed.
     """

@@ -10,7 +10,7 @@ from engine_problems import ALL, KIND, POINT, POINTS, Problem
 
 
 def cvode(peer, one: Problem, tolerance: float, method: str = "Adams") -> tuple:
-    """Integrate a problem by SUNDIALS' CVODE with its root finder; return the slide and CPU seconds.
+    """Integrate a problem by CVODE of SUNDIALS with its root finder; return the slide and the CPU seconds.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ MATRICES = {
 
 
 def siconos(peer, one: Problem, steps: int, theta: float = 0.5) -> tuple:
-    """Integrate a problem by Siconos' Moreau-Jean steps with a relay; return the slide and CPU seconds.
+    """Integrate a problem by Moreau-Jean steps of Siconos with a relay law; return the slide and the CPU seconds.
 
     Parameters
     ----------

@@ -36,9 +36,14 @@ ALL = ("decay", "block", "two", "patch")  # all problems
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Problem:
-    """limit [N] of one Coulomb interface, or `elements` (stiffness [N/m], yield slide [m]); `numbers`: the same for a
-    peer, as `switched` names them; size: of a state, for absolute tolerances; longest: step a peer may take, in cycles,
-    lest it pass over an event; last: cycles over which the error is taken; truth (k,) [m]: the slide at `times`."""
+    """Problem of the study.
+
+    `limit` is the friction limit [N] of one Coulomb interface, `elements` are (stiffness [N/m],
+    yield displacement [m]) of elastic-plastic elements. `numbers` describes the same problem for
+    another program, as in `switched`. `size` is the size of a state for absolute tolerances,
+    `longest` the largest step in cycles that does not pass over an event. The error is taken over
+    the `last` cycles, against the slide `truth` (k,) [m] at `times`.
+    """
 
     name: str
     modes: ModalBasis
@@ -55,19 +60,19 @@ class Problem:
 
     @property
     def times(self) -> np.ndarray:
-        """Instants of the last cycles."""
+        """Return the sample times in the last cycles."""
         return (
             self.cycles - self.last + np.arange(1, self.last * POINTS + 1) / POINTS
         ) * self.drive.period
 
     def error(self, slide) -> float:
-        """Largest error of the slide over its largest value."""
+        """Return the largest error of the slide relative to its largest value."""
         return float(np.abs(slide - self.truth).max() / np.abs(self.truth).max())
 
 
 @cache
 def problem(name: str) -> Problem:
-    """ "decay", "block", "two" or "patch"."""
+    """Return the problem of this name: "decay", "block", "two" or "patch"."""
     if name == "decay":
         rest = InitialState(np.array([11.5]), np.zeros(1))
         half = np.pi
@@ -148,14 +153,14 @@ def problem(name: str) -> Problem:
 
 
 def exact(one: Problem, _) -> np.ndarray:
-    """The event engine of any modes, plain Python."""
+    """Integrate by the event-driven engine for any modes, in plain Python."""
     return problems.sample_motion(
         one.modes, one.drive, one.limit, one.cycles, one.times, one.start
     ).slide
 
 
 def march(one: Problem, steps: int) -> np.ndarray:
-    """The march at `steps` per cycle."""
+    """Integrate by time stepping with `steps` per cycle."""
     model = (
         models.coulomb_model(one.limit, one.limit)
         if one.elements is None

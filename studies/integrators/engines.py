@@ -17,12 +17,12 @@ from switched import PROBLEMS, follow
 
 
 def _sampled_slide(motion: Motion, one: Problem, steps: int) -> np.ndarray:
-    """Return the slide of a motion at the problem's times."""
+    """Return the slide of a motion at the sample times of the problem."""
     return (motion.z[-one.last * steps - 1 :] @ one.modes.slide)[:: steps // POINTS][1:]
 
 
 def _duhamel_motion(one: Problem, steps: int, stick_speed: float, **how) -> np.ndarray:
-    """Return the slide by Duhamel's integral (3.10)."""
+    """Return the motion by Duhamel's integral (3.10)."""
     motion = solve_duhamel(
         one.modes,
         one.drive,
@@ -35,19 +35,19 @@ def _duhamel_motion(one: Problem, steps: int, stick_speed: float, **how) -> np.n
 
 
 def duhamel_report(one: Problem, steps: int) -> np.ndarray:
-    """Integrate by (3.10) as the report did: law sgn(v), velocity unchanged to 1e-4."""
+    """Integrate by (3.10) as in the report: the law sgn(v), iterated until the velocity changes by less than 1e-4."""
     return _duhamel_motion(one, steps, 0.0, criterion="velocity", tolerance=1e-4, relaxation=0.1)
 
 
 def duhamel_cured(one: Problem, steps: int) -> np.ndarray:
-    """Integrate by (3.10) with a static branch that narrows with the step, the force to 1e-9 of its limit."""
+    """Integrate by (3.10) with a static branch that narrows with the step; the force converges to 1e-9 of its limit."""
     return _duhamel_motion(one, steps, 0.1 * one.drive.period / steps, tolerance=1e-9 * one.limit)
 
 
 def newmark_motion(
     one: Problem, steps: int, stick_speed: float, *, needs_force: bool
 ) -> np.ndarray:
-    """Return the slide by Newmark's method.
+    """Return the motion by Newmark's method.
 
     Parameters
     ----------
@@ -71,18 +71,22 @@ def newmark_motion(
 
 
 def newmark_report(one: Problem, steps: int) -> np.ndarray:
-    """Newmark with a stick speed of 1e-3, stopped by the speed alone."""
+    """Integrate by Newmark's method with a stick speed of 1e-3; only the speed decides about sticking."""
     return newmark_motion(one, steps, 1e-3, needs_force=False)
 
 
 def newmark_cured(one: Problem, steps: int) -> np.ndarray:
-    """Newmark, stopped where the static friction suffices below what friction takes off the speed in a step."""
+    """Integrate by Newmark's method.
+
+    The block sticks if static friction suffices and the speed is below what friction removes in one
+    step.
+    """
     stick_speed = one.limit * one.drive.period / steps
     return newmark_motion(one, steps, stick_speed, needs_force=True)
 
 
 def euler_tanh(one: Problem, steps: int) -> np.ndarray:
-    """Explicit Euler and friction limit tanh(v/1e-3)."""
+    """Integrate with the friction force limit tanh(v/1e-3) by explicit Euler steps."""
     motion = solve_euler(
         one.modes,
         one.drive,
@@ -95,7 +99,7 @@ def euler_tanh(one: Problem, steps: int) -> np.ndarray:
 
 
 def advancer(tolerance: float, size: float):
-    """`advance` of `switched` by scipy's DOP853 with one event."""
+    """Return the function `advance` of `switched`, based on SciPy's DOP853 with one event."""
 
     def advance(rhs, event, t, y, end, longest, wanted):
         def stop(t, y):
@@ -125,7 +129,7 @@ def advancer(tolerance: float, size: float):
 
 
 def slide_and_events(one: Problem, tolerance: float, longest: float) -> tuple:
-    """Integrate by scipy's DOP853 from event to event; return the slide and the number of events.
+    """Integrate by SciPy's DOP853 from event to event; return the slide and the number of events.
 
     Parameters
     ----------
@@ -140,7 +144,7 @@ def slide_and_events(one: Problem, tolerance: float, longest: float) -> tuple:
 
 
 def dop853(one: Problem, tolerance: float) -> np.ndarray:
-    """scipy's DOP853 from event to event."""
+    """Integrate by SciPy's DOP853 from event to event; return the slide."""
     return slide_and_events(one, tolerance, one.longest)[0]
 
 

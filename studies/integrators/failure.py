@@ -51,7 +51,7 @@ DRAWN_CASES = {
 
 
 def _picture(rows: list, curves: dict, path: Path = FOLDER / "failure.svg") -> Path:
-    """x2 and force of four ways beside the exact ones, and the error of Newmark against the step."""
+    """Plot x2 and the friction force of four methods with exact ones, and the error of Newmark's method."""
     truth = exact("two", np.linspace(0, 20, 2001))
     with drawing(path, (9.6, 6.6), 3, 4) as (figure, axes):
         for column, (name, title) in enumerate(DRAWN_CASES.items()):

@@ -41,9 +41,14 @@ CYCLES = 200
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Row:
-    """One way to integrate Fig 16. early: largest |x2| before it can move; moves: time, |force| when |x2| passes 0.05;
-    jumps: share of steps on which the force changes by more than 1; worst, mean: force of the law at the accepted state
-    less the force used; failed: share of steps without convergence; error: of x2 at t = 20 (exact -0.305217)."""
+    """Result of one way to integrate the problem of Fig. 16.
+
+    `early` is the largest |x2| before the mass can move; `moves` is the time and the force at which
+    |x2| exceeds 0.05; `jumps` is the fraction of steps in which the force changes by more than 1;
+    `worst` and `mean` are the differences between the force of the law at the accepted state and
+    the force that was used; `failed` is the fraction of steps without convergence; `error` is that
+    of x2 at t = 20 (exact value -0.305217).
+    """
 
     name: str
     early: float
@@ -58,7 +63,7 @@ class Row:
 
 
 def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
-    """Run one case and judge it."""
+    """Integrate one case and return its row."""
     drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * step, False)
     found = solve_duhamel(
         TWO,
@@ -90,7 +95,10 @@ def solve(name, law: Law, step, criterion, tolerance, relax) -> Row:
 
 
 def peak_errors(speed: float, by_force: bool, steps=STEPS) -> list:
-    """Relative errors of the peak of the stick-slip block by Newmark with a stick speed, one per steps per cycle."""
+    """Return relative errors of the peak of the stick-slip block by Newmark's method with a stick speed.
+
+    There is one error for each number of steps per cycle.
+    """
     times = np.linspace(CYCLES - 1, CYCLES, 2001) * SDOF_DRIVE.period
     peak = np.abs(exact("sdof", times).slide).max()
     law = coulomb(SDOF_LIMIT, speed)

@@ -21,7 +21,7 @@ FLOOR = 1e-13  # smaller errors are drawn and compared as this error
 
 
 def run_once(work, one, knob) -> tuple:
-    """Run an engine of this package once; return the slide and CPU seconds.
+    """Run an engine of this package once; return the slide and the CPU seconds.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def run_once(work, one, knob) -> tuple:
 
 
 def measure(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3) -> tuple:
-    """Measure the least CPU seconds of several turns of each engine, and its error.
+    """Measure the error of each engine and the smallest CPU seconds of several runs.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _turn(found: dict, where: str, name: str, knob, work, child) -> None:
 
 
 def curve(rows: list, where: str, name: str) -> tuple:
-    """Return the errors and seconds of an engine on a problem, in the order of its knob.
+    """Return the errors and the seconds of an engine on a problem, in the order of its setting.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def curve(rows: list, where: str, name: str) -> tuple:
 
 
 def front(errors, seconds) -> tuple:
-    """The points that no other beats in both, errors falling."""
+    """Return the points that are not dominated in error and seconds, with falling errors."""
     keep = [
         i for i in range(len(errors)) if not np.any((errors < errors[i]) & (seconds <= seconds[i]))
     ]
@@ -136,7 +136,10 @@ def front(errors, seconds) -> tuple:
 
 
 def ratios(rows: list, where: str, reference: str) -> dict:
-    """{engine: {error: text}}: time over that of `reference` at equal error; "-" where an engine never gets there."""
+    """Return the times of all engines relative to `reference` at equal error.
+
+    The result is {engine: {error: text}}, with "-" if an engine does not reach the error.
+    """
     base = front(*curve(rows, where, reference))
     out = {}
     if not len(base[0]):

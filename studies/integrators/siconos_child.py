@@ -15,7 +15,7 @@ OFFSET = -1e3
 
 
 def march(kernel, ask: dict):
-    """March in steps; return the slide at every step and the CPU seconds of the steps."""
+    """Integrate with fixed steps; return the slide at every step and the CPU seconds of the steps."""
     matrix = {name: np.array(ask[name], float) for name in ("mass", "damper", "stiffness")}
     n = len(matrix["mass"])
     h = ask["step"]
@@ -49,7 +49,7 @@ def march(kernel, ask: dict):
 
 
 def main() -> None:
-    """Say which Siconos this is, then answer request by request."""
+    """Send the version of Siconos, then answer each request."""
     try:
         import siconos
         import siconos.kernel as kernel

@@ -15,7 +15,7 @@ from switched import PROBLEMS, follow
 
 
 def _advancer(cvode, tolerance: float, atol: float, method: str):
-    """`advance` of `switched` by CVODE with its root finder."""
+    """Return the function `advance` of `switched`, based on CVODE with its root finder."""
 
     def advance(rhs, event, t, y, end, longest, wanted):
         def slope(t, y, out):
@@ -55,7 +55,7 @@ def _advancer(cvode, tolerance: float, atol: float, method: str):
 
 
 def answer(cvode, ask: dict) -> dict:
-    """Slide at the times asked for, CPU seconds, events."""
+    """Return the slide at the requested times, the CPU seconds and the number of events."""
     times = np.array(ask["times"])
     best = np.inf
     for _ in range(ask.get("repeats", 1)):
@@ -72,7 +72,7 @@ def answer(cvode, ask: dict) -> dict:
 
 
 def main() -> None:
-    """Say which binding this is, then answer request by request."""
+    """Send the version of scikit-sundae, then answer each request."""
     try:
         import sksundae
         from sksundae.cvode import CVODE

@@ -13,7 +13,10 @@ from switched_patch import Patch
 
 
 class Block:
-    """m = k = 1 on a moving base: q'' + 2 xi q' + q = -size sin t - F, |F| <= limit, from rest at `place`."""
+    """Block with m = k = 1 on a moving base, released from rest at `place`.
+
+    q'' + 2 xi q' + q = -size sin t - F, |F| <= limit.
+    """
 
     def __init__(self, limit: float, xi: float, size: float = 1.0, place: float = 0.0):
         self.limit = limit
@@ -29,7 +32,7 @@ class Block:
         )
 
     def rhs(self, phase):
-        """dy/dt as a list."""
+        """Return dy/dt as a list."""
         if phase == 0:
             return lambda t, y: [0.0, 0.0]
         force = phase * self.limit
@@ -43,7 +46,7 @@ class Block:
         return slip
 
     def event(self, phase):
-        """Positive while the phase lasts."""
+        """Return a function that is positive while the phase lasts."""
         if phase == 0:
             return lambda t, y: self.limit - abs(self.size * sin(t) + y[0])
         return lambda t, y: phase * y[1]
@@ -67,12 +70,15 @@ class Block:
         return (1 if need > 0 else -1), y
 
     def slide(self, y):
-        """Slide of the interface from the states (k, n)."""
+        """Return the slide of the interface from the states (k, n)."""
         return y[:, 0]
 
 
 class TwoMasses:
-    """Two free masses and a spring, all 1; sin(omega t) on the first, friction under the second (Fig 16)."""
+    """Two free masses and a spring, all equal to 1 (Fig. 16).
+
+    The force sin(omega t) acts on the first mass and friction on the second.
+    """
 
     def __init__(self, limit: float, omega: float):
         self.limit = limit
@@ -84,7 +90,7 @@ class TwoMasses:
         return 0, np.zeros(4)
 
     def rhs(self, phase):
-        """dy/dt as a list."""
+        """Return dy/dt as a list."""
         w = self.omega
         force = phase * self.limit
 
@@ -99,7 +105,7 @@ class TwoMasses:
         return slip if phase else stick
 
     def event(self, phase):
-        """Positive while the phase lasts."""
+        """Return a function that is positive while the phase lasts."""
         if phase == 0:
             return lambda t, y: self.limit - abs(y[0] - y[1])
         return lambda t, y: phase * y[3]
@@ -123,7 +129,7 @@ class TwoMasses:
         return (1 if need > 0 else -1), y
 
     def slide(self, y):
-        """Slide of the interface from the states (k, n)."""
+        """Return the slide of the interface from the states (k, n)."""
         return y[:, 1]
 
 

@@ -6,8 +6,11 @@ import numpy as np
 
 
 class Patch:
-    """Modes under a sine with parallel elastic-plastic elements: between two reversals of the slide the force is a
-    function of the slide, so the reversals are the only events; a yield is a bend that the step control has to see."""
+    """Modes under a sine with parallel elastic-plastic elements.
+
+    Between two reversals of the slide the force is a function of the slide, so reversals are the
+    only events; a yield is a kink that the step control must resolve.
+    """
 
     def __init__(self, omega, zeta, slide, base, mass, drive, drive_omega, stiffness, yields):
         self.stiff = np.array(omega) ** 2
@@ -24,15 +27,15 @@ class Patch:
         self.at = 0.0
 
     def start(self):
-        """Return the phase and the state (z, v) at the start; the base moves against +x first."""
+        """Return the phase and the state (z, v) at the start; the base first moves towards -x."""
         return (1 if self.row @ self.base * self.drive < 0 else -1), np.zeros(2 * self.row.size)
 
     def stretches(self, q):
-        """Stretch of all elements at the slide q since the last reversal."""
+        """Return the stretches of all elements at the slide q since the last reversal."""
         return np.minimum(np.maximum(self.stretch + (q - self.at), -self.yields), self.yields)
 
     def rhs(self, phase):
-        """dy/dt."""
+        """Return dy/dt."""
         n = self.row.size
         pull = self.base * self.drive
         push = self.row / self.mass
@@ -52,7 +55,7 @@ class Patch:
         return free
 
     def event(self, phase):
-        """Positive until the slide reverses."""
+        """Return a function that is positive until the slide reverses."""
         n = self.row.size
         return lambda t, y: phase * (self.row @ y[n:])
 
@@ -73,5 +76,5 @@ class Patch:
         return -phase, np.array(y)
 
     def slide(self, y):
-        """Slide of the interface from the states (k, n)."""
+        """Return the slide of the interface from the states (k, n)."""
         return y[:, : self.row.size] @ self.row

@@ -68,7 +68,7 @@ STYLES = {
 
 
 def picture(table: dict, path: Path = FOLDER / "work_precision.svg") -> Path:
-    """Error against CPU time, one panel per problem."""
+    """Plot the error against CPU time, one panel for each problem."""
     rows = table["rows"]
     with drawing(path, (9.6, 4.6), 1, len(SHOWN_PROBLEMS), sharey=True) as (figure, axes):
         names = list(dict.fromkeys(r["engine"] for r in rows))
@@ -100,7 +100,7 @@ def picture(table: dict, path: Path = FOLDER / "work_precision.svg") -> Path:
 
 
 def report(table: dict) -> None:
-    """Print the table and the times over the fastest engine of ours at equal error."""
+    """Print the table, and the times relative to our fastest engine at equal error."""
     for row in table["rows"]:
         if row["error"] is None:
             print(
@@ -121,7 +121,7 @@ def report(table: dict) -> None:
 
 
 def main(names=ALL, ours=OURS, peers=PEERS, repeats: int = 3, path: Path | None = TABLE) -> dict:
-    """Measure, save where a path is given, print; the table {rows, versions, absent}."""
+    """Measure and print all engines, write a picture if `path` is given, and return {rows, versions, absent}."""
     with threadpool_limits(1):
         rows, versions, absent = measure(names, ours, peers, repeats)
     table = {"rows": rows, "versions": versions, "absent": absent}

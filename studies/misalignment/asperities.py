@@ -49,7 +49,7 @@ def depths(count: int, scatter: float, shape: str, seed: int = 0) -> np.ndarray:
 
 
 def closing_of_waves(k, coat: tuple = CARBIDE) -> np.ndarray:
-    """Closing of both coated faces per pressure of the wave k [1/m]; 0 for k = 0."""
+    """Return the closing of both coated faces per unit pressure of a wave with wave number k [1/m]; 0 for k = 0."""
     k = np.asarray(k, float)
     out = np.zeros(k.shape)
     out[k > 0] = 2 * exact.layered_compliance(k[k > 0], coat, TITANIUM, COATING)
@@ -58,7 +58,7 @@ def closing_of_waves(k, coat: tuple = CARBIDE) -> np.ndarray:
 
 @cache
 def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.ndarray:
-    """Return the closing (count,) at each ridge per force on the first [m2/N], without the mean of equal forces.
+    """Return the closing (count,) at each ridge per force on the first [m2/N], less the mean effect of equal forces.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def between_ridges(count: int, coat: tuple = CARBIDE, shells: int = 200) -> np.n
 
 @cache
 def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndarray:
-    """Return the closing (side, side) at each peak of a square lattice per force on the first [m/N].
+    """Return the closing (side, side) at each peak of a square lattice per unit force on the first peak [m/N].
 
     The Hertzian closing of the first peak itself is left out.
 
@@ -104,19 +104,19 @@ def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndar
 
 
 def own_ridge(force, modulus: float) -> tuple:
-    """Return the closing [m] of one of equal ridges under a force [N/m], and its slope (Westergaard)."""
+    """Return the closing [m] of one of equal ridges under a force [N/m], and its derivative (Westergaard)."""
     full = exact.westergaard_full_pressure(WAVE, HEIGHT, modulus) * WAVE
     return HEIGHT * force / full * (1 - np.log(force / full)), -HEIGHT / full * np.log(force / full)
 
 
 def own_peak(force, modulus: float) -> tuple:
-    """Return the closing [m] of a round peak under a force [N], and its slope (Hertz)."""
+    """Return the closing [m] of a round peak under a force [N], and its derivative (Hertz)."""
     closing = (9 * force**2 / (16 * RADIUS * modulus**2)) ** (1 / 3)
     return closing, 2 / 3 * closing / force
 
 
 def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: float = MEAN) -> tuple:
-    """Solve peaks that carry one force each; return k_n = dp/d(closing) [Pa/m] and the forces (count,).
+    """Solve peaks with one force each; return k_n = dp/d(closing) [Pa/m] and the forces (count,).
 
     Parameters
     ----------
@@ -160,7 +160,10 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
 def explicit(
     depth, points: int, coat: tuple = CARBIDE, mean: float = MEAN, change: float = 0.02
 ) -> float:
-    """k_n [Pa/m] of ridges at `depth` (count,), their waves resolved by `points`: pressed twice, 2 % to either side."""
+    """Return k_n [Pa/m] of ridges at `depth` (count,) that a grid of `points` resolves.
+
+    It is computed from two pressures, 2 % below and above the mean pressure.
+    """
     length = WAVE * depth.size
     x = np.arange(points) * (length / points)
     gap = (
@@ -176,7 +179,7 @@ def explicit(
 
 
 def separate(scatter: float, shape: str, coat: tuple = CARBIDE) -> float:
-    """k_n [Pa/m] of round peaks that do not feel each other: one height, `uniform` or `gaussian` heights."""
+    """Return k_n [Pa/m] of round peaks that do not interact, with equal, `uniform` or `gaussian` heights."""
     modulus = exact.combined_modulus(*coat)
     density = WAVE**-2
     rate = 4 / 3 * modulus * RADIUS**0.5 * density

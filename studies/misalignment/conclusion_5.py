@@ -76,7 +76,10 @@ def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
 
 
 def neutral(portion: float, skin: str, spring: float | None, halvings: int = 2) -> float:
-    """Misalignment [rad] of the holder that leaves `portion` rubbed: the tilt left plus what the spring gave way."""
+    """Return the misalignment [rad] of the holder for which `portion` is rubbed.
+
+    It is the remaining tilt plus the rotation of the spring.
+    """
     tilt, moment = rigid(portion, skin, halvings)
     return tilt + (moment / spring if spring is not None else 0.0)
 
@@ -110,7 +113,7 @@ def springs_for(
 def main(
     skins=tuple(tilted.SKINS), portions=PORTIONS, springs=SPRINGS, tolerances=TOLERANCES
 ) -> dict:
-    """{(skin, portion, spring): misalignment [rad]} and {(skin, tolerance): springs_for}, printed."""
+    """Print and return {(skin, portion, spring): misalignment [rad]} and {(skin, tolerance): `springs_for`}."""
     out = {}
     for skin in skins:
         for portion in portions:

@@ -58,23 +58,26 @@ COLUMNS = {
 
 
 def held_pieces(angle: float, spring: float | None, skin: str = "bare"):
-    """Pieces in a holder at the neutral angle [rad] with its spring [N m/rad], None: rigid."""
+    """Return pieces in a holder with a neutral angle [rad] and a rotational spring [N m/rad], or None for a rigid holder."""
     more = () if spring is None else (f"holder.rotational_stiffness={spring!r} N m/rad",)
     return tilted.case(float(angle), skin, *more)
 
 
 def free(offset: float, skin: str = "bare"):
-    """A piece free to rotate, the load line `offset` lengths from its middle towards the fine edge."""
+    """Return pieces of which one rotates freely; the load line is `offset` patch lengths from the middle.
+
+    A positive offset is towards the fine edge.
+    """
     return tilted.case(None, skin, f"load_line.offset={-12.7 * offset!r} mm")
 
 
 def case(angle: float, spring: float | None) -> dict:
-    """Values of the measures at one neutral angle [rad] of the holder and one stiffness [N m/rad] of it."""
+    """Return the measures for a neutral angle [rad] and a stiffness [N m/rad] of the holder."""
     return values(press_patch(held_pieces(angle, spring), tilted.pair(1)))
 
 
 def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
-    """Tilt [rad] at which the contact fraction has fallen to `fraction`, by bisection of its logarithm."""
+    """Return the tilt [rad] at which the contact fraction has fallen to `fraction`, by bisection of its logarithm."""
     low = 1e-7
     high = 1e-1
     for _ in range(steps):
@@ -87,7 +90,7 @@ def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:
 
 
 def line(found: dict) -> str:
-    """The measures of a case in a row, value and error; no error where it is below a thousandth."""
+    """Format the measures of a case as a row of values and errors; errors below a thousandth of the value are left out."""
     out = []
     for name, (head, scale) in COLUMNS.items():
         one = found[name]
@@ -99,7 +102,7 @@ def line(found: dict) -> str:
 def table(
     title: str, named: str, cases: dict, measured: Callable = tilted.compute_measures
 ) -> dict:
-    """{key: measures} of {key: pieces}, printed as they come."""
+    """Print the measures of several pieces while they are computed, and return {key: measures}."""
     print(title)
     out: dict[float, dict[str, Measure]] = {}
     for key, found in cases.items():
@@ -109,7 +112,7 @@ def table(
 
 
 def main(tilts=tilted.TILTS, springs=SPRINGS, offsets=OFFSETS) -> dict:
-    """{spring or "free": {tilt [rad] or offset [lengths]: measures}}, printed."""
+    """Print and return {spring or "free": {tilt [rad] or offset [patch lengths]: measures}}."""
     out = {
         spring: table(
             "rigid fixture" if spring is None else f"holder {spring:.0e} N m/rad",

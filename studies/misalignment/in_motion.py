@@ -51,7 +51,7 @@ AXIAL = 143.0  # [Hz] axial mode of the rig
 
 
 def scene(drive: str = "", **more):
-    """Write the shipped rig with elastic-plastic bonds, whose motion is exact.
+    """Return the text of the shipped rig with elastic-plastic bonds, whose motion is exact.
 
     `drive` is another table of the drive; `more` are keys as for `--set`.
     """
@@ -64,7 +64,7 @@ def scene(drive: str = "", **more):
 
 
 def sweep_measures(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
-    """Dataset of the measures over tilt [rad], load [lbf] and level [g]; in SI."""
+    """Return a Dataset of the measures over tilt [rad], load [lbf] and level [g], in SI units."""
     return pf.sweep(
         scene(**more),
         {
@@ -76,7 +76,7 @@ def sweep_measures(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
 
 
 def allowed_tilt(load: float, level: float, tilts=TILTS) -> str:
-    """How much tilt may be allowed under a load [lbf] at a level [g], as `patchfem sweep` says it."""
+    """Return the sentence of `patchfem sweep` on the tilt that is allowed under a load [lbf] at a level [g]."""
     return sweep_measures(tilts, (load,), (level,)).attrs["answer"]
 
 
@@ -91,7 +91,7 @@ def onsets(load: float, tilts=TILTS):
 
 
 def _yaws(tilts=TILTS, load: float = 26.0, level: float = 5.0) -> np.ndarray:
-    """Amplitudes (t,) [m] of the yaw mode in the last cycles."""
+    """Return the amplitudes (t,) [m] of the yaw mode in the last cycles."""
     found = sweep_measures(
         tilts,
         (load,),
@@ -102,14 +102,14 @@ def _yaws(tilts=TILTS, load: float = 26.0, level: float = 5.0) -> np.ndarray:
 
 
 def resonance(stiffness):
-    """Frequency [Hz] of the axial mode with an interface of this stiffness [N/m] beside its flexure."""
+    """Return the frequency [Hz] of the axial mode with an interface of this stiffness [N/m] parallel to its flexure."""
     return np.sqrt(AXIAL**2 + np.asarray(stiffness) / MASS / (2 * np.pi) ** 2)
 
 
 def maps(found) -> dict:
-    """Return maps over tilt, load and level by title: the rubbed portion, and other measures over their first value.
+    """Return maps over tilt, load and level by title.
 
-    A measure is NaN where the patch sticks, so that there is no loop.
+    They show the rubbed portion, and other measures relative to their first value.
     """
 
     def flat(name):
@@ -130,7 +130,7 @@ def maps(found) -> dict:
 
 
 def picture(found, path: Path = FOLDER / "in_motion.svg") -> Path:
-    """Draw the maps; the file written."""
+    """Draw the maps and return the path of the file."""
     from drawing import drawing
 
     tilts = found["contact_tilt_angle"].values
@@ -158,7 +158,7 @@ def picture(found, path: Path = FOLDER / "in_motion.svg") -> Path:
 
 
 def main(tilts=TILTS, loads=LOADS, levels=LEVELS):
-    """Print a table per load and level; the Dataset."""
+    """Print a table for each load and level, and return the Dataset."""
     found = sweep_measures(tilts, loads, levels)
     for load in found["contact_load"].values:
         for level in found["drive_acceleration"].values:

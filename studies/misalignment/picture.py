@@ -30,7 +30,7 @@ COLOURS = (BLUE, "#4f9bd9", "#e0975f", ORANGE)
 
 
 def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
-    """Rubbed portion at each misalignment [rad] of a holder."""
+    """Return the rubbed portion at each misalignment [rad] of a holder."""
     return np.array(
         [
             tilted.rubbed_portion(
@@ -42,7 +42,7 @@ def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
 
 
 def main(path: Path = FOLDER / "misalignment.svg", tilts=TILTS) -> Path:
-    """Draw both panels; the file written."""
+    """Draw both panels and return the path of the file."""
     with drawing(path, (9.6, 3.6), 1, 2, sharey=True) as (_, (left, right)):
         for axis, title, curves in (
             (left, "smooth, holder", [(s, "bare", text) for s, text in FIXTURES.items()]),

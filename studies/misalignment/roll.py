@@ -37,13 +37,13 @@ def rolled_pieces(roll: float, count: int, skin: str):
 
 
 def case(roll: float, count: int, skin: str = "bare") -> dict:
-    """name -> Measure of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
+    """Return {name: Measure} of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
     three = [press_patch(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
     return estimate_measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
 
 
 def roll_for(centre: float, skin: str, count: int = 16) -> float:
-    """Roll [rad] that moves the pressure sideways by `centre` [m]."""
+    """Return the roll [rad] that moves the pressure sideways by `centre` [m]."""
 
     def short(log_roll: float) -> float:
         found = values(press_patch(rolled_pieces(10**log_roll, count, skin), tilted.pair(0)))
@@ -53,7 +53,7 @@ def roll_for(centre: float, skin: str, count: int = 16) -> float:
 
 
 def main(rolls=tilted.TILTS, counts=COUNTS, skins=tuple(tilted.SKINS)) -> dict:
-    """{(skin, count, roll): measures}, printed."""
+    """Print and return {(skin, count, roll): measures}."""
     out = {}
     for skin in skins:
         for roll in rolls:

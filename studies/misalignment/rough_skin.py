@@ -47,7 +47,7 @@ STIFFNESSES = (1e15, 4.5e14, 1e14, 2.7e13, 1e13, 1e12, 5e11)
 
 
 def opening(stiffness: float | None, halvings: int = 2) -> float:
-    """Tilt [rad] at which the rig's pieces begin to open with a linear skin [Pa/m] between them, None: bare."""
+    """Return the tilt [rad] at which the rig's pieces begin to open with a linear layer [Pa/m], or None without a layer."""
     pieces = tilted.pair(halvings).compliance
     if stiffness is not None:
         part = tilted.case(0.0, "linear").interface.skin.model_copy(
@@ -65,7 +65,11 @@ def opening(stiffness: float | None, halvings: int = 2) -> float:
 def row(
     scatter: float, shape: str, ridges: int = 160, side: int = 32, points: int = 0, seeds: int = 3
 ) -> dict:
-    """k_n [Pa/m] of one scatter: ridges (median of `seeds` orders), round peaks; `points` > 0: ridges resolved."""
+    """Return k_n [Pa/m] for one scatter of heights.
+
+    It is computed for ridges (median of `seeds` orders), for round peaks, and for resolved ridges
+    if `points` > 0.
+    """
     many = [
         asperities.one_each(asperities.depths(ridges, scatter, shape, k))[0] for k in range(seeds)
     ]
@@ -86,7 +90,7 @@ def row(
 
 
 def main(scatters=SCATTERS, shapes=SHAPES, **how) -> dict:
-    """{(shape, scatter): row}, printed with the opening tilts of a linear skin of some stiffnesses."""
+    """Print and return {(shape, scatter): row}, with the opening tilts of linear layers of some stiffnesses."""
     out = {(shape, s): row(s, shape, **how) for shape in shapes for s in scatters}
     for (shape, s), found in out.items():
         cells = (f"{name} {value:.3g}" for name, value in found.items())

@@ -30,7 +30,7 @@ OFFSETS = (1 / 6, 0.25, 1 / 3, 0.4, 0.45)
 
 
 def main(tilts=tilted.TILTS, skins=tuple(tilted.SKINS), offsets=OFFSETS) -> dict:
-    """{(skin, "rigid", "held" or "free"): {tilt [rad] or offset [lengths]: measures}}, printed."""
+    """Print and return {(skin, "rigid", "held" or "free"): {tilt [rad] or offset [patch lengths]: measures}}."""
     out = {}
     for skin in skins:
         out[skin, "rigid"] = fixtures.table(

@@ -40,7 +40,7 @@ SKINS = {
 
 
 def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchModel:
-    """Build the pieces with a skin of SKINS at an angle [rad]; None leaves the rotation free.
+    """Return the model of the pieces with a layer of SKINS at an angle [rad]; with None the piece rotates freely.
 
     `more` are further key=value of contact.
     """
@@ -53,7 +53,7 @@ def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchMod
 
 @cache
 def pair(halvings: int = 2) -> Pair:
-    """The condensed pieces on the coarsest mesh (110 columns) with its cells halved so many times."""
+    """Return the condensed pieces on the coarsest mesh (110 columns), whose cells are halved `halvings` times."""
     asked = case(0.0)
     half = asked.pieces.length / 2
     x = divide_into_columns(
@@ -69,18 +69,21 @@ def pair(halvings: int = 2) -> Pair:
 
 
 def patches(asked: PatchModel) -> tuple:
-    """The Patch of a model of `case` on the finest mesh, on cells twice and four times as long."""
+    """Return the Patch of a model of `case` on the finest mesh, and on meshes with cells twice and four times as long."""
     return tuple(press_patch(asked, pair(k)) for k in (2, 1, 0))
 
 
 def compute_measures(asked: PatchModel) -> dict:
-    """name -> Measure (value and error) of a model of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
+    """Return {name: Measure} of a model of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
     three = patches(asked)
     return estimate_measures(*three) | {"rubbed": rubbed_portion(three[0])}
 
 
 def rubbed_portion(patch: Patch, share: float = RUBBED_FRACTION) -> float:
-    """Portion of the length that bears at least `share` of the mean pressure, its edges found between the nodes."""
+    """Return the portion of the length that carries at least `share` of the mean pressure.
+
+    Its ends are interpolated between nodes.
+    """
     x = patch.x
     sigma = (
         patch.pressure.sigma_n - share * patch.pressure.load / patch.pieces.interface.weight.sum()

@@ -40,7 +40,7 @@ angle = "{tilt}"
 
 
 def press_pieces(tilt: str, mesh: str = "") -> pf.Result:
-    """The pieces of the rig under a tilt, on the mesh of a file where one is named."""
+    """Return the pieces of the rig pressed under a tilt, on the mesh of a file if one is given."""
     with tempfile.TemporaryDirectory() as folder:
         scene = Path(folder) / "scene.toml"
         scene.write_text(SCENE.format(tilt=tilt), "utf-8")
@@ -48,7 +48,7 @@ def press_pieces(tilt: str, mesh: str = "") -> pf.Result:
 
 
 def pressure_difference(one: pf.Result, other: pf.Result) -> float:
-    """Half the integral of the absolute difference of two pressures over the integral of the first, 1."""
+    """Return half the integral of the absolute difference of two pressures, relative to the integral of the first [1]."""
     first, second = ((run.patch.x, run.patch.pressure.sigma_n) for run in (one, other))
     x = np.union1d(first[0], second[0])
     a, b = (np.interp(x, *curve) for curve in (first, second))
@@ -56,7 +56,11 @@ def pressure_difference(one: pf.Result, other: pf.Result) -> float:
 
 
 def rows():
-    """Per tilt: tilt, (departure of the file, error stated for it) of each measure and `between`, in per cent."""
+    """Return a row for each tilt, in percent.
+
+    A row has the tilt, (difference of the file, stated error) of each measure, and the pressure
+    difference.
+    """
     for tilt in TILTS:
         made = press_pieces(tilt)
         read = press_pieces(tilt, str(MESH))

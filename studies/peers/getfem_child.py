@@ -18,7 +18,7 @@ import numpy as np
 
 
 class Pair:
-    """One GetFEM model of the pair; every mesh and method is kept, for the model only points at them."""
+    """GetFEM model of the pair; references to every mesh and method are kept, because the model only points at them."""
 
     def __init__(self, gf, ask: dict):
         x, y, (young, nu) = np.array(ask["x"]), np.array(ask["depth"]), ask["material"]
@@ -75,7 +75,7 @@ class Pair:
         return mesh
 
     def solve(self, step: dict, limit: float) -> int:
-        """Newton from the present state under step = {N, crown, tilt}; iterations."""
+        """Solve by Newton's method from the present state under step = {N, crown, tilt}; return the number of iterations."""
         for name, value in step.items():
             self.model.set_variable(name, [value])
         count, converged = self.model.solve("max_res", limit, "max_iter", 60, "lsolver", "mumps")
@@ -85,7 +85,10 @@ class Pair:
 
 
 def answer(gf, ask: dict) -> dict:
-    """Cold build and solve, then the further steps; CPU seconds of each, pressure of the first and the last."""
+    """Assemble and solve, then solve the further steps.
+
+    Return the CPU seconds of each, and the pressures of the first and the last.
+    """
     start = process_time()
     pair = Pair(gf, ask)
     pair.model.set_variable("d", [ask["start"]])
@@ -109,7 +112,7 @@ def answer(gf, ask: dict) -> dict:
 
 
 def main() -> None:
-    """Say which GetFEM this is, then answer request by request."""
+    """Send the version of GetFEM, then answer each request."""
     try:
         import getfem as gf
     except ImportError as error:
@@ -129,7 +132,7 @@ def main() -> None:
 
 
 def version(gf) -> str:
-    """Of the installed library."""
+    """Return the version of the installed library."""
     known = getattr(gf, "__version__", None)
     if known:
         return str(known)

@@ -47,7 +47,7 @@ PEERS = ("nodal", "gauss")
 
 
 def theirs(peer: Peer, cells: int, form: str, quadrature: str) -> Row:
-    """GetFEM on the same mesh and gap; units mm, N, MPa, its start the overlap of 1.4 a."""
+    """Solve by GetFEM on the same mesh and gap, in mm, N and MPa, from an initial overlap of 1.4 a."""
     grid = make_grid(cells)
     newton = LOAD * 1e-3
     steps = [
@@ -92,7 +92,7 @@ def _median(rows: list) -> Row:
 
 
 def agreement(one: Row, other: Row) -> float:
-    """Largest difference of the pressures of all steps over the largest pressure."""
+    """Return the largest difference of the pressures of all steps relative to the largest pressure."""
     return float(np.abs(one.pressure - other.pressure).max() / one.pressure.max())
 
 
@@ -105,7 +105,11 @@ def _format_row(row: Row) -> str:
 
 
 def ratios(rows: list) -> list:
-    """Of one form: (peer row, its cold time over ours at the same mesh, at the same rms error, its further step)."""
+    """Return the ratios of time for one form.
+
+    They are (GetFEM row, its first time over ours on the same mesh, at the same rms error, and for
+    a further step).
+    """
     mine = [r for r in rows if r.program == "patchfem"]
     out = []
     for row in (r for r in rows if r.program != "patchfem"):
@@ -120,7 +124,7 @@ def ratios(rows: list) -> list:
 
 
 def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -> dict:
-    """form -> medians of all rows, printed with the ratios of time; Missing where GetFEM is absent."""
+    """Print the ratios of times and return {form: medians of all rows}; raise Missing without GetFEM."""
     out = {}
     with (
         threadpool_limits(1),

@@ -39,9 +39,12 @@ FORMS = {"mirror": 1, "pair": 2}  # bodies that are assembled
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Row:
-    """One program on one mesh. cold: CPU s of assembly, condensation or factors, contact; warm: of a further step;
-    errors: of p(0), of the half width from p^2 inside 0.8 a, of the pressure inside 0.9 a in the mean square over p0;
-    pressure: (steps, m) [Pa] of the steps."""
+    """Result of one program on one mesh.
+
+    Contains CPU seconds of assembly, condensation or factors, and contact (`cold`) and of a further
+    step (`warm`); errors of p(0), of the half width from p^2 inside 0.8 a, and of the pressure
+    inside 0.9 a (rms over p0); pressures (steps, m) [Pa].
+    """
 
     program: str
     form: str
@@ -54,7 +57,7 @@ class Row:
 
 
 def _line(fine: float, even: float, total: float) -> np.ndarray:
-    """Points from 0 to `total`: cells of `fine` up to `even`, growing from there."""
+    """Return points from 0 to `total` with cells of `fine` up to `even`, growing from there."""
     return np.concatenate(
         [
             np.arange(round(even / fine) + 1) * fine,
@@ -74,7 +77,7 @@ def make_grid(cells: int) -> TensorGrid:
 
 
 def compute_errors(x, p) -> tuple:
-    """Relative errors (p(0), half width, mean square inside 0.9 a over p0) of nodal pressures (m,) [Pa]."""
+    """Return relative errors of nodal pressures (m,) [Pa]: p(0), half width, and rms inside 0.9 a over p0."""
     near = np.abs(x) < 0.8 * HALF
     inside = np.abs(x) < 0.9 * HALF
     slope, top = np.polyfit((x[near] / HALF) ** 2, (p[near] / PEAK) ** 2, 1)
@@ -87,7 +90,7 @@ def compute_errors(x, p) -> tuple:
 
 
 def condense_pair(grid: TensorGrid, bodies: int) -> Compliance:
-    """The pair from its meshes on: one piece doubled, or both pieces assembled and condensed."""
+    """Condense the pair from its meshes: one piece counted twice, or both pieces assembled and condensed."""
     layers = Layers(MATERIAL, MATERIAL, "strain")
     parts = [interface_compliance(make_piece(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
     low = parts[0]
@@ -100,7 +103,7 @@ def condense_pair(grid: TensorGrid, bodies: int) -> Compliance:
 
 
 def ours(cells: int, form: str) -> Row:
-    """patchfem on one mesh, nothing kept from before."""
+    """Solve by patchfem on one mesh, without stored results."""
     grid = make_grid(cells)
     shape = crown(grid.x, RADIUS)
     pair, making = measure_seconds(lambda: condense_pair(grid, FORMS[form]))

@@ -41,7 +41,7 @@ PART = "in part"  # verdict of a conclusion that holds in part
 
 
 class Conclusion(NamedTuple):
-    """One of the ten: number, the claim in short, verdict, and what was found."""
+    """One of the ten conclusions: number, short claim, verdict, and result."""
 
     number: int
     claim: str
@@ -61,7 +61,7 @@ def block(level: float, frequency: float = 143.0, **sets) -> tuple:
 
 
 def phases(level: float) -> tuple:
-    """Return release and stop of the block as phases of the input displacement, 0 to 180 degrees."""
+    """Return the phases of the input displacement at which the block slips and stops, 0 to 180 degrees."""
     value = block(level)[1]
     release = np.degrees(value["slip_start_phase"])
     return release, release + 180 * (1 - value["stick_fraction"])
@@ -108,7 +108,7 @@ def second() -> Conclusion:
 
 @lru_cache
 def knee() -> float:
-    """Level [g] above which the block slides without a stop, by halving."""
+    """Return the level [g] above which the block slides without a stop, by bisection."""
     low = 5.0
     high = 6.0
     while high - low > 1e-3:
@@ -119,7 +119,7 @@ def knee() -> float:
 
 @lru_cache
 def jump() -> float:
-    """Jump of the block's acceleration when it stops, at 5 g, over the input's."""
+    """Return the jump of the block's acceleration when it stops, at 5 g, relative to that of the input."""
     return float(np.abs(np.diff(exact_cycle(ONSET).relative)).max())
 
 
@@ -242,7 +242,7 @@ ALL = (first, second, third, fourth, fifth, sixth, seventh, eighth, ninth, tenth
 
 
 def table(found: list) -> str:
-    """The conclusions as a table in Markdown."""
+    """Return the conclusions as a Markdown table."""
     rows = "\n".join(
         f"| {one.number} | {one.claim} | {one.verdict} | {one.found} |" for one in found
     )
@@ -254,7 +254,7 @@ def table(found: list) -> str:
 
 
 def main(path: Path | None = FOLDER / "conclusions.md") -> list:
-    """[Conclusion], printed and written as a table."""
+    """Print the conclusions, write them as a table, and return them."""
     found = [one() for one in ALL]
     for one in found:
         print(f"{one.number:2} {one.verdict:8} {one.claim}: {one.found}")

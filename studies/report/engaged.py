@@ -84,8 +84,11 @@ CRITICAL = {
 
 
 class Turned(NamedTuple):
-    """A mode of the engaged rig: mode; touch; level [g rms]; f (k,) [Hz]; moved (k,): its coordinate over the base
-    acceleration [um/g]; peak: the largest within 40 Hz of its frequency."""
+    """Response of a mode of the engaged rig.
+
+    Contains mode, touch, level [g rms], frequencies f (k,) [Hz], coordinate over base acceleration
+    `moved` (k,) [um/g], and its `peak` within 40 Hz of the frequency of the mode.
+    """
 
     mode: str
     touch: str
@@ -96,7 +99,7 @@ class Turned(NamedTuple):
 
 
 def rig(mode: str, touch: str) -> str:
-    """Text of the axial mode and one more beside it, whose coordinate is the output."""
+    """Return the scene text of the axial mode and one more mode, whose coordinate is the output."""
     contact, slide, feels = CASES[mode][touch]
     frequency, share = MODES[mode]
     return f"""{contact}
@@ -131,7 +134,7 @@ tolerance = 1e-2
 
 
 def random_turn(mode: str, touch: str, level: float, seconds: float = 8.0, seed: int = 1) -> Turned:
-    """H1 of the turn of a mode in a random test of so many seconds, windows of one."""
+    """Return the response of a mode in a random test of several seconds, with H1 from windows of one second."""
     done = run_random_test(rig(mode, touch), seconds, level, seed)
     how = {"fs": RATE, "nperseg": int(RATE)}
     f, power = signal.welch(done.base, **how)
@@ -178,7 +181,7 @@ def fit_damping(model: str, level: float, seconds: float = 20.0, seed: int = 1) 
 
 
 def _picture(turns: list, tests: dict, path: Path) -> Path:
-    """Yaw and rocking while the block slides, over the base, and the coherence where a mode is critically damped."""
+    """Plot yaw and rocking over base acceleration while the block slides, and the coherence for a critically damped mode."""
     colours = (GREY, "black", ORANGE, BLUE)
     with drawing(path, (10.4, 4.2), 1, 3) as (_, axes):
         for axis, mode in zip(axes, CASES):

@@ -35,7 +35,11 @@ COLOURS = (GREY, ORANGE, BLUE, "#4f9bd9")
 
 
 def main(path: Path | None = FOLDER / "figure_13.svg") -> list:
-    """One dict per p: at 0, where it is largest, how large, and the R/eps behind which a tenth of the area lies."""
+    """Return a dict for each p.
+
+    It has the weight at 0, position and size of the maximum, and the R/eps beyond which a tenth of
+    the area lies.
+    """
     x = np.linspace(0, 8, 1601)
     rows = []
     for p in ORDERS:
@@ -60,7 +64,7 @@ def main(path: Path | None = FOLDER / "figure_13.svg") -> list:
 
 
 def draw(path: Path, x) -> None:
-    """The figure as SVG."""
+    """Draw the figure as SVG."""
     with drawing(path, (6.0, 3.4)) as (_, axis):
         for p, colour in zip(ORDERS, COLOURS):
             shown = x[1:] if p < 0 else x

@@ -33,7 +33,7 @@ VERDICT = (
 
 
 def main(path: Path | None = FOLDER / "figure_14.svg") -> list:
-    """Return (eta/rho, W, fraction of the area within) at 0, 1 and 2, and at infinity."""
+    """Return (eta/rho, W, fraction of the area within) at 0, 1, 2 and infinity."""
     rows = [
         (y, float(weight_across(y)), quad(weight_across, -y, y)[0]) for y in (0.0, 1.0, 2.0, np.inf)
     ]

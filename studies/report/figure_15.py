@@ -45,8 +45,12 @@ END = 18.0
 
 
 class Row(NamedTuple):
-    """omega, ratio = k x0/F; printed: pi N0/w0 with N0 unrounded; moving: displacement then over x0; stop, place: time
-    and displacement over x0 of the rest by the engine; error: largest difference of its samples from 3.11 rounded."""
+    """Release with omega and ratio = k x0/F.
+
+    Contains time `printed` = pi N0/w0 with N0 not rounded, displacement over x0 then (`moving`),
+    time `stop` and displacement `place` of the rest by the engine, and the largest difference
+    `error` of its samples from 3.11 with N0 rounded.
+    """
 
     omega: float
     ratio: float
@@ -58,7 +62,7 @@ class Row(NamedTuple):
 
 
 def solve(omega: float, ratio: float) -> Row:
-    """The row of a block of unit mass released at x0 = 1."""
+    """Return the row of a block of unit mass that is released at x0 = 1."""
     found = pf.run(
         FOLDER / "figure_15.toml",
         **{
@@ -82,7 +86,10 @@ def solve(omega: float, ratio: float) -> Row:
 
 
 def run_report_steps(step: float = 0.05) -> tuple:
-    """Run the first reading by the report's steps; return time, x and the fraction of failed steps."""
+    """Integrate the first interpretation of the figure with the steps of the report.
+
+    Return time, x and the fraction of failed steps.
+    """
     drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 0.0, 1.0),), 1000 * step, False)
     found = solve_duhamel(
         UNDAMPED_MASS,
@@ -98,7 +105,10 @@ def run_report_steps(step: float = 0.05) -> tuple:
 
 
 def _picture(rows: list, steps: tuple, path: Path) -> Path:
-    """Displacement over time as in Fig. 15 for three readings of 11, and what the report's steps do after rest."""
+    """Plot displacement over time as in Fig.
+
+    15 for three interpretations of 11, and the motion after rest by the steps of the report.
+    """
     time = np.linspace(0, END, 1801)
     with drawing(path, (9.6, 5.6), 2, 1, height_ratios=(2, 1)) as (_, (upper, lower)):
         for r, colour in zip(rows, (BLUE, ORANGE, GREY)):

@@ -42,7 +42,7 @@ FIT_BAND = (140.0, 146.0)  # [Hz] the axial mode is fitted here
 
 
 class Free(NamedTuple):
-    """Frequencies (k,) [Hz] of the curve with transmissibility (k,), complex; peak: frequency [Hz] and height there."""
+    """Steady response: frequencies (k,) [Hz], complex transmissibility (k,), and frequency [Hz] and height of its peak."""
 
     f: np.ndarray
     h: np.ndarray
@@ -50,7 +50,7 @@ class Free(NamedTuple):
 
 
 def transmissibility(f) -> np.ndarray:
-    """Acceleration of the block over that of the base (k,), complex, of the scene's modes at f (k,) [Hz]."""
+    """Return the complex acceleration (k,) of the block over that of the base at frequencies f (k,) [Hz]."""
     modes = pf.build(SCENE).rig.modes
     omega = 2 * np.pi * np.asarray(f, float)
     return (
@@ -62,7 +62,7 @@ def transmissibility(f) -> np.ndarray:
 
 
 def curve() -> Free:
-    """At the points that a sweep with method "harmonic" chooses."""
+    """Return the response at the frequencies that a sweep with method "harmonic" chooses."""
     found = pf.run(SCENE)
     f = found.extra["curve"]["frequency"]
     h = transmissibility(f)
@@ -71,13 +71,13 @@ def curve() -> Free:
 
 
 def random_test(seconds: float = SECONDS, window: float = WINDOW) -> Estimate:
-    """H1 of a random test, from 60 to 210 Hz."""
+    """Return H1 of a random test from 60 to 210 Hz."""
     text = SCENE.read_text("utf-8").replace('method = "harmonic"', 'method = "exact"')
     return h1(run_random_test(text, seconds, RMS), window).between(60, 210)
 
 
 def _picture(free: Free, seen: Estimate, path: Path) -> Path:
-    """Magnitude above phase, and the peak by itself."""
+    """Plot magnitude, phase, and an enlarged view of the peak."""
     with drawing(path, (9.6, 5.4), 2, 2, height_ratios=(2, 1), width_ratios=(1.9, 1)) as (
         figure,
         axes,

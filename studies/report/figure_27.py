@@ -58,8 +58,11 @@ CASES = (
 
 
 class Row(NamedTuple):
-    """A random test: model, level [g rms]; the mode fitted to H1 from 60 to 260 Hz: frequency [Hz], damping; slide
-    [mil rms], its speed [m/s rms]; the estimate."""
+    """Random test of a model at a level [g rms].
+
+    Contains frequency [Hz] and damping ratio of the mode fitted to H1 from 60 to 260 Hz, slide [mil
+    rms], its speed [m/s rms], and the estimate.
+    """
 
     model: str
     level: float
@@ -71,7 +74,7 @@ class Row(NamedTuple):
 
 
 def scene(model: str) -> str:
-    """Text of a rig with one point of contact."""
+    """Return the scene text of a rig with one contact point."""
     if model == "rigid block":
         return (
             (FOLDER / "block.toml")
@@ -87,7 +90,7 @@ def scene(model: str) -> str:
 
 
 def row(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> Row:
-    """H1 of so many seconds by windows of one."""
+    """Return the row of a random test of several seconds, with H1 from windows of one second."""
     done = run_random_test(scene(model), seconds, level, seed)
     seen = h1(done, 1.0).between(60, 260)
     found = fit_mode(seen) if done.displacement.std() > 0.1 * MIL else (np.nan, np.nan)
@@ -97,12 +100,12 @@ def row(model: str, level: float, seconds: float = 20.0, seed: int = 1) -> Row:
 
 
 def linearised_damping(speed: float) -> float:
-    """Damping ratio of the rigid block by statistical linearisation at a speed [m/s rms]."""
+    """Return the damping ratio of the rigid block by statistical linearisation at a speed [m/s rms]."""
     return 0.003 + np.sqrt(2 / np.pi) * ONSET * G / (2 * 2 * np.pi * 143 * speed)
 
 
 def picture(rows: list, path: Path) -> Path:
-    """Magnitude above phase: the rigid block over the level, and the three models where they are critical."""
+    """Plot magnitude and phase: the rigid block at several levels, and the three models at critical damping."""
     colours = (GREY, BLUE, "#4f9bd9", "#9ecae1"), (BLUE, ORANGE, "black", GREY)
     sides = (
         [r for r in rows if r.model == "rigid block"],
@@ -142,7 +145,7 @@ def picture(rows: list, path: Path) -> Path:
 
 
 def main(path: Path | None = FOLDER / "figure_27.svg", cases=CASES, seconds: float = 20.0) -> list:
-    """[Row], printed and drawn."""
+    """Print, draw and return the rows."""
     rows = [row(*case, seconds) for case in cases]
     for r in rows:
         more = (

@@ -51,8 +51,11 @@ FREQUENCY = 0.1  # frequency of the frame / natural frequency of the block
 
 
 class Motion(NamedTuple):
-    """The last cycle of a run: time [1/w0] from its start on; block and frame [a0]; friction on the block [K a0]; peak:
-    half peak to peak of the block."""
+    """Last cycle of a run.
+
+    Contains time [1/w0] from its start, displacements of block and frame [a0], friction on the
+    block [K a0], and half the peak-to-peak displacement of the block.
+    """
 
     time: np.ndarray
     block: np.ndarray
@@ -62,7 +65,7 @@ class Motion(NamedTuple):
 
 
 def motion(step: float | None = None) -> Motion:
-    """By Euler's steps of `step` [1/w0], None: by the engine that the tolerance picks.
+    """Return the motion by Euler's method with steps of `step` [1/w0], or by the engine of the tolerance for None.
 
     The signs are turned about, so that the frame moves as + a0 sin(w t).
     """
@@ -84,7 +87,7 @@ def motion(step: float | None = None) -> Motion:
 
 
 def _by_euler(steps: int, period: float) -> Motion:
-    """The last cycle by Euler's method with this number of steps per cycle."""
+    """Return the last cycle by Euler's method with this number of steps per cycle."""
     rig = build(load_scene(FOLDER / "figure_5.toml")).rig
     numbers = rig.friction.interfaces[0].numbers
     motion = solve_euler(
@@ -111,27 +114,27 @@ def _by_euler(steps: int, period: float) -> Motion:
 
 
 def turns(one: Motion) -> np.ndarray:
-    """Displacements (k,) [a0] at which the block turns about, in order."""
+    """Return the displacements (k,) [a0] of the reversals of the block, in order of time."""
     rising = np.diff(one.block) > 0
     return one.block[1:-1][rising[1:] != rising[:-1]]
 
 
 def swings(one: Motion) -> np.ndarray:
-    """Sizes (k,) [a0] of the swings about 0.1 a0 while the block slides under the whole friction forward."""
+    """Return the sizes (k,) [a0] of the oscillations about 0.1 a0 while the block slides under full forward friction."""
     rising = np.diff(one.block) > 0
     at = 1 + np.flatnonzero(rising[1:] != rising[:-1])
     return np.abs(one.block[at[one.friction[at] > 0.0999]] - 0.1)
 
 
 def carried_time_fraction(one: Motion) -> float:
-    """Share of the time in which friction carries the block along: relative speed below v0, |F| < F0 tanh 1."""
+    """Return the fraction of time in which friction carries the block along: relative speed below v0, |F| < F0 tanh 1."""
     return float(
         np.trapezoid(1.0 * (np.abs(one.friction) < 0.1 * np.tanh(1.0)), one.time) / one.time[-1]
     )
 
 
 def _picture(exact: Motion, euler: dict, path: Path) -> Path:
-    """Block, frame and friction over a cycle, and the largest displacement over Euler's step."""
+    """Plot block, frame and friction over a cycle, and the largest displacement against Euler's step."""
     with drawing(path, (9.6, 6.4), 2, 2, height_ratios=(1.35, 1), width_ratios=(1.5, 1)) as (
         figure,
         axes,

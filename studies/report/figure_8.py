@@ -66,10 +66,13 @@ cycles = 2
 
 
 class Loop(NamedTuple):
-    """The last cycle: frequency [Hz]; time [s] from its start; slider and slip at the interface [m]; force in the load
-    cell and of friction [N], against the slider; peak: largest force in the cell over the friction limit; work: of the
-    friction in that cycle over that of a rigid fixture; swings: of the cell's force in a stroke; sticks: times that the
-    piece sticks in a stroke."""
+    """Last cycle at a frequency [Hz].
+
+    Contains time [s] from its start, slider and interface slip [m], force in the load cell and
+    friction force [N], peak of the load cell over the friction limit, work of the friction over
+    that with a rigid fixture, and the numbers of force oscillations and of sticking phases in a
+    stroke.
+    """
 
     frequency: float
     time: np.ndarray
@@ -84,7 +87,7 @@ class Loop(NamedTuple):
 
 
 def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
-    """figure_8.toml with its slider at a frequency [Hz]; kinetic friction stays 0.3."""
+    """Run figure_8.toml with its slider at a frequency [Hz]; kinetic friction stays 0.3."""
     omega = 2 * np.pi * frequency
     found = pf.run(
         FOLDER / "figure_8.toml",
@@ -158,7 +161,7 @@ def read_as_rigid(one: Loop) -> tuple:
 
 
 def picture(loops: list, path: Path) -> Path:
-    """The loop in the load cell over that of the contact, the same in time, and the peak over the speed."""
+    """Plot the loop of the load cell with that of the contact, both over time, and the peak against the speed."""
     one = loops[FREQUENCIES.index(10.0)]
     with drawing(path, (10.4, 3.9), 1, 3) as (_, (left, middle, right)):
         left.plot(one.slider * 1e6, one.cell, color=BLUE, lw=1, label="load cell")
@@ -190,7 +193,7 @@ def picture(loops: list, path: Path) -> Path:
 
 
 def main(path: Path | None = FOLDER / "figure_8.svg", frequencies=FREQUENCIES) -> list:
-    """[Loop], printed and drawn."""
+    """Print, draw and return the loops."""
     loops = [loop(each) for each in frequencies]
     for one in loops:
         static, length = read_as_rigid(one)

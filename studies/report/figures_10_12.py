@@ -37,9 +37,12 @@ TRANSIENT_TOL = 1e-5  # fraction of the start that may remain
 
 
 class Row(NamedTuple):
-    """The last two cycles: ratio: drive over natural frequency; time [1/w0]; x1, x2 [P0/k]; amplitude, turns and
-    distortion of both: half peak to peak, turns per cycle, root mean square of what is not the first harmonic over that
-    of all; friction: its share of the energy taken out of a cycle."""
+    """Last two cycles at a ratio of drive to natural frequency.
+
+    Contains time [1/w0], x1 and x2 [P0/k]; for both masses half the peak-to-peak value, reversals
+    per cycle and distortion (rms without the first harmonic over the rms); share of the friction in
+    the energy that leaves a cycle.
+    """
 
     ratio: float
     time: np.ndarray
@@ -52,19 +55,19 @@ class Row(NamedTuple):
 
 
 def turns_per_cycle(x) -> float:
-    """Turns per cycle of a motion x (k,) over two cycles, first and last sample alike."""
+    """Return the reversals per cycle of a motion x (k,) over two cycles whose first and last samples are equal."""
     rising = np.sign(np.diff(x[:-1], append=x[:1]))
     return float((rising != np.roll(rising, 1)).sum() / 2)
 
 
 def distortion_ratio(x) -> float:
-    """Share, of root mean squares, that is not the first harmonic of a motion x (k,) even over two cycles."""
+    """Return the rms without the first harmonic over the rms of a motion x (k,), sampled uniformly over two cycles."""
     power = np.abs(np.fft.rfft(x[:-1]))[1:] ** 2
     return float(np.sqrt(1 - power[1] / power.sum()))
 
 
 def solve(ratio: float) -> Row:
-    """Run until the start has decayed and read the last two cycles."""
+    """Run until the transient has decayed, and return the row of the last two cycles."""
     cycles = max(8, int(np.ceil(ratio * np.log(1 / TRANSIENT_TOL) / (np.pi * DAMPING))))
     found = pf.run(
         FOLDER / "figures_10_12.toml",
@@ -102,7 +105,7 @@ def solve(ratio: float) -> Row:
 
 
 def picture(rows: list, path: Path) -> Path:
-    """Both displacements over two cycles as in Figs 10, 11 and 12; how far from a sine they are, over the frequency."""
+    """Plot both displacements over two cycles as in Figs 10, 11 and 12, and their distortion against frequency."""
     with drawing(path, (9.6, 6.2), 2, 2) as (figure, axes):
         by_ratio = {r.ratio: r for r in rows}
         for (number, ratio), axis in zip(FIGURES.items(), axes.ravel()):
@@ -134,7 +137,7 @@ def picture(rows: list, path: Path) -> Path:
 
 
 def main(beside=OTHER_RATIOS, path: Path | None = FOLDER / "figures_10_12.svg") -> list:
-    """[Row] of Figs 10, 11 and 12, then of the frequencies beside them, printed and drawn."""
+    """Print, draw and return the rows of Figs 10, 11 and 12, then of nearby frequencies."""
     rows = [solve(ratio) for ratio in (*FIGURES.values(), *beside)]
     for r in rows:
         print(

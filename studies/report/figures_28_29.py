@@ -50,8 +50,11 @@ CASES = (
 
 
 class Run(NamedTuple):
-    """One run from rest: its title; stays: it never went beyond 2 mil; cycles that it ran; peaks of the last cycles
-    [g], [mil]; third over first harmonic of the acceleration; frequency [Hz]; its Response."""
+    """Run from rest.
+
+    Contains title, whether it stayed within 2 mil, number of cycles, peaks of the last cycles [g],
+    [mil], third over first harmonic of the acceleration, frequency [Hz], and its Response.
+    """
 
     title: str
     stays: bool
@@ -64,7 +67,7 @@ class Run(NamedTuple):
 
 
 def run_block(title: str, frequency: float, level: float, sets: dict) -> Run:
-    """200 cycles of grooved.toml at a frequency [Hz] and a level [g], or until it runs away.
+    """Run grooved.toml at a frequency [Hz] and a level [g] for 200 cycles, or until the motion diverges.
 
     Gone is a block beyond 2 mil, or thrown out of its grooves on the way there.
     """
@@ -88,7 +91,10 @@ def run_block(title: str, frequency: float, level: float, sets: dict) -> Run:
 
 
 def let_go(place: float, level: float) -> bool:
-    """Whether the block stays at 143 Hz and a level [g], let go at rest at a place [um] off its valley."""
+    """Return whether the block stays in its valley at 143 Hz and a level [g].
+
+    It is released at rest at a distance `place` [um] from the valley.
+    """
     text = (FOLDER / "grooved.toml").read_text("utf-8")
     start = f'[structure.start]\ndisplacement = ["{place} um", "0 m"]\nvelocity = ["0 m/s", "0 m/s"]\n\n[drive]'
     found = pf.run(text.replace("[drive]", start), **{"drive.acceleration": level * G})
@@ -96,7 +102,7 @@ def let_go(place: float, level: float) -> bool:
 
 
 def last_level(frequency: float, levels) -> float:
-    """The level [g] at which the block leaves when it is raised through `levels` every 50 cycles."""
+    """Return the level [g] at which the block leaves its valley if the level is raised through `levels` every 50 cycles."""
     text = (FOLDER / "grooved.toml").read_text("utf-8")
     listed = ", ".join(f'"{level:g} g"' for level in levels)
     text = text.replace("cycles = 200", "cycles = 50").replace(
@@ -108,7 +114,7 @@ def last_level(frequency: float, levels) -> float:
 
 
 def picture(runs: list, path: Path) -> Path:
-    """Input, absolute acceleration and displacement of every run, one above the other as the recorder drew them."""
+    """Plot input, absolute acceleration and displacement of every run, one above the other as the recorder drew them."""
     with drawing(path, (10.4, 6.2), 3, len(runs), sharey="row", sharex="col") as (_, axes):
         for column, run in enumerate(runs):
             r = run.seen
@@ -136,7 +142,7 @@ def picture(runs: list, path: Path) -> Path:
 
 
 def main(path: Path | None = FOLDER / "figures_28_29.svg", cases=CASES) -> list:
-    """[Run], printed and drawn."""
+    """Print, draw and return the runs."""
     runs = [run_block(*case) for case in cases]
     for run in runs:
         print(

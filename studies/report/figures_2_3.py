@@ -47,8 +47,11 @@ CURVE = 401  # points of a drawn cycle, and steps per cycle of Newmark less one
 
 
 class Row(NamedTuple):
-    """Steady motion: onset, level [g]; outcome; q = amplitude over that of the input; amplitude [mil]; largest absolute
-    acceleration [g]; share of the time stuck."""
+    """Steady motion at an onset and a level [g].
+
+    Contains outcome, amplitude over that of the input, amplitude [mil], largest absolute
+    acceleration [g] and fraction of time that sticks.
+    """
 
     onset: float
     level: float
@@ -60,8 +63,11 @@ class Row(NamedTuple):
 
 
 class Cycle(NamedTuple):
-    """One steady cycle from phase 0 of the input displacement on: displacement, velocity, friction, relative and
-    absolute acceleration (k,), as multiples of those of the input (of K X0 for the friction)."""
+    """Steady cycle that starts at phase 0 of the input displacement.
+
+    Contains displacement, velocity, friction, relative and absolute acceleration (k,), relative to
+    those of the input (friction to K X0).
+    """
 
     displacement: np.ndarray
     velocity: np.ndarray
@@ -71,7 +77,7 @@ class Cycle(NamedTuple):
 
 
 def steady(onset: float, level: float) -> Row:
-    """The row of block.toml with this onset and level [g]."""
+    """Return the row of block.toml with this onset and level [g]."""
     sets = {"structure.moving_mass": LIMIT / (onset * G), "drive.acceleration": level * G}
     found = pf.run(FOLDER / "block.toml", **sets)
     amplitude = found.measures["relative_displacement_amplitude"].value
@@ -87,7 +93,7 @@ def steady(onset: float, level: float) -> Row:
 
 
 def exact_cycle(onset: float, level: float = 5.0, after: int = 40) -> Cycle:
-    """A cycle of the exact motion `after` cycles from rest."""
+    """Return a cycle of the exact motion, `after` cycles from rest."""
     times = 2 * np.pi * (after + 0.5 + np.linspace(0, 1, CURVE))
     r = sample_motion(SDOF, SDOF_DRIVE, onset / level, after + 2.0, times)
     return Cycle(
@@ -98,7 +104,7 @@ def exact_cycle(onset: float, level: float = 5.0, after: int = 40) -> Cycle:
 def newmark_run(
     stick_speed: float, onset: float = 4.0, level: float = 5.0, cycles: int = 60
 ) -> Cycle:
-    """The last cycle of Newmark's method that stops the block below `stick_speed`."""
+    """Return the last cycle of Newmark's method, which stops the block below `stick_speed`."""
     found = solve_newmark(
         SDOF,
         SDOF_DRIVE,
@@ -118,7 +124,7 @@ def newmark_run(
 
 
 def growth(onset: float, level: float, cycles: int = 200) -> np.ndarray:
-    """Largest displacement (cycles,) [mil] in every cycle from rest."""
+    """Return the largest displacement (cycles,) [mil] of every cycle from rest."""
     q = sample_motion(
         SDOF,
         SDOF_DRIVE,
@@ -130,7 +136,7 @@ def growth(onset: float, level: float, cycles: int = 200) -> np.ndarray:
 
 
 def picture(cycles: dict, path: Path) -> Path:
-    """Histories and the limit cycle as in Figs 2, 3, 32 and 33, and the growth at four levels."""
+    """Plot histories and limit cycles as in Figs 2, 3, 32 and 33, and the growth at four levels."""
     phase = np.linspace(0, 360, CURVE)
     with drawing(path, (9.6, 11.0), 4, 2) as (figure, axes):
         panels = [
@@ -166,7 +172,7 @@ def picture(cycles: dict, path: Path) -> Path:
 
 
 def _growth(axes) -> None:
-    """Left: displacement over the cycles from rest; right: steady displacement over the level, beside Table 1."""
+    """Plot displacement over the cycles from rest, and the steady displacement over the level with Table 1."""
     for level, colour in ((5.0, GREY), (6.0, "#4f9bd9"), (8.0, BLUE)):
         grown = growth(4.14, level)
         axes[0].semilogy(np.arange(1, 201), grown, color=colour)

@@ -68,8 +68,11 @@ BITE = 0.03e-6  # [m] worn off by one pass
 
 
 class Set(NamedTuple):
-    """Four traces: (before, after) along x and along y; parts: their Comparison along x and y; across: x over y before
-    and after, amplitude ratio as Quantity."""
+    """Four traces, before and after wear along x and y.
+
+    Contains their Comparison along x and y, and the amplitude ratios x over y before and after as
+    Quantity.
+    """
 
     traces: tuple
     parts: list
@@ -83,12 +86,12 @@ def rub_surface(stroke: int) -> tuple:
 
 
 def trace(heights, name: str) -> Profile:
-    """Heights along one line as a trace."""
+    """Return the heights along one line as a trace."""
     return Profile(frozen_array(bands.STEP * np.arange(heights.size)), frozen_array(heights), name)
 
 
 def cut(before, after, line: int) -> Set:
-    """The set at a line of the raster, the traces after APART lines beside those before."""
+    """Return the set at a line of the raster; the traces after are APART lines from those before."""
     other = (line + LINES_BETWEEN) % bands.POINTS
     pairs = (
         (trace(before[line], "before, x"), trace(after[other], "after, x")),
@@ -99,7 +102,7 @@ def cut(before, after, line: int) -> Set:
 
 
 def counts(sets: list) -> tuple:
-    """Count the sets that are reduced along x, along y, and lower along x than along y after and before."""
+    """Count the sets whose waves are reduced along x, reduced along y, and lower along x than along y after and before."""
     ratios = [
         (*[part.ratios.amplitude for part in one.parts], one.across[1], one.across[0])
         for one in sets
@@ -110,7 +113,7 @@ def counts(sets: list) -> tuple:
 
 
 def count_held(sets: list, row) -> int:
-    """In how many comparisons of the sets the interval holds the ratio of the whole areas."""
+    """Count the comparisons of the sets whose interval contains the ratio of the whole areas."""
     return sum(
         one.parts[way].ratios.amplitude.low < row.after[way] < one.parts[way].ratios.amplitude.high
         for one in sets
@@ -119,32 +122,32 @@ def count_held(sets: list, row) -> int:
 
 
 def amplitude(trace: Profile) -> float:
-    """Amplitude [m] of the waves of the band."""
+    """Return the amplitude [m] of the waves in the band."""
     return band_amplitude(estimate_spectrum(level(trace).z, bands.STEP), *BAND)
 
 
 def heights(sets: list, when: int) -> np.ndarray:
-    """Wave heights (2 sets,) [m] of all traces before (0) or after (1): twice the amplitude of the band."""
+    """Return the wave heights (2 sets,) [m] of all traces before (0) or after (1): twice the amplitude in the band."""
     return np.array([2 * amplitude(pair[when]) for one in sets for pair in one.traces])
 
 
 def totals(sets: list, way: int) -> np.ndarray:
-    """Total heights Pt (2, sets) [m] of the traces along x (0) or y (1), before and after."""
+    """Return the total heights Pt (2, sets) [m] of the traces along x (0) or y (1), before and after."""
     return np.array([[np.ptp(level(one.traces[way][when]).z) for one in sets] for when in (0, 1)])
 
 
 def middle(sets: list) -> Set:
-    """The set through the middle of the surface, which is drawn and written."""
+    """Return the set through the middle of the surface, which is drawn and written."""
     return sets[len(sets) // 2]
 
 
 def spread(values, digits: int) -> str:
-    """Smallest and largest as text."""
+    """Format the smallest and the largest value."""
     return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
 
 
 def picture(sets: list, path: Path) -> Path:
-    """The four traces of a set as in Figs 30 and 31, and what every set says of the waves after and before."""
+    """Plot the four traces of a set as in Figs 30 and 31, and the wave heights of all sets after and before."""
     with drawing(path, (9.6, 8.2), 3, 2) as (_, axes):
         for when, number, colour in ((0, 30, GREY), (1, 31, BLUE)):
             for way, axis in zip((0, 1), axes[when]):
@@ -200,7 +203,7 @@ def write(one: Set, folder: Path) -> list:
 def main(
     strokes=STROKES, count: int = SETS, path: Path | None = FOLDER / "figures_30_31.svg"
 ) -> dict:
-    """{stroke: ([Set], Row of the whole areas)}, printed and drawn."""
+    """Print, draw and return {stroke: ([Set], Row of the whole areas)}."""
     lines = [k * bands.POINTS // count for k in range(count)]
     found = {}
     for stroke in strokes:

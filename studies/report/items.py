@@ -22,8 +22,11 @@ VERDICTS = {
 
 
 class Item(NamedTuple):
-    """One item: where it stands in the report, what is said there; scene, study and test, paths of the repository, ""
-    without one; verdict: one of VERDICTS, with what is lacking."""
+    """Item of the report.
+
+    Contains its place, its statement, paths of the scene, study and test ("" if there is none), and
+    the verdict, one of VERDICTS, with what is missing.
+    """
 
     place: str
     said: str
@@ -620,12 +623,12 @@ ITEMS = (
 
 
 def link(path: str) -> str:
-    """A path of the repository as a link beside the page."""
+    """Return a path of the repository as a link from the page."""
     return f"[{path.split('/', 1)[1]}](../../{path})" if path else "-"
 
 
 def table(items=ITEMS) -> str:
-    """The page in Markdown."""
+    """Return the page in Markdown."""
     counts = [
         (sum(item.verdict.split(":")[0] == verdict for item in items), words)
         for verdict, words in VERDICTS.items()
@@ -653,7 +656,7 @@ def table(items=ITEMS) -> str:
 
 
 def main(path: Path | None = FOLDER / "items.md") -> tuple:
-    """The items, written as a page."""
+    """Write the items as a page and return them."""
     if path is not None:
         path.write_text(table(), "utf-8")
     return ITEMS

@@ -24,8 +24,11 @@ BAND = (20.0, 400.0)  # [Hz] band of the random base acceleration
 
 
 class Test(NamedTuple):
-    """Samples at RATE of a random test: acceleration of base and block [m s-2], the block's displacement [m] and
-    velocity [m/s] on the base."""
+    """Samples of a random test at RATE.
+
+    Contains acceleration of base and block [m s-2], displacement [m] and velocity [m/s] of the
+    block relative to the base.
+    """
 
     base: np.ndarray
     block: np.ndarray
@@ -34,20 +37,20 @@ class Test(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """H1 of block over base acceleration: f (k,) [Hz], h (k,) complex, coherence (k,)."""
+    """H1 of block over base acceleration: f (k,) [Hz], complex h (k,), coherence (k,)."""
 
     f: np.ndarray
     h: np.ndarray
     coherence: np.ndarray
 
     def between(self, low: float, high: float) -> "Estimate":
-        """The part between two frequencies [Hz]."""
+        """Return the part between two frequencies [Hz]."""
         inside = (self.f >= low) & (self.f <= high)
         return Estimate(self.f[inside], self.h[inside], self.coherence[inside])
 
 
 def _random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
-    """A normal random record, even over BAND; rms in g."""
+    """Return a normal random record with a flat spectrum over BAND and the given rms [g]."""
     count = int(seconds * RATE)
     f = np.fft.rfftfreq(count, 1 / RATE)
     random = np.random.default_rng(seed)
@@ -61,7 +64,7 @@ def _random_base(seconds: float, rms: float, seed: int = 1) -> RecordedDrive:
 
 
 def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None = None):
-    """March the rig of a scene from rest and return every sample.
+    """Integrate the rig of a scene from rest and return every sample.
 
     Parameters
     ----------
@@ -87,13 +90,13 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
 
 
 def run_random_test(scene, seconds: float, rms: float, seed: int = 1) -> Test:
-    """The rig of a scene under `random_base` from rest."""
+    """Run the rig of a scene from rest under `_random_base`."""
     seen = march_samples(scene, _random_base(seconds, rms, seed), seconds=seconds - STEPS / RATE)
     return Test(seen.base_acceleration, seen.acceleration, seen.output, seen.output_rate)
 
 
 def h1(test: Test, seconds: float) -> Estimate:
-    """H1 = S_xy/S_xx by Hann windows of so many seconds that overlap by half."""
+    """Estimate H1 = S_xy/S_xx with Hann windows of several seconds that overlap by half."""
     how = {"fs": RATE, "nperseg": int(seconds * RATE)}
     f, input_power = signal.welch(test.base, **how)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -107,7 +110,7 @@ def h1(test: Test, seconds: float) -> Estimate:
 
 
 def mode_transmissibility(f, frequency: float, damping: float):
-    """Absolute over base acceleration of one mode, (f_0^2 + 2 i zeta f_0 f)/(f_0^2 - f^2 + 2 i zeta f_0 f)."""
+    """Return absolute over base acceleration of one mode, (f_0^2 + 2 i zeta f_0 f)/(f_0^2 - f^2 + 2 i zeta f_0 f)."""
     damper = 2j * damping * frequency * np.asarray(f)
     return (frequency**2 + damper) / (frequency**2 - np.asarray(f) ** 2 + damper)
 

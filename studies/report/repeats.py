@@ -68,7 +68,7 @@ STEADY = {
 
 
 class Reading(NamedTuple):
-    """One row of Table 1 with what the model makes of it.
+    """Row of Table 1 with the results of the model.
 
     row: `MeasuredRow` of the table; column: number from 0; value: acceleration [m/s2] after the MINUTES; before, depth [m]:
     mean worn depth at their start and end; contact: share of the length in contact at the end.
@@ -83,7 +83,7 @@ class Reading(NamedTuple):
 
 
 def columns() -> list:
-    """List (column, row) of Table 1 in the order of the print, with rows without a reading."""
+    """List (column, row) of Table 1 in the order of the print, and rows without a value."""
     out = []
     column = -1
     last = None
@@ -102,10 +102,9 @@ def series(
     static: float = STATIC,
     rows: list | None = None,
 ) -> list:
-    """Readings of the whole series, one after the other on the same pieces; place: an empty folder for their results.
+    """Compute the readings of a whole series, one after the other on the same pieces.
 
-    coefficient [m2/N] of Archard's law; friction: a table [wear.friction], or nothing; static: friction of new pieces;
-    rows: of `columns`, all of them by default.
+    `place` is an empty folder for the results.
     """
     text = (
         SCENE.read_text("utf-8")
@@ -148,7 +147,7 @@ def series(
 
 
 def as_onsets(readings: list) -> str:
-    """[wear.friction] that follows the onset of slip from column to column, over the worn depth of a series."""
+    """Return a table [wear.friction] with the onset of slip of each column against the worn depth of a series."""
     first = {reading.column: reading.before for reading in reversed(readings)}
     depth = ", ".join(f'"{first[column]!r} m"' for column in sorted(first))
     factor = ", ".join(f"{one / ONSETS[0]:.5f}" for one in ONSETS)
@@ -156,7 +155,7 @@ def as_onsets(readings: list) -> str:
 
 
 def pairs(readings: list) -> np.ndarray:
-    """Logarithms of the repeat over the first reading, (k, 2): as read, as the model has it, of what was read twice."""
+    """Return the logarithms (k, 2) of second over first readings, as measured and by the model."""
     first = {
         (reading.row.frequency, reading.row.input): reading
         for reading in readings
@@ -181,7 +180,7 @@ def rms(values) -> float:
 
 
 def main(coefficients=(COEFFICIENT,)) -> dict:
-    """Print the repeats; return the readings of a series for each wear coefficient [m2/N] by name.
+    """Print the repeated readings; return by name the readings of a series for each wear coefficient [m2/N].
 
     One more series lets the friction follow the onset of slip.
     """

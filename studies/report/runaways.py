@@ -53,7 +53,7 @@ STILL = {YAW: 0.0}
 
 
 def block(friction: str, more: str = "") -> str:
-    """Text of a block without grooves and without yaw."""
+    """Return the scene text of a block without grooves and without yaw."""
     head = GROOVED_SCENE.split("[normal.grooves]")[0]
     tail = GROOVED_SCENE[GROOVED_SCENE.index("[structure]") :]
     yaw = tail.index('[[structure.mode]]\nname = "yaw"')
@@ -118,8 +118,11 @@ SHOWN_PATHS = ("friction alone, held to 8 g", "softening spring", "grooves", "gr
 
 
 class Row(NamedTuple):
-    """A path: name; level [g] of its runaway at each frequency, None where it stays up to 12 g; before: (slip, motion
-    at the output) [mil], half peak to peak, at 135 Hz at the level before."""
+    """Levels of divergence of a load path.
+
+    Contains its name, the level [g] at each frequency (None if the motion stays bounded up to 12
+    g), and (slip, motion at the output) [mil], half peak-to-peak, at 135 Hz at the level before.
+    """
 
     name: str
     levels: tuple
@@ -127,7 +130,7 @@ class Row(NamedTuple):
 
 
 def motion(name: str, frequency: float, level: float, **more) -> tuple:
-    """Return whether the block left within 150 cycles, its slip [mil] and its motion at the output [mil].
+    """Return whether the motion diverges within 150 cycles, its slip [mil] and its motion at the output [mil].
 
     Parameters
     ----------
@@ -157,7 +160,10 @@ def motion(name: str, frequency: float, level: float, **more) -> tuple:
 
 
 def row(name: str) -> Row:
-    """By halving, so that a path that leaves at one level is taken to leave at all above it."""
+    """Find the levels of divergence of a load path by bisection.
+
+    This assumes that a path that diverges at one level diverges at all higher levels.
+    """
     out = []
     before = None
     for frequency in FREQUENCIES:
@@ -174,7 +180,7 @@ def row(name: str) -> Row:
 
 
 def main(path: Path | None = FOLDER / "runaways.svg", names=tuple(PATHS)) -> list:
-    """[Row], printed and drawn."""
+    """Print, draw and return the rows."""
     rows = [row(name) for name in names]
     for one in rows:
         print(
@@ -193,7 +199,7 @@ def main(path: Path | None = FOLDER / "runaways.svg", names=tuple(PATHS)) -> lis
 
 
 def picture(rows: list, path: Path) -> Path:
-    """Level of the runaway over the frequency."""
+    """Plot the level of divergence against frequency."""
     with drawing(path, (7.2, 4.4)) as (_, axis):
         for name, colour in zip(SHOWN_PATHS, (GREY, "black", BLUE, ORANGE)):
             one = next(row for row in rows if row.name == name)

@@ -64,8 +64,11 @@ SEED = 3  # seed of the random starts
 
 
 class Step(NamedTuple):
-    """The last cycles of one level: frequency [Hz]; level [g]; largest acceleration [g]; gauge [V], half peak to peak;
-    both as read, None where nothing was; unstable: flagged U."""
+    """Last cycles at a frequency [Hz] and level [g].
+
+    Contains largest acceleration [g] and gauge voltage [V], half peak-to-peak, the values of Table
+    1 (None if not measured), and whether the table marks them as unstable (U).
+    """
 
     frequency: float
     level: float
@@ -76,13 +79,16 @@ class Step(NamedTuple):
 
 
 def text() -> str:
-    """The rig beside its second path, on one point of contact."""
+    """Return the scene text of the rig with its second load path, on one contact point."""
     whole = SCENE.read_text("utf-8")
     return POINT + whole[whole.index("static =") :]
 
 
 def raise_levels(frequency: float):
-    """Every sample of the series of levels at a frequency [Hz], the state carried over."""
+    """Return every sample of the series of levels at a frequency [Hz].
+
+    Each level starts from the state of the one before.
+    """
     scene = text()
     scene = (
         scene[: scene.index("[drive]")]
@@ -100,7 +106,7 @@ cycles = {CYCLES_PER_LEVEL}
 
 
 def steps(frequency: float, seen) -> list:
-    """[Step] of the last ten cycles of every level."""
+    """Return a Step of the last ten cycles of every level."""
     rows = {
         row.input / G: row
         for row in read_table(TABLE)
@@ -130,7 +136,7 @@ def steps(frequency: float, seen) -> list:
 
 
 def fit_gauge(gauge: bool):
-    """Spring and yaw fitted to 143 Hz, with or without a free factor of the gauge: `FittedRows`."""
+    """Fit spring and yaw to 143 Hz, with or without a free gauge factor."""
     scene = loads(text(), SCENE, READING)
     wanted, wrong = read_ranges((*FREE, *((GAUGE,) if gauge else ())))
     assert not wrong
@@ -141,7 +147,7 @@ def fit_gauge(gauge: bool):
 
 
 def _picture(series: dict, found: dict, path: Path) -> Path:
-    """Input, acceleration and gauge as the recorder drew them: a column per frequency, and three cycles at 143 Hz."""
+    """Plot input, acceleration and gauge as the recorder drew them, by frequency, and three cycles at 143 Hz."""
     with drawing(path, (10.4, 6.0), 3, 3, sharey="row", width_ratios=(4, 5, 4)) as (_, axes):
         for column, (frequency, seen) in zip(axes.T, series.items()):
             _draw_envelope(column, frequency, seen)
@@ -184,7 +190,7 @@ def _picture(series: dict, found: dict, path: Path) -> Path:
 
 
 def _draw_envelope(column, frequency: float, seen) -> None:
-    """The band between the largest and the smallest value of every two cycles."""
+    """Draw the band between the largest and the smallest value of every two cycles."""
     count = int(seen.time[-1] * frequency + 1e-6) // 2
     for axis, value in zip(
         column, (seen.base_acceleration / G, seen.acceleration / G, seen.output / MIL)
@@ -228,7 +234,7 @@ def main(path: Path | None = FOLDER / "steps.svg", fits: bool = True) -> tuple:
 
 
 def format_score(score: dict) -> str:
-    """all / acceleration / displacement."""
+    """Format the scores of all readings, accelerations and displacements."""
     return " / ".join(f"{score[name]:.3f}" for name in ("all", "acceleration", "displacement"))
 
 

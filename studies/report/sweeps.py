@@ -51,8 +51,11 @@ MODELS = {
 
 
 class Swept(NamedTuple):
-    """One sweep: model; level [g]; at the middle of every stretch of ten cycles, (k,): frequency [Hz], largest
-    acceleration [g], half peak to peak of the displacement [mil], third over first harmonic of the acceleration."""
+    """Frequency sweep of a model at a level [g].
+
+    Contains for every ten cycles (k,) the middle frequency [Hz], largest acceleration [g], half the
+    peak-to-peak displacement [mil] and third over first harmonic of the acceleration.
+    """
 
     model: str
     level: float
@@ -63,7 +66,7 @@ class Swept(NamedTuple):
 
 
 def scene(model: str) -> str:
-    """Text of a rig whose base is swept."""
+    """Return the scene text of a rig whose base is swept in frequency."""
     text = (FOLDER / MODELS[model]).read_text("utf-8")
     text = "\n".join(
         line
@@ -84,7 +87,7 @@ method = "march"
 
 
 def sweep_level(model: str, level: float) -> Swept:
-    """The sweep at a level [g], cut into stretches of ten cycles."""
+    """Run the sweep at a level [g] and divide it into ranges of ten cycles."""
     seen = march_samples(scene(model).replace('"4 g"', f'"{level} g"'), steps=200)
     turns = START_FREQUENCY * seen.time + RATE * seen.time**2 / 2
     even = np.arange(0, turns[-1], 1 / 64)
@@ -117,7 +120,7 @@ def critical(sweeps: list) -> np.ndarray:
 
 
 def picture(sweeps: list, path: Path) -> Path:
-    """Acceleration over input above the distortion, a column per model."""
+    """Plot acceleration over input and the distortion, a column for each model."""
     colours = dict(zip(SHOWN_LEVELS, ("black", GREY, BLUE, ORANGE)))
     with drawing(path, (10.4, 5.6), 2, 3, sharex=True, sharey="row") as (_, axes):
         for column, model in enumerate(MODELS):
@@ -151,7 +154,7 @@ def picture(sweeps: list, path: Path) -> Path:
 
 
 def main(path: Path | None = FOLDER / "sweeps.svg", models=tuple(MODELS)) -> list:
-    """[Swept], printed and drawn."""
+    """Print, draw and return the sweeps."""
     sweeps = [sweep_level(model, level) for model in models for level in LEVELS]
     for model in models:
         mine = [sweep for sweep in sweeps if sweep.model == model]

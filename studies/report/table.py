@@ -33,8 +33,11 @@ LONG = 20  # CPU seconds beyond which a study is marked as long
 
 
 class Study(NamedTuple):
-    """One study: its path below studies/, question, answer, and whether a figure of the report is reproduced ("" where
-    it is none)."""
+    """Entry of the table of studies.
+
+    Contains the path below studies/, question, answer, and the figure of the report that it
+    reproduces ("" if there is none).
+    """
 
     path: str
     question: str
@@ -43,7 +46,7 @@ class Study(NamedTuple):
 
 
 def constant(tree: ast.Module, name: str) -> str | None:
-    """The text that a module gives a name, as it is written there; None without one."""
+    """Return the text of the value that a module assigns to a name; None if it does not."""
     for line in tree.body:
         if isinstance(line, ast.Assign) and any(
             isinstance(t, ast.Name) and t.id == name for t in line.targets
@@ -53,7 +56,7 @@ def constant(tree: ast.Module, name: str) -> str | None:
 
 
 def studies() -> list:
-    """Every script of the gallery of studies/README.md, in its order."""
+    """Return every script of the gallery of studies/README.md, in its order."""
     found = []
     seen = set()
     for line in (STUDIES / "README.md").read_text("utf-8").splitlines():
@@ -78,7 +81,7 @@ def studies() -> list:
 
 
 def measure_study(path: str) -> float | None:
-    """CPU seconds of one study in a process of its own; None where it did not run to its end."""
+    """Measure the CPU seconds of one study in a process of its own; None if it fails."""
 
     def limit_seconds():
         resource.setrlimit(resource.RLIMIT_CPU, (LONGEST, LONGEST))
@@ -103,7 +106,7 @@ def measure_study(path: str) -> float | None:
 
 
 def table(found: list, seconds: dict) -> str:
-    """The page in Markdown."""
+    """Return the page in Markdown."""
     rows = [
         f"| [{one.path}](../{one.path}) | {one.question} | {one.answer} | {format_seconds(seconds.get(one.path))} | "
         f"{one.reproduced} |"
@@ -138,14 +141,14 @@ def table(found: list, seconds: dict) -> str:
 
 
 def format_seconds(seconds: float | None) -> str:
-    """CPU seconds as a cell, those of a study that takes long marked."""
+    """Format CPU seconds as a table cell, with a mark for slow studies."""
     if seconds is None:
         return "-"
     return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}" + ", long" * (seconds > LONG)
 
 
 def main(measure: list | None = None, path: Path | None = FOLDER / "README.md") -> list:
-    """[Study], written as a page; measure: paths to be measured, [] for all, None for none."""
+    """Write the page and return the studies; measure: paths to be measured, [] for all, None for none."""
     found = studies()
     seconds = json.loads(SECONDS_FILE.read_text("utf-8")) if SECONDS_FILE.exists() else {}
     if measure is not None:

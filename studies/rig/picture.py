@@ -21,7 +21,7 @@ FOLDER = Path(__file__).parent
 
 
 def main(path: Path = FOLDER / "rig.svg") -> Path:
-    """Run rig.toml, draw pressure, shear, loop and the measured accelerations at 143 Hz; the file written."""
+    """Draw pressure, shear stress, loop and measured accelerations of rig.toml at 143 Hz; return the path of the file."""
     found = runner.run(runner.plan(scene.load(FOLDER / "rig.toml")), estimate=False)
     x = found.patch.x * 1e3
     fields = found.fields

@@ -36,7 +36,7 @@ SHEAR = "[contact.shear]"
 
 
 def _solve(reading: str, elastic: bool, cycles: float):
-    """The Result of the rig at 143 Hz and 5 g; elastic: the pieces give way in shear."""
+    """Return the Result of the rig at 143 Hz and 5 g; `elastic`: the pieces deform in shear."""
     text = (FOLDER / "rig.toml").read_text("utf-8")
     if not elastic:
         text = "".join(line for line in text.splitlines(True) if not line.startswith(SHEAR))
@@ -45,7 +45,7 @@ def _solve(reading: str, elastic: bool, cycles: float):
 
 
 def picture(found: dict, path: Path) -> Path:
-    """The friction loops of the last cycle, of both readings, on rigid and on elastic pieces."""
+    """Plot the friction loops of the last cycle for both interpretations, on rigid and on elastic pieces."""
     with drawing(path, (9.6, 4.2), 1, 2, sharey=True, sharex=True) as (figure, axes):
         for axis, elastic in zip(axes, (False, True)):
             for reading, colour, words in (
@@ -65,7 +65,7 @@ def picture(found: dict, path: Path) -> Path:
 
 
 def main(cycles: float = 200, path: Path | None = FOLDER / "readings.svg") -> dict:
-    """Return measures with their errors by (reading, elastic) after so many cycles from rest."""
+    """Return measures with their errors by (interpretation, elastic) after a number of cycles from rest."""
     found = {}
     out = {}
     for elastic in (False, True):

@@ -27,7 +27,7 @@ TILTS = (0.0, 1e-5, 1e-4, 1e-3)
 
 
 def main(tilts=TILTS, cycles: float = 200) -> list:
-    """Return one dict per tilt [rad]: contact fraction, K_t, slip thresholds, amplitude [m] and loop area [J].
+    """Return a dict for each tilt [rad]: contact fraction, K_t, slip thresholds, amplitude [m] and loop area [J].
 
     The thresholds [m] are the first, the median and the last; pairs are (value, error).
     """
@@ -76,7 +76,7 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
 
 
 def allowed_tilt(tilts="1e-6 rad..1e-3 rad:7") -> str:
-    """How much tilt may be allowed, as `patchfem sweep` says it."""
+    """Return the sentence of `patchfem sweep` on the tilt that is allowed."""
     return pf.sweep(FOLDER / "rig.toml", {"contact.tilt.angle": tilts}).attrs["answer"]
 
 

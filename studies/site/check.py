@@ -19,7 +19,7 @@ PAGES = (FOLDER / "start.md", *sorted((FOLDER / "tasks").glob("*.md")))
 
 
 class _Page(HTMLParser):
-    """What a page links to, the names that can be linked in it, and its pictures without words in their place."""
+    """Links of a page, the names that can be linked in it, and its pictures without alternative text."""
 
     def __init__(self):
         super().__init__()
@@ -38,19 +38,19 @@ class _Page(HTMLParser):
 
 @cache
 def read(path: Path) -> _Page:
-    """A page of HTML, read once."""
+    """Read a page of HTML once."""
     page = _Page()
     page.feed(path.read_text("utf-8"))
     return page
 
 
 def _pages(folder: Path) -> list:
-    """The pages of a built site, without the theme's templates."""
+    """Return the pages of a built site, without the templates of the theme."""
     return sorted(set(folder.rglob("*.html")) - set(folder.rglob("_static/**/*.html")))
 
 
 def mute(folder: Path) -> list:
-    """The pictures of a built site that have no words in their place, as "page: picture"."""
+    """Return the pictures of a built site that have no alternative text, as "page: picture"."""
     return [
         f"{path.relative_to(folder)}: {name}" for path in _pages(folder) for name in read(path).mute
     ]
@@ -73,7 +73,7 @@ def links(folder: Path) -> tuple:
 
 
 def commands(page: Path) -> list:
-    """The commands that a page shows as bash, in order."""
+    """Return the commands that a page shows as bash, in order."""
     blocks = re.findall(r"^```bash\n(.*?)^```", page.read_text("utf-8"), re.S | re.M)
     return [line for block in blocks for line in block.splitlines() if line.strip()]
 
@@ -94,7 +94,7 @@ def faults(page: Path) -> list:
 
 
 def main(site: str) -> int:
-    """Print what is wrong; 1 where anything is."""
+    """Print all faults; return 1 if there are any."""
     tried, wrong = links(Path(site))
     print(f"{tried} links tried, {len(wrong)} dead")
     silent = mute(Path(site))

@@ -75,14 +75,14 @@ suppress_warnings = ["myst.header"]  # a page of the repository may begin below 
 
 
 def setup(app) -> None:
-    """Write the pages that are made from the program, before any page is read; at the end a first one for a browser."""
+    """Write the generated pages before any page is read, and a first page for browsers at the end."""
     app.connect("builder-inited", lambda app: made.write(FOLDER / "made"))
     app.connect("doctree-read", _name_pictures)
     app.connect("build-finished", _front)
 
 
 def _name_pictures(app, doctree) -> None:
-    """Pictures that a cell of code draws are told by the heading above them; else their file is read out."""
+    """Give pictures that code cells draw the heading above them as alternative text instead of their file name."""
     for image in doctree.findall(nodes.image):
         above = image
         while above.parent and not isinstance(above, nodes.section):

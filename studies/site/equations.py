@@ -19,6 +19,6 @@ def _display(self, node) -> None:
 
 
 def setup(app) -> dict:
-    """Name the renderer for `html_math_renderer`."""
+    """Register the renderer for `html_math_renderer`."""
     app.add_html_math_renderer("mathml", (_inline, None), (_display, None))
     return {"parallel_read_safe": True}

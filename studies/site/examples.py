@@ -67,22 +67,22 @@ bond_length = "1 um"
 
 
 def law(name: str, keys: str = "") -> tuple:
-    """A point that rubs under a law."""
+    """Return the scene of a contact point with a friction law."""
     return POINT, f'[friction]\nlaw = "{name}"\nstatic = 0.3\n{keys}'
 
 
 def method(name: str, start: str = SOFT) -> tuple:
-    """A rig whose motion is found by a method."""
+    """Return the scene of a rig whose motion is computed by a method."""
     return start, f'[accuracy]\ntolerance = 1e-2\nmethod = "{name}"\n'
 
 
 def drive(rows: str) -> tuple:
-    """A rig under a drive."""
+    """Return the scene of a rig under a drive."""
     return RIG, "[drive]\n" + rows
 
 
 def reading(rows: str) -> tuple:
-    """A rig beside readings of an accelerometer."""
+    """Return the scene of a rig with measured values of an accelerometer."""
     return RIG, f'[measured]\nfile = "readings.csv"\n{rows}'
 
 
@@ -248,7 +248,7 @@ def _table(head: str, *columns) -> str:
 
 
 def _matrix(entries) -> str:
-    """A symmetric matrix of (row, column, value), counted from 1, as Matrix Market."""
+    """Return a symmetric matrix of entries (row, column, value), counted from 1, in Matrix Market format."""
     size = max(row for row, _, _ in entries)
     return (
         "\n".join(
@@ -282,12 +282,12 @@ FILES = {
 
 
 def blocks(text: str) -> dict:
-    """header -> text of each table of a scene, in order."""
+    """Return {header: text} of each table of a scene, in order."""
     parts = re.split(r"^(?=\[)", text, flags=re.M)
     return {part.partition("\n")[0]: part for part in parts if part.strip()}
 
 
 def scene(effect: str) -> str:
-    """The whole scene that shows an effect."""
+    """Return the complete scene that shows an effect."""
     start, more = EXAMPLES[effect]
     return "".join((blocks(start) | blocks(more)).values())

@@ -53,7 +53,7 @@ WITHOUT = 6  # rows of a table of changes
 
 
 def write(folder: Path) -> None:
-    """All pages, into a folder of the site; nothing where none of what they are made from has changed since."""
+    """Write all pages into a folder of the site, unless none of their sources has changed."""
     matplotlib.use("Agg")
     (folder / "effects").mkdir(parents=True, exist_ok=True)
     files = sorted(
@@ -88,12 +88,12 @@ def write(folder: Path) -> None:
 
 
 def slug(effect: str) -> str:
-    """The name of the page of an effect."""
+    """Return the name of the page of an effect."""
     return re.sub(r"[.=]", "-", effect)
 
 
 def fence(kind: str, text: str) -> str:
-    """A block of Markdown."""
+    """Return a fenced block of Markdown."""
     return f"{FENCE}{kind}\n{text.strip()}\n{FENCE}"
 
 
@@ -101,7 +101,7 @@ def fence(kind: str, text: str) -> str:
 
 
 def effects_index() -> str:
-    """The list of all effects, group by group."""
+    """Return the list of all effects by group."""
     parts = [
         "# Effects",
         "An effect is on if its table or its value is in the scene. Each page has the equation, a "
@@ -161,7 +161,7 @@ def remove_links(text: str) -> str:
 
 
 def effect(name: str, folder: Path) -> str:
-    """The page of an effect; its picture is drawn into the folder."""
+    """Return the page of an effect, and draw its picture into the folder."""
     table, key, value = effect_table(name)
     heading = f'`{key} = "{value}"` in `[{table}]`' if value else f"`[{table}]`"
     parts = [
@@ -185,7 +185,7 @@ def effect(name: str, folder: Path) -> str:
 
 
 def read_files(name: str) -> list:
-    """The first lines of the files that a scene reads."""
+    """Return the first lines of the files that a scene reads."""
     return [
         f"The first lines of `{file}`:\n\n" + fence("text", "\n".join(text.splitlines()[:4]))
         for file, text in examples.FILES.items()
@@ -194,7 +194,7 @@ def read_files(name: str) -> list:
 
 
 def answer(name: str, folder: Path) -> list:
-    """Run a scene with and without the effect; return the table of both and its picture."""
+    """Run a scene with and without the effect; return the table of both and the picture."""
     scene = folder / f"{slug(name)}.toml"
     scene.write_text(examples.scene(name), "utf-8")
     picture = folder / f"{slug(name)}.svg"
@@ -215,7 +215,7 @@ def answer(name: str, folder: Path) -> list:
 
 
 def save(axes, path: Path) -> None:
-    """A picture as SVG whose bytes follow from what it shows."""
+    """Save a picture as SVG whose bytes depend only on what it shows."""
     figure = axes.figure
     figure.set_size_inches(7, 3.6)
     with matplotlib.rc_context({"svg.hashsalt": "patchfem"}):
@@ -224,7 +224,10 @@ def save(axes, path: Path) -> None:
 
 
 def changes(name: str, result, folder: Path) -> str:
-    """The measures that the effect changes by more than their errors; the first ones where it has no run without it."""
+    """Return the measures that the effect changes by more than their errors.
+
+    Without a run that lacks the effect, return the first measures.
+    """
     start, more = examples.EXAMPLES[name]
     plain = None
     if more and not effect_table(name)[2] and name != "contact.approach":
@@ -257,7 +260,7 @@ def changes(name: str, result, folder: Path) -> str:
 
 
 def differs(one, other) -> bool:
-    """Whether two answers of a measure differ by more than both errors and round-off."""
+    """Return whether two values of a measure differ by more than both errors and round-off."""
     if other is None or other.value is None:
         return False
     return (
@@ -267,7 +270,7 @@ def differs(one, other) -> bool:
 
 
 def key_rows(name: str) -> list:
-    """The keys of the effect: of a table all of them, of a value those that it needs and may have."""
+    """Return the keys of an effect: all keys of a table, or the keys that a value requires and allows."""
     table, key, value = effect_table(name)
     if name == "sweep":
         return [
@@ -288,7 +291,7 @@ def key_rows(name: str) -> list:
 
 
 def limits(name: str) -> list:
-    """List what an effect does not go with, by trying every other effect beside it."""
+    """List the effects that cannot be combined with an effect, by trying every other effect."""
     value = effect_table(name)[2]
     said = {}
     if value in LAWS:
@@ -313,7 +316,7 @@ def limits(name: str) -> list:
 
 
 def refusing_sentences(name: str, other: str) -> list:
-    """Sentences with which the scene of an effect refuses another one for not being built yet."""
+    """Return the sentences with which the scene of an effect refuses another effect that is not implemented for it."""
     start, more = examples.EXAMPLES[name]
     blocks = examples.blocks(start) | examples.blocks(more)
     own = examples.blocks(more)
@@ -335,7 +338,7 @@ def refusing_sentences(name: str, other: str) -> list:
 
 
 def source(name: str) -> list:
-    """The papers that an effect stands on."""
+    """Return the papers on which an effect is based."""
     found = [entry for effects, (_, _, entry) in SOURCES if name in effects]
     return (
         [
@@ -357,7 +360,7 @@ def source(name: str) -> list:
 
 
 def glossary() -> str:
-    """Every term and every measure in one alphabet."""
+    """Return every term and every measure in one alphabetical list."""
     words = glossary_terms()
     for row in (*STATIC, *MOTION):
         text = f"{row.text[:1].upper()}{row.text[1:]} [{row.unit}]. A measure: `{row.name}` in `summary.json`."
@@ -385,7 +388,7 @@ def _move_link(link: re.Match) -> str:
 
 
 def commands() -> str:
-    """The first screen and the help of every verb, as the command line prints them."""
+    """Return the first screen and the help of every command, as printed."""
     from patchfem.__main__ import VERBS
 
     parts = [
@@ -413,7 +416,7 @@ def run_patchfem(*words: str) -> str:
 
 
 def python() -> str:
-    """The public names of the package with their docstrings."""
+    """Return the public names of the package with their docstrings."""
     parts = [
         "# Python",
         "`import patchfem as pf`; each name below is `pf.NAME`. A key with dots is passed as "
@@ -436,7 +439,7 @@ def python() -> str:
 
 
 def code() -> str:
-    """The reading order of the package and what each folder says of itself."""
+    """Return the reading order of the package and the description of each folder."""
     order = re.findall(r"^\d+\. `(\w+)`\s+(.*)$", pf.__doc__, re.M)
     parts = [
         "# How the code is laid out",

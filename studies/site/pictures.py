@@ -369,7 +369,7 @@ def write_all() -> None:
 
 
 def main(words: list[str]) -> int:
-    """Draw all pictures, or with --check compare them; the exit status."""
+    """Draw all pictures, or compare them with --check; return the exit status."""
     if words != ["--check"]:
         write_all()
         return 0

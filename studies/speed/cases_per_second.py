@@ -70,14 +70,14 @@ tolerance = 1e-3
 
 
 def draw_blocks(count: int, seed: int = 1) -> np.ndarray:
-    """Friction over the push and damping ratio (count, 2) of random blocks."""
+    """Return the ratio of friction to force and the damping ratio (count, 2) of random blocks."""
     r = np.random.default_rng(seed)
     return np.stack([r.uniform(0.1, 0.9, count), 10 ** r.uniform(np.log10(0.003), -1, count)], 1)
 
 
 @njit(fastmath=True, error_model="numpy")
 def loop(limit, turn, part, steps, cycles, out):
-    """Integrate n blocks by a loop of thirty lines, LANES side by side.
+    """Integrate n blocks by a loop of thirty lines, LANES cases at a time.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def loop(limit, turn, part, steps, cycles, out):
 
 
 def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
-    """Amplitudes (n,) of the loop."""
+    """Return the amplitudes (n,) of the loop."""
     whole = np.resize(cases, (-(-len(cases) // LANES) * LANES, 2))
     limit = whole[:, 0].copy()
     zeta = whole[:, 1]
@@ -166,7 +166,7 @@ def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
 
 
 def by_patchfem(cases: np.ndarray):
-    """Answers of the cases from the values of their keys on, by this process: by lanes where they are many."""
+    """Compute the results of the cases from the values of their keys in this process; many cases are computed in lanes."""
     axes = [
         make_axis(key, map(repr, column), distinct=False)
         for key, column in zip(
@@ -179,7 +179,7 @@ def by_patchfem(cases: np.ndarray):
 
 
 def by_exact(cases: np.ndarray):
-    """The same by the exact engine alone, in its batch."""
+    """Compute the results by the exact engine alone, in its batch."""
     lanes = batches.BATCHES
     batches.BATCHES = tuple(lane for lane in lanes if lane.name != "lumped.lanes")
     try:
@@ -189,7 +189,7 @@ def by_exact(cases: np.ndarray):
 
 
 def top(slide: np.ndarray) -> float:
-    """Half the range of samples, each end by the parabola through its three."""
+    """Return half the range of samples, each end by a parabola through three samples."""
     ends = []
     for one in (slide, -slide):
         k = 1 + int(np.argmax(one[1:-1]))
@@ -202,13 +202,13 @@ TIMES = 2 * np.pi * (CYCLES - 1 + np.arange(POINTS + 2) / POINTS)
 
 
 def by_dop853(case, tolerance: float) -> float:
-    """Amplitude of one case by SciPy's DOP853 from event to event."""
+    """Return the amplitude of one case by SciPy's DOP853 from event to event."""
     block = PROBLEMS["block"](limit=float(case[0]), xi=float(case[1]))
     return top(follow(block, advancer(tolerance, 1.0), TIMES, 1 / 8)[0])
 
 
 def by_cvode(child: Peer, cases: np.ndarray, tolerance: float) -> tuple:
-    """Integrate cases by SUNDIALS' CVODE with its root finder; return amplitudes (n,) and CPU seconds.
+    """Integrate cases by CVODE of SUNDIALS with its root finder; return amplitudes (n,) and CPU seconds.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def by_cvode(child: Peer, cases: np.ndarray, tolerance: float) -> tuple:
 
 
 def row(name: str, knob: str, seconds: float, amplitudes, exact) -> dict:
-    """Cases per CPU second, median and rms of the error of the amplitude over the exact one."""
+    """Return cases per CPU second, and median and rms of the error of the amplitude relative to the exact one."""
     error = np.abs(np.asarray(amplitudes) / exact - 1)
     out = {
         "way": name,
@@ -251,7 +251,7 @@ def row(name: str, knob: str, seconds: float, amplitudes, exact) -> dict:
 
 
 def _block(law: str) -> str:
-    """The block of a family of cases under a law."""
+    """Return the block of a family of cases with a law."""
     return SCENE.replace('law = "coulomb"\nstatic = 0.5', f"{law}\nstatic = 0.5")
 
 
@@ -328,7 +328,7 @@ FAMILIES = {
 
 
 def _answer_family(name: str, count: int, seed: int):
-    """Answers of random cases of a family, from the values of their keys on."""
+    """Compute the results of random cases of a family, from the values of their keys."""
     text, _, keys = FAMILIES[name]
     r = np.random.default_rng(seed)
     axes = [
@@ -343,7 +343,7 @@ def _answer_family(name: str, count: int, seed: int):
 
 
 def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float = 1.0) -> list[dict]:
-    """Measure cases per CPU second of every family, as the median of several sweeps of other cases.
+    """Measure the cases per CPU second of every family, as the median of several sweeps with different cases.
 
     A small sweep before them compiles and imports. The fraction of cases is given whose amplitude (or peak pressure) has
     an error within the tolerance of the scene.
@@ -391,7 +391,7 @@ def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float =
 def main(
     count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)
 ) -> list[dict]:
-    """Measure all ways and print them; the rows."""
+    """Measure all methods, print them and return the rows."""
     cases = draw_blocks(count)
     warm = cases[:LANES]
     for way in (by_patchfem, by_exact, lambda some: by_loop(some, 20)):

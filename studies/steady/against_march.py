@@ -39,8 +39,11 @@ LONG = 2000  # cycles of the exact run
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Row:
-    """One frequency [Hz] of one contact: MEASURES found directly, by the march and, of Coulomb, by a long exact run;
-    regime and largest multiplier of the steady motion."""
+    """Contact at one frequency [Hz].
+
+    Contains MEASURES by the direct method, by time stepping and, for Coulomb's law, by a long exact
+    run; regime and largest multiplier of the steady motion.
+    """
 
     contact: str
     frequency: float
@@ -51,14 +54,14 @@ class Row:
     multiplier: float
 
     def miss(self, name: str, other: str = "march") -> float:
-        """Difference of a measure from the steady motion's over it; 0 where nothing slips in either."""
+        """Return the relative difference of a measure from that of the steady motion; 0 if nothing slips in either."""
         found = getattr(self, other)[name]
         truth = self.steady[name]
         return abs(found - truth) / abs(truth) if truth else abs(found)
 
 
 def solve(contact: str, frequency: float, **accuracy):
-    """simulate.Result of a contact at a frequency [Hz]; accuracy: keys of the table, `cycles` of the drive."""
+    """Return the Result of a contact at a frequency [Hz]; accuracy: keys of the table, and `cycles` of the drive."""
     sets = [f"drive.frequency={frequency} Hz", f"drive.cycles={accuracy.pop('cycles', CYCLES)}"]
     sets += [f"accuracy.{key}={value}" for key, value in accuracy.items()]
     return runner.run(runner.plan(scene.loads(TEXTS[contact], sets=sets)), estimate=False)
@@ -71,7 +74,7 @@ def _kept(found) -> dict:
 def row(
     contact: str, frequency: float, steps: int = STEPS, cycles: float = CYCLES, long: float = LONG
 ) -> Row:
-    """Both ways at one frequency."""
+    """Return the results of both methods at one frequency."""
     steady = solve(contact, frequency, method="harmonic", tolerance=1e-4)
     march = solve(contact, frequency, method="march", steps_per_cycle=steps, cycles=cycles)
     run = (
@@ -84,14 +87,14 @@ def row(
 
 
 def compute(names=NAMES, frequencies=FREQUENCIES, **how) -> dict:
-    """{contact: [Row]}."""
+    """Return {contact: [Row]}."""
     return {name: [row(name, float(f), **how) for f in frequencies] for name in names}
 
 
 def main(
     names=NAMES, frequencies=FREQUENCIES, path: Path | None = FOLDER / "against_march.svg", **how
 ) -> dict:
-    """{contact: [Row]}, printed and drawn."""
+    """Print, draw and return {contact: [Row]}."""
     table = compute(names, frequencies, **how)
     for name, rows in table.items():
         regimes = list(dict.fromkeys(r.regime for r in rows))

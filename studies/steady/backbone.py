@@ -42,8 +42,11 @@ SHARES = np.geomspace(0.1, 100, 16)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Row:
-    """Amplitudes (k,) [m] of a case; frequency [Hz] and damping [1] from the loops of the bench, by the free balance of
-    one harmonic and of nine."""
+    """Case with amplitudes (k,) [m].
+
+    Contains frequency [Hz] and damping ratio [1] from the loops of the bench, and by harmonic
+    balance of the free motion with one and with nine harmonics.
+    """
 
     case: str
     amplitude: np.ndarray
@@ -82,7 +85,7 @@ def loop(text: str, amplitude: float, steps: int) -> tuple:
 
 
 def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
-    """One contact."""
+    """Return the row of one contact."""
     text, size = CASES[name]
     model = build(scene.loads(text))
     modes = model.rig.modes
@@ -105,7 +108,7 @@ def case(name: str, shares=SHARES, steps: int = 4000) -> Row:
 
 
 def main(names=tuple(CASES), path: Path | None = FOLDER / "backbone.svg", **how) -> list:
-    """[Row], printed and drawn."""
+    """Print, draw and return the rows."""
     rows = [case(name, **how) for name in names]
     for r in rows:
         top = int(r.bench[1].argmax())

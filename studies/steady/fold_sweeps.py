@@ -22,8 +22,11 @@ STEPS = 400  # per cycle
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Curve:
-    """Steady motions along the arc: frequency [Hz], amplitude [m], stable, largest multiplier (k,); folds [Hz]: where
-    the upper branch ends, where the lower does."""
+    """Steady motions along the arc.
+
+    Contains frequency [Hz], amplitude [m], stability and largest multiplier (k,), and the
+    frequencies of the folds [Hz] at which the upper and the lower branch end.
+    """
 
     frequency: np.ndarray
     amplitude: np.ndarray
@@ -32,7 +35,7 @@ class Curve:
     folds: tuple
 
     def branch(self, upper: bool) -> tuple:
-        """Return frequencies, rising, and amplitudes of the stable upper or lower branch."""
+        """Return rising frequencies and amplitudes of the stable upper or lower branch."""
         turns = np.flatnonzero(np.diff(self.frequency) < 0)
         cut = slice(0, turns[0] + 1) if upper else slice(turns[-1] + 1, None)
         return self.frequency[cut], self.amplitude[cut]
@@ -40,9 +43,12 @@ class Curve:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sweep:
-    """A marched sweep: rate [Hz/s], up or down, frequency [Hz] and amplitude [m] at every turn of the slide, where it
-    jumps [Hz], and its largest distance from the branch it follows over the amplitude, before it has come within 0.3 Hz
-    of the jump."""
+    """Time-stepped sweep.
+
+    Contains rate [Hz/s], direction, frequency [Hz] and amplitude [m] at every reversal of the
+    slide, frequency of the jump [Hz], and largest relative distance from its branch until 0.3 Hz
+    before the jump.
+    """
 
     rate: float
     up: bool
@@ -53,7 +59,7 @@ class Sweep:
 
 
 def curve(low: float = 138.0, high: float = 152.0, tolerance: float = 1e-4) -> Curve:
-    """The scene by its own method."""
+    """Compute the curve of steady motions by the method of the scene."""
     sets = [f"drive.from={low} Hz", f"drive.to={high} Hz", f"accuracy.tolerance={tolerance}"]
     found = runner.run(
         runner.plan(scene.load(FOLDER / "stiffened.toml", sets)), estimate=False
@@ -75,7 +81,7 @@ def sweep(
     low: float = LOW_END,
     high: float = HIGH_END,
 ) -> Sweep:
-    """March up or down from rest at the first frequency; the state is carried through."""
+    """Sweep the frequency up or down by time stepping from rest at the first frequency; the state is carried over."""
     low, high = (
         (max(low, SLOW_STARTS[0]), min(high, SLOW_STARTS[1])) if rate < SLOW else (low, high)
     )

@@ -12,7 +12,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 
 def against_march(table: dict, measure: str, path: Path) -> Path:
-    """Amplitude over frequency, found directly and by the march, and their difference below."""
+    """Plot amplitude against frequency by the direct method and by time stepping, and their difference."""
     names = list(table)
     wide = min(len(names) + 1, 3)  # the last place is that of the legend
     tall = -(-(len(names) + 1) // wide)
@@ -69,7 +69,7 @@ def against_march(table: dict, measure: str, path: Path) -> Path:
 
 
 def backbone(rows: list, path: Path) -> Path:
-    """Frequency and damping over amplitude; lines: nine harmonics, marks: the bench."""
+    """Plot frequency and damping against amplitude; lines are nine harmonics, markers are the bench."""
     with drawing(path, (8.5, 3.4), 1, 2) as (_, axes):
         for r, colour in zip(rows, (BLUE, ORANGE, GREY)):
             for axis, line, mark in zip(axes, r.many, r.bench):
@@ -91,7 +91,7 @@ def backbone(rows: list, path: Path) -> Path:
 
 
 def fold(steady, sweeps: list, path: Path, ends: tuple) -> Path:
-    """The curve of steady motions with the slowest sweeps over it, and the frequencies of their jumps over the rate.
+    """Plot the curve of steady motions with the slowest sweeps, and the frequencies of their jumps against the rate.
 
     ends: lowest and highest frequency shown [Hz].
     """

@@ -26,7 +26,7 @@ BOND = 0.243e-6  # m by which the point gives way before it slides
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A free number with its ends that is no key of the scene; it stands where a Range does."""
+    """Free number with its range that is not a key of the scene; it is used in place of a Range."""
 
     key: str
     low: float
@@ -36,7 +36,7 @@ class Number:
 
 
 class Derived(FitRequest):
-    """A Question of which the last numbers become --set strings together: derive(*numbers) -> strings."""
+    """Question whose last numbers together become --set strings: derive(*numbers) -> strings."""
 
     def __init__(self, scene, wanted, measured, derive):
         super().__init__(scene, wanted, measured)
@@ -47,14 +47,14 @@ class Derived(FitRequest):
 
 
 class DerivedAsked(ConditionModels):
-    """What Derived asks."""
+    """Conditions of a Derived question."""
 
     def __init__(self, scene, conditions, wanted, measured, derive):
         super().__init__(scene, conditions, wanted, measured)
         self.derive = derive
 
     def strings(self, values) -> list:
-        """--set strings of values (n,)."""
+        """Return the --set strings of values (n,)."""
         keys = [k for k in self.inner if not isinstance(self.ranges[k], Number)]
         numbers = [float(values[k]) for k in self.inner if k not in keys]
         return [
@@ -67,7 +67,7 @@ class DerivedAsked(ConditionModels):
 
 
 def rods(share: float, mass: float) -> list:
-    """--set strings of a block on rods in series with the flexures that carry the strain gage.
+    """Return the --set strings of a block on rods in series with the flexures that carry the strain gauge.
 
     share: of the static compliance that the rods have; mass: at the tip of the flexures, over that of the block. The
     first mode stays at 143 Hz; the gage reads the tip, by the factor of a static test. Modes have the mass of both, so
@@ -98,7 +98,7 @@ def rods(share: float, mass: float) -> list:
 
 
 def by_row(cells):
-    """Cells of which every row of the table, in the order of the print, is a condition of its own."""
+    """Return cells for which every row of the table, in the order of the print, is a separate condition."""
     conditions = np.array([(row.frequency, row.input) for row in cells.rows])
     return replace(
         cells, conditions=frozen_array(conditions), condition=frozen_array(cells.row, np.int64)
@@ -106,7 +106,7 @@ def by_row(cells):
 
 
 class Worn(ModelReadings):
-    """A Computed of a Derived question whose conditions are the rows of the table in the order in which they were run.
+    """Computed conditions of a Derived question: the rows of the table in the order in which they were run.
 
     The friction of a row is that of new pieces times 1 + (factor - 1) depth/DEPTH, `factor` the last value: as
     [wear.friction] has it between two rows of its table. Depth: COEFFICIENT times the mean pressure times the path of

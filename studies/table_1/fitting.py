@@ -54,7 +54,7 @@ NULLS = {"constant": "constant", "strong": "power_input_frequency"}
 
 
 def training(cells, protocol: str) -> np.ndarray:
-    """Which readings (n,) a protocol fits: "143", "all" or "without FREQUENCY"."""
+    """Return a mask (n,) of the readings that a protocol fits: "143", "all" or "without FREQUENCY"."""
     if protocol == "all":
         return np.ones(cells.row.size, bool)
     held = PREDICTED_ROWS if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
@@ -78,7 +78,7 @@ def stuck_gain(cells, seen) -> float:
 
 
 def cells_for(rung: str):
-    """The readings of Table 1 as a rung is asked for them."""
+    """Return the readings of Table 1 for a model."""
     cells = read_readings(TABLE)
     return by_row(cells) if RUNGS[rung].worn else cells
 
@@ -107,7 +107,7 @@ def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> Mod
 def fit_rung(
     rung: str, reading: str, protocol: str, placebo: str = "", starts: int = 0, most: int = 0
 ) -> dict:
-    """Fit a rung under a reading to the readings of a protocol, as a record of numbers that JSON keeps.
+    """Fit a model with an interpretation to the readings of a protocol; return a record of numbers that JSON can store.
 
     starts, most: first and last number of random starts, 0 takes those of the recipe. Returns names and values of what
     is free and which bound each touches, the gain that was taken from the training readings or fitted to them, scores
@@ -153,7 +153,7 @@ def fit_rung(
 
 
 def _contained_starts(rung: str, reading: str, protocol: str, wanted, rows: dict) -> list:
-    """Return values (n,) to start from, taken from the records `rows` of `known`.
+    """Return values (n,) to start from, taken from the records `rows` of known fits.
 
     These are the records of the rungs and readings that are this one with some numbers fixed, fitted to the same rows,
     and of this one fitted to 143 Hz if that is a part of these rows.
@@ -181,7 +181,7 @@ def _contained_starts(rung: str, reading: str, protocol: str, wanted, rows: dict
 
 
 def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> tuple:
-    """Descend from many starts until two end in the best valley; return values, training rms and valleys.
+    """Minimise from many starts until two end in the best minimum; return values, training rms and minima.
 
     The starts are `begins`, random ones, twice as many each time, and the best end with each number that may be 0 at 0.
 
@@ -238,7 +238,7 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
 
 
 def _screen_points(quick, points, forget) -> np.ndarray:
-    """The point (n,) of some of the unit cube with the least sum of squares, each computed from rest."""
+    """Return the point (n,) of the unit cube with the least sum of squares among some points, each computed from rest."""
     costs = []
     for u in points:
         forget()
@@ -248,7 +248,7 @@ def _screen_points(quick, points, forget) -> np.ndarray:
 
 
 def group_valleys(cells, computed, seen, last, ends) -> tuple:
-    """Return the number of ends in the best valley, and the other valleys near it.
+    """Return the number of searches that end in the best minimum, and the other minima close to it.
 
     Parameters
     ----------
@@ -290,7 +290,7 @@ def rms(values) -> float:
 
 
 def bounds(wanted, values) -> list:
-    """ "low", "high" or "" of every value: whether it lies within a thousandth of its range from an end."""
+    """Return "low", "high" or "" for every value: whether it lies within a thousandth of its range from an end."""
     u = make_space([one.low for one in wanted], [one.high for one in wanted]).unit(
         np.asarray(values)
     )
@@ -315,9 +315,11 @@ def gain(computed, reading: str, values) -> float | None:
 
 
 def _bootstrap(cells, logs, seen) -> dict:
-    """5 and 95 % of the scores of the others (n,) bool when rows are drawn with replacement, the fit kept:
-    {"fitted", "others": {kind: [low, high]}, "better": {null: {kind: share of draws in which the model scores the
-    others better}}}; None where there is nothing to draw."""
+    """Return the 5 and 95 % quantiles of the scores if rows are resampled and the fit is kept.
+
+    The result is {"fitted", "others": {kind: [low, high]}, "better": {null: {kind: fraction of
+    samples in which the model scores better}}}; None if nothing can be resampled.
+    """
     out = {"fitted": intervals(cells, logs, seen), "others": intervals(cells, logs, ~seen)}
     nulls = {name: fit_null_model(cells, null, seen)[0] for name, null in NULLS.items()}
     return out | {
@@ -326,7 +328,7 @@ def _bootstrap(cells, logs, seen) -> dict:
 
 
 def draw_rows(cells, among) -> np.ndarray:
-    """How often (DRAWS, n) each reading counts when the rows with readings among `among` (n,) bool are drawn anew."""
+    """Return how often (DRAWS, n) each reading counts if the rows with readings among `among` (n,) bool are resampled."""
     rows = np.unique(cells.row[among])
     draws = np.random.default_rng(0).integers(0, rows.size, (DRAWS, rows.size))
     often = np.zeros((DRAWS, len(cells.rows)))
@@ -335,7 +337,7 @@ def draw_rows(cells, among) -> np.ndarray:
 
 
 def _resample_scores(cells, logs, often, kind: str) -> np.ndarray:
-    """Scores (DRAWS,) of a kind of reading in drawn rows; NaN where none was drawn."""
+    """Return the scores (DRAWS,) of a kind of reading in resampled rows; NaN if none was drawn."""
     weight = often * {"all": 1, "acceleration": cells.felt, "displacement": ~cells.felt}[kind]
     square = np.where(weight.sum(axis=0) > 0, np.square(np.asarray(logs, float)), 0.0)
     with np.errstate(invalid="ignore"):
@@ -346,7 +348,7 @@ KIND = ("all", "acceleration", "displacement")
 
 
 def intervals(cells, logs, among) -> dict | None:
-    """{kind: [low, high]} of the scores among readings (n,) bool, as `bootstrap` has them."""
+    """Return {kind: [low, high]} of the scores of readings (n,) bool, as in `_bootstrap`."""
     if not among.any():
         return None
     often = draw_rows(cells, among)
@@ -359,7 +361,10 @@ def intervals(cells, logs, among) -> dict | None:
 
 
 def better(cells, logs, null, among) -> dict | None:
-    """{kind: share of draws in which logs (n,) score better than those of a null}, None where that predicts nothing."""
+    """Return how often a model scores better than a null model in resampled rows.
+
+    The result is {kind: fraction of samples}; None if the null model predicts nothing.
+    """
     if not among.any():
         return None
     often = draw_rows(cells, among)
@@ -374,7 +379,7 @@ def better(cells, logs, null, among) -> dict | None:
 
 
 def round_digits(given, digits: int = 4):
-    """The numbers of a tree to so many significant digits; what is not finite is None."""
+    """Round all numbers of nested containers to a number of significant digits; values that are not finite become None."""
     if given is None or isinstance(given, str):
         return given
     if isinstance(given, dict):
@@ -385,13 +390,13 @@ def round_digits(given, digits: int = 4):
 
 
 def read_records() -> dict:
-    """Read all records: (rung, reading, protocol, placebo) -> record."""
+    """Read all records: {(model, interpretation, protocol, placebo): record}."""
     rows = json.loads(SCORES.read_text("utf-8")) if SCORES.exists() else []
     return {(row["rung"], row["reading"], row["protocol"], row["placebo"]): row for row in rows}
 
 
 def keep(rows: dict) -> None:
-    """Write the records, one a line."""
+    """Write the records, one per line."""
     lines = ",\n".join(json.dumps(row) for row in rows.values())
     partial = SCORES.with_suffix(".partial")
     partial.write_text(f"[\n{lines}\n]\n", "utf-8")

@@ -28,7 +28,7 @@ from table import tables
 
 
 def main(minutes: float = 0.0) -> dict:
-    """Fit what is missing for so many minutes, print the tables and return all records.
+    """Fit missing models for a number of minutes, print the tables and return all records.
 
     The fits follow the order of the recipe; the records are those of `read_records`.
     """

@@ -48,14 +48,14 @@ SHOWN_MODELS = (
 
 
 def _compute_measure(scene, frequency: float, level: float, name: str) -> float | None:
-    """A measure of the scene at a frequency [Hz] and a level [g]; None where it has none."""
+    """Return a measure of the scene at a frequency [Hz] and a level [g]; None if it has none."""
     sets = [*scene.sets, f"drive.frequency={frequency} Hz", f"drive.acceleration={level} g"]
     found = run(plan(loads(scene.text, scene.path, sets))).measures.get(name)
     return None if found is None else found.value
 
 
 def runaway(question, values, frequency: float) -> float | None:
-    """Lowest level [g] on the grid at which a model runs away; None where it does not up to 12 g."""
+    """Return the lowest level [g] of the grid at which a model diverges; None if it stays bounded up to 12 g."""
     computed = ModelReadings(
         question.condition_models([(frequency, level * G_N) for level in RUNAWAYS])
     )
@@ -67,7 +67,7 @@ def runaway(question, values, frequency: float) -> float | None:
 
 
 def row(rung: str, reading: str, values, frequency: float) -> dict:
-    """{"rung", "frequency", "onset" [g], "runaway" [g], "slip_phase" [degrees]} of a rung with fitted values."""
+    """Return {"rung", "frequency", "onset" [g], "runaway" [g], "slip_phase" [degrees]} of a model with fitted values."""
     question = RUNGS[rung].question(reading)
     asked = question.condition_models([(frequency, 5 * G_N)])
     scene = asked.base.override(
@@ -92,7 +92,7 @@ def row(rung: str, reading: str, values, frequency: float) -> dict:
 
 
 def main(shown=SHOWN_MODELS, frequencies=FREQUENCIES) -> list:
-    """Print and return a `row` per rung and frequency."""
+    """Print and return a `row` for each model and frequency."""
     known = {
         (load["rung"], load["reading"]): load
         for load in json.loads((FOLDER / "scores.json").read_text("utf-8"))

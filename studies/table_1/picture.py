@@ -34,7 +34,10 @@ FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 
 
 def main(path: Path = FOLDER / "ladder.svg") -> Path:
-    """Draw accelerations at four frequencies and displacements at the two where a gauge worked; the file written."""
+    """Draw accelerations at four frequencies and displacements at the two frequencies where a gauge worked.
+
+    Return the path of the file.
+    """
     rows = read_records()
     cells = read_readings(TABLE)
     with drawing(path, (9.6, 5.4), 2, 4, sharex=True) as (figure, axes):

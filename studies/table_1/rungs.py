@@ -107,7 +107,7 @@ class Rung:
     worn: bool = False
 
     def text(self, reading: str, *more: str) -> Scene:
-        """The scene under a reading, with more --set strings."""
+        """Return the scene with an interpretation and further --set strings."""
         path = FOLDER / self.scene
         text = path.read_text("utf-8")
         if self.point:
@@ -257,7 +257,7 @@ PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what th
 
 
 def variants() -> list:
-    """List every (rung, reading, protocol, placebo) of the recipe.
+    """List every (model, interpretation, protocol, placebo) of the recipe.
 
     The protocol is "143" or one of PROTOCOLS; the placebo is a --set string or "".
     """
@@ -308,7 +308,7 @@ SLOW = (
 
 
 def _rank(variant: tuple) -> tuple:
-    """Return the place of a variant in a campaign that may be stopped.
+    """Return the position of a variant in a campaign that may be stopped.
 
     First come quick fits to 143 Hz and the first two of FOLDS, then slow fits to 143 Hz, other FOLDS, free gains, other
     folds, all rows and placebos.

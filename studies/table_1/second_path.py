@@ -37,7 +37,7 @@ POINT = (
 
 
 def question(point: bool = False) -> FitRequest:
-    """The scene with the patch, or with one elastic-plastic point in its place, and its free numbers."""
+    """Return the scene with the patch, or with one elastic-plastic point in its place, and its free numbers."""
     path = FOLDER / "second_path.toml"
     text = path.read_text("utf-8")
     if point:
@@ -46,7 +46,7 @@ def question(point: bool = False) -> FitRequest:
 
 
 def as_it_stands(point: bool = False) -> dict:
-    """Scores of the scene's own numbers and the seconds of its 27 readings, the second time that they are asked."""
+    """Return the scores of the scene's own numbers, and the seconds of its 27 readings when they are computed again."""
     cells = read_readings(TABLE)
     asked = question(point)
     held = cells.select(PREDICTED_ROWS)
@@ -72,14 +72,14 @@ def as_it_stands(point: bool = False) -> dict:
 
 
 def fit_path(point: bool = False, starts: int = 8):
-    """The numbers fitted to 143 Hz from random starts, as FittedRows."""
+    """Return the numbers fitted to 143 Hz from random starts, as FittedRows."""
     return fit_rows(
         question(point), RowsOptions(hold=(PREDICTED_ROWS,), search=SearchSettings(starts))
     )
 
 
 def main(starts: int = 8) -> dict:
-    """Print values and scores of the patch and of the point; returns {name: {"fitted", "held_out", "values"}}."""
+    """Print values and scores of the patch and of the point; return {name: {"fitted", "held_out", "values"}}."""
     out = {}
     print(f"{'':<8}{'':<12}{'acceleration':>14}{'displacement':>14}{'all':>8}")
     for name in ("patch", "point"):

@@ -113,7 +113,7 @@ NAMED_FITS = {
 
 
 def three(values: dict | None) -> str:
-    """ "all / acceleration / displacement" of scores; a dash where one is missing."""
+    """Format scores as "all / acceleration / displacement", with a dash for a missing one."""
     if values is None:
         return "-"
     return " / ".join("-" if values[name] is None else short(values[name]) for name in KIND)
@@ -124,13 +124,13 @@ def short(score: float) -> str:
 
 
 def _read_folds(rows: dict, rung: str, reading: str) -> list | None:
-    """The records of the four folds; None where one is missing."""
+    """Return the records of the four folds; None if one is missing."""
     folds = [rows.get((rung, reading, protocol, "")) for protocol in PROTOCOLS[1:]]
     return None if None in folds else folds
 
 
 def left_logs(folds) -> np.ndarray:
-    """Logarithms (n,) of every reading by the fit that did not see its frequency."""
+    """Return the logarithms (n,) of every reading by the fit that did not use its frequency."""
     cells = read_readings(TABLE)
     logs = np.full(cells.row.size, np.nan)
     for fold in folds:
@@ -140,7 +140,7 @@ def left_logs(folds) -> np.ndarray:
 
 
 def left_out(rows: dict, rung: str, reading: str) -> dict | None:
-    """Scores of every reading by the fit that did not see its frequency; None where a fold is missing."""
+    """Return the scores of every reading by the fit that did not use its frequency; None if a fold is missing."""
     folds = _read_folds(rows, rung, reading)
     if folds is None:
         return None
@@ -149,7 +149,7 @@ def left_out(rows: dict, rung: str, reading: str) -> dict | None:
 
 
 def null_left(name: str) -> np.ndarray:
-    """`left_logs` of a model without mechanics."""
+    """Return `left_logs` of a model without mechanics."""
     cells = read_readings(TABLE)
     out = np.full(cells.row.size, np.nan)
     for protocol in PROTOCOLS[1:]:
@@ -159,7 +159,7 @@ def null_left(name: str) -> np.ndarray:
 
 
 def numbers(row: dict) -> str:
-    """The fitted numbers of a record, named, and which end of its range one touches."""
+    """Format the fitted numbers of a record with their names, and which end of its range a number reaches."""
     parts = []
     for key, value, end in zip(row["keys"], row["values"], row["at_bound"]):
         name = key.rpartition(".")[2]
@@ -177,18 +177,21 @@ def numbers(row: dict) -> str:
 
 
 def rung_title(rung: str) -> str:
-    """The name of a model as it is printed."""
+    """Return the printed name of a model."""
     return TITLES.get(rung, rung)
 
 
 def starts_text(row: dict) -> str:
-    """In how many of its starts a record found its valley; † once only, ‡ taken over from the ladder before."""
+    """Format in how many searches a record found its minimum.
+
+    A dagger marks a minimum that was found once, a double dagger one from earlier records.
+    """
     text = f"{row['valleys']['best']} of {row['valleys']['starts']}"
     return text + " †" * (row["valleys"]["best"] < 2) + " ‡" * row.get("before", False)
 
 
 def nulls() -> list:
-    """Rows (name, numbers of the accelerations, fitted to 143 Hz, held out, left out, all) of scores."""
+    """Return rows (name, accelerations fitted, fitted to 143 Hz, held out, left out, all) of scores."""
     cells = read_readings(TABLE)
     out = []
     seen = training(cells, "143")
@@ -212,7 +215,7 @@ def nulls() -> list:
 
 
 def tables(rows: dict) -> list:
-    """Lines of markdown of what was computed: (rung, reading, protocol, placebo) -> record."""
+    """Return Markdown lines of the records {(model, interpretation, protocol, placebo): record}."""
     return [
         *_rungs(rows),
         "",
@@ -258,7 +261,7 @@ def _rungs(rows: dict) -> list:
 
 
 def _mark_scores(rows: dict, rung: str, reading: str) -> str:
-    """The left-out scores, with † where the best valley of a fold was found once only."""
+    """Return the left-out scores, with a dagger if the best minimum of a fold was found only once."""
     folds = _read_folds(rows, rung, reading)
     once = folds and any(fold["valleys"]["best"] < 2 for fold in folds)
     return three(left_out(rows, rung, reading)) + (" †" if once else "")
@@ -275,7 +278,10 @@ def fully_folded(rows: dict) -> list:
 
 
 def _left_out_lines(rows: dict) -> list:
-    """Each frequency left out: scores with their bootstrap, and how often the rows drawn anew prefer the model."""
+    """Return lines for each left-out frequency.
+
+    They have scores with bootstrap intervals, and how often resampled rows prefer the model.
+    """
     cells = read_readings(TABLE)
     every = np.ones(cells.row.size, bool)
     out = [
@@ -313,7 +319,7 @@ def _left_out_lines(rows: dict) -> list:
 
 
 def _ends(folds) -> str:
-    """Which numbers lie at an end of their range in which folds."""
+    """Describe which numbers are at an end of their range in which folds."""
     parts = []
     for fold in folds:
         ends = [
@@ -328,7 +334,7 @@ def _ends(folds) -> str:
 
 
 def _comparison_lines(rows: dict) -> list:
-    """The ladder before and after, for what stood in both."""
+    """Return lines that compare earlier and present records for models that are in both."""
     out = [
         "| model | accelerometer shows | version | score at 143 Hz | score at 135, 150, 155 Hz | score with each "
         "frequency left out | starts |",
@@ -431,7 +437,7 @@ def head(rows: dict) -> list:
 
 
 def parts(rows: dict) -> dict:
-    """Name of a mark in README.md -> the lines that stand behind it."""
+    """Return {name of a mark in README.md: lines between the marks}."""
     return {
         "head": head(rows),
         "rungs": _rungs(rows),
@@ -442,7 +448,7 @@ def parts(rows: dict) -> dict:
 
 
 def main(path: Path = FOLDER / "README.md") -> str:
-    """Put every table between its marks in README.md; the text written."""
+    """Write every table between its marks in README.md, and return the text."""
     text = path.read_text("utf-8")
     for name, lines in parts(read_records()).items():
         before, _, rest = text.partition(MARK.format(name) + "\n")

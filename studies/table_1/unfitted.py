@@ -30,7 +30,10 @@ MEASURES = "absolute_acceleration_peak", "relative_displacement_amplitude"
 
 
 def answer(name: str, frequency: float, level: float, cycles: float, estimate: bool = True) -> dict:
-    """Measures of a run of "coulomb" or "patch" at a frequency [Hz] and a level [m s-2]; estimate: their errors too."""
+    """Return the measures of a run of "coulomb" or "patch" at a frequency [Hz] and a level [m s-2].
+
+    With `estimate`, the measures have errors.
+    """
     sets = [
         f"drive.frequency={frequency} Hz",
         f"drive.acceleration={level / G_N:.12g} g",

@@ -49,9 +49,12 @@ INTERVAL = (0.05, 0.95)
 
 
 class Row(NamedTuple):
-    """stroke, worn [m] off each piece; ratio: band amplitude x over y, mean of whole areas, scatter: their standard
-    deviation; interval (2,) of that ratio for one trace per direction; seen: how often such a ratio lies below the
-    interval of new surfaces; after: amplitude over that before, in x and in y; after_interval: those of one trace each.
+    """Result for a stroke and a depth worn off each piece [m].
+
+    `ratio` is the band amplitude x over y, as a mean of whole areas with the standard deviation
+    `scatter`; `interval` (2,) is that of a single trace per direction; `seen` is how often such a
+    ratio lies below the interval of new surfaces; `after` is the amplitude relative to that before
+    in x and y, `after_interval` that of single traces.
     """
 
     stroke: float
@@ -65,22 +68,22 @@ class Row(NamedTuple):
 
 
 def amplitudes(areas) -> np.ndarray:
-    """Band amplitude (2, k, traces) [m] of every eighth trace along x and along y of k areas."""
+    """Return the band amplitude (2, k, traces) [m] of every eighth trace along x and along y of k areas."""
     return np.array([[periodic_amplitude(z, STEP, axis)[::8] for z in areas] for axis in (1, 0)])
 
 
 def area_amplitudes(traces) -> np.ndarray:
-    """Band amplitude of each area, from those of its traces."""
+    """Return the band amplitude of each area, from those of its traces."""
     return np.sqrt((traces**2).mean(axis=-1))
 
 
 def pairs(one, other) -> np.ndarray:
-    """Ratio of every trace of an area to every other-way trace of the same area."""
+    """Return the ratio of every trace of an area to every trace of the same area in the other direction."""
     return (one[:, :, None] / other[:, None, :]).ravel()
 
 
 def row(stroke: int, worn: float, before, after) -> Row:
-    """Row from the amplitudes of all areas (2, k, traces) [m] before and after."""
+    """Return the row of the amplitudes of all areas (2, k, traces) [m] before and after."""
     ratios = area_amplitudes(after[0]) / area_amplitudes(after[1])
     single = pairs(*after)
     along_x, along_y = map(area_amplitudes, after)
@@ -104,7 +107,10 @@ def row(stroke: int, worn: float, before, after) -> Row:
 
 
 def wear(strokes, seeds: int, bite: float) -> tuple:
-    """[Row] of new surfaces and of every stroke and depth, and the first lower surface (before, {stroke: after})."""
+    """Return rows for the new surfaces and for every stroke and depth.
+
+    Also return the first lower surface (before, {stroke: after}).
+    """
     new = [
         [report_area((POINTS, POINTS), STEP, 2 * seed + piece)[2] for piece in (0, 1)]
         for seed in range(seeds)
@@ -125,7 +131,7 @@ def wear(strokes, seeds: int, bite: float) -> tuple:
 
 
 def _picture(rows: list, shown: tuple, path: Path) -> Path:
-    """Left: traces of one surface, new and worn at 6.4 um. Right: band ratio over stroke."""
+    """Plot traces of one surface, new and worn at 6.4 um, and the band ratio against the stroke."""
     new = shown[0]
     worn = shown[1][2]
     with drawing(path, (9.6, 3.8), 1, 2, width_ratios=(1.25, 1)) as (_, (left, right)):
@@ -185,7 +191,7 @@ def main(
     bite: float = 0.01 * UM,
     path: Path | None = FOLDER / "bands.svg",
 ) -> list:
-    """[Row], printed and drawn; first that of new surfaces."""
+    """Print, draw and return the rows; the first is that of new surfaces."""
     rows, shown = wear(strokes, seeds, bite)
     for r in rows:
         low, high = r.interval

@@ -51,8 +51,11 @@ SHOWN_MEASURES = (
 
 
 class Row(NamedTuple):
-    """The rig after CYCLES at a coefficient [m2/N]: measures by name, error of the peak [Pa], onset of slip [g],
-    largest depth [m], history over the cycles, place x (m,) [m] and pressures (2, m) [Pa] new and worn."""
+    """Rig after CYCLES with a wear coefficient [m2/N].
+
+    Contains measures by name, error of the peak [Pa], onset of slip [g], largest depth [m], history
+    over the cycles, positions x (m,) [m] and pressures (2, m) [Pa] new and worn.
+    """
 
     coefficient: float
     values: dict
@@ -65,7 +68,7 @@ class Row(NamedTuple):
 
 
 def onset(worn, cycles: int, pair=None) -> float:
-    """Level [g] at which the patch with this worn depth (m,) [m] begins to slip, raised from 3.5 g by .25 g."""
+    """Return the level [g] at which a patch with this worn depth (m,) [m] begins to slip, in steps of .25 g from 3.5 g."""
     text = (
         RIG[: RIG.index("[friction]")]
         + PLASTIC
@@ -82,7 +85,7 @@ def onset(worn, cycles: int, pair=None) -> float:
 
 
 def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> Row:
-    """The shipped rig worn with a coefficient [m2/N]; motion: cycles of each march."""
+    """Return the shipped rig worn with a coefficient [m2/N]; motion: cycles of each run in time."""
     text = RIG + f'[wear]\ncoefficient = "{coefficient!r} m^2/N"\ncycles = {cycles}\n'
     found = runner.run(
         scene.loads(text, SCENE, [f"accuracy.tolerance={tolerance}", f"drive.cycles={motion}"])
@@ -103,7 +106,7 @@ def _worn_rig(coefficient: float, cycles: int, motion: int, tolerance: str) -> R
 
 
 def picture(rows: list, path: Path) -> Path:
-    """Pressure new and worn, what changes over the cycles, and onset and loop over the coefficient."""
+    """Plot the pressure new and worn, the history over the cycles, and onset and loop against the coefficient."""
     middle = rows[len(rows) // 2]
     with drawing(path, (9.6, 2.9), 1, 3) as (_, (a, b, c)):
         a.plot(middle.x * 1e3, middle.pressure[0] / 1e6, color=GREY, label="new")
@@ -137,7 +140,7 @@ def main(
     tolerance="1e-2",
     path=FOLDER / "rig_story.svg",
 ) -> list:
-    """Rows of the rig, new and worn with each coefficient; printed as a table, drawn where a path is given."""
+    """Print and return rows of the rig, new and worn with each coefficient; draw them if a path is given."""
     rows = [_worn_rig(each, cycles, motion, tolerance) for each in coefficients]
     new = {name: rows[0].history[name][0] for name in SHOWN_MEASURES}
     pair = runner.run(
