@@ -1,4 +1,5 @@
-"""Accuracy against computing time: the curve of a marched run, beside the exact solution of its scene."""
+"""The curve of accuracy against computing time of a run by time integration agrees with the exact
+solution."""
 
 import re
 from itertools import pairwise
@@ -36,19 +37,22 @@ MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_a
 
 
 @pytest.fixture(scope="module")
-def marched():
+def marched_result():
+    """Return the result of the scene by time integration."""
     return pf.run(BLOCK, **MARCH)
 
 
 def worst_true_error(steps: int, exact) -> float:
-    """Return the worst true relative error of the main measures with some steps per cycle."""
+    """Return the largest true relative error of the main measures with some steps per cycle."""
     measures = pf.run(BLOCK, **MARCH, **{"accuracy.steps_per_cycle": steps}).measures
     return max(abs(measures[name].value / exact[name].value - 1) for name in MAIN)
 
 
-def test_always_the_errors_of_the_curve_hold_the_true_ones(marched):
+def test_always_errors_of_curve_cover_true_errors(marched_result):
+    """The errors on the curve cover the true errors and are at most ten times larger; each doubling
+    of the steps has a smaller error and takes twice the time."""
     exact = pf.run(BLOCK, **{"accuracy.method": "exact"}).measures
-    curve = compute_accuracy_curve(marched)
+    curve = compute_accuracy_curve(marched_result)
     settings = [*curve.coarser[::-1], curve.present, curve.finer]
     assert [setting.steps for setting in settings] == [400, 800, 1600, 3200]
     for setting in settings:
@@ -58,34 +62,40 @@ def test_always_the_errors_of_the_curve_hold_the_true_ones(marched):
         assert better.error < cheaper.error and better.seconds == 2 * cheaper.seconds
 
 
-def test_exact_the_present_point_is_the_stated_error_and_takes_a_part_of_the_time(marched):
-    present = compute_accuracy_curve(marched).present
-    measures = marched.measures
-    tolerance = marched.plan.model.accuracy.tolerance
+def test_exact_present_point_has_stated_error_and_step_time(marched_result):
+    """The point of the present run has the largest stated error of the main measures and the
+    computing time of its steps."""
+    present = compute_accuracy_curve(marched_result).present
+    measures = marched_result.measures
+    tolerance = marched_result.plan.model.accuracy.tolerance
     worst = max(
         measures[name].error / (abs(measures[name].value) + measures[name].floor / tolerance)
         for name in MAIN
     )
     assert present.error == pytest.approx(worst, rel=1e-12) and present.measure in MAIN
-    assert 0 < present.seconds < marched.seconds["total"]
-    step_runs = marched.extra["step_runs"]
+    assert 0 < present.seconds < marched_result.seconds["total"]
+    step_runs = marched_result.extra["step_runs"]
     assert present.steps == step_runs[0].steps
     assert present.seconds / present.steps == pytest.approx(
         min(run.seconds / run.steps for run in step_runs), rel=1e-12
     )
 
 
-def test_exact_the_page_has_one_picture_that_names_the_neighbours(marched, tmp_path):
-    text = (marched.save(tmp_path / "run") / "report.html").read_text("utf-8")
+def test_exact_report_shows_neighbouring_step_counts(marched_result, tmp_path):
+    """The report has one figure of the curve, which names the settings with half and with twice the
+    steps."""
+    text = (marched_result.save(tmp_path / "run") / "report.html").read_text("utf-8")
     assert len(re.findall('aria-label="What accuracy costs"', text)) == 1
     assert "This run: 1600 steps per cycle" in text
     assert "Next cheaper: accuracy.steps_per_cycle = 800" in text
     assert "Next better: accuracy.steps_per_cycle = 3200" in text
-    names = marched.plot.accuracy().get_legend_handles_labels()[1]
+    names = marched_result.plot.accuracy().get_legend_handles_labels()[1]
     assert {"this run", "fewer steps per cycle"} < set(names)
 
 
-def test_exact_the_caption_names_what_limits_after_twice_the_steps():
+def test_exact_caption_names_error_that_remains_with_more_steps():
+    """The caption names the measure whose error twice the steps would not reduce, and the cause of
+    this error."""
     values = [{"loop_area": area, "absolute_acceleration_peak": 1.0} for area in (1.0, 1.03, 1.12)]
     step_runs = [
         Fake(steps=steps, seconds=steps / 400, values=row)
@@ -108,7 +118,7 @@ def test_exact_the_caption_names_what_limits_after_twice_the_steps():
 @pytest.mark.parametrize(
     "scene", [BLOCK, pf.new("bench"), pf.new("patch")], ids=["exact", "bench", "patch"]
 )
-def test_refuses_a_curve_where_steps_do_not_limit_the_accuracy(scene):
+def test_refuses_curve_if_steps_do_not_limit_accuracy(scene):
     result = pf.run(scene)
     assert compute_accuracy_curve(result) is None
     with pytest.raises(pf.PatchfemError, match=r"plot\.accuracy: nothing to draw"):

@@ -1,4 +1,5 @@
-"""A bench on the compiled engines: against the laws stepped in NumPy, its error bar, its energy, its progress."""
+"""Compiled engines of a bench agree with the NumPy laws, and their errors, energy balance and
+progress are right."""
 
 from dataclasses import replace
 
@@ -42,11 +43,13 @@ SUMS = (
 )
 
 
-def model_of(law, slide, *sets, where=POINT):
+def build_bench(law, slide, *sets, where=POINT):
+    """Return the model of a bench with a friction law and a slide."""
     return build(loads(where + FRICTION + law + "[slide]\n" + SLIDES[slide], sets=sets))
 
 
-def sum_of(reading, order, growth):
+def format_sum_law(reading, order, growth):
+    """Return the [friction] keys of a nonlocal law that needs the sum over all bonds."""
     return (
         BONDS
         + growth
@@ -55,25 +58,28 @@ def sum_of(reading, order, growth):
     )
 
 
-def both(model, steps, patch=None, frames=0):
+def run_both_ways(model, steps, patch=None, frames=0):
+    """Return the results of the compiled engine and of the law stepped in NumPy."""
     time, slide = model.slide.samples(steps)[:2]
     return bench.run(model, patch, steps, frames), slide_step_by_step(
         Slide(model, patch, time, slide, frames)
     )
 
 
-# ---- the compiled engines and their twins
+# ---- compiled engines and their NumPy versions
 
 
 @pytest.mark.share(0, 2, 4, 6, 8, 10, 13, 15, 17, 19, 21, 23)
 @pytest.mark.parametrize("slide", SLIDES)
 @pytest.mark.parametrize("law", EXACT)
-def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
-    one, two = both(model_of(EXACT[law], slide), 80)
-    limit = np.abs(two.force).max()
-    assert one.force == pytest.approx(two.force, abs=1e-13 * limit)
-    assert one.slip == pytest.approx(two.slip, abs=1e-18)
-    assert one.ledger == pytest.approx(two.ledger, abs=1e-13 * np.abs(np.diff(two.ledger[0])).sum())
+def test_exact_compiled_bench_agrees_with_numpy_law(law, slide):
+    compiled, stepped = run_both_ways(build_bench(EXACT[law], slide), 80)
+    limit = np.abs(stepped.force).max()
+    assert compiled.force == pytest.approx(stepped.force, abs=1e-13 * limit)
+    assert compiled.slip == pytest.approx(stepped.slip, abs=1e-18)
+    assert compiled.ledger == pytest.approx(
+        stepped.ledger, abs=1e-13 * np.abs(np.diff(stepped.ledger[0])).sum()
+    )
 
 
 @pytest.mark.share(0, 4, 8, 12)
@@ -85,32 +91,38 @@ def test_exact_a_compiled_bench_is_its_law_step_by_step(law, slide):
         for n, slide in enumerate(SLIDES)
     ],
 )
-def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(
-    reading, order, growth, slide
-):
-    """1e-5 besides for the two points per strip, which fall with the step; a third of all laws and slides always."""
-    one, two = both(model_of(sum_of(reading, order, growth), slide), 60)
-    error = one.engine.choice.error + (2e-5 if growth else 1e-5)
-    assert one.engine.name.endswith("bond list")
-    assert np.abs(one.force - two.force).max() <= error * 30
-    assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
+def test_exact_bond_list_agrees_with_numpy_sum_within_error(reading, order, growth, slide):
+    """The bond list agrees with the NumPy sum over all bonds within its stated error, plus 1e-5 for
+    the two points per strip, whose error falls with the step."""
+    compiled, stepped = run_both_ways(
+        build_bench(format_sum_law(reading, order, growth), slide), 60
+    )
+    error = compiled.engine.choice.error + (2e-5 if growth else 1e-5)
+    assert compiled.engine.name.endswith("bond list")
+    assert np.abs(compiled.force - stepped.force).max() <= error * 30
+    assert (
+        np.abs(compiled.ledger - stepped.ledger).max()
+        <= 3 * error * np.abs(np.diff(stepped.ledger[0])).sum()
+    )
 
 
 @pytest.mark.parametrize(
     "law", ["coulomb that holds more", "averaged", "elastic-plastic", "growing"]
 )
-def test_exact_frames_of_a_patch_are_those_of_its_points(law):
-    model = model_of(EXACT[law], "sine", where=PATCH)
+def test_exact_frames_of_patch_agree_with_numpy_law(law):
+    """The tractions and displacements of the stored frames of a compiled patch agree with those of
+    the law stepped in NumPy."""
+    model = build_bench(EXACT[law], "sine", where=PATCH)
     patch = solve_with_coarser(model.patch, 1e-3, False)[0]
-    one, two = both(model, 40, patch, 5)
-    top = np.abs(two.tau).max()
-    assert (one.frames == two.frames).all() and one.tau.shape == (5, patch.x.size)
-    assert one.force == pytest.approx(two.force, abs=1e-12 * np.abs(two.force).max())
-    assert one.tau == pytest.approx(two.tau, abs=1e-12 * top)
-    assert one.local == pytest.approx(two.local, abs=1e-17)
+    compiled, stepped = run_both_ways(model, 40, patch, 5)
+    peak_traction = np.abs(stepped.tau).max()
+    assert (compiled.frames == stepped.frames).all() and compiled.tau.shape == (5, patch.x.size)
+    assert compiled.force == pytest.approx(stepped.force, abs=1e-12 * np.abs(stepped.force).max())
+    assert compiled.tau == pytest.approx(stepped.tau, abs=1e-12 * peak_traction)
+    assert compiled.local == pytest.approx(stepped.local, abs=1e-17)
 
 
-# ---- what runs, and what it says of itself
+# ---- choice of the engine and its name
 
 
 @pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8)
@@ -122,15 +134,19 @@ def test_exact_frames_of_a_patch_are_those_of_its_points(law):
     (BONDS, PATCH + 'on = "lower"\n', "law step by step"), (BONDS, PATCH + "[contact.shear]\n", "bond points"),
     (EXACT["coulomb"], PATCH + "[contact.shear]\n", "parallel elements"),
 ])  # fmt: skip
-def test_exact_a_plan_names_the_engine_that_runs(law, where, name):
-    what = plan(model_of(law, "sine", "accuracy.steps_per_cycle=200", where=where))
-    result = run(what, estimate=False)
-    assert what.engine == result.extra["engine"] == result.response.engine.name == f"bench, {name}"
-    assert ("bond_list_about" in what.unknowns) == name.endswith("list")
+def test_exact_plan_names_engine_of_run(law, where, name):
+    run_plan = plan(build_bench(law, "sine", "accuracy.steps_per_cycle=200", where=where))
+    result = run(run_plan, estimate=False)
+    assert (
+        run_plan.engine == result.extra["engine"] == result.response.engine.name == f"bench, {name}"
+    )
+    assert ("bond_list_about" in run_plan.unknowns) == name.endswith("list")
 
 
-def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
-    model = model_of(
+def test_refuses_long_bond_list_and_unsupported_merging():
+    """A bond list that takes longer than the limit, and merging of bonds under a pressure that
+    varies, are refused."""
+    model = build_bench(
         BONDS + "order = 2\n",
         "sine",
         "accuracy.quadrature=direct",
@@ -144,7 +160,7 @@ def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
         plan(model)
     with pytest.raises(SceneError, match=r"'merged' with friction\.breakaway, or with a pressure"):
         plan(
-            model_of(
+            build_bench(
                 BONDS + "order = 2\n",
                 "sine",
                 "accuracy.quadrature=merged",
@@ -157,20 +173,23 @@ def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
     ("order = 2\n", "sine"), ("order = 0.5\n", "small"), ('reading = "report"\norder = 0.5\n' + GROWTH, "sine"),
     (GROWTH + "order = 2\n", "dwell"),
 ])  # fmt: skip
-def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
-    """Against the sum over every bond, nothing merged or cut off, at four times the steps."""
+def test_exact_errors_cover_merging_of_bonds(keys, slide):
+    """The errors of a run that merges bonds cover its difference from the sum over every bond with
+    four times the steps."""
     sets = ["accuracy.tolerance=1e-2", "accuracy.quadrature=merged", "accuracy.steps_per_cycle=400"]
-    model = model_of(BONDS + keys, slide, *sets)
-    found = run(model)
-    choice = found.response.engine.choice
+    model = build_bench(BONDS + keys, slide, *sets)
+    result = run(model)
+    choice = result.response.engine.choice
     assert choice.engine == "merged" and choice.merge > 0
-    assert found.measures["friction_force_peak"].error >= choice.error * 30
+    assert result.measures["friction_force_peak"].error >= choice.error * 30
     steps = 4 * model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, 2e-6)
-    whole = replace(choice, engine="direct", merge=0.0, tail=0.0, error=0.0)
-    truth = bench.run(model, None, steps, watch=PassOptions(whole))
-    for name, measure in found.measures.items():
+    direct = replace(choice, engine="direct", merge=0.0, tail=0.0, error=0.0)
+    reference = bench.run(model, None, steps, watch=PassOptions(direct))
+    for name, measure in result.measures.items():
         if name not in ("work_check", "energy_balance"):
-            assert abs(measure.value - truth.values[name]) <= measure.error + measure.floor, name
+            assert abs(measure.value - reference.values[name]) <= measure.error + measure.floor, (
+                name
+            )
 
 
 # ---- progress
@@ -186,58 +205,64 @@ def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
         (EXACT["tanh"], PATCH + 'on = "lower"\n'),
     ],
 )
-def test_always_the_done_share_grows_to_one(law, where):
-    told = []
+def test_always_progress_grows_to_one(law, where):
+    fractions = []
     run(
-        model_of(law, "sine", "accuracy.steps_per_cycle=6000", where=where),
-        progress=told.append,
+        build_bench(law, "sine", "accuracy.steps_per_cycle=6000", where=where),
+        progress=fractions.append,
         estimate=False,
     )
-    assert told[-1] == 1.0 and (np.diff([0.0, *told]) >= 0).all()
-    assert len(told) >= (1 if law == EXACT["coulomb"] else 12000 // N_BLOCK_SAMPLES)
+    assert fractions[-1] == 1.0 and (np.diff([0.0, *fractions]) >= 0).all()
+    assert len(fractions) >= (1 if law == EXACT["coulomb"] else 12000 // N_BLOCK_SAMPLES)
 
 
-def test_always_an_interrupt_ends_a_bench_between_two_blocks():
-    told = []
+def test_always_interrupt_ends_bench_between_blocks():
+    fractions = []
 
-    def stop(share):
-        told.append(share)
+    def interrupt_after_half(share):
+        fractions.append(share)
         if share > 0.5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(model_of(BONDS, "sine", "accuracy.steps_per_cycle=20000"), progress=stop)
-    assert told[-1] <= 0.5 + N_BLOCK_SAMPLES / 40000
+        run(
+            build_bench(BONDS, "sine", "accuracy.steps_per_cycle=20000"),
+            progress=interrupt_after_half,
+        )
+    assert fractions[-1] <= 0.5 + N_BLOCK_SAMPLES / 40000
 
 
-# ---- two books of energy
+# ---- energy balance and work check
 
 
-def test_exact_a_jump_of_the_force_at_a_turn_costs_the_check_nothing():
+def test_exact_work_check_allows_force_jump_at_reversal():
+    """The friction force of the Coulomb law jumps at a reversal; the work check still closes within
+    1e-13."""
     for law in ("coulomb", "coulomb that holds more"):
-        assert bench.run(model_of(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
+        assert bench.run(build_bench(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
 
 
 @pytest.mark.parametrize(
-    "chi, beta, slide",
+    "chi, beta, amplitude",
     [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5), (-0.6, 0.0, 3e-6)],
 )
-def test_exact_the_cells_of_iwans_law_are_in_the_bars(chi, beta, slide):
-    """Segalman's closed form of the steady loop: its area and its tip, which a first loading has as well."""
+def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
+    """The area and the tip of the loop agree within their errors with the closed form (Segalman
+    2005); the tip of the first loading is that of the loop."""
     scene = loads(
         '[normal]\nload = "5 kN"\n[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e9 N/m"\n'
-        f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{slide!r} m"\n'
+        f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\n'
         'frequency = "1 Hz"\ncycles = 2\n'
     )
-    tip, area = steady_loop(scene.friction, 5e3, slide)
+    tip, area = steady_loop(scene.friction, 5e3, amplitude)
     measures = run(scene).measures
     for name, exact in (
         ("loop_area", area),
         ("friction_force_peak", tip),
-        ("secant_stiffness", tip / slide),
+        ("secant_stiffness", tip / amplitude),
     ):
-        off = abs(measures[name].value - exact)
-        assert off <= measures[name].error + 1e-12 * abs(exact), name
+        difference = abs(measures[name].value - exact)
+        assert difference <= measures[name].error + 1e-12 * abs(exact), name
     assert (
         0 < measures["loop_area"].error < 40 * abs(measures["loop_area"].value - area) + 1e-6 * area
     )

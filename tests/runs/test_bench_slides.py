@@ -1,4 +1,5 @@
-"""Slides of a bench with a rest in them or read from a table: the path itself, and what ageing at rest must give."""
+"""Benches with a dwell or a table as sliding path: the path itself, and the growth of friction at
+rest."""
 
 import math
 
@@ -27,62 +28,71 @@ rest_speed = "1 um/s"
 DWELL = '[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "0.3 s"\ndistance_after = "20 um"\n'
 
 
-def healed(hold, scale=1.0):
-    """(bond length when the rest begins, when it ends), 2.10 with v = 0: eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
-    slow = steady_bond_length(SPEED, LENGTH * scale, RATIO, A_S, L_K * scale)
-    return slow, LENGTH * scale - (LENGTH * scale - slow) * np.exp(-A_S * hold / FLOOR)
+def bond_lengths_at_rest(hold, scale=1.0):
+    """Return the bond lengths at the start and at the end of a rest (2.10 with v = 0): eps_0 -
+    (eps_0 - eps) exp(-a_s t/v_h)."""
+    sliding_length = steady_bond_length(SPEED, LENGTH * scale, RATIO, A_S, L_K * scale)
+    return sliding_length, LENGTH * scale - (LENGTH * scale - sliding_length) * np.exp(
+        -A_S * hold / FLOOR
+    )
 
 
-def restart(hold, x, scale=1.0):
-    """F/(mu_s N) at x [m] after a rest: dz/dx = 1 - z/eps with 2.10 along the path, integrated on its own."""
-    slow, start = healed(hold, scale)
+def friction_after_rest(hold, x, scale=1.0):
+    """Return F/(mu_s N) at x [m] after a rest, from an integration of dz/dx = 1 - z/eps with 2.10
+    along the path."""
+    sliding_length, start = bond_lengths_at_rest(hold, scale)
     rate = A_S / SPEED**2 + 1 / (L_K * scale)
-    found = solve_ivp(
-        lambda y, z: 1 - z / (slow + (start - slow) * np.exp(-rate * y)),
+    solution = solve_ivp(
+        lambda y, z: 1 - z / (sliding_length + (start - sliding_length) * np.exp(-rate * y)),
         (0, 20e-6 * scale),
-        [slow],
+        [sliding_length],
         method="DOP853",
         rtol=1e-12,
         atol=1e-18,
         max_step=1e-7 * scale,
         dense_output=True,
     )
-    return found.sol(np.clip(x, 0, None))[0] / (LENGTH * scale)
+    return solution.sol(np.clip(x, 0, None))[0] / (LENGTH * scale)
 
 
-def breakaway(hold, scale=1.0):
-    """(largest, last) F/(mu_s N) of the 20 um after a rest."""
-    curve = restart(hold, np.linspace(0, 20e-6, 100_001) * scale, scale)
+def breakaway_ratios(hold, scale=1.0):
+    """Return the largest and the last F/(mu_s N) of the 20 um after a rest."""
+    curve = friction_after_rest(hold, np.linspace(0, 20e-6, 100_001) * scale, scale)
     return curve.max(), curve[-1]
 
 
-def steps_of(model) -> int:
-    """Steps per cycle as a run of the bench takes them."""
+def count_steps(model) -> int:
+    """Return the steps per cycle that a run of the bench takes."""
     return model.slide.steps(
         model.accuracy.tolerance, model.accuracy.steps_per_cycle, model.friction.bond_length
     )
 
 
-def sliding(text, *sets, steps=None):
+def run_bench(text, *sets, steps=None):
+    """Return the response of the bench of a scene."""
     model = build(loads(text, sets=sets))
-    return bench.run(model, None, steps or steps_of(model))
+    return bench.run(model, None, steps or count_steps(model))
 
 
 @pytest.fixture
-def table(tmp_path):
-    def write(text, friction=COULOMB, *sets):
+def write_path_scene(tmp_path):
+    """Return a function that writes a table of the sliding path and loads a scene with it."""
+
+    def write_table(text, friction=COULOMB, *sets):
         (tmp_path / "path.csv").write_bytes(text.encode() if isinstance(text, str) else text)
         scene = tmp_path / "scene.toml"
         scene.write_text(POINT + friction + '[slide]\nkind = "file"\nfile = "path.csv"\n', "utf-8")
         return load(scene, sets)
 
-    return write
+    return write_table
 
 
 # ---- the dwell
 
 
-def test_exact_the_dwell_is_slide_rest_slide():
+def test_exact_dwell_slides_rests_and_slides():
+    """The path of a dwell slides 40 um at constant speed, rests for 0.3 s, and slides another 20
+    um."""
     path = build(loads(POINT + NONLOCAL + DWELL)).slide
     time, slide, first, omega = path.samples(600)
     speed = np.diff(slide) / np.diff(time)
@@ -97,48 +107,56 @@ def test_exact_the_dwell_is_slide_rest_slide():
 
 
 @pytest.mark.parametrize("hold", [0.0, 0.03, 0.3, 3.0])
-def test_exact_the_breakaway_follows_the_growth_at_rest(hold):
-    """The peak after the rest over mu_s N, against the same law integrated by a Runge-Kutta method of order 8."""
-    found = sliding(
+def test_exact_breakaway_agrees_with_growth_at_rest(hold):
+    """The peak friction after a rest agrees with the same law integrated by a Runge-Kutta method of
+    order 8."""
+    response = run_bench(
         POINT + NONLOCAL + DWELL, f"slide.hold={hold} s", "accuracy.steps_per_cycle=6000"
     )
-    after = found.force[found.slide >= 39.999e-6] / (0.3 * found.load[0])
-    assert after[0] == pytest.approx(healed(hold)[0] / LENGTH, rel=1e-5)
-    assert after.max() == pytest.approx(breakaway(hold)[0], rel=2e-5)
-    assert found.values["friction_ratio_end"] == pytest.approx(
-        0.3 * healed(hold)[0] / LENGTH, rel=1e-4
+    after = response.force[response.slide >= 39.999e-6] / (0.3 * response.load[0])
+    assert after[0] == pytest.approx(bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-5)
+    assert after.max() == pytest.approx(breakaway_ratios(hold)[0], rel=2e-5)
+    assert response.values["friction_ratio_end"] == pytest.approx(
+        0.3 * bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-4
     )
 
 
-def test_order_of_the_restart_is_two():
-    """The whole force after the rest, not its largest sample, which jumps from sample to sample."""
-    miss = []
+def test_order_of_friction_after_rest_is_two():
+    """The error of the whole force after a rest is of second order in the step; the largest sample
+    alone would jump between samples."""
+    errors = []
     for steps in (600, 1200, 2400):
-        found = sliding(POINT + NONLOCAL + DWELL, steps=steps)
-        after = found.slide >= 39.9999e-6
-        truth = restart(0.3, found.slide[after] - 40e-6)
-        miss.append(np.abs(found.force[after] / (0.3 * found.load[0]) - truth).max())
-    assert miss[1:] == pytest.approx([miss[0] / 4, miss[0] / 16], rel=0.02) and miss[2] < 2e-6
+        response = run_bench(POINT + NONLOCAL + DWELL, steps=steps)
+        after = response.slide >= 39.9999e-6
+        reference = friction_after_rest(0.3, response.slide[after] - 40e-6)
+        errors.append(np.abs(response.force[after] / (0.3 * response.load[0]) - reference).max())
+    assert (
+        errors[1:] == pytest.approx([errors[0] / 4, errors[0] / 16], rel=0.02) and errors[2] < 2e-6
+    )
 
 
 @pytest.mark.parametrize("order", [0, 1])
-def test_exact_the_printed_law_grows_its_force_at_rest(order):
-    """Every bond grows its own length from 0 on the way and then at rest; the force is their sum, by quadrature."""
-    found = sliding(
+def test_exact_report_law_grows_at_rest(order):
+    """With the law of the report each bond grows its own length while it slides and then at rest;
+    the force agrees with a quadrature over all bonds."""
+    response = run_bench(
         POINT + NONLOCAL + DWELL, "friction.reading=report", f"friction.order={order}", steps=1200
     )
-    rest = np.flatnonzero(np.diff(found.slide) == 0)
-    slow, _ = healed(0)
+    rest = np.flatnonzero(np.diff(response.slide) == 0)
+    sliding_length, _ = bond_lengths_at_rest(0)
     for k in (*rest, rest[-1] + 1):
-        left = np.exp(-A_S * (found.time[k] - 0.04) / FLOOR)
+        decay = np.exp(-A_S * (response.time[k] - 0.04) / FLOOR)
 
-        def force(y, left=left):
-            own = LENGTH - (LENGTH + slow * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * left
+        def force(y, left=decay):
+            own = (
+                LENGTH
+                - (LENGTH + sliding_length * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * left
+            )
             return (y / own) ** order * np.exp(-y / own)
 
-        truth = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
-        assert found.force[k] / (0.3 * found.load[0]) == pytest.approx(truth, rel=2e-5)
-    assert found.force[rest[-1] + 1] > 1.2 * found.force[rest[0]]
+        reference = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
+        assert response.force[k] / (0.3 * response.load[0]) == pytest.approx(reference, rel=2e-5)
+    assert response.force[rest[-1] + 1] > 1.2 * response.force[rest[0]]
 
 
 # ---- the table
@@ -147,7 +165,7 @@ def test_exact_the_printed_law_grows_its_force_at_rest(order):
 HEAD = "time [s],displacement [um]\n"
 
 
-@pytest.mark.parametrize("text, says", [
+@pytest.mark.parametrize("text, message", [
     ("", ":1: a header like"), ("0,0\n1,1\n", ":1: a header like"), ("time,displacement\n0,0\n1,1\n", ":1: a header"),
     ("time [s],displacement [um],x [m]\n", ":1: a header"), ("time [s],time [s]\n", ":1: a header"),
     ("time [s],displacement [N]\n0,0\n1,1\n", ":1: displacement [N]: unknown unit; use one of m, km"),
@@ -159,15 +177,17 @@ HEAD = "time [s],displacement [um]\n"
     (HEAD + "0,5\n1,1\n", ":2: displacement starts at 5e-06"), (HEAD + "1,0\n2,1\n", ":2: time starts at 1"),
     (HEAD + "0,0\n1,0\n", "displacement is 0 in every row"), (b"\xff\xfe\x00", "cannot be read"),
 ])  # fmt: skip
-def test_refuses_a_broken_table_by_line(table, text, says):
-    scene = table(text)
+def test_refuses_faulty_path_table_with_line(write_path_scene, text, message):
+    scene = write_path_scene(text)
     with pytest.raises(PatchfemError) as error:
         plan(scene)
-    assert "path.csv" in str(error.value) and says in str(error.value)
+    assert "path.csv" in str(error.value) and message in str(error.value)
 
 
 @pytest.mark.parametrize("kind", ["dwell", "file"])
-def test_exact_results_of_both_kinds_are_written(tmp_path, kind):
+def test_exact_dwell_and_table_give_same_breakaway(tmp_path, kind):
+    """A dwell and a table of the same path are run from the command line; peak and final friction
+    agree with the reference within their errors."""
     text = (
         POINT
         + NONLOCAL
@@ -181,30 +201,33 @@ def test_exact_results_of_both_kinds_are_written(tmp_path, kind):
     assert f"slide.kind={kind}" in result.plan.effects
     peak = result.measures["friction_ratio_peak"]
     end = result.measures["friction_ratio_end"]
-    best, last = breakaway(0.3)
-    assert abs(peak.value - 0.3 * best) <= peak.error < 1e-3 * peak.value
-    assert abs(end.value - 0.3 * last) <= max(end.error, 1e-9)
+    peak_ratio, end_ratio = breakaway_ratios(0.3)
+    assert abs(peak.value - 0.3 * peak_ratio) <= peak.error < 1e-3 * peak.value
+    assert abs(end.value - 0.3 * end_ratio) <= max(end.error, 1e-9)
     assert "drift_per_cycle" not in result.measures
 
 
-def test_exact_coulomb_breaks_away_at_its_static_friction():
-    """At the first instant and after a rest the force is mu_s N, while sliding mu_k N; the work knows only mu_k."""
-    run_ = sliding(POINT + COULOMB + "kinetic = 0.2\n" + DWELL)
-    load = run_.load[0]
-    force = run_.force
-    moves = np.diff(run_.slide) > 0
-    ends = np.flatnonzero(moves & ~np.append(False, moves[:-1]))
-    assert ends.size == 2 and force[ends] == pytest.approx(0.3 * load, rel=1e-14)
-    assert np.delete(force, ends) == pytest.approx(0.2 * load, rel=1e-14)
-    assert run_.values["friction_ratio_peak"] == pytest.approx(0.3)
-    assert run_.values["friction_ratio_end"] == 0.2
-    assert run_.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
+def test_exact_coulomb_bench_breaks_away_at_static_friction():
+    """At the first instant and after a rest the force is mu_s N, while sliding mu_k N; the friction
+    work depends only on mu_k."""
+    response = run_bench(POINT + COULOMB + "kinetic = 0.2\n" + DWELL)
+    load = response.load[0]
+    force = response.force
+    is_moving = np.diff(response.slide) > 0
+    starts = np.flatnonzero(is_moving & ~np.append(False, is_moving[:-1]))
+    assert starts.size == 2 and force[starts] == pytest.approx(0.3 * load, rel=1e-14)
+    assert np.delete(force, starts) == pytest.approx(0.2 * load, rel=1e-14)
+    assert response.values["friction_ratio_peak"] == pytest.approx(0.3)
+    assert response.values["friction_ratio_end"] == 0.2
+    assert response.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
 
 
 @pytest.mark.parametrize("speed", ["1e-160 m/s", "1e-300 m/s"])
 @pytest.mark.parametrize("keys", ["", 'reading = "report"\n'])
-def test_exact_endlessly_slow_slides_are_those_of_full_grown_bonds(speed, keys, recwarn):
-    slow = sliding(
+def test_exact_extremely_slow_slide_has_full_bond_length(speed, keys, recwarn):
+    """At speeds of 1e-160 m/s and less, the bonds grow to their full length, and no overflow
+    warning occurs."""
+    slow = run_bench(
         POINT
         + NONLOCAL
         + keys
@@ -214,7 +237,7 @@ def test_exact_endlessly_slow_slides_are_those_of_full_grown_bonds(speed, keys, 
     assert all(np.isfinite(value) for value in slow.values.values()) and not recwarn.list
 
 
-def test_refuses_a_slide_of_more_steps_than_memory_holds(tmp_path):
+def test_refuses_slide_with_more_steps_than_memory(tmp_path):
     scene = tmp_path / "a.toml"
     scene.write_text(
         POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n'

@@ -1,4 +1,4 @@
-"""Modes that a laboratory measured with the joint bolted: the joint's stiffness comes off them."""
+"""Modes measured with the joint bolted: the stiffness of the joint is removed from them."""
 
 import numpy as np
 import pytest
@@ -48,8 +48,9 @@ STUCK = 'measured = "stuck"'
 
 
 @pytest.mark.parametrize("law", ["iwan", "bouc-wen", "lugre", "elastic-plastic", "nonlocal"])
-def test_exact_free_then_stuck_then_free(law):
-    """What `plan` says of the held mode, read as measured, gives the free mode that it began with."""
+def test_exact_stuck_frequency_of_plan_returns_free_frequency(law):
+    """The stuck frequency that `plan` prints, given as a measured frequency, returns the free
+    frequency of the mode."""
     before = POINT + friction_of(law)
     free = pf.plan(before + MODES % ("", 143.0, 0.8, 0.9) + DRIVE).as_json()["modes"][0]
     stuck = pf.plan(before + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()[
@@ -59,8 +60,9 @@ def test_exact_free_then_stuck_then_free(law):
     assert stuck["stuck_frequency"] == pytest.approx(free["stuck_frequency"], rel=1e-12)
 
 
-def test_exact_two_modes_and_a_bonded_spring():
-    """The held shapes of two modes, given as measured, turn back into the free ones; the spring stays where it was."""
+def test_exact_two_stuck_modes_return_free_modes():
+    """Frequencies and shapes of two modes measured with the stuck joint return the free modes; a
+    bonded spring stays in both."""
     spring = '[structure.bonded]\nstiffness = "4e5 N/m"\n'
     tail = POINT + friction_of("iwan") + spring + DRIVE
     text = tail + MODES % ("", 143.0, 0.8, 0.9) + SECOND % (400.0, 0.5, -0.2)
@@ -72,21 +74,22 @@ def test_exact_two_modes_and_a_bonded_spring():
     slide = (rows[0] @ shapes).tolist()
     output = (free.output @ shapes).tolist()
     base = (free.base @ shapes).tolist()
-    held = (
+    stuck = (
         MODES % (STUCK, f[0], slide[0], output[0])
         + f"base = {base[0]!r}\n"
         + (SECOND % (f[1], slide[1], output[1])).replace("base = 0.0", f"base = {base[1]!r}")
     )
-    found = pf.build(tail + held).rig.modes
-    assert found.omega == pytest.approx(free.omega, rel=1e-10)
+    modes = pf.build(tail + stuck).rig.modes
+    assert modes.omega == pytest.approx(free.omega, rel=1e-10)
     for name in ("slide", "output", "base"):
-        assert np.abs(getattr(found, name)) == pytest.approx(np.abs(getattr(free, name)), rel=1e-9)
-    listed = pf.plan(tail + held).as_json()["modes"]
-    assert [one["stuck_frequency"] for one in listed] == pytest.approx(f, rel=1e-10)
+        assert np.abs(getattr(modes, name)) == pytest.approx(np.abs(getattr(free, name)), rel=1e-9)
+    listed = pf.plan(tail + stuck).as_json()["modes"]
+    assert [mode["stuck_frequency"] for mode in listed] == pytest.approx(f, rel=1e-10)
 
 
-def test_exact_several_interfaces_of_a_file(tmp_path):
-    """Matrices of two coordinates with two joints: with both held and taken off as without."""
+def test_exact_matrices_with_stuck_joints_return_free_modes(tmp_path):
+    """Matrices of two coordinates measured with two stuck joints give the same modes as the
+    matrices without joints."""
     M = np.diag([1.0, 2.0])
     K = np.array([[5e5, -2e5], [-2e5, 4e5]])
     faces = np.array([[1.0, 0.0], [1.0, -1.0]])
@@ -97,37 +100,40 @@ def test_exact_several_interfaces_of_a_file(tmp_path):
         '[[structure.interface]]\nbetween = %s\nload = "50 N"\nlaw = "iwan"\nstatic = 0.3\nstiffness = "%g N/m"\n'
         "chi = -0.5\nbeta = 0.5\n"
     )
-    both = law % ([1, 0], 1e5) + law % ([1, 2], 3e5) + DRIVE
-    made = [
-        pf.build(pf.load(f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{more}\n' + both))
+    interfaces = law % ([1, 0], 1e5) + law % ([1, 2], 3e5) + DRIVE
+    models = [
+        pf.build(
+            pf.load(f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{more}\n' + interfaces)
+        )
         for name, more in (("free.npz", ""), ("stuck.npz", STUCK))
     ]
-    assert made[1].rig.modes.omega == pytest.approx(made[0].rig.modes.omega, rel=1e-10)
-    assert made[1].rig.modes.zeta == pytest.approx(made[0].rig.modes.zeta, rel=1e-10)
+    assert models[1].rig.modes.omega == pytest.approx(models[0].rig.modes.omega, rel=1e-10)
+    assert models[1].rig.modes.zeta == pytest.approx(models[0].rig.modes.zeta, rel=1e-10)
 
 
-def test_exact_a_patch_is_taken_off_as_it_is_pressed():
-    """The run has the measured frequency when nothing slips, whatever the plan foresaw of the pieces."""
-    asked = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
-    model = joint.remove_joint(asked)
+def test_exact_stuck_patch_has_measured_frequency():
+    """A rig whose patch sticks has the measured frequency, because the run removes the stiffness of
+    the pressed patch, not the estimate of the plan."""
+    measured = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
+    model = joint.remove_joint(measured)
     patch, *_ = joint.patch_result.solve_with_coarser(model.patch, 1e-3)
-    held = np.sqrt(model.rig.modes.omega[0] ** 2 + joint.patch_stiffness(model, patch) / 0.884)
-    assert held / (2 * np.pi) == pytest.approx(14300.0, rel=1e-12)
-    assert pf.run(asked).plan.model.rig.modes.omega[0] == pytest.approx(
+    stuck = np.sqrt(model.rig.modes.omega[0] ** 2 + joint.patch_stiffness(model, patch) / 0.884)
+    assert stuck / (2 * np.pi) == pytest.approx(14300.0, rel=1e-12)
+    assert pf.run(measured).plan.model.rig.modes.omega[0] == pytest.approx(
         model.rig.modes.omega[0], rel=1e-12
     )
-    listed = pf.plan(asked).as_json()["modes"][0]
+    listed = pf.plan(measured).as_json()["modes"][0]
     assert (
         listed["free_frequency"]
         < model.rig.modes.omega[0] / (2 * np.pi)
         < listed["stuck_frequency"]
     )
-    soft = pf.run_many([asked]).outcome
-    assert "failed" not in [str(one) for one in soft]
+    outcomes = pf.run_many([measured]).outcome
+    assert "failed" not in [str(outcome) for outcome in outcomes]
 
 
 @pytest.mark.parametrize(
-    "text, said",
+    "text, message",
     [
         (
             POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE,
@@ -147,18 +153,20 @@ def test_exact_a_patch_is_taken_off_as_it_is_pressed():
         ),
     ],
 )
-def test_refuses_a_joint_that_cannot_come_off(text, said):
-    with pytest.raises(PatchfemError, match=f"(?s)structure.m.*{said}"):
+def test_refuses_stuck_modes_with_unsuitable_joint(text, message):
+    with pytest.raises(PatchfemError, match=f"(?s)structure.m.*{message}"):
         pf.run(text)
 
 
-def test_refuses_what_has_no_joint_of_one_stiffness():
+def test_refuses_stuck_modes_without_constant_joint_stiffness():
     assert "add [friction]" in mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
-    told = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
-    assert any("structure.masses, because only modes can be measured" in one for one in told)
+    messages = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
     assert any(
-        "a normal load that changes" in one
-        for one in mistakes(
+        "structure.masses, because only modes can be measured" in message for message in messages
+    )
+    assert any(
+        "a normal load that changes" in message
+        for message in mistakes(
             POINT
             + 'amplitude = "10 N"\nfrequency = "50 Hz"\n'
             + friction_of("iwan")

@@ -1,4 +1,4 @@
-"""What a run says of its bonds: notes on what the law means, warnings where a number cannot be trusted."""
+"""Notes and warnings of a run about its bonds."""
 
 import pytest
 
@@ -21,31 +21,35 @@ RIG = (
 )
 
 
-def notes(text, law):
-    found = run(load(text.format(law=law)), estimate=False)
-    return found, " | ".join(found.extra["notes"])
+def run_with_notes(text, law):
+    """Return the result of a scene with a friction law, and its notes as one text."""
+    result = run(load(text.format(law=law)), estimate=False)
+    return result, " | ".join(result.extra["notes"])
 
 
-def test_exact_a_stretch_that_exceeds_mu_n_is_noted():
-    """Bonds that formed at a fifth of the length hold on after a rest: a steady slide of order 3 never exceeds it."""
-    found, said = notes(BENCH, GROWTH + "order = 3\n")
-    ratio = found.measures["friction_ratio_peak"].value / 0.3
-    assert ratio > 1.1 and f"friction force reaches {ratio:.3g} times mu_s N" in said
-    assert "order = 3 and a growing" in said
-    found, said = notes(BENCH, "order = 3\n")
-    assert found.measures["friction_ratio_peak"].value / 0.3 <= 1 and not said
+def test_exact_friction_above_static_limit_is_noted():
+    """After a rest, short bonds are stretched and the friction force exceeds mu_s N, which a note
+    reports; steady sliding of order 3 never exceeds it."""
+    result, text = run_with_notes(BENCH, GROWTH + "order = 3\n")
+    ratio = result.measures["friction_ratio_peak"].value / 0.3
+    assert ratio > 1.1 and f"friction force reaches {ratio:.3g} times mu_s N" in text
+    assert "order = 3 and a growing" in text
+    result, text = run_with_notes(BENCH, "order = 3\n")
+    assert result.measures["friction_ratio_peak"].value / 0.3 <= 1 and not text
 
 
 @pytest.mark.parametrize("text", [BENCH, RIG])
-def test_exact_the_printed_initial_bonds_that_do_not_grow_are_noted(text):
+def test_exact_initial_bonds_without_growth_are_noted(text):
     growth = GROWTH.replace("50 um", "0.5 um").replace("0.06", "0.2") + 'reading = "report"\n'
-    assert "the initial bonds keep the bond length eps_0" in notes(text, growth)[1]
-    assert "initial bonds" not in notes(text, growth + "initial_bonds = 0\n")[1]
+    assert "the initial bonds keep the bond length eps_0" in run_with_notes(text, growth)[1]
+    assert "initial bonds" not in run_with_notes(text, growth + "initial_bonds = 0\n")[1]
 
 
-def test_exact_initial_bonds_of_negative_order_are_warned_of_in_rigs_too():
-    found, _ = notes(RIG.replace("cycles = 10", "cycles = 1"), 'reading = "report"\norder = -0.5\n')
-    assert any("infinite at the first instant" in line for line in found.warnings)
+def test_exact_initial_bonds_of_negative_order_give_warning():
+    result, _ = run_with_notes(
+        RIG.replace("cycles = 10", "cycles = 1"), 'reading = "report"\norder = -0.5\n'
+    )
+    assert any("infinite at the first instant" in line for line in result.warnings)
     assert not warn_of_unbounded_bonds(
         Bonds(0.3, 1e-6, -0.5, "report", initial=0.0)
     ) and not warn_of_unbounded_bonds(Bonds(0.3, 1e-6))

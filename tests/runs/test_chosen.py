@@ -1,4 +1,4 @@
-"""`numerics` in summary.json: what a run chose, and what a scene pinned."""
+"""The entry `numerics` of summary.json: settings that the run chose or the scene prescribed."""
 
 import pytest
 
@@ -16,15 +16,15 @@ RIG = (
 @pytest.mark.parametrize(
     "law, method, engine", [("coulomb", "auto", "exact"), ("tanh", "march", "march")]
 )
-def test_exact_names_the_engine_and_its_steps(law, method, engine):
+def test_exact_summary_names_engine_and_steps(law, method, engine):
     speed = 'reference_speed = "1 mm/s"\n' if law == "tanh" else ""
     text = RIG.format(law).replace("static = 0.3\n", f"static = 0.3\n{speed}")
-    found = summarise_run(pf.run(text + f'[accuracy]\nmethod = "{method}"\n'))["numerics"]
-    assert found["engine"] == engine and found["window_cycles"] == 2
-    assert ("steps_per_cycle" in found) == (engine != "exact")
+    numerics = summarise_run(pf.run(text + f'[accuracy]\nmethod = "{method}"\n'))["numerics"]
+    assert numerics["engine"] == engine and numerics["window_cycles"] == 2
+    assert ("steps_per_cycle" in numerics) == (engine != "exact")
 
 
-def test_exact_a_pinned_step_count_is_named():
+def test_exact_summary_names_prescribed_steps():
     text = (
         HEAD.format("elastic-plastic")
         + 'bond_length = "1 um"\n[slide]\nkind = "sine"\namplitude = "5 um"\n'

@@ -1,7 +1,8 @@
-"""What `check` lets through runs, and what it refuses it refuses at a key and with a remedy: laws beside effects.
+"""Combinations of friction laws and effects: scenes that `check` accepts run, and others are
+refused with key and remedy.
 
-Every law stands beside every effect of its kind of run and every engine. A march counts as run where its time loop
-would begin, so that nothing is compiled for it.
+Every law is combined with every effect of its kind of run and with every engine. A march counts as
+run when its time loop would begin, so that nothing is compiled for it.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ VARIANTS = {
 FEW = "[accuracy]\nsteps_per_cycle = 32\n"
 RUBS = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 POINT = '[normal]\nload = "26 lbf"\n'
-# its pressure is even
+# The pressure of this patch is nearly uniform.
 PATCH = COATED.replace('"0.5 mm"', '"1.5 mm"') + '[contact.crown]\nradius = "100 m"\n'
 SHAKEN = MODE + DRIVE.replace("cycles = 30", "cycles = 2") + FEW
 SLID = SLIDE + "cycles = 1\n" + FEW
@@ -73,7 +74,7 @@ WAVES = [
 ]
 METHODS = [[], *([f"accuracy.method={name}"] for name in ("exact", "march", "harmonic"))]
 SUMS = [[], *([f"accuracy.quadrature={name}"] for name in ("recursion", "direct", "merged"))]
-# kind of run -> (text, table of the law, effects, engines)
+# Kind of run: (text, table of the law, effects, engines).
 RUNS = {
     "bench of a point": (POINT + RUBS + SLID, "friction", [[], SWING], SUMS),
     "bench of a patch": (
@@ -100,25 +101,25 @@ RUNS = {
 }
 
 
-class Reached(Exception):
-    """A march has everything that its time loop needs."""
+class TimeLoopReached(Exception):
+    """Exception of a march that is ready to start its time loop."""
 
 
-def reached(*_):
-    raise Reached
+def raise_time_loop_reached(*_):
+    raise TimeLoopReached
 
 
-def ran(scene) -> bool:
-    """Whether a scene runs; a PatchfemError passes through."""
+def run_to_time_loop(scene) -> bool:
+    """Return True if a scene runs, at least up to its time loop; a PatchfemError passes through."""
     try:
         run(scene, estimate=False)
-    except Reached:
+    except TimeLoopReached:
         return True
     return True
 
 
-def walk(text: str, sets: list) -> str:
-    """ "refused" or "ran"; a refusal must name a key and what to do."""
+def check_and_run(text: str, sets: list) -> str:
+    """Return "refused" or "ran" for a scene; a refusal must name a key and a remedy."""
     try:
         scene = loads(text, "a.toml", sets)
     except SceneError as error:
@@ -128,14 +129,15 @@ def walk(text: str, sets: list) -> str:
                 r"\b(use|leave|put|set|name|give|needed|choose|built|belongs)\b", message
             ), message
         return "refused"
-    assert ran(scene)
+    assert run_to_time_loop(scene)
     return "ran"
 
 
-def walked(name: str, law: str, every: int) -> None:
-    """What check lets through of the effects and engines beside a law runs; every: the share of them that is tried."""
-    text, at, effects, engines = RUNS[name]
-    needed = [
+def assert_combinations_run(name: str, law: str, every: int) -> None:
+    """Assert that every n-th combination of a law with effects and engines runs or is refused with
+    a key and a remedy."""
+    text, law_table, effects, engines = RUNS[name]
+    law_keys = [
         f"law={law}",
         *(f"{key}={VALUES[key]}" for key in LAWS[law].keys[0].replace("|stiffness", "").split()),
     ]
@@ -144,39 +146,47 @@ def walked(name: str, law: str, every: int) -> None:
         for variant in ([], *VARIANTS.get(law, ()))
         for effect, engine in product(effects, engines)
     ]
-    first = (
+    offset = (
         list(RUNS).index(name) + list(LAWS).index(law)
-    ) % every  # another share for each law and kind
-    found = [
-        walk(text, [*(f"{at}.{one}" for one in (*needed, *variant)), *effect, *engine])
-        for variant, effect, engine in cases[:1] + cases[1 + first :: every]
+    ) % every  # Each law and kind of run tests other combinations.
+    outcomes = [
+        check_and_run(
+            text, [*(f"{law_table}.{one}" for one in (*law_keys, *variant)), *effect, *engine]
+        )
+        for variant, effect, engine in cases[:1] + cases[1 + offset :: every]
     ]
-    assert "ran" in found or (name == "interfaces" and "joints" not in LAWS[law].supports.split())
+    assert "ran" in outcomes or (
+        name == "interfaces" and "joints" not in LAWS[law].supports.split()
+    )
 
 
 @pytest.fixture
-def stopped_at_the_time_loop(monkeypatch):
-    """A march ends where its time loop would begin."""
-    monkeypatch.setattr(march, "warm_up", reached)
+def stop_at_time_loop(monkeypatch):
+    """Stop a march where its time loop would begin."""
+    monkeypatch.setattr(march, "warm_up", raise_time_loop_reached)
 
 
-@pytest.mark.usefixtures("stopped_at_the_time_loop")
+@pytest.mark.usefixtures("stop_at_time_loop")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("name", RUNS)
-def test_always_a_share_of_what_check_lets_through_runs(name, law):
-    walked(name, law, 9)
+def test_always_accepted_combinations_run(name, law):
+    assert_combinations_run(name, law, 9)
 
 
-@pytest.mark.usefixtures("stopped_at_the_time_loop")
+@pytest.mark.usefixtures("stop_at_time_loop")
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize("effect", [[], STIFFENS, INTERLOCKS])
-def test_always_what_check_lets_through_runs_without_friction(effect):
-    found = [walk(SHAKEN, [*effect, *wave, *method]) for wave in ([], *WAVES) for method in METHODS]
-    assert {"ran", "refused"} == set(found)
+def test_always_accepted_combinations_without_friction_run(effect):
+    outcomes = [
+        check_and_run(SHAKEN, [*effect, *wave, *method])
+        for wave in ([], *WAVES)
+        for method in METHODS
+    ]
+    assert {"ran", "refused"} == set(outcomes)
 
 
 @pytest.mark.parametrize(
-    "text, sets, key, says",
+    "text, sets, key, reason",
     [
         (
             SHAKEN,
@@ -214,6 +224,7 @@ def test_always_what_check_lets_through_runs_without_friction(effect):
         ),
     ],
 )
-def test_refuses_at_check_what_only_a_run_knew(text, sets, key, says):
+def test_refuses_unsupported_combinations_at_check(text, sets, key, reason):
+    """`check` refuses combinations that only a run could detect in earlier versions."""
     message = only(text, *sets)
-    assert message.startswith(f"--set: {key}: ") and says in message
+    assert message.startswith(f"--set: {key}: ") and reason in message

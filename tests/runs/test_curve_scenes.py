@@ -1,4 +1,5 @@
-"""Curves of steady motions over a sweep with default settings: peaks narrower than any spacing of even points."""
+"""Frequency response curves over a sweep with default settings, with peaks narrower than a uniform
+spacing of points."""
 
 import numpy as np
 import pytest
@@ -35,45 +36,57 @@ method = "harmonic"
 ZETA, LEVEL = 0.003, 0.980665
 
 
-def amplitude(f):
-    """Sum over both modes of output base a/(omega_r^2 - omega^2 + 2 i zeta omega_r omega)."""
+def modal_sum(f):
+    """Return the amplitude: the sum over both modes of output base a/(omega_r^2 - omega^2 + 2 i
+    zeta omega_r omega)."""
     w = 2 * np.pi * np.atleast_1d(f)[:, None]
-    own = 2 * np.pi * np.array([143.0, 73.0])
+    omega = 2 * np.pi * np.array([143.0, 73.0])
     return np.abs(
-        LEVEL * np.sum(np.array([0.9, 0.005]) / (own**2 - w**2 + 2j * ZETA * own * w), axis=1)
+        LEVEL * np.sum(np.array([0.9, 0.005]) / (omega**2 - w**2 + 2j * ZETA * omega * w), axis=1)
     )
 
 
-def test_exact_a_linear_curve_is_the_sum_of_its_modes():
-    """At every point, and between them within a percent; the peak is output base a/(2 zeta omega^2)."""
-    found = pf.run(RIG)
-    curve = found.extra["curve"]
-    np.testing.assert_allclose(curve["amplitude"], amplitude(curve["frequency"]), rtol=1e-12)
+def test_exact_linear_curve_agrees_with_modal_sum():
+    """The curve without friction agrees with the modal sum at every point, and within 1 % between
+    the points. The peak is output base a/(2 zeta omega^2)."""
+    result = pf.run(RIG)
+    curve = result.extra["curve"]
+    np.testing.assert_allclose(curve["amplitude"], modal_sum(curve["frequency"]), rtol=1e-12)
     np.testing.assert_allclose(
         curve["multiplier"], np.exp(-ZETA * 2 * np.pi * 73 / curve["frequency"]), rtol=1e-9
     )
-    fine = np.linspace(60, 210, 200001)
+    frequencies = np.linspace(60, 210, 200001)
     assert (
-        np.abs(np.interp(fine, curve["frequency"], curve["amplitude"]) / amplitude(fine) - 1).max()
+        np.abs(
+            np.interp(frequencies, curve["frequency"], curve["amplitude"]) / modal_sum(frequencies)
+            - 1
+        ).max()
         < 0.01
     )
-    top = found.measures["relative_displacement_amplitude"].value
-    assert top == pytest.approx(0.9 * LEVEL / (2 * ZETA * (2 * np.pi * 143) ** 2), rel=1e-4)
-    peak = found.measures["peak_frequency"]
+    peak_amplitude = result.measures["relative_displacement_amplitude"].value
+    assert peak_amplitude == pytest.approx(
+        0.9 * LEVEL / (2 * ZETA * (2 * np.pi * 143) ** 2), rel=1e-4
+    )
+    peak = result.measures["peak_frequency"]
     assert abs(peak.value - 143 * np.sqrt(1 - 2 * ZETA**2)) < peak.error < 0.2
 
 
-def test_always_an_undamped_mode_has_a_hole_in_its_curve():
+def test_always_undamped_resonance_is_missing_in_curve():
+    """The point at the frequency of an undamped mode has no amplitude and is marked as unbounded;
+    the other points are finite."""
     curve = pf.run(
         RIG.replace("0.003", "0"), **{"drive.from": "142 Hz", "drive.to": "144 Hz"}
     ).extra["curve"]
-    at = curve["frequency"] == 143.0
-    assert np.isnan(curve["amplitude"][at]).all() and curve["regime"][at] == "unbounded"
-    assert np.isfinite(curve["amplitude"][~at]).all()
+    at_resonance = curve["frequency"] == 143.0
+    assert (
+        np.isnan(curve["amplitude"][at_resonance]).all()
+        and curve["regime"][at_resonance] == "unbounded"
+    )
+    assert np.isfinite(curve["amplitude"][~at_resonance]).all()
 
 
 @pytest.mark.parametrize(
-    "low, high, key, said",
+    "low, high, key, advice",
     [
         (
             100,
@@ -102,9 +115,10 @@ def test_always_an_undamped_mode_has_a_hole_in_its_curve():
         (120, 160, "", ""),
     ],
 )
-def test_exact_a_largest_response_at_an_end_of_the_sweep_is_no_peak(low, high, key, said):
-    """One mode's flank has no peak; the mode whose flank it is lies on the named side."""
-    found = pf.run(RIG, **{"drive.from": f"{low} Hz", "drive.to": f"{high} Hz"})
-    warned = [one for one in found.warnings if "the largest response lies at" in one]
-    assert len(warned) == bool(said)
-    assert all(key in one and said in one for one in warned)
+def test_exact_maximum_at_end_of_sweep_gives_warning(low, high, key, advice):
+    """A largest response at an end of the sweep is not a peak; the warning names the mode whose
+    resonance lies outside, and on which side."""
+    result = pf.run(RIG, **{"drive.from": f"{low} Hz", "drive.to": f"{high} Hz"})
+    warnings = [warning for warning in result.warnings if "the largest response lies at" in warning]
+    assert len(warnings) == bool(advice)
+    assert all(key in warning and advice in warning for warning in warnings)

@@ -1,4 +1,5 @@
-"""`equivalent_damping` is a ratio of the first mode: how the mode is scaled does not enter, other modes leave none."""
+"""The measure `equivalent_damping` refers to the first mode and does not depend on the scale of its
+mode shape."""
 
 import numpy as np
 import pytest
@@ -23,11 +24,12 @@ ENGINES = (
 SLIDE = 2.5
 
 
-def scene(
+def format_rig(
     law: str, method: str = "auto", slide: float = 1.0, more: str = "", drive: str = ""
 ) -> str:
-    """A rig of 2 kg whose mode of 120 Hz is scaled so that it slides by `slide` per unit of its coordinate."""
-    own = "" if method == "auto" else f'method = "{method}"'
+    """Return a rig of 2 kg with a mode of 120 Hz whose sliding component is `slide` per unit of its
+    coordinate."""
+    method_key = "" if method == "auto" else f'method = "{method}"'
     return f"""
 [normal]
 load = "12 N"
@@ -49,12 +51,13 @@ frequency = "110 Hz"
 {drive or 'acceleration = "2 g"' + chr(10) + "cycles = 30"}
 [accuracy]
 tolerance = 1e-2
-{own}
+{method_key}
 """
 
 
-def ratio(result):
-    """loop_area/(2 pi m w^2 Z^2) by the run's own modal coordinate, Z half of what it moves in a cycle, as written."""
+def damping_from_loop_area(result):
+    """Return loop_area/(2 pi m w^2 Z^2), where Z is half the peak-to-peak modal coordinate per
+    cycle."""
     modal = result.window.modal[:, 0]
     time = result.window.time
     cycles = round((time[-1] - time[0]) * 110)
@@ -72,13 +75,17 @@ def ratio(result):
 
 @pytest.mark.share(0, 3, 4, 5, 6)
 @pytest.mark.parametrize("law,method", ENGINES)
-def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
-    """Twice the scale is exact in binary numbers, so nothing may change. At 2.5 times every number is rounded anew: an
-    integrator of chosen steps may take another step somewhere, which moves forces by 2e-8 of the largest at most; the
-    resonance makes 2e-7 of the amplitude of that, and the stiffness, far below that of the limit at the amplitude, is a
-    difference of such forces. Processors differ in where they round."""
-    plain, doubled, scaled = (
-        pf.run(load(scene(law, method, slide))) for slide in (1.0, 2.0, SLIDE)
+def test_exact_damping_does_not_depend_on_mode_scale(law, method):
+    """A scale of 2 is exact in binary arithmetic and changes nothing; a scale of 2.5 changes only
+    round-off.
+
+    With adaptive steps, round-off can change a step, and forces differ by at most 2e-8 of the
+    largest. Near resonance the amplitude then differs by 2e-7. The stiffness is a difference of
+    such forces and is far below the stiffness of the friction limit over the amplitude. Processors
+    round differently.
+    """
+    unscaled, doubled, scaled = (
+        pf.run(load(format_rig(law, method, slide))) for slide in (1.0, 2.0, SLIDE)
     )
     for name in (
         "equivalent_damping",
@@ -86,32 +93,38 @@ def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
         "loop_area",
         "relative_displacement_amplitude",
     ):
-        a, b, c = (one.measures[name] for one in (plain, doubled, scaled))
+        a, b, c = (result.measures[name] for result in (unscaled, doubled, scaled))
         assert b.value == pytest.approx(a.value, rel=1e-13, abs=0), name
-        rounded = (
-            2e-8 * 3.6 / plain.measures["relative_displacement_amplitude"].value
+        abs_tol = (
+            2e-8 * 3.6 / unscaled.measures["relative_displacement_amplitude"].value
             if (law, method, name) == ("tanh", "auto", "equivalent_stiffness")
             else 1e-12
         )
-        chosen = 4e-7 if (law, method) == ("tanh", "auto") else 1e-7
-        assert c.value == pytest.approx(a.value, rel=chosen, abs=rounded), name
-    assert scaled.measures["equivalent_damping"].value == pytest.approx(ratio(scaled), rel=2e-3)
+        rel_tol = 4e-7 if (law, method) == ("tanh", "auto") else 1e-7
+        assert c.value == pytest.approx(a.value, rel=rel_tol, abs=abs_tol), name
+    assert scaled.measures["equivalent_damping"].value == pytest.approx(
+        damping_from_loop_area(scaled), rel=2e-3
+    )
 
 
-def test_exact_another_mode_that_slides_leaves_no_ratio():
-    """At 110 Hz a mode of 300 Hz that slides as much carries some tenths of the slide; one of 0.001 does not."""
+def test_exact_second_sliding_mode_gives_no_damping_ratio():
+    """A second mode of 300 Hz that contributes more than 5 % of the relative displacement leaves
+    the measure without a value, with a reason; with a contribution of 0.001 the measure has its
+    value."""
     second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
     shared, alone = (
-        pf.run(load(scene("coulomb", slide=SLIDE, more=second.format(slide))))
+        pf.run(load(format_rig("coulomb", slide=SLIDE, more=second.format(slide))))
         for slide in (2.5, 0.001)
     )
-    part = shared.window.modal * shared.plan.model.rig.modes.slide
-    share = np.ptp(part[:, 1]) / np.ptp(part.sum(axis=1))
-    assert share > 0.05
-    none = shared.measures["equivalent_damping"]
-    assert none.value is None
+    contributions = shared.window.modal * shared.plan.model.rig.modes.slide
+    fraction = np.ptp(contributions[:, 1]) / np.ptp(contributions.sum(axis=1))
+    assert fraction > 0.05
+    damping = shared.measures["equivalent_damping"]
+    assert damping.value is None
     assert (
-        none.reason
-        == f"this measure is that of mode 1, but another mode contributes {100 * share:.2g} % of the slide"
+        damping.reason
+        == f"this measure is that of mode 1, but another mode contributes {100 * fraction:.2g} % of the slide"
     )
-    assert alone.measures["equivalent_damping"].value == pytest.approx(ratio(alone), rel=2e-3)
+    assert alone.measures["equivalent_damping"].value == pytest.approx(
+        damping_from_loop_area(alone), rel=2e-3
+    )

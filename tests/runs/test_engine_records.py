@@ -1,4 +1,4 @@
-"""Engines are what their records say: one table of what each takes."""
+"""The table of engines lists the features that each engine supports."""
 
 from itertools import product
 
@@ -10,14 +10,14 @@ from patchfem.scene.rules.methods import ENGINE_SUPPORT, FEATURE_FINDERS
 LEVELS = WAVEFORMS["levels"]
 
 
-def test_always_every_engine_has_a_row_of_what_it_takes():
+def test_always_every_engine_lists_supported_features():
     assert set(ENGINES) == set(ENGINE_SUPPORT)
     for support in ENGINE_SUPPORT.values():
         assert set(support.features.split()) <= set(FEATURE_FINDERS)
 
 
-def motions():
-    """Motions of every law with everything that may stand beside it."""
+def list_motion_features():
+    """Yield the features of motions for every law and every combination of effects."""
     for law, soft, varies, yaws, spring, waveform in product(
         LAWS,
         ("", "[contact.shear]"),
@@ -32,15 +32,19 @@ def motions():
             )
 
 
-def reasons(m) -> list:
-    """What the engines of method "exact" lack for a Motion."""
+def list_missing_features(m) -> list:
+    """Return the features of a motion that each engine of the method "exact" lacks."""
     return [
-        find_unsupported_feature(name, m) for name, one in ENGINES.items() if one.method == "exact"
+        find_unsupported_feature(name, m)
+        for name, engine in ENGINES.items()
+        if engine.method == "exact"
     ]
 
 
-def test_exact_the_march_takes_all_that_others_lack():
-    for m in motions():
+def test_exact_march_supports_every_feature():
+    """The march supports every combination; a varying load or a stiffening spring has no other
+    engine."""
+    for m in list_motion_features():
         assert find_unsupported_feature("march", m) == ""
         if m.load_change or m.spring:
-            assert all([*reasons(m), find_unsupported_feature("smooth", m)])
+            assert all([*list_missing_features(m), find_unsupported_feature("smooth", m)])

@@ -1,4 +1,4 @@
-"""What the exact engine is expected to cost, the engine that is chosen for it, and that the cost is bounded."""
+"""The expected cost of the exact engine, the choice of the engine, and the limit of the cost."""
 
 import numpy as np
 import pytest
@@ -55,8 +55,8 @@ SWEEP = (
 )
 
 
-def pieces(model) -> int:
-    """Pieces that the engine takes."""
+def count_pieces(model) -> int:
+    """Return the number of linear pieces that the exact engine computes."""
     rig = model.rig
     return len(
         rows_of(
@@ -80,54 +80,59 @@ def pieces(model) -> int:
         MODES + RUBS + SWEEP,
     ],
 )
-def test_always_pieces_are_foreseen_within_a_factor_of_four(text):
+def test_always_piece_count_is_estimated_within_factor_four(text):
     model = pf.plan(text).model
     expected = costs.intervals_per_cycle(model) * model.rig.drive.cycles
-    took = pieces(model)
-    assert took / 4 < expected < 4 * took
+    actual = count_pieces(model)
+    assert actual / 4 < expected < 4 * actual
 
 
-def test_exact_a_linear_rig_under_a_drive_far_below_its_modes():
-    """A drive 1400 times slower than the modes takes a piece for every second radian of the modes."""
+def test_exact_linear_rig_under_slow_drive():
+    """A linear rig under a drive 1400 times slower than its modes agrees with the static response;
+    the exact engine needs one piece per 2 rad of the modes."""
     text = MODES + YAW + SLOW.replace(FREQUENCY, "0.1 Hz")
     result = pf.run(text)
     assert result.plan.engine == "exact"
     assert costs.max_exact_seconds(result.plan.model) < 20
     w = 2 * np.pi * np.array([143.0, 129.0])
-    # the output is the first mode's alone
-    wanted = 5 * 9.80665 / (w[0] ** 2 - (0.2 * np.pi) ** 2)
+    # Only the first mode contributes to the output.
+    expected = 5 * 9.80665 / (w[0] ** 2 - (0.2 * np.pi) ** 2)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
-        wanted, rel=1e-7
+        expected, rel=1e-7
     )
     assert result.measures["energy_balance"].value < 1e-12
 
 
 @pytest.mark.parametrize("kinetic", [None, 0.2])
-def test_exact_one_mode_under_a_drive_far_below_it(kinetic):
-    """Stick-slip of a spring: the slide lags by the limit; the energy closes."""
+def test_exact_spring_block_under_slow_drive(kinetic):
+    """The amplitude and the loop area of a spring and block under a slow drive agree with the
+    closed form, and the energy balance closes."""
     text = MODES + RUBS + SLOW.replace(FREQUENCY, "0.01 Hz").replace("5 g", "18 g")
     result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
     assert costs.max_exact_seconds(result.plan.model) < 20
     limit = 0.3 * 26 * 4.4482216152605
     k = 0.884 * (2 * np.pi * 143) ** 2
-    wanted = 0.884 * 18 * 9.80665 / k - limit / k
+    expected = 0.884 * 18 * 9.80665 / k - limit / k
     if kinetic is None:
         assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
-            wanted, rel=1e-5
+            expected, rel=1e-5
         )
-        assert result.measures["loop_area"].value == pytest.approx(4 * limit * wanted, rel=1e-5)
+        assert result.measures["loop_area"].value == pytest.approx(4 * limit * expected, rel=1e-5)
     assert result.measures["energy_balance"].value < 1e-12
 
 
-def test_always_a_motion_that_rings_for_ever_is_left_to_the_march():
+def test_always_undamped_rig_under_slow_drive_is_marched():
+    """The free vibration of an undamped rig never decays; under a slow drive the exact engine is
+    too expensive and the march is chosen."""
     text = MODES.replace("0.003", "0") + RUBS + SLOW.replace("5 g", "18 g")
     plan = pf.plan(text)
     assert plan.engine == "march"
     assert costs.max_exact_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
 
 
-def test_exact_the_averaged_pressure_behind_a_damper_without_end_is_marched():
-    """Too stiff for exact events, it asks for the pressure behind each point, which no engine but the march has."""
+def test_exact_averaged_law_with_extreme_damping_is_marched():
+    """With a damping ratio of 2e9, the averaged law is too stiff for exact events. The march is
+    chosen, and the friction force reaches mu_s N."""
     law = 'law = "convolution"\nbond_length = "1 nm"'
     text = (
         MODES.replace("0.003", "2e9")
@@ -140,7 +145,7 @@ def test_exact_the_averaged_pressure_behind_a_damper_without_end_is_marched():
     assert abs(force.value - 0.3 * 26 * 4.4482216152605) <= force.error <= 1e-8 * force.value
 
 
-def test_refuses_an_exact_run_without_end():
+def test_refuses_exact_run_with_unlimited_cost():
     slow = SLOW.replace(FREQUENCY, "0.00003 Hz").replace("5 g", "18 g")
     text = MODES.replace("0.003", "0") + RUBS + slow + '[accuracy]\nmethod = "exact"\n'
     with pytest.raises(Missing, match=r'drive\.cycles .* accuracy\.method = "march"'):

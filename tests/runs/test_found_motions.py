@@ -1,4 +1,5 @@
-"""Motions whose outcome, window or bar was false: against independent programs and what the words mean."""
+"""Motions whose outcome, window or error was wrong in an earlier version agree with independent
+programs."""
 
 from functools import cache
 from pathlib import Path
@@ -13,7 +14,8 @@ from patchfem.core import Measure, Outcome, SineDrive
 from patchfem.response import judge_outcome, settling
 
 FOUND = Path(__file__).parent / "found"
-TRUE = (  # scene, measure, truth: DOP853 from reversal to reversal at 3e-14, or a march of 4000 steps a cycle
+# Scene, measure, reference (DOP853 between reversals at 3e-14, or a march with 4000 steps per cycle), its digits.
+TRUE = (
     ("peak_bouc_wen_53", "friction_force_peak", 20.594500409, 3e-8),
     ("peak_bouc_wen_53", "absolute_acceleration_peak", 217.5187442529, 1e-8),
     ("tanh_levels_114", "absolute_acceleration_peak", 664.244, 9e-3),
@@ -42,30 +44,32 @@ tolerance = 1e-2
 
 
 @cache
-def once(name: str):
+def run_scene(name: str):
+    """Return the result of a scene of the folder `found`, computed once."""
     return pf.run(load(FOUND / f"{name}.toml"))
 
 
-@pytest.mark.share(*range(2, len(TRUE)))  # Bouc and Wen: a loop to compile for these alone
-@pytest.mark.parametrize(("name", "measure", "truth", "digit"), TRUE)
-def test_exact_the_bar_holds_an_independent_program(name, measure, truth, digit):
-    found = once(name).measures[measure]
-    assert abs(found.value - truth) <= found.error + digit
-    assert found.error <= (2 / 128 if measure == "stick_fraction" else 1e-2 * truth)
+# The Bouc-Wen scenes would compile a loop that no other test needs.
+@pytest.mark.share(*range(2, len(TRUE)))
+@pytest.mark.parametrize(("name", "measure", "reference", "round_off"), TRUE)
+def test_exact_measure_agrees_with_independent_program(name, measure, reference, round_off):
+    result = run_scene(name).measures[measure]
+    assert abs(result.value - reference) <= result.error + round_off
+    assert result.error <= (2 / 128 if measure == "stick_fraction" else 1e-2 * reference)
 
 
-def test_always_a_motion_that_nothing_bounds_has_no_steady_amplitude():
+def test_always_unbounded_motion_has_no_steady_amplitude():
     result = pf.run(load(FOUND / "harmonic_unbounded.toml"))
     assert result.outcome is Outcome.GROWS
-    assert all(one.error is None for one in result.measures.values())
-    assert {name for name, one in result.measures.items() if one.value is not None} == {
+    assert all(measure.error is None for measure in result.measures.values())
+    assert {name for name, measure in result.measures.items() if measure.value is not None} == {
         "normal_load"
     }
     assert "no bounded motion" in result.measures["relative_displacement_amplitude"].reason
     assert not any("estimated error" in text for text in result.warnings)
 
 
-def test_always_what_slides_for_ever_under_a_step_has_no_bar():
+def test_always_endless_sliding_under_step_has_no_errors():
     drive = 'kind = "force"\nwaveform = "step"\nforce = "5 N"\ncycles = 40'
     result = pf.run(
         load(
@@ -78,7 +82,7 @@ def test_always_what_slides_for_ever_under_a_step_has_no_bar():
         )
     )
     assert result.outcome is Outcome.GROWS
-    assert all(one.error is None for one in result.measures.values())
+    assert all(measure.error is None for measure in result.measures.values())
 
 
 @pytest.mark.parametrize(
@@ -91,9 +95,10 @@ def test_always_what_slides_for_ever_under_a_step_has_no_bar():
     ],
 )
 @pytest.mark.parametrize("sine", [True, False])
-def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
-    """The amplitude of 18.6 nm stays; a drift of the tolerance, 1e-3 of it, and of the floor of 1e-11 m is none."""
-    sizes = np.full(6, 18.6e-9)
+def test_always_drifting_motion_is_not_steady(drift, outcome, sine):
+    """A motion with a constant amplitude of 18.6 nm is steady only if its drift per cycle is below
+    the tolerance (1e-3 of the amplitude) and the floor of 1e-11 m."""
+    amplitudes = np.full(6, 18.6e-9)
     measures = {
         "relative_displacement_amplitude": Measure(18.6e-9, "m", 1e-12, 1e-10),
         "drift_per_cycle": Measure(drift, "m", 1e-13, 1e-11),
@@ -105,15 +110,15 @@ def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
             segments=(SimpleNamespace(amplitude=0.0, constant=0.0),), period=1e-3, acceleration=1e-3
         )
     )
-    raw = SimpleNamespace(
+    response = SimpleNamespace(
         outcome=None,
         window=SimpleNamespace(time=np.linspace(0, 6e-3, 7)),
-        amplitudes=sizes,
+        amplitudes=amplitudes,
         extremes=None,
         steady=(None, None),
         bounded=False,
     )
-    assert settling.classify(sizes, 1e-3) is Outcome.STEADY
+    assert settling.classify(amplitudes, 1e-3) is Outcome.STEADY
     if not sine:
         drive = pf.build(
             load(
@@ -125,27 +130,30 @@ def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
                 )
             )
         ).rig.drive.signal
-    assert judge_outcome(raw, measures, 1e-3, drive)[0] is outcome
+    assert judge_outcome(response, measures, 1e-3, drive)[0] is outcome
 
 
-@pytest.mark.parametrize(("level", "said"), [("0.2 g", True), ("40 g", False)])
-def test_always_a_joint_that_never_slips_as_a_whole_has_more_than_one_steady_motion(level, said):
-    """Its held part keeps the mean force of its past: from a push of 2 um aside the march keeps one that is not 0."""
+@pytest.mark.parametrize(("level", "has_note"), [("0.2 g", True), ("40 g", False)])
+def test_always_partial_slip_gives_note_about_uniqueness(level, has_note):
+    """A joint that never slips completely has several steady states, because its stuck part keeps
+    the mean force of its history; a note says so."""
     law = 'law = "iwan"\nstiffness = "1e7 N/m"\nchi = -0.5\nbeta = 0.5'
     drive = f'kind = "base"\nfrequency = "120 Hz"\nacceleration = "{level}"\ncycles = 20'
     text = RIG.format(law=law, frequency=120, drive=drive, method='method = "harmonic"')
-    found = pf.run(load(text.replace('load = "10 N"', 'load = "100 N"')))
-    assert any("the steady motion is therefore not unique" in note for note in found.notes) == said
+    result = pf.run(load(text.replace('load = "10 N"', 'load = "100 N"')))
+    assert (
+        any("the steady motion is therefore not unique" in note for note in result.notes)
+        == has_note
+    )
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(
     ("stop", "outcome"), [('travel = "5 mm"\n', "exceeds_travel"), ("", "grows")]
 )
-def test_always_a_step_beyond_the_barrier_of_a_softening_spring_ends_the_run_before_it(
-    stop, outcome
-):
-    """Its force over a step is cubic in what the step moves: one across the barrier ended at 1e160 m."""
+def test_always_softening_spring_ends_run_at_potential_barrier(stop, outcome):
+    """A run ends before a step crosses the potential barrier of a softening spring; the cubic force
+    beyond it led to 1e160 m."""
     text = RIG.format(
         law='law = "coulomb"',
         frequency=143.0,

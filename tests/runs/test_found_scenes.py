@@ -1,7 +1,8 @@
-"""Scenes whose bars once missed: each measure lies inside its bar of what is true.
+"""Scenes whose errors were too small in an earlier version agree with reference values within the
+errors.
 
-The truths printed here come from other programs or from many more steps; those of the slow tests from the independent
-integrator of `motion_reference`.
+The reference values come from other programs or from many more steps; those of the slow tests come
+from the independent integrator of `motion_reference`.
 """
 
 from pathlib import Path
@@ -12,7 +13,7 @@ from motion_scenes import spec, written
 from patchfem import run
 
 FOUND = Path(__file__).parent / "found"
-KNOWN = [  # scene, measure, truth, half a unit of its last digit
+KNOWN = [  # Scene, measure, reference, half a unit of its last digit.
     ("s77_21", "relative_displacement_amplitude", 3.5862e-5, 5e-10),
     ("s77_21", "absolute_acceleration_peak", 3.562, 5e-4),
     ("s77_21", "friction_force_peak", 2.820, 5e-4),
@@ -23,54 +24,54 @@ KNOWN = [  # scene, measure, truth, half a unit of its last digit
 ]
 
 
-@pytest.mark.parametrize(("name", "measure", "truth", "digit"), KNOWN)
-def test_exact_a_truth_from_outside_lies_inside_the_bar(name, measure, truth, digit):
-    found = run(FOUND / f"{name}.toml").measures[measure]
-    assert abs(found.value - truth) <= found.error + digit
-    assert found.error <= 0.1 * abs(found.value)
+@pytest.mark.parametrize(("name", "measure", "reference", "round_off"), KNOWN)
+def test_exact_measure_agrees_with_external_reference(name, measure, reference, round_off):
+    result = run(FOUND / f"{name}.toml").measures[measure]
+    assert abs(result.value - reference) <= result.error + round_off
+    assert result.error <= 0.1 * abs(result.value)
 
 
-DRAWN = [  # random scene, measure, truth of the independent program, half a unit of its last digit
-    (7062, "stick_fraction", 0.048004613, 5e-10),  # off 400 samples a cycle it was 0.0403
+DRAWN = [  # Seed, measure, reference of the independent program, half a unit of its last digit.
+    # With 400 samples per cycle the result was 0.0403.
+    (7062, "stick_fraction", 0.048004613, 5e-10),
     (7062, "slip_start_phase", 2.089609, 5e-7),
     (
         5046,
         "relative_displacement_amplitude",
         8.20190559e-6,
         5e-15,
-    ),  # 768 cells for the density of Iwan's law
+    ),  # The density of the Iwan law has 768 cells here.
     (5046, "equivalent_stiffness", -74645.1102, 5e-5),
     (
         9256,
         "relative_displacement_amplitude",
         6.689247147339e-5,
         5e-18,
-    ),  # the rise at v_s lay between the stages
+    ),  # The rise of friction at v_s was between two stages of the integrator.
     (9256, "equivalent_stiffness", 4188.7310127, 5e-8),
 ]
 
 
 @pytest.mark.share(2, 3)
-@pytest.mark.parametrize(("seed", "measure", "truth", "digit"), DRAWN)
-def test_exact_a_random_scene_holds_what_the_independent_program_found(
-    seed, measure, truth, digit, tmp_path
+@pytest.mark.parametrize(("seed", "measure", "reference", "round_off"), DRAWN)
+def test_exact_random_scene_agrees_with_independent_program(
+    seed, measure, reference, round_off, tmp_path
 ):
-    asked = spec(seed)
-    if seed == 5046:  # all its cells, where a looser tolerance takes as few as do
-        asked["tolerance"] = 1e-6
-    found = run(written(asked, tmp_path)).measures[measure]
-    assert abs(found.value - truth) <= found.error + digit
-    # a run whose steps meet a tolerance keeps a hundredth of the floor, a crossing besides 1e-7, 1e-4 of its floor
-    assert found.error <= 1e-6 * abs(found.value) + 0.0101 * found.floor
+    settings = spec(seed)
+    if seed == 5046:  # This tolerance uses all cells; a larger one uses fewer.
+        settings["tolerance"] = 1e-6
+    result = run(written(settings, tmp_path)).measures[measure]
+    assert abs(result.value - reference) <= result.error + round_off
+    # Steps that meet the tolerance leave 1 % of the floor; an event adds 1e-7 and 1e-4 of its
+    # floor.
+    assert result.error <= 1e-6 * abs(result.value) + 0.0101 * result.floor
 
 
 @pytest.mark.parametrize(
-    ("measure", "truth"), [("stick_fraction", 0.1762914152), ("slip_start_phase", 2.2076168335)]
+    ("measure", "reference"), [("stick_fraction", 0.1762914152), ("slip_start_phase", 2.2076168335)]
 )
-def test_instants_of_slip_of_a_density_in_cells_have_an_error_of_first_order(
-    measure, truth, tmp_path
-):
-    """The stiffness of Iwan's law jumps from cell to cell; with errors of second order, which were 1.4 times too small
-    here, the run took a quarter of the cells."""
-    found = run(written(spec(97000034), tmp_path)).measures[measure]
-    assert abs(found.value - truth) <= found.error <= 0.01
+def test_exact_iwan_slip_instants_have_first_order_errors(measure, reference, tmp_path):
+    """The stiffness of the Iwan law jumps from cell to cell, so instants of slip have errors of
+    first order in the cells. An estimate of second order was 1.4 times too small here."""
+    result = run(written(spec(97000034), tmp_path)).measures[measure]
+    assert abs(result.value - reference) <= result.error <= 0.01

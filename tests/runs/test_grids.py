@@ -1,4 +1,5 @@
-"""The grids of a patch: a plan counts those that a run makes, and a wave of the gap has cells that show it."""
+"""The grids of a patch: a plan predicts those of the run, and short waves of the gap have enough
+cells."""
 
 import numpy as np
 import pytest
@@ -21,17 +22,19 @@ COATED = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.15 mm"\n'
 ENDING = "[contact.{}]\n{}\n"
 
 
-def asked(text, *sets):
+def build_patch(text, *sets):
+    """Return the patch of a scene with --set options."""
     return build(loads(text, "a.toml", sets)).patch
 
 
-def grids_of_run(patch, tolerance) -> tuple:
-    """(columns, rows) of nodes of the finest grid of each piece, as a run solves them; how many levels there are."""
+def count_nodes_of_run(patch, tolerance) -> tuple:
+    """Return the (columns, rows) of nodes of the finest grid of each piece as a run solves them,
+    and the number of levels."""
     patches = solve_with_coarser(patch, tolerance)
     pair = patches[0].pair
     bodies = [pair.grid] if pair.upper is pair.piece else [pair.grid, pair.upper_grid]
     return tuple((body.x.size, body.depth.size) for body in bodies), sum(
-        one is not None for one in patches
+        level is not None for level in patches
     )
 
 
@@ -47,12 +50,15 @@ def grids_of_run(patch, tolerance) -> tuple:
         (PIECES + '[contact.upper]\nheight = "4 mm"\n', 1e-3, ["contact.element_size=0.2 mm"]),
     ],
 )
-def test_exact_a_plan_counts_the_grids_of_the_run(text, tolerance, sets):
-    patch = asked(text, *sets)
-    found, (finest, levels) = expected_grids(patch, tolerance), grids_of_run(patch, tolerance)
-    assert found.finest == finest
-    assert found.levels == levels
-    assert found.points == max(n for n, _ in finest)
+def test_exact_plan_predicts_grids_of_run(text, tolerance, sets):
+    patch = build_patch(text, *sets)
+    expected, (finest, levels) = (
+        expected_grids(patch, tolerance),
+        count_nodes_of_run(patch, tolerance),
+    )
+    assert expected.finest == finest
+    assert expected.levels == levels
+    assert expected.points == max(n for n, _ in finest)
 
 
 @pytest.mark.parametrize(
@@ -65,11 +71,15 @@ def test_exact_a_plan_counts_the_grids_of_the_run(text, tolerance, sets):
         + ENDING.format("tilt", 'angle = "0.5 mrad"'),
     ],
 )
-def test_always_a_plan_expects_the_grids_of_a_contact_that_only_its_pressure_ends(text):
-    """A plan searches the contact as a run does."""
-    patch = asked(text)
-    (found,), ((wanted,), _) = expected_grids(patch, 1e-2).finest, grids_of_run(patch, 1e-2)
-    assert np.array_equal(found, wanted)
+def test_always_plan_predicts_grid_of_limited_contact(text):
+    """A plan searches the contact region of a crown or of a soft skin as a run does and predicts
+    the same grid."""
+    patch = build_patch(text)
+    (expected,), ((actual,), _) = (
+        expected_grids(patch, 1e-2).finest,
+        count_nodes_of_run(patch, 1e-2),
+    )
+    assert np.array_equal(expected, actual)
 
 
 ECCENTRIC_LOAD = 'offset = "3 mm"'
@@ -79,11 +89,11 @@ SMALL_CROWN = 'radius = "0.3 m"'
 @pytest.mark.parametrize(
     "ending", [ENDING.format("load_line", ECCENTRIC_LOAD), ENDING.format("crown", SMALL_CROWN)]
 )
-def test_always_further_searches_for_the_contact_give_the_same_columns(ending, monkeypatch):
+def test_always_further_contact_searches_keep_columns(ending, monkeypatch):
     columns = []
-    for fraction in (grids.BAND_CHANGE_TOL, -1.0):  # a search is never settled with -1
+    for fraction in (grids.BAND_CHANGE_TOL, -1.0):  # With -1, the search never stops early.
         store.clear_cache()
         monkeypatch.setattr(grids, "BAND_CHANGE_TOL", fraction)
-        columns.append(grids.make_base_grids(asked(PIECES + ending)).bodies[0].x)
+        columns.append(grids.make_base_grids(build_patch(PIECES + ending)).bodies[0].x)
     settled, searched = columns
     assert np.abs(settled - searched).max() < 0.1 * np.diff(searched).min()

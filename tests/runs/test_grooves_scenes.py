@@ -1,4 +1,5 @@
-"""Scenes with [normal.grooves] and [contact.grooves]: loops by their closed form, plans, refusals, nothing unasked."""
+"""Scenes with [normal.grooves] and [contact.grooves]: loops in closed form, plans, refusals and
+outcomes."""
 
 import numpy as np
 import pytest
@@ -46,122 +47,150 @@ PIECES = f'\n{BLOCK}element_size = "1 mm"\n'
 WAVE = 2 * np.pi / 80e-6
 
 
-def flat(text):
+def remove_grooves(text):
+    """Return a scene without its grooves."""
     return text.replace(GROOVES, "")
 
 
-def run(text, **keys):
+def run_with_keys(text, **keys):
+    """Return the result of a scene with some keys replaced."""
     return pf.run(loads(text, sets=[f"{key}={value}" for key, value in keys.items()]))
 
 
-def value(result, name):
+def measure_value(result, name):
+    """Return the value of a measure."""
     return result.measures[name].value
 
 
-def area(load, mu, amplitude, reach):
-    """Loop of a slow slide between +-reach: N times the integral of the two limits' difference."""
+def groove_loop_area(load, mu, amplitude, reach):
+    """Return the area of the loop of slow sliding between +-reach: N times the integral of the
+    difference of the two friction limits."""
     q = np.linspace(-reach, reach, 200_001)
     t = amplitude * WAVE * np.sin(WAVE * q)
     return load * np.trapezoid((t + mu) / (1 - mu * t) - (t - mu) / (1 + mu * t), q)
 
 
 @pytest.mark.parametrize("reach", [30e-6, 200e-6])
-def test_exact_the_loop_of_a_slow_slide(reach):
-    found = run(BENCH, **{"slide.amplitude": f"{reach} m"})
-    assert value(found, "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, reach), rel=1e-9)
-    assert value(found, "energy_dissipated") == pytest.approx(
-        value(found, "friction_work"), rel=1e-9
+def test_exact_slow_sliding_loop_agrees_with_closed_form(reach):
+    result = run_with_keys(BENCH, **{"slide.amplitude": f"{reach} m"})
+    assert measure_value(result, "loop_area") == pytest.approx(
+        groove_loop_area(115, 0.4, 7.5e-6, reach), rel=1e-9
     )
-    assert value(found, "energy_balance") < 1e-12 and value(found, "work_check") < 1e-3
-    steep = 7.5e-6 * WAVE
-    assert value(found, "friction_force_peak") == pytest.approx(
-        115 * (steep + 0.4) / (1 - 0.4 * steep), rel=1e-3
+    assert measure_value(result, "energy_dissipated") == pytest.approx(
+        measure_value(result, "friction_work"), rel=1e-9
+    )
+    assert (
+        measure_value(result, "energy_balance") < 1e-12
+        and measure_value(result, "work_check") < 1e-3
+    )
+    slope = 7.5e-6 * WAVE
+    assert measure_value(result, "friction_force_peak") == pytest.approx(
+        115 * (slope + 0.4) / (1 - 0.4 * slope), rel=1e-3
     )
 
 
-def test_exact_a_slow_slide_breaks_away_and_goes_on_by_coefficients_of_their_own():
-    """F/N = tan(flank + angle of friction): the static one at the start, on a flank that falls, then the kinetic."""
-    found = run(BENCH, **{"friction.kinetic": "0.3"})
-    assert value(found, "loop_area") == pytest.approx(area(115, 0.3, 7.5e-6, 30e-6), rel=1e-9)
-    flank = np.arctan(7.5e-6 * WAVE * np.sin(-0.3))
-    short = BENCH.replace(
+def test_exact_breakaway_on_grooves_uses_static_coefficient():
+    """The friction force is N tan(slope angle + friction angle): with the static coefficient at the
+    start, on a falling slope, and with the kinetic coefficient in the loop."""
+    result = run_with_keys(BENCH, **{"friction.kinetic": "0.3"})
+    assert measure_value(result, "loop_area") == pytest.approx(
+        groove_loop_area(115, 0.3, 7.5e-6, 30e-6), rel=1e-9
+    )
+    slope_angle = np.arctan(7.5e-6 * WAVE * np.sin(-0.3))
+    first_micron = BENCH.replace(
         'kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "1 um"'
     )
-    found = run(short, **{"friction.kinetic": "0.1", "normal.grooves.phase": "0.3 rad"})
-    assert value(found, "friction_force_peak") == pytest.approx(
-        115 * np.tan(flank + np.arctan(0.4)), rel=1e-9
+    result = run_with_keys(
+        first_micron, **{"friction.kinetic": "0.1", "normal.grooves.phase": "0.3 rad"}
+    )
+    assert measure_value(result, "friction_force_peak") == pytest.approx(
+        115 * np.tan(slope_angle + np.arctan(0.4)), rel=1e-9
     )
 
 
-def test_exact_a_rig_slips_by_the_kinetic_coefficient():
-    """Flanks of a slope of 1e-12 and the exact engine without grooves."""
-    there = run(
+def test_exact_rig_on_grooves_slips_with_kinetic_coefficient():
+    """A rig on grooves with a slope of 1e-12 agrees with the exact engine without grooves."""
+    grooved = run_with_keys(
         RIG,
         **{"friction.kinetic": "0.3", "normal.grooves.amplitude": "1e-11 um", "drive.cycles": "10"},
     )
-    here = run(flat(RIG), **{"friction.kinetic": "0.3", "drive.cycles": "10"})
-    assert there.extra["engine"] == "march" and here.extra["engine"] != "march"
+    plain = run_with_keys(remove_grooves(RIG), **{"friction.kinetic": "0.3", "drive.cycles": "10"})
+    assert grooved.extra["engine"] == "march" and plain.extra["engine"] != "march"
     for name in ("friction_work", "loop_area", "relative_displacement_amplitude"):
-        assert value(there, name) == pytest.approx(value(here, name), rel=1e-5)
+        assert measure_value(grooved, name) == pytest.approx(measure_value(plain, name), rel=1e-5)
 
 
-def test_exact_a_slow_slide_of_a_force_that_follows_the_speed():
-    """Far above v_0 it is Coulomb's; far below v_0 it is a dashpot along the flank: c ds/dt with c = mu N/v_0."""
-    rate = BENCH.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 um/s"')
-    assert value(run(rate), "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, 30e-6), rel=1e-9)
-    slow = run(rate.replace('"1 um/s"', '"1000 m/s"'))
+def test_exact_tanh_loop_on_grooves_agrees_with_limits():
+    """Far above the speed v_0 the loop is that of Coulomb's law; far below it is that of a dashpot
+    along the slope, c ds/dt with c = mu N/v_0."""
+    tanh_bench = BENCH.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 um/s"')
+    assert measure_value(run_with_keys(tanh_bench), "loop_area") == pytest.approx(
+        groove_loop_area(115, 0.4, 7.5e-6, 30e-6), rel=1e-9
+    )
+    viscous = run_with_keys(tanh_bench.replace('"1 um/s"', '"1000 m/s"'))
     q = np.linspace(-30e-6, 30e-6, 20_001)
     t = 7.5e-6 * WAVE * np.sin(WAVE * q)
     dashpot = 115 * 0.4 / 1000 * 1e-3 * np.trapezoid(2 * (1 + t**2) ** 1.5, q)
-    assert value(slow, "loop_area") == pytest.approx(dashpot, rel=1e-6)
+    assert measure_value(viscous, "loop_area") == pytest.approx(dashpot, rel=1e-6)
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
-def test_always_a_law_with_memory_acts_along_the_flank(law):
-    """Books close; with bonds far shorter than the flank the loop of a slow slide is Coulomb's."""
+def test_always_hysteretic_laws_on_grooves_close_energy_balance(law):
+    """The energy balance closes for laws with memory along the slope; with bonds far shorter than a
+    groove, the loop is that of Coulomb's law."""
 
     def text(of, length):
         return of.replace('law = "coulomb"', f'law = "{law}"\nbond_length = "{length}"')
 
-    found = run(text(BENCH, "0.1 um"), **{"accuracy.steps_per_cycle": "4000"})
-    assert value(found, "energy_balance") < 1e-10 and value(found, "work_check") < 1e-3
-    assert value(found, "loop_area") == pytest.approx(area(115, 0.4, 7.5e-6, 30e-6), rel=0.01)
-    assert value(found, "friction_work") - value(found, "energy_stored") == pytest.approx(
-        value(found, "energy_dissipated"), rel=1e-9
+    result = run_with_keys(text(BENCH, "0.1 um"), **{"accuracy.steps_per_cycle": "4000"})
+    assert (
+        measure_value(result, "energy_balance") < 1e-10
+        and measure_value(result, "work_check") < 1e-3
     )
-    found = run(
+    assert measure_value(result, "loop_area") == pytest.approx(
+        groove_loop_area(115, 0.4, 7.5e-6, 30e-6), rel=0.01
+    )
+    assert measure_value(result, "friction_work") - measure_value(
+        result, "energy_stored"
+    ) == pytest.approx(measure_value(result, "energy_dissipated"), rel=1e-9)
+    result = run_with_keys(
         text(RIG, "1 um"),
         **{"normal.grooves.lifted_mass": "0.3 kg", "accuracy.steps_per_cycle": "400"},
     )
-    assert value(found, "energy_balance") < 1e-10 and value(found, "work_check") < 2e-3
+    assert (
+        measure_value(result, "energy_balance") < 1e-10
+        and measure_value(result, "work_check") < 2e-3
+    )
 
 
-def test_exact_a_patch_under_a_rigid_slide_is_the_point():
+def test_exact_rigid_patch_on_grooves_agrees_with_point():
     pieces = PIECES + GROOVES
     point = f'[normal]\nload = "115 N"\n{GROOVES}'
     for text, names in (
         (RIG, ("relative_displacement_amplitude", "loop_area")),
         (BENCH, ("loop_area",)),
     ):
-        there, here = (
-            run(one, **{"accuracy.steps_per_cycle": "40"})
-            for one in (text.replace(point, pieces), text)
+        patch, point_result = (
+            run_with_keys(scene, **{"accuracy.steps_per_cycle": "40"})
+            for scene in (text.replace(point, pieces), text)
         )
         for name in names:
-            assert value(there, name) == pytest.approx(value(here, name), rel=1e-8)
+            assert measure_value(patch, name) == pytest.approx(
+                measure_value(point_result, name), rel=1e-8
+            )
 
 
 @pytest.mark.parametrize("text", [BENCH, RIG])
-def test_exact_flat_grooves_are_the_law_itself(text):
-    """Amplitude 0 gives every number of the scene without grooves."""
-    there = run(text, **{"normal.grooves.amplitude": "0 um"})
-    here = run(flat(text))
-    assert {name: one.value for name, one in there.measures.items()} == {
-        name: one.value for name, one in here.measures.items()
+def test_exact_grooves_of_zero_amplitude_change_nothing(text):
+    """Grooves of amplitude 0 give the numbers of the scene without grooves."""
+    grooved = run_with_keys(text, **{"normal.grooves.amplitude": "0 um"})
+    plain = run_with_keys(remove_grooves(text))
+    assert {name: measure.value for name, measure in grooved.measures.items()} == {
+        name: measure.value for name, measure in plain.measures.items()
     }
 
 
-def test_refuses_heave_over_grooves():
+def test_refuses_normal_motion_with_grooves():
     text = (
         RIG.replace("[normal]", PIECES)
         .replace('load = "115 N"\ngrooves', "grooves")
@@ -222,28 +251,28 @@ def test_refuses_heave_over_grooves():
         (BENCH, ["normal.grooves.amplitude=-1 um"], "normal.grooves.amplitude", ""),
     ],
 )
-def test_refuses_what_grooves_cannot_stand_beside(text, sets, key, words):
-    with pytest.raises(SceneError) as told:
+def test_refuses_keys_incompatible_with_grooves(text, sets, key, words):
+    with pytest.raises(SceneError) as error:
         loads(text, sets=sets)
-    assert any(f" {key}: " in line and words in line for line in told.value.mistakes), (
-        told.value.mistakes
+    assert any(f" {key}: " in line and words in line for line in error.value.mistakes), (
+        error.value.mistakes
     )
 
 
-def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
+def test_refuses_grooves_in_static_patch_or_unsuitable_shear():
     patch = BLOCK + GROOVES
     with pytest.raises(SceneError, match=r"contact\.grooves: .*needs a sliding motion"):
         loads(patch)
-    soft = BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]")
+    sheared = BENCH.replace(f'[normal]\nload = "115 N"\n{GROOVES}', patch + "\n[contact.shear]")
     with pytest.raises(SceneError, match=r"friction\.law: 'tanh' with \[contact\.shear\]"):
-        loads(soft.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 mm/s"'))
-    soft = soft.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
+        loads(sheared.replace('law = "coulomb"', 'law = "tanh"\nreference_speed = "1 mm/s"'))
+    sheared = sheared.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
     with pytest.raises(
         SceneError,
         match=r"contact\.holder\.tangential_stiffness: not supported yet with "
         r"\[contact\.grooves\]",
     ):
-        loads(soft + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
+        loads(sheared + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
 
 
 LEAVES = {
@@ -255,15 +284,19 @@ LEAVES = {
 
 
 @pytest.mark.parametrize("law", ['law = "coulomb"', 'law = "tanh"\nreference_speed = "5 mm/s"'])
-def test_exact_the_books_end_with_the_sample_that_exceeds_the_travel(law):
-    """The sums are those of the last sample, wherever travel is exceeded within what is marched at once."""
-    limit = RIG.replace('law = "coulomb"', law).replace(
+def test_exact_energy_balance_ends_with_exceeded_travel(law):
+    """The energy sums end with the sample that exceeds the travel, wherever it lies in a block of
+    steps."""
+    text = RIG.replace('law = "coulomb"', law).replace(
         "moving_mass", 'travel = "0.08 mm"\nmoving_mass'
     )
     for level in ("9 g", "10 g", "12 g"):
-        found = run(limit, **{"drive.acceleration": level})
-        assert found.outcome is Outcome.EXCEEDS_TRAVEL
-        assert value(found, "energy_balance") < 1e-9 and value(found, "work_check") < 5e-3
+        result = run_with_keys(text, **{"drive.acceleration": level})
+        assert result.outcome is Outcome.EXCEEDS_TRAVEL
+        assert (
+            measure_value(result, "energy_balance") < 1e-9
+            and measure_value(result, "work_check") < 5e-3
+        )
 
 
 @pytest.mark.parametrize(
@@ -275,13 +308,16 @@ def test_exact_the_books_end_with_the_sample_that_exceeds_the_travel(law):
     ],
     ids=["exact", "march", "repeated"],
 )
-def test_always_a_lifted_mass_that_leaves_its_grooves_is_an_outcome(text):
-    """In every engine; the moment stands in a note, no warning calls it a solve that failed."""
-    found = run(text, **LEAVES)
-    assert found.outcome is Outcome.LEAVES_GROOVES
-    assert "left their grooves" in found.outcome.sentence
-    assert any("leaves the grooves at" in one for one in found.notes)
-    assert not any("leaves the grooves" in one or "residual" in one for one in found.warnings)
-    assert all(one.error is not None for one in found.measures.values() if one.value is not None)
-    load = found.response.extra["normal_load"]
+def test_always_lifted_mass_leaving_grooves_is_outcome(text):
+    """In every engine the outcome is `leaves_grooves`; a note states the instant, and no warning
+    calls it a failed solution."""
+    result = run_with_keys(text, **LEAVES)
+    assert result.outcome is Outcome.LEAVES_GROOVES
+    assert "left their grooves" in result.outcome.sentence
+    assert any("leaves the grooves at" in item for item in result.notes)
+    assert not any("leaves the grooves" in item or "residual" in item for item in result.warnings)
+    assert all(
+        item.error is not None for item in result.measures.values() if item.value is not None
+    )
+    load = result.response.extra["normal_load"]
     assert load.min() <= 0.05 * load.max()

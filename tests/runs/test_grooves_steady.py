@@ -1,4 +1,5 @@
-"""The steady motion over grooves found directly, `accuracy.method = "harmonic"`, beside marches from rest."""
+"""Steady states over grooves found directly (`accuracy.method = "harmonic"`) agree with time
+integrations from rest."""
 
 import numpy as np
 import pytest
@@ -43,70 +44,83 @@ EVERY = [
 ]
 
 
-def scene(law, *sets):
+def load_rig(law, *sets):
+    """Return the scene of the rig with a friction law and --set options."""
     return loads(RIG.replace('"coulomb"', f'"{law}"\n{KEYS[law]}'), sets=sets)
 
 
-def contact_of(text):
+def make_model_and_contact(text):
+    """Return the model of a scene and the contact of its time integration."""
     model = build(text)
     return model, interface.make_contact(model, choose_numerics(model), None)
 
 
-def marched(text, cycles=40, steps=400):
-    """(half the swing of the last cycle, work of the friction in it, its largest force) of a march from rest."""
-    model, contact = contact_of(text)
-    done = march(model.rig.modes, model.rig.drive.signal, contact, cycles, steps, window=1)
-    assert done.outcome is None
+def march_last_cycle(text, cycles=40, steps=400):
+    """Return half of the peak-to-peak displacement, the friction work and the largest force of the
+    last cycle of a march from rest."""
+    model, contact = make_model_and_contact(text)
+    run = march(model.rig.modes, model.rig.drive.signal, contact, cycles, steps, window=1)
+    assert run.outcome is None
     return (
-        float(np.ptp(done.amplitudes[-1])) / 2,
-        done.window_work,
-        float(np.abs(done.window.force).max()),
+        float(np.ptp(run.amplitudes[-1])) / 2,
+        run.window_work,
+        float(np.abs(run.window.force).max()),
     )
 
 
 @pytest.mark.share(1, 4, 6)
 @pytest.mark.parametrize(("law", "frequency"), EVERY)
-def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
-    asked = scene(law, f"drive.frequency={frequency} Hz")
-    found = pf.run(asked)
-    assert found.outcome is Outcome.STEADY and found.measures["energy_balance"].value < 2e-3
-    for name, true in zip(SHOWN, marched(asked, steps=1600 if "bond_length" in KEYS[law] else 400)):
-        one = found.measures[name]
-        assert abs(one.value - true) <= one.error + 1.5e-3 * abs(true), name
-        assert one.error < 5e-3 * abs(one.value)
+def test_always_steady_state_agrees_with_march(law, frequency):
+    scene_to_run = load_rig(law, f"drive.frequency={frequency} Hz")
+    result = pf.run(scene_to_run)
+    assert result.outcome is Outcome.STEADY and result.measures["energy_balance"].value < 2e-3
+    for name, reference in zip(
+        SHOWN, march_last_cycle(scene_to_run, steps=1600 if "bond_length" in KEYS[law] else 400)
+    ):
+        measure = result.measures[name]
+        assert abs(measure.value - reference) <= measure.error + 1.5e-3 * abs(reference), name
+        assert measure.error < 5e-3 * abs(measure.value)
 
 
-def test_exact_coulombs_steady_motion_closes_to_round_off():
-    """From stop to release the steps leave 1e-11; the books of the cycle close and the map repeats."""
-    found = pf.run(scene("coulomb"))
-    assert found.extra["residual"] < 1e-8 and found.extra["map"] == "march"
-    assert found.measures["energy_balance"].value < 1e-9
-    true = marched(scene("coulomb"), 40)
-    for name, value in list(zip(SHOWN, true))[:2]:
-        assert found.measures[name].value == pytest.approx(value, rel=1e-7)
+def test_exact_coulomb_steady_state_closes_to_round_off():
+    """The residual of the cycle is below 1e-8, its energy balance closes within 1e-9, and it agrees
+    with a march within 1e-7."""
+    result = pf.run(load_rig("coulomb"))
+    assert result.extra["residual"] < 1e-8 and result.extra["map"] == "march"
+    assert result.measures["energy_balance"].value < 1e-9
+    reference = march_last_cycle(load_rig("coulomb"), 40)
+    for name, value in list(zip(SHOWN, reference))[:2]:
+        assert result.measures[name].value == pytest.approx(value, rel=1e-7)
 
 
-def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
-    """A small motion about the bottom of the grooves: a linear oscillator of the stiffness N k^2 A beside its mode."""
-    asked = scene(
+def test_exact_multipliers_agree_with_linear_groove_stiffness():
+    """With hardly any friction, a small motion at the bottom of the grooves has the Floquet
+    multipliers of a linear oscillator with the added stiffness N k^2 A."""
+    scene_to_run = load_rig(
         "tanh",
         "friction.static=1e-9",
         "normal.grooves.amplitude=0.5 um",
         "drive.acceleration=1e-3 m/s^2",
     )
-    found, (model, _) = pf.run(asked).extra["multipliers"], contact_of(asked)
+    multipliers, (model, _) = (
+        pf.run(scene_to_run).extra["multipliers"],
+        make_model_and_contact(scene_to_run),
+    )
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    kept = 0.003 * model.rig.modes.omega[0]
-    own = np.sqrt(modes.omega[0] ** 2 + model.grooves.stiffness(115.0) / modes.mass - kept**2)
-    np.testing.assert_allclose(np.abs(found), np.exp(-kept * drive.period), rtol=1e-4)
-    assert np.abs(np.angle(found)) == pytest.approx(
-        np.abs(np.angle(np.exp(1j * own * drive.period))), abs=1e-3
+    decay_rate = 0.003 * model.rig.modes.omega[0]
+    omega = np.sqrt(
+        modes.omega[0] ** 2 + model.grooves.stiffness(115.0) / modes.mass - decay_rate**2
+    )
+    np.testing.assert_allclose(np.abs(multipliers), np.exp(-decay_rate * drive.period), rtol=1e-4)
+    assert np.abs(np.angle(multipliers)) == pytest.approx(
+        np.abs(np.angle(np.exp(1j * omega * drive.period))), abs=1e-3
     )
 
 
-def test_always_elastic_pieces_move_as_in_a_march():
-    """Points behind the shear modes of a patch: the march at the same steps."""
+def test_always_sheared_patch_on_grooves_agrees_with_march():
+    """A patch with [contact.shear] on grooves agrees with a march of the same steps, and its
+    tractions add up to the friction force."""
     pieces = (
         BLOCK
         + 'element_size = "2 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n[contact.shear]\n'

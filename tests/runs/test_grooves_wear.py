@@ -1,4 +1,5 @@
-"""Grooves that wear: volume, amplitude by its own differential equation, work of friction, capacity and runaway."""
+"""Wear of grooves: worn volume, amplitude, friction work, complete removal and growth of the
+motion."""
 
 import numpy as np
 import pytest
@@ -42,58 +43,61 @@ steps_per_cycle = 100
 """
 
 
-def run(text, estimate=True, **keys):
+def run_with_keys(text, estimate=True, **keys):
+    """Return the result of a scene with some keys replaced."""
     model = build(loads(text, sets=[f"{key}={value}" for key, value in keys.items()]))
     return run_plan(model, estimate=estimate)
 
 
-def value(result, name):
+def measure_value(result, name):
+    """Return the value of a measure."""
     return result.measures[name].value
 
 
-def path(amplitude, reach=15e-6):
-    """int R ds/N over a cycle between +-reach, R ds = (1 + t^2)/(1 -+ mu t) N dq."""
+def slip_path_per_cycle(amplitude, reach=15e-6):
+    """Return int R ds/N over a cycle between +-reach, where R ds = (1 + t^2)/(1 -+ mu t) N dq."""
 
-    def part(q, way):
+    def slip_rate(q, way):
         t = amplitude * WAVE * np.sin(WAVE * q)
         return (1 + t * t) / (1 - way * MU * t)
 
-    return sum(quad(part, -reach, reach, args=(way,))[0] for way in (-1, 1))
+    return sum(quad(slip_rate, -reach, reach, args=(way,))[0] for way in (-1, 1))
 
 
 @pytest.mark.parametrize("share", [0.5, 0.3])
-def test_exact_the_amplitude_by_its_own_differential_equation(share):
-    """dA/dn = -share kappa N int R ds/N over the area, of the piece that loses more; the volume is what left both."""
-    found = run(PIECES + SLIDE, **{"wear.upper_share": share})
-    more = max(share, 1 - share)
-    way = solve_ivp(
-        lambda n, a: -more * KAPPA * LOAD * path(a[0]) / AREA,
+def test_exact_worn_amplitude_agrees_with_differential_equation(share):
+    """The worn amplitude agrees with dA/dn = -share kappa N int R ds/N divided by the area, for the
+    piece that wears more; the worn volume is that of both pieces."""
+    result = run_with_keys(PIECES + SLIDE, **{"wear.upper_share": share})
+    larger_share = max(share, 1 - share)
+    solution = solve_ivp(
+        lambda n, a: -larger_share * KAPPA * LOAD * slip_path_per_cycle(a[0]) / AREA,
         (0, 4e6),
         [7.5e-6],
         rtol=1e-9,
         atol=1e-15,
     )
-    left = found.measures["groove_amplitude"]
-    volume = value(found, "worn_volume")
-    assert abs(left.value - way.y[0, -1]) <= left.error < 2e-3 * left.value
-    assert (7.5e-6 - left.value) * AREA == pytest.approx(more * volume, rel=1e-12)
-    steep = left.value * WAVE
-    t = steep * np.sin(WAVE * 15e-6)
-    assert value(found, "friction_force_peak") == pytest.approx(
+    amplitude = result.measures["groove_amplitude"]
+    volume = measure_value(result, "worn_volume")
+    assert abs(amplitude.value - solution.y[0, -1]) <= amplitude.error < 2e-3 * amplitude.value
+    assert (7.5e-6 - amplitude.value) * AREA == pytest.approx(larger_share * volume, rel=1e-12)
+    slope = amplitude.value * WAVE
+    t = slope * np.sin(WAVE * 15e-6)
+    assert measure_value(result, "friction_force_peak") == pytest.approx(
         LOAD * (t + MU) / (1 - MU * t), rel=1e-9
     )
-    history = found.extra["wear"]
+    history = result.extra["wear"]
     assert history["groove_amplitude"][0] == 7.5e-6
     assert (np.diff(history["groove_amplitude"]) < 0).all()
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("lifted", ["0 kg", "0.4 kg"])
-def test_exact_a_rig_wears_by_the_work_of_its_friction(lifted):
-    """Coulomb: f = mu R along the flank, so kappa int R ds is kappa/mu times friction's own work, the loop's area; with
-    form 'energy' it is kappa times that work."""
-    for form, part in (("archard", MU), ("energy", 1.0)):
-        found = run(
+def test_exact_wear_of_rig_agrees_with_friction_work(lifted):
+    """With Coulomb's law, the wear kappa int R ds is kappa/mu times the friction work, which is the
+    loop area; with the form 'energy' it is kappa times this work."""
+    for form, divisor in (("archard", MU), ("energy", 1.0)):
+        result = run_with_keys(
             PIECES + RIG,
             False,
             **{
@@ -104,8 +108,8 @@ def test_exact_a_rig_wears_by_the_work_of_its_friction(lifted):
                 "wear.jumps": 1,
             },
         )
-        assert value(found, "worn_volume") == pytest.approx(
-            KAPPA * 10 * value(found, "loop_area") / part, rel=1e-4
+        assert measure_value(result, "worn_volume") == pytest.approx(
+            KAPPA * 10 * measure_value(result, "loop_area") / divisor, rel=1e-4
         )
 
 
@@ -114,7 +118,7 @@ SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize(
-    ("text", "more"),
+    ("text", "keys"),
     [
         (SLIDE, {"slide.amplitude": "0.3 um", "contact.grooves.phase": "1 rad"}),
         (
@@ -137,50 +141,55 @@ SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
         ),
     ],
 )
-def test_exact_elastic_pieces_wear_by_the_work_of_their_friction(text, more):
-    """Slip and normal force of every point along the flank: their sum over the patch is what the books say, kappa times
-    friction's own work (form 'energy') or that over mu, and the flanks lose their share of it."""
-    for form, part in (("archard", MU), ("energy", 1.0)):
-        found = run(
+def test_exact_wear_of_sheared_patch_agrees_with_friction_work(text, keys):
+    """The sum of the wear of all points is kappa times the friction work (form 'energy') or this
+    over mu, and the grooves lose their share of it."""
+    for form, divisor in (("archard", MU), ("energy", 1.0)):
+        result = run_with_keys(
             SOFT + text,
             False,
-            **{"wear.form": f'"{form}"', "wear.cycles": 10, "wear.jumps": 1, **more},
+            **{"wear.form": f'"{form}"', "wear.cycles": 10, "wear.jumps": 1, **keys},
         )
-        volume = value(found, "worn_volume")
-        assert volume == pytest.approx(KAPPA * 10 * value(found, "loop_area") / part, rel=1.2e-3)
-        assert (7.5e-6 - value(found, "groove_amplitude")) * AREA == pytest.approx(
+        volume = measure_value(result, "worn_volume")
+        assert volume == pytest.approx(
+            KAPPA * 10 * measure_value(result, "loop_area") / divisor, rel=1.2e-3
+        )
+        assert (7.5e-6 - measure_value(result, "groove_amplitude")) * AREA == pytest.approx(
             0.5 * volume, rel=1e-9
         )
-        assert value(found, "energy_balance") < 1e-8
+        assert measure_value(result, "energy_balance") < 1e-8
 
 
-def test_exact_on_flat_ground_they_wear_as_the_exact_set_of_elements():
-    """Worn depth of every point, flanks of a slope of 1e-12, a stroke of some three slides at which the pieces let
-    go."""
+def test_exact_wear_on_flat_grooves_agrees_with_contact_elements():
+    """The worn depth of every point on grooves with a slope of 1e-12 agrees with that of the exact
+    contact elements, for an amplitude about three times that of the first complete slip."""
     keys = {"slide.amplitude": "0.3 um", "wear.cycles": 1000, "wear.jumps": 1}
-    here = run(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"})
-    there = run(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"})
-    np.testing.assert_allclose(here.patch.unloaded_gap, there.patch.unloaded_gap, rtol=2e-3)
-    path = here.patch.unloaded_gap / here.patch.pressure.sigma_n
-    assert np.ptp(path) > 0.05 * path.mean()
-
-
-def test_always_worn_grooves_let_the_motion_run_away():
-    """At 7 g new grooves hold for ever; worn by a tenth they let the motion grow, and then pass its stop."""
-    found = run(PIECES + RIG, False, **{"wear.cycles": 2e7, "wear.jumps": 12})
-    said = next(
-        line for line in found.warnings if line.startswith("wear was computed only up to cycle")
+    grooved = run_with_keys(
+        SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"}
     )
-    assert "exceeded the travel" in said
-    history = found.extra["wear"]
+    plain = run_with_keys(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"})
+    np.testing.assert_allclose(grooved.patch.unloaded_gap, plain.patch.unloaded_gap, rtol=2e-3)
+    slip_paths = grooved.patch.unloaded_gap / grooved.patch.pressure.sigma_n
+    assert np.ptp(slip_paths) > 0.05 * slip_paths.mean()
+
+
+def test_always_worn_grooves_let_motion_exceed_travel():
+    """At 7 g the motion stays in new grooves; once these are worn by a tenth, it grows and exceeds
+    the travel."""
+    result = run_with_keys(PIECES + RIG, False, **{"wear.cycles": 2e7, "wear.jumps": 12})
+    warning = next(
+        line for line in result.warnings if line.startswith("wear was computed only up to cycle")
+    )
+    assert "exceeded the travel" in warning
+    history = result.extra["wear"]
     assert 6e-6 < history["groove_amplitude"][-1] < 7e-6
-    moves = history["relative_displacement_amplitude"]
-    assert (np.diff(moves) > 0).all() and moves[-1] > 1.3 * moves[0]
+    amplitudes = history["relative_displacement_amplitude"]
+    assert (np.diff(amplitudes) > 0).all() and amplitudes[-1] > 1.3 * amplitudes[0]
 
 
-def test_exact_flat_grooves_wear_on_as_the_law_itself():
-    """Worn flat the run is Coulomb's on flat ground."""
-    found = run(PIECES + SLIDE, False, **{"wear.cycles": 1e8})
-    assert value(found, "groove_amplitude") == 0.0
-    assert value(found, "loop_area") == pytest.approx(4 * MU * LOAD * 15e-6, rel=1e-12)
-    assert value(found, "worn_volume") > 2 * 7.5e-6 * AREA
+def test_exact_removed_grooves_leave_coulomb_loop():
+    """After the grooves are worn away, the loop is that of Coulomb's law on a flat surface."""
+    result = run_with_keys(PIECES + SLIDE, False, **{"wear.cycles": 1e8})
+    assert measure_value(result, "groove_amplitude") == 0.0
+    assert measure_value(result, "loop_area") == pytest.approx(4 * MU * LOAD * 15e-6, rel=1e-12)
+    assert measure_value(result, "worn_volume") > 2 * 7.5e-6 * AREA

@@ -1,4 +1,5 @@
-"""Hard cases of dry friction as scenes, through every engine that applies, against closed forms and other programs."""
+"""Difficult cases of dry friction, in every engine that applies, agree with closed forms and other
+programs."""
 
 from functools import lru_cache
 from math import asin, cos, pi, sin
@@ -12,12 +13,12 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-W = 2 * pi * 100  # rad/s, of 1 kg
+W = 2 * pi * 100  # Angular frequency [rad/s] of the mode of 1 kg.
 LOAD = 100.0
 
 
-def rig(friction, drive, damping=0.003, frequency=100.0, more="", law="coulomb"):
-    """One mode of 1 kg under 100 N; friction: keys of [friction]; drive: keys of [drive]."""
+def format_rig(friction, drive, damping=0.003, frequency=100.0, more="", law="coulomb"):
+    """Return a scene of one mode of 1 kg under 100 N with the given keys of [friction] and [drive]."""
     return f"""\
 [structure]
 moving_mass = "1 kg"
@@ -38,7 +39,8 @@ law = "{law}"
 """
 
 
-def base(acceleration, cycles, ratio=1.0):
+def format_base_drive(acceleration, cycles, ratio=1.0):
+    """Return the keys of a base acceleration [m/s^2] at a frequency ratio."""
     return (
         f'kind = "base"\nfrequency = "{100 * ratio!r} Hz"\nacceleration = "{acceleration!r} m/s^2"\n'
         f"cycles = {cycles}"
@@ -46,22 +48,30 @@ def base(acceleration, cycles, ratio=1.0):
 
 
 @lru_cache(maxsize=64)
-def result_of(text, *sets, estimate=True):
+def run_text(text, *sets, estimate=True):
+    """Return the result of a scene, computed once."""
     return run(loads(text, "a.toml", sets), estimate=estimate)
 
 
-def value(result, name="relative_displacement_amplitude"):
+def measure_value(result, name="relative_displacement_amplitude"):
+    """Return the value of a measure."""
     return result.measures[name].value
 
 
-def close(result, name, want, least=0.0):
-    """Whether a measure lies within its own error of the truth."""
-    one = result.measures[name]
-    assert abs(one.value - want) <= one.error + least, (name, one.value, want, one.error)
+def assert_within_error(result, name, reference, round_off=0.0):
+    """Assert that a measure agrees with a reference within its error plus `least`."""
+    measure = result.measures[name]
+    assert abs(measure.value - reference) <= measure.error + round_off, (
+        name,
+        measure.value,
+        reference,
+        measure.error,
+    )
 
 
-def balanced(result, bound):
-    assert value(result, "energy_balance") <= bound
+def assert_energy_balance(result, bound):
+    """Assert that the energy balance of a run is at most `bound`."""
+    assert measure_value(result, "energy_balance") <= bound
 
 
 SECOND = '[[structure.mode]]\nname = "other"\nfrequency = "271 Hz"\ndamping = 0.01\nslide = 0.0\nbase = 0.0\n'
@@ -69,86 +79,99 @@ SECOND = '[[structure.mode]]\nname = "other"\nfrequency = "271 Hz"\ndamping = 0.
 
 @pytest.mark.parametrize("more", ["", SECOND], ids=["one mode", "general"])
 @pytest.mark.parametrize("power", range(4, 11))
-def test_exact_grazing_onset(power, more):
-    """First slip 9/2 (1 - D)^2 a/omega^2; relative error of order 1 - D, and of round-off over 1 - D."""
-    part = 10.0**-power
-    result = result_of(
-        rig("static = 0.3", base(30.0 / (1 - part), 0.5), 0.0, more=more), estimate=False
+def test_exact_first_slip_near_friction_limit(power, more):
+    """Just above the onset the first slip is 9/2 (1 - D)^2 a/omega^2, up to terms of relative order
+    1 - D and round-off over 1 - D."""
+    excess = 10.0**-power
+    result = run_text(
+        format_rig("static = 0.3", format_base_drive(30.0 / (1 - excess), 0.5), 0.0, more=more),
+        estimate=False,
     )
-    want = 4.5 * part**2 * 30.0 / W**2
-    assert abs(result.response.slide[-1]) == pytest.approx(want, rel=3 * part + 1e-14 / part)
+    expected = 4.5 * excess**2 * 30.0 / W**2
+    assert abs(result.response.slide[-1]) == pytest.approx(
+        expected, rel=3 * excess + 1e-14 / excess
+    )
     assert result.outcome != "stuck"
-    balanced(result, 1e-10)
+    assert_energy_balance(result, 1e-10)
 
 
-def two_stops(d):
-    """Half peak-to-peak over a/omega^2 of the undamped motion at resonance with two stops, by its half period.
+def amplitude_with_two_stops(d):
+    """Return the half peak-to-peak amplitude over a/omega^2 of the undamped motion at resonance
+    with two stops per cycle.
 
-    Released at -q where sin t + q = D; x'' + x = sin t - D until x' = 0, which must be at +q. (Den Hartog's phases.)
+    The mass is released at -q when sin t + q = D and moves by x'' + x = sin t - D until x' = 0 at
+    +q (Den Hartog).
     """
 
-    def miss(q):
+    def residual(q):
         begin = asin(d - q)
-        a, b = _through(begin, -q, d)
+        a, b = solve_sliding_phase(begin, -q, d)
         return a(brentq(b, begin + 0.5, begin + pi)) - q
 
     grid = np.linspace(1e-3, min(d, 0.7853), 400)
-    values = [miss(q) for q in grid]
+    values = [residual(q) for q in grid]
     k = next(i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0)
-    return brentq(miss, grid[k], grid[k + 1], xtol=1e-15)
+    return brentq(residual, grid[k], grid[k + 1], xtol=1e-15)
 
 
-def _through(begin, x, d):
-    """x(t), x'(t) of x'' + x = sin t - d from (x, 0) at `begin`."""
-    one = x + d + begin * cos(begin) / 2
-    two = cos(begin) / 2 - begin * sin(begin) / 2
+def solve_sliding_phase(begin, x, d):
+    """Return the functions x(t) and x'(t) of x'' + x = sin t - d from (x, 0) at the time `begin`."""
+    c = x + d + begin * cos(begin) / 2
+    s = cos(begin) / 2 - begin * sin(begin) / 2
 
-    def place(t):
-        return -d - t * cos(t) / 2 + one * cos(t - begin) + two * sin(t - begin)
+    def displacement(t):
+        return -d - t * cos(t) / 2 + c * cos(t - begin) + s * sin(t - begin)
 
-    def rate(t):
-        return -cos(t) / 2 + t * sin(t) / 2 - one * sin(t - begin) + two * cos(t - begin)
+    def velocity(t):
+        return -cos(t) / 2 + t * sin(t) / 2 - c * sin(t - begin) + s * cos(t - begin)
 
-    return place, rate
+    return displacement, velocity
 
 
-def test_exact_above_the_resonance_threshold():
-    """D = pi/4 + 1e-3 without damping: bounded, by the half period; D = 0.8 is the printed 0.299431041748427515."""
-    assert two_stops(0.8) == pytest.approx(0.299431041748427515, abs=1e-13)
+def test_exact_amplitude_above_resonance_threshold():
+    """At D = pi/4 + 1e-3 without damping, the amplitude is bounded and agrees with the half-period
+    solution; at D = 0.8 this solution is the printed 0.299431041748427515."""
+    assert amplitude_with_two_stops(0.8) == pytest.approx(0.299431041748427515, abs=1e-13)
     d = pi / 4 + 1e-3
-    want = two_stops(d)
-    condition = (two_stops(d * (1 + 1e-6)) / want - 1) / 1e-6
+    expected = amplitude_with_two_stops(d)
+    condition = (amplitude_with_two_stops(d * (1 + 1e-6)) / expected - 1) / 1e-6
     assert 5 < abs(condition) < 1e3
-    text = rig("static = 0.3", base(30.0 / d, 1500), 0.0)
-    result = result_of(text)
+    text = format_rig("static = 0.3", format_base_drive(30.0 / d, 1500), 0.0)
+    result = run_text(text)
     assert result.outcome == "steady"
-    assert value(result) * W**2 / (30.0 / d) == pytest.approx(want, rel=1e-12 * abs(condition))
-    balanced(result, 1e-10)
-    point = result_of(text, "accuracy.method=harmonic")
-    close(
-        point,
+    assert measure_value(result) * W**2 / (30.0 / d) == pytest.approx(
+        expected, rel=1e-12 * abs(condition)
+    )
+    assert_energy_balance(result, 1e-10)
+    harmonic = run_text(text, "accuracy.method=harmonic")
+    assert_within_error(
+        harmonic,
         "relative_displacement_amplitude",
-        want * 30.0 / d / W**2,
-        1e-9 * want * 30.0 / d / W**2,
+        expected * 30.0 / d / W**2,
+        1e-9 * expected * 30.0 / d / W**2,
     )
 
 
-def test_exact_below_the_resonance_threshold():
-    """D = pi/4 - 1e-3 without damping: no bounded motion; the amplitude rises by pi - 4 D (a/omega^2) a cycle."""
+def test_exact_growth_below_resonance_threshold():
+    """At D = pi/4 - 1e-3 without damping, the amplitude grows by (pi - 4 D) a/omega^2 per cycle."""
     d = pi / 4 - 1e-3
-    short, long = (result_of(rig("static = 0.3", base(30.0 / d, n), 0.0)) for n in (900, 1500))
-    assert short.outcome == long.outcome == "grows"
-    assert long.measures["relative_displacement_amplitude"].error is None
-    rise = (value(long) - value(short)) / 600 * W**2 / (30.0 / d)
+    short_run, long_run = (
+        run_text(format_rig("static = 0.3", format_base_drive(30.0 / d, n), 0.0))
+        for n in (900, 1500)
+    )
+    assert short_run.outcome == long_run.outcome == "grows"
+    assert long_run.measures["relative_displacement_amplitude"].error is None
+    rise = (measure_value(long_run) - measure_value(short_run)) / 600 * W**2 / (30.0 / d)
     assert rise == pytest.approx(pi - 4 * d, rel=1e-2)
-    balanced(long, 1e-10)
+    assert_energy_balance(long_run, 1e-10)
 
 
-def test_exact_a_rigid_mode_slides_under_a_force():
-    """A block on a table under F sin w t: from rest it slides (cos a - cos b) - D (b - a) F/(m w^2) ... and stops."""
+def test_exact_free_block_on_table_agrees_with_closed_form():
+    """A block on a table under F sin w t slides from the angle a to b by (cos a (b - a) - sin b +
+    sin a - D (b - a)^2/2) F/(m w^2) and stops."""
     d = 0.8
     w = 2 * pi * 50
-    text = rig(
+    text = format_rig(
         "static = 0.3",
         f'kind = "force"\nfrequency = "50 Hz"\nforce = "{30 / d!r} N"\ncycles = 30',
         0.0,
@@ -156,19 +179,20 @@ def test_exact_a_rigid_mode_slides_under_a_force():
     )
     begin = asin(d)
     end = brentq(lambda t: cos(begin) - cos(t) - d * (t - begin), begin + 0.1, begin + pi)
-    far = cos(begin) * (end - begin) - sin(end) + sin(begin) - d * (end - begin) ** 2 / 2
-    exact = result_of(text)
+    slip = cos(begin) * (end - begin) - sin(end) + sin(begin) - d * (end - begin) ** 2 / 2
+    exact = run_text(text)
     assert exact.plan.model.rig.structure.frequencies.tolist() == [0]
-    assert value(exact) == pytest.approx(far / 2 * (30 / d) / w**2, rel=1e-11)
-    assert value(exact, "stick_fraction") == pytest.approx(1 - (end - begin) / pi, rel=1e-9)
-    assert abs(value(exact, "drift_per_cycle")) <= 1e-12 * value(exact)
-    balanced(exact, 1e-10)
-    marched = result_of(text, "accuracy.method=march")
-    close(marched, "relative_displacement_amplitude", far / 2 * (30 / d) / w**2)
-    balanced(marched, 1e-8)
+    assert measure_value(exact) == pytest.approx(slip / 2 * (30 / d) / w**2, rel=1e-11)
+    assert measure_value(exact, "stick_fraction") == pytest.approx(1 - (end - begin) / pi, rel=1e-9)
+    assert abs(measure_value(exact, "drift_per_cycle")) <= 1e-12 * measure_value(exact)
+    assert_energy_balance(exact, 1e-10)
+    marched = run_text(text, "accuracy.method=march")
+    assert_within_error(marched, "relative_displacement_amplitude", slip / 2 * (30 / d) / w**2)
+    assert_energy_balance(marched, 1e-8)
 
 
-# amplitude of the slip [m] and loop area [J] by an event search on DOP853 at 1e-11, a program of its own
+# Damping, frequency ratio, level, static, cycles, slip amplitude [m] and loop area [J] of an
+# independent program (DOP853 at 1e-11 with event search).
 PEERS = {
     "overdamped": (2.0, 1.0, 10.0, 0.05, 20, 2.177447050215183e-06, 4.354894097337636e-05),
     "eight stops": (0.01, 1 / 16, 10.0, 0.05, 12, 1.3238644852087504e-05, 2.6477289704175477e-4),
@@ -177,68 +201,75 @@ PEERS = {
 
 @pytest.mark.parametrize("name", PEERS)
 @pytest.mark.parametrize("method", ["auto", "march", "harmonic"])
-def test_exact_against_another_program(name, method):
+def test_exact_slip_and_loop_agree_with_independent_program(name, method):
     damping, ratio, level, static, cycles, slip, area = PEERS[name]
-    result = result_of(
-        rig(f"static = {static}", base(level, cycles, ratio), damping), f"accuracy.method={method}"
+    result = run_text(
+        format_rig(f"static = {static}", format_base_drive(level, cycles, ratio), damping),
+        f"accuracy.method={method}",
     )
     if name == "eight stops" and method == "auto":
-        late = result.response.time > (cycles - 1) / (100 * ratio)
-        still = result.response.slide_rate[late] == 0
-        assert np.count_nonzero(still[1:] & ~still[:-1]) == 8
-    share = {"auto": 1e-9, "march": 5e-4, "harmonic": 1e-9}[method]
-    assert value(result, "slip_amplitude") == pytest.approx(slip, rel=share)
-    assert value(result, "loop_area") == pytest.approx(area, rel=share)
+        last_cycle = result.response.time > (cycles - 1) / (100 * ratio)
+        sticks = result.response.slide_rate[last_cycle] == 0
+        assert np.count_nonzero(sticks[1:] & ~sticks[:-1]) == 8
+    rel_tol = {"auto": 1e-9, "march": 5e-4, "harmonic": 1e-9}[method]
+    assert measure_value(result, "slip_amplitude") == pytest.approx(slip, rel=rel_tol)
+    assert measure_value(result, "loop_area") == pytest.approx(area, rel=rel_tol)
     if method != "harmonic":
-        balanced(result, 1e-10 if method == "auto" else 1e-8)
+        assert_energy_balance(result, 1e-10 if method == "auto" else 1e-8)
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize(
-    "damping, want", [(0.0, 0.29943104174842751488), (0.003, 0.28704671337871602595)]
+    "damping, expected", [(0.0, 0.29943104174842751488), (0.003, 0.28704671337871602595)]
 )
-def test_exact_steady_at_resonance(damping, want):
-    """Printed numbers of D = 0.8."""
-    text = rig("static = 0.3", base(37.5, 200), damping)
-    assert value(result_of(text)) == pytest.approx(want * 37.5 / W**2, rel=1e-11)
+def test_exact_amplitude_at_resonance_agrees_with_printed_value(damping, expected):
+    """The amplitude for D = 0.8 agrees with the printed value in every engine."""
+    text = format_rig("static = 0.3", format_base_drive(37.5, 200), damping)
+    assert measure_value(run_text(text)) == pytest.approx(expected * 37.5 / W**2, rel=1e-11)
     for method in ("march", "harmonic"):
-        close(
-            result_of(text, f"accuracy.method={method}"),
+        assert_within_error(
+            run_text(text, f"accuracy.method={method}"),
             "relative_displacement_amplitude",
-            want * 37.5 / W**2,
-            1e-10 * want * 37.5 / W**2,
+            expected * 37.5 / W**2,
+            1e-10 * expected * 37.5 / W**2,
         )
 
 
 @pytest.mark.parametrize("cycles", [4000, 60_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
-def test_exact_many_cycles_keep_their_phase(cycles):
-    """Amplitude and the phase of the release, 0.538622 rad after the drive, as in the first two hundred."""
-    short, long = (
-        result_of(rig("static = 0.3", base(37.5, n)), estimate=False) for n in (200, cycles)
+def test_exact_phase_after_many_cycles(cycles):
+    """After up to a million cycles, the amplitude and the phase of the release, 0.538622 rad after
+    the drive, are those after 200 cycles."""
+    short_run, long_run = (
+        run_text(format_rig("static = 0.3", format_base_drive(37.5, n)), estimate=False)
+        for n in (200, cycles)
     )
-    want = 0.28704671337871602595 * 37.5 / W**2
-    assert value(long) == pytest.approx(want, rel=1e-12)
-    assert value(long, "slip_start_phase") == pytest.approx(0.538622, abs=1e-6)
-    assert value(long, "slip_start_phase") == pytest.approx(
-        value(short, "slip_start_phase"), abs=1e-11
+    expected = 0.28704671337871602595 * 37.5 / W**2
+    assert measure_value(long_run) == pytest.approx(expected, rel=1e-12)
+    assert measure_value(long_run, "slip_start_phase") == pytest.approx(0.538622, abs=1e-6)
+    assert measure_value(long_run, "slip_start_phase") == pytest.approx(
+        measure_value(short_run, "slip_start_phase"), abs=1e-11
     )
-    assert abs(value(long, "drift_per_cycle")) <= 1e-12 * want and long.outcome == "steady"
-    balanced(long, 1e-10)
+    assert (
+        abs(measure_value(long_run, "drift_per_cycle")) <= 1e-12 * expected
+        and long_run.outcome == "steady"
+    )
+    assert_energy_balance(long_run, 1e-10)
 
 
-def test_exact_static_above_kinetic_is_bistable():
-    """6 g at 135 Hz of 143 Hz under friction of 7 g at rest, 4 g in motion: at rest for ever, or 4.83011 a/omega^2."""
-    text = rig("static = 0.7\nkinetic = 0.4", base(60.0, 400, 135 / 143))
-    rest = result_of(text)
-    moving = result_of(text, 'structure.start={velocity = ["0.5 m/s"]}')
-    assert rest.outcome == "stuck" and value(rest) == 0.0
+def test_exact_static_above_kinetic_has_two_steady_states():
+    """At 135/143 of the natural frequency with static friction of 7 and kinetic friction of 4 over
+    a drive of 6, the mass stays at rest, or moves with the amplitude 4.83011 a/omega^2."""
+    text = format_rig("static = 0.7\nkinetic = 0.4", format_base_drive(60.0, 400, 135 / 143))
+    rest = run_text(text)
+    moving = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}')
+    assert rest.outcome == "stuck" and measure_value(rest) == 0.0
     assert moving.outcome == "steady"
-    # the printed number is over omega_n^2
-    assert value(moving) == pytest.approx(4.83011 * 60.0 / W**2, rel=1e-5)
-    for one in (rest, moving):
-        balanced(one, 1e-10)
-    marched = result_of(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
-    close(marched, "relative_displacement_amplitude", value(moving))
+    # The printed value is relative to omega_n^2.
+    assert measure_value(moving) == pytest.approx(4.83011 * 60.0 / W**2, rel=1e-5)
+    for result in (rest, moving):
+        assert_energy_balance(result, 1e-10)
+    marched = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
+    assert_within_error(marched, "relative_displacement_amplitude", measure_value(moving))
 
 
 HEAVE = (
@@ -277,19 +308,19 @@ cycles = 4
 )
 
 
-@pytest.mark.share(1, 2)  # Coulomb: a loop to compile for this alone
+@pytest.mark.share(1, 2)  # The Coulomb case would compile a loop that no other test needs.
 @pytest.mark.parametrize(
     "law", ["coulomb", 'elastic-plastic"\nbond_length = "1 um', 'nonlocal"\nbond_length = "1 um']
 )
-def test_always_lift_off_closes_its_energy(law):
-    found = result_of(HEAVE % law, estimate=False)
-    load = found.response.extra["normal_load"]
-    assert load.min() == 0.0 and (np.abs(found.response.force) <= 0.3 * load + 1e-9).all()
-    balanced(found, 1e-8)
+def test_always_energy_balance_closes_with_lift_off(law):
+    result = run_text(HEAVE % law, estimate=False)
+    load = result.response.extra["normal_load"]
+    assert load.min() == 0.0 and (np.abs(result.response.force) <= 0.3 * load + 1e-9).all()
+    assert_energy_balance(result, 1e-8)
 
 
-def test_refuses_a_start_beyond_the_travel():
-    text = rig(
+def test_refuses_start_beyond_travel():
+    text = format_rig(
         "static = 0.05",
         'kind = "free"\ndisplacement = "0.5 mm"\ncycles = 10',
         more='travel = "0.4 mm"',
@@ -298,11 +329,12 @@ def test_refuses_a_start_beyond_the_travel():
         with pytest.raises(
             PatchfemError, match=r"structure\.travel: the motion starts beyond this travel"
         ):
-            result_of(text, f"accuracy.method={method}")
+            run_text(text, f"accuracy.method={method}")
 
 
-def test_refuses_a_block_too_light_for_its_steps():
-    """A block of milligrams rings on its printed bonds far above any step: it ran without end."""
+def test_refuses_block_with_unresolved_bond_frequency():
+    """A block of 6.5 mg vibrates on its bonds at a frequency far above any time step; the run is
+    refused instead of running without end."""
     text = (
         '[normal]\nload = "26 lbf"\n[friction]\nlaw = "nonlocal"\nreading = "report"\nstatic = 0.3\n'
         'bond_length = "1 um"\n[structure]\nmoving_mass = "6.5 mg"\n[[structure.mode]]\nname = "axial"\n'

@@ -1,4 +1,5 @@
-"""A block that the printed law holds: its list of bonds grows by a strip per step, which plan and run both know."""
+"""Blocks that stick under the law of the report: their list of bonds grows by a strip per step, in
+plan and run."""
 
 import re
 from time import process_time
@@ -106,27 +107,30 @@ tolerance = 0.003
     [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0), (RELEASED, 1.5)],
     ids=["mode", "masses", "released"],
 )
-def test_always_the_steps_of_a_stuck_block_are_within_those_of_the_plan(text, more):
-    """more: strips over those foreseen, one per step; steps of a released block are cut into pieces at its start."""
+def test_always_plan_estimates_strips_of_stuck_block(text, more):
+    """The plan estimates the strips of bonds of a stuck block, one per step, within a factor of
+    1.5. `more` allows for the steps that are subdivided after a release."""
     scene = load(text)
-    foreseen = plan(scene)
-    found = run(scene)
+    run_plan = plan(scene)
+    result = run(scene)
     assert (
-        found.extra["book"]["strips"] / more
-        <= foreseen.unknowns["bond_list_about"]
-        <= 1.5 * found.extra["book"]["strips"]
+        result.extra["book"]["strips"] / more
+        <= run_plan.unknowns["bond_list_about"]
+        <= 1.5 * result.extra["book"]["strips"]
     )
-    # what is not known is said
-    assert any("accuracy.steps_per_cycle" in text for text in found.warnings)
+    # A warning states the missing error.
+    assert any("accuracy.steps_per_cycle" in text for text in result.warnings)
 
 
-SPRING = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000  # of RELEASED [N/m]
-MAX_START = 1e6 * 0.53 * 133.2 / 2 / SPRING  # [um], at which the spring pulls with half the limit
-MAX_PUSH = 0.662 * 54.08 / 0.5617 / 0.8 / 2  # [m/s^2], that of RIG with its base of 0.8
+SPRING = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000  # Stiffness [N/m] of the springs of RELEASED.
+# Start [um] at which the spring force is half of the friction limit.
+MAX_START = 1e6 * 0.53 * 133.2 / 2 / SPRING
+# Acceleration [m/s^2] of RIG, whose base factor is 0.8, at half of the friction limit.
+MAX_PUSH = 0.662 * 54.08 / 0.5617 / 0.8 / 2
 
 
 @pytest.mark.parametrize(
-    "text, is_held",
+    "text, is_stuck",
     [
         (RELEASED.replace("11.82", repr(0.999 * MAX_START)), True),
         (RELEASED.replace("11.82", repr(1.001 * MAX_START)), False),
@@ -136,8 +140,8 @@ MAX_PUSH = 0.662 * 54.08 / 0.5617 / 0.8 / 2  # [m/s^2], that of RIG with its bas
         (RIG.format(reading="stretch", push=5.739), False),
     ],
 )
-def test_exact_the_printed_law_holds_what_half_its_limit_can_hold(text, is_held):
-    assert any(GROWS in sentence for sentence in plan(text).verdict) is is_held
+def test_exact_report_law_sticks_up_to_half_friction_limit(text, is_stuck):
+    assert any(GROWS in sentence for sentence in plan(text).verdict) is is_stuck
 
 
 LEVELS = (
@@ -155,19 +159,21 @@ tolerance = 0.2
 )
 
 
-def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
-    """D 1.2 of the largest level: one strip per step, and one of each piece that a step is cut into."""
-    foreseen = plan(LEVELS)
-    found = run(load(LEVELS), estimate=False)
-    book = found.extra["book"]
-    assert any(GROWS in sentence for sentence in foreseen.verdict)
-    assert foreseen.unknowns["bond_list_about"] == pytest.approx(
-        book["strips"] - book["substeps"], rel=0.05
+def test_always_plan_estimates_growing_bonds_under_levels():
+    """The plan estimates one strip per step and one per subdivision of a step; the largest level is
+    1/1.2 of the friction limit."""
+    run_plan = plan(LEVELS)
+    result = run(load(LEVELS), estimate=False)
+    counts = result.extra["book"]
+    assert any(GROWS in sentence for sentence in run_plan.verdict)
+    assert run_plan.unknowns["bond_list_about"] == pytest.approx(
+        counts["strips"] - counts["substeps"], rel=0.05
     )
 
 
-def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
-    """Its seconds grow with the square of its cycles: the run is stopped after a sixtieth of the limit or more."""
+def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
+    """The computing time grows with the square of the number of cycles. The run is stopped early,
+    with an estimate of its time."""
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
     begin = process_time()
     assert GROWS in str(plan(scene))
@@ -176,7 +182,7 @@ def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
         Missing,
         match=r"the list of bonds would need a computing time of about \d+ s, more than the "
         r"limit of 3 s; lower drive.cycles",
-    ) as told:
+    ) as error:
         run(scene, estimate=False)
-    assert float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3
+    assert float(re.search(r"about (\d+) s", str(error.value))[1]) >= 3
     assert process_time() - begin < 30

@@ -1,4 +1,4 @@
-"""Fixtures and bodies of a patch through its scene: springs, approach, unlike pieces, a step, any mesh."""
+"""Holders and pieces of a patch: springs, approach, unlike pieces, and a step."""
 
 import numpy as np
 import pytest
@@ -27,36 +27,39 @@ LOAD = 'load = "26 lbf"'
 TOLERANCE = 1e-3
 
 
-def solved(keys=LOAD, tables=""):
-    found = build(scene.loads(TEXT.format(keys, tables))).patch
-    patch = solve_with_coarser(found, TOLERANCE, False)[0]
+def solve_patch(keys=LOAD, tables=""):
+    """Return the solved patch of a scene and its values."""
+    model = build(scene.loads(TEXT.format(keys, tables))).patch
+    patch = solve_with_coarser(model, TOLERANCE, False)[0]
     return patch, values(patch)
 
 
-def test_exact_a_soft_holder_is_a_free_piece_and_a_stiff_one_a_clamp():
-    line = '[contact.load_line]\noffset = "0.5 mm"\n'
+def test_exact_holder_limits_are_free_and_clamped():
+    """A holder with a very small rotational stiffness acts as a free piece, one with a very large
+    stiffness as a clamp."""
+    load_line = '[contact.load_line]\noffset = "0.5 mm"\n'
     tilt = '[contact.tilt]\nangle = "0.1 mrad"\n'
     spring = '[contact.holder]\nrotational_stiffness = "{} N m/rad"\n'
-    free = solved(tables=line)[1]
-    clamped = solved(tables=tilt)[1]
-    soft = solved(tables=line + spring.format("1e-6"))[1]
-    stiff = solved(tables=tilt + spring.format("1e13"))[1]
+    free = solve_patch(tables=load_line)[1]
+    clamped = solve_patch(tables=tilt)[1]
+    soft = solve_patch(tables=load_line + spring.format("1e-6"))[1]
+    stiff = solve_patch(tables=tilt + spring.format("1e13"))[1]
     for name in ("contact_fraction", "rotation", "moment", "approach", "pressure_peak"):
         assert soft[name] == pytest.approx(free[name], rel=1e-8)
         assert stiff[name] == pytest.approx(clamped[name], rel=1e-6)
 
 
 @given(st.floats(0, 8), st.floats(-2e-4, 2e-4), st.floats(-5e-3, 5e-3))
-def test_always_the_holder_carries_what_the_pressure_does_not(power, angle, offset):
-    """Moment about the middle: sum f x = N offset + K (rotation - angle)."""
-    stiffness = 10.0**power
-    patch, found = solved(
+def test_always_moments_of_holder_and_pressure_balance(exponent, angle, offset):
+    """The moment of the pressure about the middle is N offset + K (rotation - angle)."""
+    stiffness = 10.0**exponent
+    patch, patch_values = solve_patch(
         tables=f'[contact.tilt]\nangle = "{angle} rad"\n[contact.load_line]\noffset = "{offset} m"\n'
         f'[contact.holder]\nrotational_stiffness = "{stiffness} N m/rad"\n'
     )
-    wanted = found["normal_load"] * offset + stiffness * (found["rotation"] - angle)
-    assert found["moment"] == pytest.approx(
-        wanted, abs=1e-9 * (found["normal_load"] * 6e-3 + stiffness * 3e-4)
+    expected = patch_values["normal_load"] * offset + stiffness * (patch_values["rotation"] - angle)
+    assert patch_values["moment"] == pytest.approx(
+        expected, abs=1e-9 * (patch_values["normal_load"] * 6e-3 + stiffness * 3e-4)
     )
     assert max(patch.pressure.residuals.values()) < 1e-9
 
@@ -64,50 +67,55 @@ def test_always_the_holder_carries_what_the_pressure_does_not(power, angle, offs
 UNLIKE = '[contact.{}]\nheight = "9 mm"\nsubstrate = "steel"\ncoating = "none"\n'
 
 
-def test_exact_unlike_pieces_add_their_compliances_and_may_be_swapped():
+def test_exact_compliances_of_unlike_pieces_add():
+    """The compliance of two unlike pieces is the mean of those of the like pairs, and exchanging
+    the pieces changes nothing."""
     tilt = '[contact.tilt]\nangle = "0.1 mrad"\n'
-    (a, one), (_, two) = (
-        solved(tables=tilt + UNLIKE.format("upper")),
-        solved(tables=tilt + UNLIKE.format("lower")),
+    (a, upper_values), (_, lower_values) = (
+        solve_patch(tables=tilt + UNLIKE.format("upper")),
+        solve_patch(tables=tilt + UNLIKE.format("lower")),
     )
-    for name, value in one.items():
-        assert two[name] == pytest.approx(value, rel=1e-9, abs=1e-15)
+    for name, value in upper_values.items():
+        assert lower_values[name] == pytest.approx(value, rel=1e-9, abs=1e-15)
     assert a.pair.upper_grid.height == 9e-3
     assert a.pair.grid.height == 6.35e-3
     assert a.pair.upper_grid.coating_rows == 0
-    like = solved(tables=tilt)[0]
-    other = solved(tables=tilt + UNLIKE.format("upper") + UNLIKE.format("lower"))[0]
+    like_patch = solve_patch(tables=tilt)[0]
+    other_patch = solve_patch(tables=tilt + UNLIKE.format("upper") + UNLIKE.format("lower"))[0]
     assert a.pieces.normal == pytest.approx(
-        (like.pieces.normal + other.pieces.normal) / 2, rel=1e-9
+        (like_patch.pieces.normal + other_patch.pieces.normal) / 2, rel=1e-9
     )
 
 
-def test_exact_a_step_lifts_one_side():
-    patch, found = solved(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
+def test_exact_step_opens_gap_on_one_side():
+    patch, patch_values = solve_patch(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
     x = patch.pair.grid.x
     assert patch.unloaded_gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
-    assert patch.pressure.sigma_n[x > 2e-3].max() == 0 and found["pressure_centre"] < 0
+    assert patch.pressure.sigma_n[x > 2e-3].max() == 0 and patch_values["pressure_centre"] < 0
     assert step(np.array([-1.0, 0.0, 1.0]), 2.0, 0.0).tolist() == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])
-def test_exact_a_soft_linear_skin_is_the_wedge_on_a_foundation(angle):
-    """Bodies a thousand times stiffer than the skin: contact length sqrt(2 N/(k theta b)), full below 2 p/(k L)."""
+def test_exact_soft_linear_skin_agrees_with_wedge_on_foundation(angle):
+    """If the pieces are a thousand times stiffer than the skin, the contact length is sqrt(2 N/(k
+    theta b)), and contact is full below the angle 2 p/(k L)."""
     stiffness = 1e10
     load = 26 * 4.4482216152605
     size = 12.7e-3
-    found = solved(
+    patch_values = solve_patch(
         tables=f'[contact.tilt]\nangle = "{angle} rad"\n[contact.asperities]\nlaw = "linear"\n'
         f'normal_stiffness = "{stiffness} Pa/m"\ntangential_ratio = 0.8\n'
     )[1]
     opening = 2 * load / size**2 / (stiffness * size)
     length = min(size, np.sqrt(2 * load / (stiffness * angle * size)))
-    assert (found["contact_fraction"] == 1) == (angle < opening)
-    assert found["contact_fraction"] == pytest.approx(length / size, abs=0.02)
-    assert found["normal_stiffness"] == pytest.approx(
-        stiffness * size * found["contact_fraction"] * size, rel=2e-3
+    assert (patch_values["contact_fraction"] == 1) == (angle < opening)
+    assert patch_values["contact_fraction"] == pytest.approx(length / size, abs=0.02)
+    assert patch_values["normal_stiffness"] == pytest.approx(
+        stiffness * size * patch_values["contact_fraction"] * size, rel=2e-3
     )
-    assert found["tangential_stiffness"] == pytest.approx(0.8 * found["normal_stiffness"], rel=2e-2)
+    assert patch_values["tangential_stiffness"] == pytest.approx(
+        0.8 * patch_values["normal_stiffness"], rel=2e-2
+    )
 
 
 TURNING = {
@@ -124,18 +132,21 @@ TURNING = {
 
 @pytest.mark.share(0, 2, 5)
 @pytest.mark.parametrize("tables", TURNING.values(), ids=TURNING.keys())
-def test_exact_an_approach_with_a_turning_piece_is_the_load_that_reaches_it(tables):
-    """The approach that a load gives, asked for in its place, gives that load back, the rotation and the pressure."""
-    _, loaded = solved(tables=tables)
-    closed = solved("", tables + f'[contact.approach]\ndistance = "{loaded["approach"]!r} m"\n')[1]
-    assert closed["normal_load"] == pytest.approx(loaded["normal_load"], rel=1e-7)
+def test_exact_approach_with_rotation_returns_load(tables):
+    """The approach that results from a load, prescribed instead of the load, returns this load, its
+    rotation and its pressure."""
+    _, by_load = solve_patch(tables=tables)
+    by_approach = solve_patch(
+        "", tables + f'[contact.approach]\ndistance = "{by_load["approach"]!r} m"\n'
+    )[1]
+    assert by_approach["normal_load"] == pytest.approx(by_load["normal_load"], rel=1e-7)
     for name in ("rotation", "moment", "pressure_peak", "approach"):
-        assert closed[name] == pytest.approx(loaded[name], rel=1e-6, abs=1e-13), name
+        assert by_approach[name] == pytest.approx(by_load[name], rel=1e-6, abs=1e-13), name
 
 
-def test_exact_a_turning_piece_above_first_touch_is_apart():
+def test_exact_rotating_piece_before_contact_has_no_load():
     tables = TURNING["spring"]
-    patch, found = solved(
+    patch, patch_values = solve_patch(
         "", tables.replace("0.01 mrad", "0 mrad") + '[contact.approach]\ndistance = "0 m"\n'
     )
-    assert patch.pressure.outcome is Outcome.NO_CONTACT and found["normal_load"] == 0
+    assert patch.pressure.outcome is Outcome.NO_CONTACT and patch_values["normal_load"] == 0

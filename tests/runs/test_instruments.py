@@ -1,4 +1,5 @@
-"""An accelerometer and a gauge that do not move alike: what each sees of one motion, in every engine."""
+"""An accelerometer and a displacement gauge with different mode shapes measure the same motion, in
+every engine."""
 
 import numpy as np
 import pytest
@@ -40,13 +41,15 @@ FELT, SEEN = {"axial": 1.0, "yaw": -0.4}, {"axial": 0.9, "yaw": 0.2}
 NAMES = "absolute_acceleration_peak", "relative_displacement_amplitude"
 
 
-def sets(key, rows):
+def assign_mode_keys(key, rows):
+    """Return the --set options of a key of both modes."""
     return [f"structure.mode.{name}.{key}={value}" for name, value in rows.items()]
 
 
-def values(text, *given):
-    found = run(loads(text, sets=given))
-    return found, [found.measures[name] for name in NAMES]
+def run_instruments(text, *options):
+    """Return the result of a scene and its measures of acceleration and displacement."""
+    result = run(loads(text, sets=options))
+    return result, [result.measures[name] for name in NAMES]
 
 
 @pytest.mark.share(0, 2, 4, 6)
@@ -62,9 +65,9 @@ def values(text, *given):
         ("nonlocal", "harmonic"),
     ],
 )
-def test_exact_accelerometer_and_gauge_read_the_same_motion(law, method):
-    """Friction knows nothing of instruments: the acceleration is that of a run whose output is the accelerometer, and
-    the displacement that of one whose output is the gauge."""
+def test_exact_accelerometer_and_gauge_agree_with_separate_outputs(law, method):
+    """Instruments do not affect friction: the acceleration agrees with a run whose output is the
+    accelerometer, the displacement with one whose output is the gauge."""
     text = (
         POINT
         + LAWS[law]
@@ -73,57 +76,63 @@ def test_exact_accelerometer_and_gauge_read_the_same_motion(law, method):
     )
     text += "" if method != "march" else "steps_per_cycle = 400\n"
     text = text if method == "harmonic" else text.replace("cycles = 100", "cycles = 10")
-    both, (acceleration, displacement) = values(
-        text, *sets("accelerometer", FELT), *sets("gauge", SEEN)
+    both, (acceleration, displacement) = run_instruments(
+        text, *assign_mode_keys("accelerometer", FELT), *assign_mode_keys("gauge", SEEN)
     )
-    _, (felt, _) = values(text, *sets("output", FELT))
-    gauged, (_, seen) = values(text, *sets("output", SEEN))
-    assert acceleration.value == felt.value
-    assert displacement.value == pytest.approx(seen.value, rel=1e-6)
-    assert both.outcome == gauged.outcome
+    _, (reference_acceleration, _) = run_instruments(text, *assign_mode_keys("output", FELT))
+    gauge_result, (_, reference_displacement) = run_instruments(
+        text, *assign_mode_keys("output", SEEN)
+    )
+    assert acceleration.value == reference_acceleration.value
+    assert displacement.value == pytest.approx(reference_displacement.value, rel=1e-6)
+    assert both.outcome == gauge_result.outcome
     assert displacement.error is not None
-    assert abs(displacement.value - seen.value) <= displacement.error + 1e-10
+    assert abs(displacement.value - reference_displacement.value) <= displacement.error + 1e-10
     assert np.array_equal(both.window.output, both.window.modal @ both.plan.model.rig.modes.gauge)
 
 
-def test_exact_a_linear_rig_in_closed_form():
-    """z = -a base/(Omega^2 - omega^2 + 2 i zeta Omega omega), and both instruments' sums of it."""
+def test_exact_linear_instruments_agree_with_closed_form():
+    """The modal coordinates are z = -a base/(Omega^2 - omega^2 + 2 i zeta Omega omega), and both
+    instruments measure their weighted sums."""
     text = MODES[: MODES.index("[structure.bonded]")] + MODES[MODES.index("[drive]") :]
     text = text.replace('"yaw"\n', '"yaw"\nbase = 0.3\n').replace(
         "slide = 1.0", "slide = 1.0\nbase = 0.9"
     )
-    found, (acceleration, displacement) = values(
-        text, *sets("accelerometer", FELT), *sets("gauge", SEEN), "accuracy.method=harmonic"
+    result, (acceleration, displacement) = run_instruments(
+        text,
+        *assign_mode_keys("accelerometer", FELT),
+        *assign_mode_keys("gauge", SEEN),
+        "accuracy.method=harmonic",
     )
     w = 2 * np.pi * 140
     a = 5 * 9.80665
-    own = 2 * np.pi * np.array([143.0, 129.0])
+    omegas = 2 * np.pi * np.array([143.0, 129.0])
     zeta = np.array([0.02, 0.03])
     base = np.array([0.9, 0.3])
-    z = -a * base / (own**2 - w**2 + 2j * zeta * own * w)
-    felt = abs(a - w**2 * z @ [1.0, -0.4])
-    assert acceleration.value == pytest.approx(felt, rel=1e-6)
+    z = -a * base / (omegas**2 - w**2 + 2j * zeta * omegas * w)
+    expected = abs(a - w**2 * z @ [1.0, -0.4])
+    assert acceleration.value == pytest.approx(expected, rel=1e-6)
     assert displacement.value == pytest.approx(abs(z @ [0.9, 0.2]), rel=1e-8)
-    drive = found.plan.model.rig.drive.signal
-    assert read_instrument(found.window, drive, acceleration.value, "fundamental") == pytest.approx(
-        felt, rel=1e-8
-    )
+    drive = result.plan.model.rig.drive.signal
+    assert read_instrument(
+        result.window, drive, acceleration.value, "fundamental"
+    ) == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize(
-    "more, said",
+    "more, message",
     [
         (("structure.travel=5 mm",), "with structure.travel"),
         (("structure.stiffening.cubic=1e12 N/m^3",), "with structure.stiffening"),
         (("drive.waveform=levels",), "waveform = 'levels'"),
     ],
 )
-def test_refuses_instruments_where_the_output_is_judged(more, said):
-    with pytest.raises(SceneError, match=said):
+def test_refuses_instruments_if_output_limits_the_run(more, message):
+    with pytest.raises(SceneError, match=message):
         loads(POINT + LAWS["coulomb"] + MODES, sets=["structure.mode.yaw.gauge=0.2", *more])
 
 
-def test_exact_half_a_swing_of_cubics():
+def test_exact_half_range_of_cubic_motion():
     t = np.array([0.0, 1.0, 3.0])
     y = t**3 - 4 * t**2 + 2 * t
     v = 3 * t**2 - 8 * t + 2

@@ -1,5 +1,8 @@
-"""Interfaces that have a patch of their own: against the rig of one patch, against an integration and a slip of nodes
-written here, in any order and alone; their bars, files and refusals."""
+"""Interfaces with patches of their own agree with a rig of one patch and with an independent
+integration.
+
+The order of the interfaces, their errors, files and refusals are checked as well.
+"""
 
 import json
 
@@ -17,23 +20,25 @@ STIFF = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 40\n'
 
 
-def contact(at: str, load: float, radius: float, more: str = "") -> str:
-    """The tables of a crowned patch that shears."""
+def format_contact(table: str, load: float, radius: float, more: str = "") -> str:
+    """Return the tables of a crowned patch with shear."""
     return (
-        f'[{at}]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "8 mm"\nload = "{load} N"\nsubstrate = "steel"\n'
-        f'{more}[{at}.crown]\nradius = "{radius} m"\n[{at}.shear]\n'
+        f'[{table}]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "8 mm"\nload = "{load} N"\nsubstrate = "steel"\n'
+        f'{more}[{table}.crown]\nradius = "{radius} m"\n[{table}.shear]\n'
     )
 
 
-def face(between: str, load: float, radius: float, law: str = LAW, more: str = "") -> str:
-    """An interface with a patch."""
-    return f"[[structure.interface]]\nbetween = {between}\n{law}" + contact(
+def format_interface(
+    between: str, load: float, radius: float, law: str = LAW, more: str = ""
+) -> str:
+    """Return an interface with a patch."""
+    return f"[[structure.interface]]\nbetween = {between}\n{law}" + format_contact(
         "structure.interface.contact", load, radius, more
     )
 
 
-def held(mass: int, to: int, stiffness: float = SPRING) -> str:
-    """A spring and a damper between two masses."""
+def format_spring_and_damper(mass: int, to: int, stiffness: float = SPRING) -> str:
+    """Return a spring and a damper between two masses."""
     pair = f"between = [{mass}, {to}]\n"
     return (
         f'[[structure.spring]]\n{pair}stiffness = "{stiffness} N/m"\n[[structure.damper]]\n{pair}'
@@ -41,21 +46,29 @@ def held(mass: int, to: int, stiffness: float = SPRING) -> str:
     )
 
 
-def masses(count: int) -> str:
-    """The head of a structure of equal masses."""
+def format_masses(count: int) -> str:
+    """Return the table of a structure of equal masses."""
     return f"[structure]\nmasses = {json.dumps([f'{MASS} kg'] * count)}\n"
 
 
-ALONE = masses(1) + held(1, 0) + face("[1, 0]", 100, 0.5) + DRIVE
+ALONE = (
+    format_masses(1) + format_spring_and_damper(1, 0) + format_interface("[1, 0]", 100, 0.5) + DRIVE
+)
 CHAIN = (
-    masses(2) + held(1, 0) + held(2, 1) + face("[1, 0]", 100, 0.5) + face("[2, 1]", 60, 2.0) + DRIVE
+    format_masses(2)
+    + format_spring_and_damper(1, 0)
+    + format_spring_and_damper(2, 1)
+    + format_interface("[1, 0]", 100, 0.5)
+    + format_interface("[2, 1]", 60, 2.0)
+    + DRIVE
 )
 
 
-def rig_of_one(law: str = LAW) -> str:
-    """The rig of [contact] whose mode is the mass of ALONE on its spring."""
+def format_equivalent_rig(law: str = LAW) -> str:
+    """Return the rig with [contact] whose mode is the mass of ALONE on its spring."""
     return (
-        contact("contact", 100, 0.5) + f'[friction]\n{law}[structure]\nmoving_mass = "{MASS} kg"\n'
+        format_contact("contact", 100, 0.5)
+        + f'[friction]\n{law}[structure]\nmoving_mass = "{MASS} kg"\n'
         '[[structure.mode]]\nname = "a"\nslide = 1.0\n'
         f'frequency = "{float(np.sqrt(SPRING / MASS)) / (2 * np.pi)!r} Hz"\n'
         f"damping = {DAMPER / (2 * float(np.sqrt(SPRING * MASS)))!r}\n" + DRIVE
@@ -65,237 +78,288 @@ def rig_of_one(law: str = LAW) -> str:
 @pytest.mark.parametrize(
     "law, method", [(LAW, "auto"), (STIFF, "auto"), (LAW, "march"), (LAW, "harmonic")]
 )
-def test_exact_one_interface_with_a_patch_is_the_rig_of_that_patch(law, method):
-    """Every measure and every error, of both ways to write one scene."""
+def test_exact_single_interface_agrees_with_contact_rig(law, method):
+    """Every measure and error of a scene agrees between both ways to write it: as an interface and
+    as [contact]."""
     more = f'[accuracy]\nmethod = "{method}"\n'
-    mine = pf.run(ALONE.replace(LAW, law) + more)
-    want = pf.run(rig_of_one(law) + more)
-    assert mine.outcome == want.outcome and mine.measures.keys() == want.measures.keys()
-    for name, one in want.measures.items():
-        ours = mine.measures[name]
-        if one.value is None:
-            assert ours.value is None
+    interface = pf.run(ALONE.replace(LAW, law) + more)
+    rig = pf.run(format_equivalent_rig(law) + more)
+    assert interface.outcome == rig.outcome and interface.measures.keys() == rig.measures.keys()
+    for name, expected in rig.measures.items():
+        actual = interface.measures[name]
+        if expected.value is None:
+            assert actual.value is None
             continue
-        size = max(abs(one.value), one.error or 0.0, one.floor)
-        assert ours.value == pytest.approx(one.value, abs=1e-9 * size), name
-        assert (ours.error or 0.0) == pytest.approx(one.error or 0.0, rel=1e-6, abs=1e-9 * size), (
-            name
-        )
-    if method != "march":  # which shows the pressed state alone
-        fields = mine.extra["faces"][0].fields
+        size = max(abs(expected.value), expected.error or 0.0, expected.floor)
+        assert actual.value == pytest.approx(expected.value, abs=1e-9 * size), name
+        assert (actual.error or 0.0) == pytest.approx(
+            expected.error or 0.0, rel=1e-6, abs=1e-9 * size
+        ), name
+    if method != "march":  # A march stores only the fields of the pressed state.
+        fields = interface.extra["faces"][0].fields
         for name in ("time", "normal_stress", "shear_stress", "slip", "status"):
-            size = np.abs(want.fields[name]).max()
+            size = np.abs(rig.fields[name]).max()
             np.testing.assert_allclose(
-                fields[name], want.fields[name], atol=1e-9 * size, err_msg=name
+                fields[name], rig.fields[name], atol=1e-9 * size, err_msg=name
             )
-    slipped = mine.measures["slip_amplitude"]
-    assert slipped.value > 100 * slipped.error > 0
+    slip_amplitude = interface.measures["slip_amplitude"]
+    assert slip_amplitude.value > 100 * slip_amplitude.error > 0
 
 
 @pytest.fixture(scope="module")
-def chain():
-    """The chain of two masses with a patch at each of its interfaces, run."""
+def chain_result():
+    """Return the result of two masses with a patch at each interface."""
     return pf.run(CHAIN)
 
 
-def swapped(name: str) -> str:
-    """Name of a measure where the two interfaces stand the other way round."""
+def swap_interface_suffix(name: str) -> str:
+    """Return the name of a measure with the interfaces exchanged."""
     return name[:-2] if name.endswith("_2") else f"{name}_2"
 
 
-def test_exact_the_order_of_interfaces_does_not_matter(chain):
-    other = pf.run(
-        masses(2)
-        + held(1, 0)
-        + held(2, 1)
-        + face("[2, 1]", 60, 2.0)
-        + face("[1, 0]", 100, 0.5)
+def test_exact_results_do_not_depend_on_interface_order(chain_result):
+    reversed_result = pf.run(
+        format_masses(2)
+        + format_spring_and_damper(1, 0)
+        + format_spring_and_damper(2, 1)
+        + format_interface("[2, 1]", 60, 2.0)
+        + format_interface("[1, 0]", 100, 0.5)
         + DRIVE
     )
-    assert other.outcome == chain.outcome
+    assert reversed_result.outcome == chain_result.outcome
     pairs = [
-        (name, swapped(name) if swapped(name) in chain.measures else name)
-        for name in chain.measures
+        (
+            name,
+            swap_interface_suffix(name)
+            if swap_interface_suffix(name) in chain_result.measures
+            else name,
+        )
+        for name in chain_result.measures
     ]
     assert sum(one != two for one, two in pairs) > 20
     for one, two in pairs:
-        # of the first interface alone
+        # These measures exist only for the first interface.
         if one.startswith(("slip_start", "equivalent", "secant", "drift")):
             continue
-        ours = other.measures[two]
-        want = chain.measures[one]
-        assert ours.value == pytest.approx(want.value, rel=1e-8, abs=want.floor), one
-        # the secant stiffness of the first alone is among the signs
-        assert ours.error <= 3 * want.error + want.floor
-        assert want.error <= 3 * ours.error + want.floor
+        actual = reversed_result.measures[two]
+        expected = chain_result.measures[one]
+        assert actual.value == pytest.approx(expected.value, rel=1e-8, abs=expected.floor), one
+        # The error of the secant stiffness of the first interface enters the others.
+        assert actual.error <= 3 * expected.error + expected.floor
+        assert expected.error <= 3 * actual.error + expected.floor
 
 
-def slipping_nodes(giving, limit) -> tuple:
-    """(stiffness, yield slide) of what nodes (m,) of a compliance (m, m) [m/N] and of friction limits [N] do under one
-    rising slide: those that stick carry t of giving t = q - what the others bend them, and one after the other slips.
+def compute_yield_sequence(giving, limit) -> tuple:
+    """Return the stiffness and the yield displacement of each slip event under a rising
+    displacement.
+
+    `giving` is the compliance (m, m) [m/N] of the nodes and `limit` their friction limits (m,) [N].
+    Stuck nodes carry forces t with giving t = q minus the displacement by slipping nodes; the nodes
+    slip one after the other.
     """
     sticks = np.ones(limit.size, bool)
-    slides = [0.0]
+    displacements = [0.0]
     forces = [0.0]
     while sticks.any():
-        per = np.linalg.solve(
+        coefficients = np.linalg.solve(
             giving[np.ix_(sticks, sticks)],
             np.stack(
                 [np.ones(sticks.sum()), giving[np.ix_(sticks, ~sticks)] @ limit[~sticks]], axis=1
             ),
         )
-        # the slide at which each of those that stick reaches its limit
-        at = (limit[sticks] + per[:, 1]) / per[:, 0]
-        slides.append(at.min())
-        forces.append(float((per[:, 0] * at.min() - per[:, 1]).sum() + limit[~sticks].sum()))
-        sticks[np.flatnonzero(sticks)[at <= at.min() * (1 + 1e-9)]] = False
-    slope = np.diff(forces) / np.diff(slides)
-    return slope - np.append(slope[1:], 0.0), np.array(slides[1:])
+        # Displacement at which each stuck node reaches its friction limit.
+        yield_displacements = (limit[sticks] + coefficients[:, 1]) / coefficients[:, 0]
+        displacements.append(yield_displacements.min())
+        forces.append(
+            float(
+                (coefficients[:, 0] * yield_displacements.min() - coefficients[:, 1]).sum()
+                + limit[~sticks].sum()
+            )
+        )
+        sticks[
+            np.flatnonzero(sticks)[yield_displacements <= yield_displacements.min() * (1 + 1e-9)]
+        ] = False
+    slope = np.diff(forces) / np.diff(displacements)
+    return slope - np.append(slope[1:], 0.0), np.array(displacements[1:])
 
 
-def integrated(model, cycles: int, steps: int) -> tuple:
-    """(motion of mass 1 [m], friction work [J]) at the end of `cycles` of CHAIN relative to its base, in leapfrog
-    steps; its patches are nodes that slip."""
-    sets = []
-    for one in model.rig.friction.interfaces:
-        patch = faces.press_on_meshes(one, model.accuracy.tolerance)[0]
-        bears = patch.active
+def integrate_chain(model, cycles: int, steps: int) -> tuple:
+    """Return the displacement of mass 1 [m] and the friction work [J] after some cycles of CHAIN,
+    by leapfrog steps.
+
+    The patches are nodes that slip one after the other.
+    """
+    yield_sequences = []
+    for interface in model.rig.friction.interfaces:
+        patch = faces.press_on_meshes(interface, model.accuracy.tolerance)[0]
+        in_contact = patch.active
         load = patch.pressure.sigma_n * patch.pieces.interface.weight
-        sets.append(
-            slipping_nodes(patch.giving[np.ix_(bears, bears)], one.numbers.static * load[bears])
+        yield_sequences.append(
+            compute_yield_sequence(
+                patch.giving[np.ix_(in_contact, in_contact)],
+                interface.numbers.static * load[in_contact],
+            )
         )
     rows = np.array([[1.0, 0.0], [-1.0, 1.0]])
     omega = 2 * np.pi * 240
     peak = 8 * 9.80665
     h = 1 / (240 * steps)
-    place = np.zeros(2)
-    half = np.zeros(2)
+    displacement = np.zeros(2)
+    velocity = np.zeros(2)
     work = 0.0
-    held = [np.zeros(k.size) for k, _ in sets]
+    element_forces = [np.zeros(k.size) for k, _ in yield_sequences]
     total = np.zeros(2)
     for n in range(cycles * steps):
-        before = total
-        rate = half
-        for _ in range(3):  # the rate at the step is the mean of those half a step before and after
-            push = -SPRING * rows.T @ rows @ place - DAMPER * rows.T @ rows @ rate - rows.T @ total
-            after = half + h * (push / MASS - peak * np.sin(omega * n * h)) * (
+        previous = total
+        rate = velocity
+        # The velocity at the step is the mean of those half a step before and after it.
+        for _ in range(3):
+            force = (
+                -SPRING * rows.T @ rows @ displacement
+                - DAMPER * rows.T @ rows @ rate
+                - rows.T @ total
+            )
+            next_velocity = velocity + h * (force / MASS - peak * np.sin(omega * n * h)) * (
                 0.5 if n == 0 else 1.0
             )
-            rate = (half + after) / 2 if n else np.zeros(2)
-        half = after
-        place = place + h * half
-        move = rows @ half * h
+            rate = (velocity + next_velocity) / 2 if n else np.zeros(2)
+        velocity = next_velocity
+        displacement = displacement + h * velocity
+        increments = rows @ velocity * h
         total = np.zeros(2)
-        for k, (stiffness, most) in enumerate(sets):
-            held[k] = np.clip(held[k] + move[k], -most, most)
-            total[k] = stiffness @ held[k]
-        work += float((before + total) / 2 @ move)
-    return place[0], work
+        for k, (stiffness, limits) in enumerate(yield_sequences):
+            element_forces[k] = np.clip(element_forces[k] + increments[k], -limits, limits)
+            total[k] = stiffness @ element_forces[k]
+        work += float((previous + total) / 2 @ increments)
+    return displacement[0], work
 
 
-def test_an_integration_of_its_own_agrees():
-    """Three cycles of the chain from rest: the slip of the nodes and the motion in leapfrog steps, both written here;
-    what half of the steps change shows the error of these."""
+def test_exact_chain_agrees_with_independent_integration():
+    """Three cycles of the chain from rest agree with leapfrog steps and slipping nodes written
+    here. The change on halving the steps is the error of the reference."""
     cycles = 3
-    found = pf.run(CHAIN, **{"drive.cycles": float(cycles)})
+    result = pf.run(CHAIN, **{"drive.cycles": float(cycles)})
     model = pf.build(pf.load(CHAIN))
-    coarse, fine = (np.array(integrated(model, cycles, steps)) for steps in (4000, 8000))
-    best = fine + (fine - coarse) / 3
-    open_ = np.abs(fine - coarse)
-    response = found.response
-    ours = np.array([response.extra["slides"][-1, 0], found.measures["friction_work"].value])
-    assert (open_ < 1e-5 * np.abs(fine)).all()
-    assert (np.abs(ours - best) < open_ + 1e-6 * np.abs(best)).all(), (ours, best, open_)
+    coarse, fine = (np.array(integrate_chain(model, cycles, steps)) for steps in (4000, 8000))
+    extrapolated = fine + (fine - coarse) / 3
+    change = np.abs(fine - coarse)
+    response = result.response
+    actual = np.array([response.extra["slides"][-1, 0], result.measures["friction_work"].value])
+    assert (change < 1e-5 * np.abs(fine)).all()
+    assert (np.abs(actual - extrapolated) < change + 1e-6 * np.abs(extrapolated)).all(), (
+        actual,
+        extrapolated,
+        change,
+    )
 
 
-def test_the_march_and_the_balance_agree_with_the_exact_motion(chain):
+def test_exact_engines_of_chain_agree_within_errors(chain_result):
     for method in ("march", "harmonic"):
-        other = pf.run(CHAIN, **{"accuracy.method": method})
+        result = pf.run(CHAIN, **{"accuracy.method": method})
         for name in (
             "relative_displacement_amplitude",
             "loop_area",
             "loop_area_2",
             "slip_amplitude_2",
         ):
-            one = chain.measures[name]
-            two = other.measures[name]
-            assert abs(one.value - two.value) <= one.error + two.error, (method, name)
+            expected = chain_result.measures[name]
+            actual = result.measures[name]
+            assert abs(expected.value - actual.value) <= expected.error + actual.error, (
+                method,
+                name,
+            )
 
 
-def test_bars_hold_the_change_to_finer_meshes(chain):
+def test_always_errors_cover_finer_meshes(chain_result):
     fine = pf.run(CHAIN, **{"accuracy.tolerance": "1e-4"}).measures
-    for name, one in chain.measures.items():
-        if one.value is not None and one.error is not None and name in fine:
+    for name, measure in chain_result.measures.items():
+        if measure.value is not None and measure.error is not None and name in fine:
             assert (
-                abs(one.value - fine[name].value) <= one.error + fine[name].error + one.floor * 1e-3
+                abs(measure.value - fine[name].value)
+                <= measure.error + fine[name].error + measure.floor * 1e-3
             ), name
-    assert 0 < chain.measures["loop_area_2"].error < 1e-2 * chain.measures["loop_area_2"].value
+    assert (
+        0
+        < chain_result.measures["loop_area_2"].error
+        < 1e-2 * chain_result.measures["loop_area_2"].value
+    )
 
 
-def test_exact_a_patch_beside_a_point_and_one_that_bears_nothing():
-    """A rigid point leaves the exact engine of elements; a patch without a load changes nothing."""
+def test_exact_patch_with_point_interface_and_without_load():
+    """A second interface without load changes nothing, as a patch or as a point. With a rigid
+    point, the march replaces the exact engine of contact elements and agrees with a very stiff
+    point."""
     point = f'[[structure.interface]]\nbetween = [2, 1]\n{LAW}load = "0 N"\n'
-    head = masses(2) + held(1, 0) + held(2, 1) + face("[1, 0]", 100, 0.5)
-    one, two = (
-        pf.run(head + other + DRIVE)
-        for other in (face("[2, 1]", 0, 2.0), point.replace(LAW, STIFF))
+    head = (
+        format_masses(2)
+        + format_spring_and_damper(1, 0)
+        + format_spring_and_damper(2, 1)
+        + format_interface("[1, 0]", 100, 0.5)
+    )
+    with_patch, with_point = (
+        pf.run(head + interface + DRIVE)
+        for interface in (format_interface("[2, 1]", 0, 2.0), point.replace(LAW, STIFF))
     )
     for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
-        assert one.measures[name].value == pytest.approx(two.measures[name].value, rel=1e-9), name
-    assert one.measures["normal_load_2"].value == 0
-    mixed, stiff = (
+        assert with_patch.measures[name].value == pytest.approx(
+            with_point.measures[name].value, rel=1e-9
+        ), name
+    assert with_patch.measures["normal_load_2"].value == 0
+    rigid_point, stiff_point = (
         pf.run(head + point.replace('"0 N"', '"20 N"').replace(LAW, law) + DRIVE)
         for law in (LAW, STIFF.replace("50 nm", "1 nm"))
     )
-    assert (mixed.extra["engine"], stiff.extra["engine"]) == ("march", "piecewise")
+    assert (rigid_point.extra["engine"], stiff_point.extra["engine"]) == ("march", "piecewise")
     for name in ("relative_displacement_amplitude", "loop_area", "loop_area_2"):
-        assert mixed.measures[name].value == pytest.approx(stiff.measures[name].value, rel=1e-2), (
-            name
-        )
+        assert rigid_point.measures[name].value == pytest.approx(
+            stiff_point.measures[name].value, rel=1e-2
+        ), name
 
 
-def test_exact_elements_of_strips_are_those_of_one_patch():
-    """Strips of equal pressure, side by side behind one slide, slip as the whole."""
+def test_exact_contact_elements_of_strips_agree_with_patch():
+    """The contact elements of three strips of equal pressure carry the force of the whole patch."""
     strips = "[structure.interface.contact.strips]\ncount = 3\n"
-    wide, whole = (
+    strip_interface, whole = (
         pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.friction.interfaces[0]
         for more in (strips, "")
     )
     for slide in (2e-8, 1e-7, 1e-6):
         force = [
-            float(k @ np.minimum(slide, most))
-            for k, most, _ in (faces.make_elements(one, 1e-3) for one in (wide, whole))
+            float(k @ np.minimum(slide, limits))
+            for k, limits, _ in (
+                faces.make_elements(interface, 1e-3) for interface in (strip_interface, whole)
+            )
         ]
         assert force[0] == pytest.approx(force[1], rel=1e-3)
 
 
-def test_a_rigid_patch_moves_as_a_point_with_a_warning():
+def test_always_rigid_patch_moves_as_point_with_warning():
     rigid = ALONE.replace("[structure.interface.contact.shear]\n", "")
     point = (
-        masses(1)
-        + held(1, 0)
+        format_masses(1)
+        + format_spring_and_damper(1, 0)
         + f'[[structure.interface]]\nbetween = [1, 0]\n{LAW}load = "100 N"\n'
         + DRIVE
     )
-    one = pf.run(rigid)
-    two = pf.run(point)
-    for name, want in two.measures.items():
-        found = one.measures[name]
-        assert found.reason == want.reason, name
+    patch_result = pf.run(rigid)
+    point_result = pf.run(point)
+    for name, expected in point_result.measures.items():
+        actual = patch_result.measures[name]
+        assert actual.reason == expected.reason, name
         assert (
-            found.value is None
-            if want.value is None
-            else found.value == pytest.approx(want.value, rel=1e-12)
+            actual.value is None
+            if expected.value is None
+            else actual.value == pytest.approx(expected.value, rel=1e-12)
         ), name
-    assert one.measures["pressure_peak"].value > 1e7
+    assert patch_result.measures["pressure_peak"].value > 1e7
     assert any(
         "interface 1-0: the shape of the patch does not affect" in text
         and "[structure.interface.contact.shear]" in text
-        for text in one.warnings
+        for text in patch_result.warnings
     )
 
 
-def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypatch, chain):
+def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, chain_result):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "chain.toml").write_text(CHAIN)
     answer = cli("run", "chain.toml", "-o", "out")
@@ -306,47 +370,56 @@ def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypat
             total = (data[f"normal_stress_{number}"] * weight).sum(f"x_{number}").values
             assert total.size == 17 and total == pytest.approx(load, rel=1e-9)
             force = (data[f"shear_stress_{number}"] * weight).sum(f"x_{number}").values
-            seen = np.interp(data["frame_time"], data["time"], data["friction_force"][number - 1])
-            np.testing.assert_allclose(force[1:], seen[1:], atol=1e-4 * np.abs(seen).max())
-    probed = json.loads(cli("plan", "chain.toml", "--probe", "--json").out)["stiffness_chain"]
-    for ours, name in (
+            expected = np.interp(
+                data["frame_time"], data["time"], data["friction_force"][number - 1]
+            )
+            np.testing.assert_allclose(force[1:], expected[1:], atol=1e-4 * np.abs(expected).max())
+    stiffness_chain = json.loads(cli("plan", "chain.toml", "--probe", "--json").out)[
+        "stiffness_chain"
+    ]
+    for key, name in (
         ("pieces_shear", "tangential_stiffness"),
         ("pieces_shear_2", "tangential_stiffness_2"),
     ):
-        assert probed[ours] == pytest.approx(chain.measures[name].value, rel=1e-2)
+        assert stiffness_chain[key] == pytest.approx(chain_result.measures[name].value, rel=1e-2)
     page = (tmp_path / "out/report.html").read_text()
     assert "Pressure on interface 1-0" in page and "Pressure on interface 2-1" in page
     assert cli("export", "out/interfaces/2-1", "-o", "fields.csv").code == 0
-    lost = cli("view", "out", "-o", "v.png")
-    assert lost.code == 4 and "out/interfaces/1-0" in lost.err
-    told = json.loads((tmp_path / "out/summary.json").read_text())
-    assert told["numerics"]["interface_nodes_2"] == data.sizes["x_2"]
+    view_answer = cli("view", "out", "-o", "v.png")
+    assert view_answer.code == 4 and "out/interfaces/1-0" in view_answer.err
+    summary = json.loads((tmp_path / "out/summary.json").read_text())
+    assert summary["numerics"]["interface_nodes_2"] == data.sizes["x_2"]
     assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
     assert cli("export", "chain.toml", "-o", "elements.npz").code == 0
     assert np.load("elements.npz", allow_pickle=True)
 
 
-def test_a_slide_beyond_a_piece_and_pieces_without_a_load_end_the_run():
+def test_always_lost_contact_of_interface_ends_run():
+    """A relative displacement beyond the length of a piece ends the run as `leaves_contact`,
+    interfaces without load as `no_contact`."""
     assert (
         str(pf.run(CHAIN, **{"drive.acceleration": "3000 g", "drive.cycles": 5.0}).outcome)
         == "leaves_contact"
     )
-    bare = pf.run(CHAIN, **{f"structure.interface.{k}.contact.load": "0 N" for k in (0, 1)})
-    assert str(bare.outcome) == "no_contact" and set(bare.measures) == {"normal_load"}
+    unloaded = pf.run(CHAIN, **{f"structure.interface.{k}.contact.load": "0 N" for k in (0, 1)})
+    assert str(unloaded.outcome) == "no_contact" and set(unloaded.measures) == {"normal_load"}
 
 
-def test_a_mesh_of_few_elements_leaves_the_errors_of_the_motion_open():
-    few = pf.run(CHAIN, **{"structure.interface.0.contact.element_size": "5 mm"})
-    assert few.measures["loop_area_2"].error is None and few.measures["pressure_peak_2"].error > 0
+def test_always_coarse_interface_mesh_gives_no_motion_errors():
+    coarse = pf.run(CHAIN, **{"structure.interface.0.contact.element_size": "5 mm"})
+    assert (
+        coarse.measures["loop_area_2"].error is None
+        and coarse.measures["pressure_peak_2"].error > 0
+    )
     assert any(
-        "interface 1-0: the interface has too" in one
-        and "leave out structure.interface.contact.element_size" in one
-        for one in few.warnings
+        "interface 1-0: the interface has too" in warning
+        and "leave out structure.interface.contact.element_size" in warning
+        for warning in coarse.warnings
     )
 
 
 @pytest.mark.parametrize(
-    "old, new, says",
+    "old, new, message",
     [
         (
             "[drive]",
@@ -395,10 +468,10 @@ def test_a_mesh_of_few_elements_leaves_the_errors_of_the_motion_open():
         ),
     ],
 )
-def test_refuses_what_a_patch_of_an_interface_cannot_be(old, new, says, tmp_path):
-    """Each mistake at its own line, with what to do."""
+def test_refuses_unsupported_keys_of_interface_patch(old, new, message, tmp_path):
+    """Each fault is reported with its line and a remedy."""
     text = CHAIN.replace(old, new)
     assert text != CHAIN
     (tmp_path / "chain.toml").write_text(text)
     answer = cli("check", str(tmp_path / "chain.toml"))
-    assert answer.code == 2 and says in answer.err and "chain.toml:" in answer.err, answer.err
+    assert answer.code == 2 and message in answer.err and "chain.toml:" in answer.err, answer.err

@@ -1,4 +1,5 @@
-"""Rigs of masses with one and two interfaces through the command line: files, events, exact against march."""
+"""Rigs of masses with one and two interfaces through the command line: files, events, exact engine
+and march."""
 
 import json
 
@@ -105,36 +106,39 @@ cycles = 60
 
 
 @pytest.fixture(autouse=True)
-def loop(monkeypatch):
+def use_one_loop(monkeypatch):
+    """Let all marches share one compiled time loop."""
     share_one_loop(monkeypatch)
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    """(scene text, *words) -> (summary, dataset) of a run through the command line, each once."""
+def run_scene(tmp_path_factory):
+    """Return a function (scene text, *words) -> (summary, dataset) that runs each scene once
+    through the command line."""
     base = tmp_path_factory.mktemp("interfaces")
-    kept = {}
+    results = {}
 
-    def of(text, *words):
-        if (text, words) not in kept:
-            path = base / f"scene{len(kept)}.toml"
+    def run_once(text, *words):
+        if (text, words) not in results:
+            path = base / f"scene{len(results)}.toml"
             path.write_text(text, "utf-8")
             answer = cli("run", path, "-o", base / path.stem, "--json", *words)
             assert answer.code == 0, answer.err
             with xr.open_dataset(base / path.stem / "result.nc") as data:
-                kept[text, words] = json.loads(answer.out), data.load()
-        return kept[text, words]
+                results[text, words] = json.loads(answer.out), data.load()
+        return results[text, words]
 
-    return of
+    return run_once
 
 
-def test_exact_figure_16_of_the_report(written):
-    """Mass 2 stays where it is until 8.0797, and the force never passes 3 (numbers of a 40-digit computation)."""
-    summary, data = written(FIG16)
+def test_exact_figure_16_of_the_report(run_scene):
+    """Mass 2 stays at rest until t = 8.0797, and the friction force never exceeds 3 N (reference: a
+    computation with 40 digits)."""
+    summary, data = run_scene(FIG16)
     slide = data.relative_displacement.sel(interface="2-0")
-    late = data.time > 8.079711463905416 + 1e-9
-    assert np.abs(slide.values[~late.values]).max() < 1e-15
-    assert np.abs(slide.values[late.values]).max() > 0.5
+    after_release = data.time > 8.079711463905416 + 1e-9
+    assert np.abs(slide.values[~after_release.values]).max() < 1e-15
+    assert np.abs(slide.values[after_release.values]).max() > 0.5
     assert np.abs(data.friction_force).max() <= 3 * (1 + 1e-12)
     stops = data.event_kind.values == EVENT_KIND_NAMES.index("stop")
     assert data.event_time.values[0] == pytest.approx(8.079711463905416, abs=1e-11)
@@ -155,38 +159,42 @@ def test_exact_figure_16_of_the_report(written):
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["exact", "march"])
-def test_exact_two_equal_masses_side_by_side_move_as_one(written, method):
+def test_exact_two_equal_masses_agree_with_single_mass(run_scene, method):
     words = ("--set", f"accuracy.method={method}")
     if method == "march":
         words += ("--set", "accuracy.steps_per_cycle=400")
-    pair, data = written(SIDE_BY_SIDE + DRIVE, *words)
-    one, alone = written(ONE + DRIVE, *words)
+    pair, data = run_scene(SIDE_BY_SIDE + DRIVE, *words)
+    single, single_data = run_scene(ONE + DRIVE, *words)
     for name in ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area"):
-        mine = one["measures"][name]
+        expected = single["measures"][name]
         first = pair["measures"][name]
         second = pair["measures"][f"{name}_2"]
-        assert first["value"] == pytest.approx(mine["value"], rel=1e-8), name
-        # the second loop is read from samples
-        near = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8
-        assert second["value"] == pytest.approx(mine["value"], rel=near), name
-        assert (second["unit"], second["floor"]) == (mine["unit"], mine["floor"]) and second[
-            "error"
-        ] >= 0
+        assert first["value"] == pytest.approx(expected["value"], rel=1e-8), name
+        # The area of the second loop is computed from samples.
+        rel_tol = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8
+        assert second["value"] == pytest.approx(expected["value"], rel=rel_tol), name
+        assert (second["unit"], second["floor"]) == (
+            expected["unit"],
+            expected["floor"],
+        ) and second["error"] >= 0
     assert data.interface.values.tolist() == ["1-0", "2-0"]
     for name in ("relative_displacement", "relative_velocity", "friction_force", "normal_load"):
         assert data[name].dims == ("interface", "time")
         assert np.abs(data[name][0] - data[name][1]).max() <= 1e-9 * np.abs(data[name]).max(), name
     for number in (1, 2):
-        mine = data.event_interface.values == number
-        assert data.event_kind.values[mine].tolist() == alone.event_kind.values.tolist()
-        assert data.event_time.values[mine] == pytest.approx(alone.event_time.values, abs=1e-10)
+        expected = data.event_interface.values == number
+        assert data.event_kind.values[expected].tolist() == single_data.event_kind.values.tolist()
+        assert data.event_time.values[expected] == pytest.approx(
+            single_data.event_time.values, abs=1e-10
+        )
 
 
-def test_exact_only_the_second_interface_slips():
-    """The first one loaded a hundredfold holds: the run is not stuck, by either engine."""
+def test_exact_slip_of_second_interface_alone_is_not_stuck():
+    """With a hundred times the normal load the first interface sticks and only the second slips;
+    the outcome is not `stuck`, in both engines."""
     text = CHAIN.replace('"0.5 N"', '"50 N"')
     for words in ((), ("accuracy.method=march",)):
-        found = run(loads(text, sets=["drive.cycles=20", *words]), estimate=False)
-        assert found.outcome != "stuck" and found.measures["slip_amplitude"].value < 1e-12
-        assert found.measures["slip_amplitude_2"].value > 0.01
-        assert found.measures["stick_fraction"].value == pytest.approx(1)
+        result = run(loads(text, sets=["drive.cycles=20", *words]), estimate=False)
+        assert result.outcome != "stuck" and result.measures["slip_amplitude"].value < 1e-12
+        assert result.measures["slip_amplitude_2"].value > 0.01
+        assert result.measures["stick_fraction"].value == pytest.approx(1)

@@ -1,4 +1,4 @@
-"""What a run keeps of its motion, and how it is said to have ended, for every engine and drive."""
+"""Histories that a run stores, and its outcome, for every engine and drive."""
 
 from dataclasses import replace
 
@@ -56,17 +56,17 @@ DRIVES = {
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    """(engine, drive) -> (scene, Result), each once."""
+def run_case(tmp_path_factory):
+    """Return a function (engine, drive) -> (scene, Result) that runs each case once."""
     folder = tmp_path_factory.mktemp("histories")
-    kept = {}
+    results = {}
     time = np.linspace(0, 0.1, 800)
     value = 6 * G_N * np.sin(2 * np.pi * (130 * time + 100 * time**2))
     rows = "\n".join(f"{t:.9g},{a:.9g}" for t, a in zip(time, value))
     (folder / "signal.csv").write_text("time [s],acceleration [m/s^2]\n" + rows + "\n", "utf-8")
 
     def of(engine, drive):
-        if (engine, drive) not in kept:
+        if (engine, drive) not in results:
             words = []
             if engine.startswith("march"):
                 words = ["accuracy.method=march"]
@@ -75,8 +75,8 @@ def done(tmp_path_factory):
             from patchfem.scene import load
 
             scene = load(path, words)
-            kept[engine, drive] = scene, run(scene, estimate=False)
-        return kept[engine, drive]
+            results[engine, drive] = scene, run(scene, estimate=False)
+        return results[engine, drive]
 
     return of
 
@@ -86,45 +86,48 @@ CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES]
 
 @pytest.mark.share(0, 4, 8, 10, 13, 17, 20, 22, 26, 30, 34, 37, 41, 44, 48, 51, 55, 58, 62)
 @pytest.mark.parametrize(("engine", "drive"), CASES)
-def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, engine, drive):
-    _, result = done(engine, drive)
+def test_always_last_two_cycles_have_hundred_samples_each(run_case, engine, drive):
+    """A history contains the start, the end, and at least 100 samples per cycle of the last two
+    cycles."""
+    _, result = run_case(engine, drive)
     r = result.response
     sine = result.plan.model.rig.drive.signal
     end = result.window.time[-1]
     assert np.all(np.diff(r.time) > 0) and r.time[0] == 0 and r.time[-1] == end
     assert r.time.size >= 100
     begin = max(0.0, end - 2 * sine.period)
-    late = r.time[r.time >= begin * (1 - 1e-9)]
-    assert late.size >= 100 * (end - begin) / sine.period
-    assert late[0] - begin < 1e-6 * sine.period and np.diff(late).max() <= sine.period / 100 * (
-        1 + 1e-6
-    )
+    last_times = r.time[r.time >= begin * (1 - 1e-9)]
+    assert last_times.size >= 100 * (end - begin) / sine.period
+    assert last_times[0] - begin < 1e-6 * sine.period and np.diff(
+        last_times
+    ).max() <= sine.period / 100 * (1 + 1e-6)
 
 
 @pytest.mark.parametrize("engine", [*ENGINES, "smooth"])
-def test_always_a_release_is_kept_evenly_all_along(done, engine):
-    """At least 20 samples a cycle from its start on; before, turning points stood alone up to the last cycles."""
+def test_always_release_history_has_uniform_samples(run_case, engine):
+    """The history of a release has at least 20 samples per cycle from its start; an earlier version
+    stored only reversals before the last cycles."""
     if engine == "smooth":
         result = run(loads(TANH + MODE + RELEASE), estimate=False)
         assert result.extra["engine"] == "smooth"
     else:
-        _, result = done(engine, "release")
+        _, result = run_case(engine, "release")
     r = result.response
     period = result.plan.model.rig.drive.signal.period
     assert r.time[0] == 0 and r.time[-1] == result.window.time[-1] and (np.diff(r.time) > 0).all()
     assert np.diff(r.time).max() <= period / 20 * (1 + 1e-6)
-    # between samples the motion is the cubic of both ends: there is nothing else beside it
+    # The cubic Hermite interpolant between two samples stays close to a straight line.
     middle = (r.output[1:] + r.output[:-1]) / 2 + np.diff(r.time) * (
         r.output_rate[:-1] - r.output_rate[1:]
     ) / 8
-    straight = np.interp((r.time[1:] + r.time[:-1]) / 2, r.time, r.output)
-    assert np.abs(middle - straight).max() < 2e-2 * np.abs(r.output).max()
+    linear = np.interp((r.time[1:] + r.time[:-1]) / 2, r.time, r.output)
+    assert np.abs(middle - linear).max() < 2e-2 * np.abs(r.output).max()
 
 
-def test_exact_how_runs_end():
-    """A release of a rubbing block sticks; without friction it comes to rest or has not yet; a sweep never is steady
-    and never grows, whatever its amplitude does; nothing moves under a drive too small."""
-    wanted = {
+def test_exact_outcomes_of_drives():
+    """The outcome depends on the drive: for example, a release with friction sticks, a sweep is
+    never steady and never grows, and a drive below the friction limit leaves the block stuck."""
+    outcomes = {
         (SLIPPING + MODE + RELEASE): "stuck",
         (MODE + RELEASE): "transient",
         (MODE.replace("0.003", "0.3") + RELEASE): "steady",
@@ -140,12 +143,12 @@ def test_exact_how_runs_end():
         (SOFT + MODE + RELEASE): "stuck",
         (TANH + MODE + RELEASE.replace("0.1 s", "1 s")): "steady",
     }
-    for text, outcome in wanted.items():
-        found = run(loads(text), estimate=False)
-        assert found.outcome == outcome, (text, found.outcome)
-        if found.outcome is Outcome.TRANSIENT and "sweep" in text:
-            assert any("changes until the end" in line for line in found.warnings)
-            assert "relative_displacement_amplitude_steady" not in found.measures
+    for text, outcome in outcomes.items():
+        result = run(loads(text), estimate=False)
+        assert result.outcome == outcome, (text, result.outcome)
+        if result.outcome is Outcome.TRANSIENT and "sweep" in text:
+            assert any("changes until the end" in line for line in result.warnings)
+            assert "relative_displacement_amplitude_steady" not in result.measures
 
 
 @pytest.mark.parametrize(
@@ -160,24 +163,26 @@ def test_exact_how_runs_end():
     ],
     ids=["part of a cycle", "sweep", "travel"],
 )
-def test_exact_a_run_that_keeps_only_its_last_cycles_has_the_same_measures(text):
-    """It keeps nothing from before the last cycles and reads the same from these.
+def test_exact_short_history_has_measures_of_full_history(text):
+    """A run that stores only its last cycles has the measures of the run with the full history.
 
-    Sums over the whole run are taken in other pieces, so these have another last digit.
+    Sums over the whole run are computed in other blocks and agree to round-off.
     """
     model = build(loads(text))
     numerics = replace(choose_numerics(model), engine="march", steps=100)
-    full, bare = (run_march(model, replace(numerics, whole=whole), None) for whole in (True, False))
+    full, short = (
+        run_march(model, replace(numerics, whole=whole), None) for whole in (True, False)
+    )
     sums = {
         name: full.values[name]
         for name in ("friction_work", "energy_dissipated", "energy_balance", "work_check")
     }
-    assert {name: bare.values[name] for name in sums} == pytest.approx(sums, rel=1e-13, abs=1e-13)
-    assert bare.values | sums == full.values and bare.outcome == full.outcome
+    assert {name: short.values[name] for name in sums} == pytest.approx(sums, rel=1e-13, abs=1e-13)
+    assert short.values | sums == full.values and short.outcome == full.outcome
     for name in ("time", "output", "force", "slip"):
-        assert np.array_equal(getattr(bare.window, name), getattr(full.window, name)), name
-    assert np.array_equal(bare.amplitudes[-1:], full.amplitudes[-1:])
-    count = bare.response.time.size
+        assert np.array_equal(getattr(short.window, name), getattr(full.window, name)), name
+    assert np.array_equal(short.amplitudes[-1:], full.amplitudes[-1:])
+    count = short.response.time.size
     assert count < full.response.time.size and np.array_equal(
-        bare.response.output, full.response.output[-count:]
+        short.response.output, full.response.output[-count:]
     )

@@ -1,4 +1,5 @@
-"""Runs of one patch share it: pressed and measured once, with the answers of runs that share nothing."""
+"""Runs of one patch share it: the patch is solved once, and the results agree with runs that share
+nothing."""
 
 import numpy as np
 import pytest
@@ -14,7 +15,8 @@ DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncyc
 TEXT = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE + DRIVE
 
 
-def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
+def build_models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
+    """Return models of all angles and drive levels on shared meshes."""
     return with_shared_meshes(
         [
             pf.build(TEXT, **{"contact.tilt.angle": angle, "drive.acceleration": 9.81 * level})
@@ -25,26 +27,27 @@ def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
 
 
 @pytest.fixture(autouse=True)
-def no_saved_state_error():
+def empty_patch_cache():
+    """Clear the cache of solved patches."""
     store.clear_cache()
 
 
-def test_exact_runs_that_share_a_patch_equal_runs_that_share_nothing():
-    cases = models()
-    found = one_by_one.solve(cases)
+def test_exact_runs_with_shared_patch_agree_with_separate_runs():
+    cases = build_models()
+    shared = one_by_one.solve(cases)
     for case, model in enumerate(cases):
         store.clear_cache()
-        alone = one_by_one.solve([model])
-        assert alone.outcome[0] == found.outcome[case] and alone.notes.get(0) == found.notes.get(
-            case
-        )
-        for name, values in alone.values.items():
-            np.testing.assert_array_equal(found.values[name][case], values[0], name)
-            np.testing.assert_array_equal(found.errors[name][case], alone.errors[name][0], name)
+        separate = one_by_one.solve([model])
+        assert separate.outcome[0] == shared.outcome[case] and separate.notes.get(
+            0
+        ) == shared.notes.get(case)
+        for name, values in separate.values.items():
+            np.testing.assert_array_equal(shared.values[name][case], values[0], name)
+            np.testing.assert_array_equal(shared.errors[name][case], separate.errors[name][0], name)
 
 
 @pytest.mark.parametrize(
-    "changed",
+    "changes",
     [
         {"contact.load": 100.0},
         {"contact.tilt.angle": 3e-5},
@@ -63,9 +66,9 @@ def test_exact_runs_that_share_a_patch_equal_runs_that_share_nothing():
         {"contact.holder.rotational_stiffness": 1e3},
     ],
 )
-def test_always_other_patches_are_not_the_same(changed):
+def test_always_different_patches_have_different_keys(changes):
     first, second, third = (
-        pf.build(TEXT, **more).patch for more in ({}, {"drive.acceleration": 1.0}, changed)
+        pf.build(TEXT, **keys).patch for keys in ({}, {"drive.acceleration": 1.0}, changes)
     )
     assert content_key(first) == content_key(second) and hash(content_key(first)) == hash(
         content_key(second)
@@ -73,10 +76,10 @@ def test_always_other_patches_are_not_the_same(changed):
     assert content_key(first) != content_key(third)
 
 
-def test_always_a_file_that_may_change_is_read_again(tmp_path):
-    own = pf.build(TEXT)
-    assert not store.may_be_shared(own.patch) and store.may_be_shared(
-        with_shared_meshes([own, own])[0].patch
+def test_always_patch_with_file_is_not_shared(tmp_path):
+    model = pf.build(TEXT)
+    assert not store.may_be_shared(model.patch) and store.may_be_shared(
+        with_shared_meshes([model, model])[0].patch
     )
     (tmp_path / "heights.csv").write_text(
         "x [mm],z [um]\n" + "".join(f"{0.1 * k - 7},{k % 2}\n" for k in range(140))

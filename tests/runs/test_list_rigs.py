@@ -1,4 +1,5 @@
-"""Rigs whose bonds are a list, orders other than 1 and the report's reading, on random scenes: both books close."""
+"""Rigs with a list of bonds (orders other than 1 and the law of the report) on random scenes:
+energy balances close."""
 
 import numpy as np
 
@@ -36,8 +37,8 @@ steps_per_cycle = {steps}
 """
 
 
-def drawn(rng) -> str:
-    """A scene by chance."""
+def draw_rig(rng) -> str:
+    """Return a random scene."""
     reading = str(rng.choice(["stretch", "report"]))
     order = float(rng.choice([0, 0.5, 2, 3.3] if reading == "stretch" else [-0.5, 0, 0.5, 1, 2]))
     law = f'reading = "{reading}"\norder = {order}\n'
@@ -61,11 +62,12 @@ def drawn(rng) -> str:
     )
 
 
-def test_always_both_books_of_6_random_rigs_close():
-    """Energy balance and friction work; with the reading "stretch" no energy is created."""
+def test_always_energy_balance_of_random_rigs_closes():
+    """The energy balance and the friction work of six random rigs close; with the reading "stretch"
+    no energy is created."""
     rng = np.random.default_rng(1)
     for _ in range(6):
-        text = drawn(rng)
+        text = draw_rig(rng)
         result = run(load(text), estimate=False)
         values = {name: measure.value for name, measure in result.measures.items()}
         assert values["energy_balance"] <= 1e-8 and values["work_check"] <= 5e-3, text

@@ -1,4 +1,5 @@
-"""summary.json names what computed each measure, and the patch of a result has its arrays."""
+"""summary.json names the method that computed each measure, and the patch of a result has its
+arrays."""
 
 import numpy as np
 
@@ -30,29 +31,32 @@ frequency = "143 Hz"
 """
 
 
-def test_always_a_value_of_another_engine_is_not_that_of_the_mesh():
-    """A measure has the value of the finest mesh where that is named, and another one where another engine is."""
+def test_always_summary_names_method_of_each_measure():
+    """A measure has the value of the finest mesh if and only if the summary names the finest mesh
+    as its method."""
     result = run(PATCH.format(1e-3))
     on_mesh = values(result.patch)
-    named = summarise_run(result)["numerics"]["measures"]
-    assert named.keys() == {name for name, one in result.measures.items() if one.value is not None}
-    assert patch_rows.EXTRAPOLATED_SOURCE in named.values()
-    for name, words in named.items():
+    methods = summarise_run(result)["numerics"]["measures"]
+    assert methods.keys() == {
+        name for name, measure in result.measures.items() if measure.value is not None
+    }
+    assert patch_rows.EXTRAPOLATED_SOURCE in methods.values()
+    for name, method in methods.items():
         is_of_mesh = result.measures[name].value == on_mesh[name]
         assert (
             is_of_mesh
-            if words == patch_rows.FINEST_MESH_SOURCE
+            if method == patch_rows.FINEST_MESH_SOURCE
             else on_mesh[name] == 0 or not is_of_mesh
         ), name
 
 
-def test_always_a_motion_has_the_engine_of_its_run():
+def test_always_motion_measures_name_engine_of_run():
     numerics = summarise_run(run(PATCH.format(1e-2) + SLIDE))["numerics"]
     assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
     assert numerics["measures"]["normal_stiffness"].startswith("finite elements")
 
 
-def test_exact_the_arrays_of_a_static_patch_balance_its_load():
+def test_exact_arrays_of_static_patch_balance_load():
     result = run(PATCH.format(1e-2))
     patch = result.patch
     force = patch.pieces.interface.weight @ patch.normal_stress
@@ -64,7 +68,7 @@ def test_exact_the_arrays_of_a_static_patch_balance_its_load():
     assert patch.shear_stress.shape == patch.slip.shape == patch.x.shape
 
 
-def test_exact_the_arrays_of_a_moving_patch_are_those_of_its_last_frame():
+def test_exact_arrays_of_sliding_patch_are_last_frame():
     bench = PATCH.replace("[accuracy]", "[contact.shear]\n[accuracy]").format(1e-2) + SLIDE
     result = run(bench)
     for name in ("shear_stress", "slip"):

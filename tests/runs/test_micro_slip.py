@@ -1,4 +1,5 @@
-"""Benches in micro-slip: work and stiffness against an independent program, and what the tolerance buys."""
+"""Benches in micro-slip: loop area and stiffness against an independent program, and the effect of
+the tolerance."""
 
 import re
 
@@ -7,7 +8,7 @@ import pytest
 import patchfem as pf
 from patchfem.scene import loads
 
-# crowned steel pieces, slid by a fortieth of the slide at which all of them slips
+# Crowned steel pieces; the slide amplitude is 1/40 of that of complete slip.
 CROWNED = """
 [contact]
 length = "39.833 mm"
@@ -32,7 +33,7 @@ frequency = "10 Hz"
 cycles = 2
 """
 )
-LOOP = 1.84e-9  # J; an independent finite-element program, to 1 %
+LOOP = 1.84e-9  # Loop area [J] of an independent finite-element program, within 1 %.
 TOLERANCES = ("1e-2", "1e-3", "1e-4")
 MEASURES = (
     "loop_area",
@@ -48,41 +49,44 @@ MEASURES = (
 
 
 @pytest.fixture(scope="module")
-def runs():
+def results():
+    """Return tolerance -> result of the bench."""
     return {
         tolerance: pf.run(loads(SLID, "slid.toml", [f"accuracy.tolerance={tolerance}"]))
         for tolerance in TOLERANCES
     }
 
 
-def test_always_the_work_of_micro_slip_is_resolved(runs):
-    """A mesh that is not graded to the slip zone gave 4.25e-9 +- 1.0e-9 J at the default tolerance."""
-    for tolerance, found in runs.items():
-        loop = found.measures["loop_area"]
+def test_always_micro_slip_loop_agrees_with_independent_program(results):
+    """The loop area agrees with an independent program. A mesh that was not refined at the slip
+    zone gave 4.25e-9 +- 1.0e-9 J at the default tolerance."""
+    for tolerance, result in results.items():
+        loop = result.measures["loop_area"]
         assert abs(loop.value - LOOP) <= loop.error + 0.01 * LOOP, tolerance
         assert loop.error <= 0.1 * LOOP, tolerance
 
 
-def test_always_a_tighter_tolerance_buys_nodes_and_widens_no_error(runs):
-    wide, middle, tight = (runs[tolerance] for tolerance in TOLERANCES)
-    assert wide.patch.x.size < middle.patch.x.size < tight.patch.x.size
-    for coarse, fine in ((wide, middle), (middle, tight)):
+def test_always_smaller_tolerance_has_more_nodes_and_smaller_errors(results):
+    loose, middle, tight = (results[tolerance] for tolerance in TOLERANCES)
+    assert loose.patch.x.size < middle.patch.x.size < tight.patch.x.size
+    for coarse, fine in ((loose, middle), (middle, tight)):
         for name in MEASURES:
             assert fine.measures[name].error <= coarse.measures[name].error * (1 + 1e-9), name
 
 
-def test_exact_the_tangential_stiffness_is_that_of_the_patch_at_rest(runs):
+def test_exact_tangential_stiffness_agrees_with_static_patch(results):
     at_rest = pf.run(loads(CROWNED, "at rest.toml")).measures["tangential_stiffness"]
-    slid = runs["1e-3"].measures["tangential_stiffness"]
-    assert slid.value == pytest.approx(at_rest.value, rel=1e-12)
-    assert slid.error == pytest.approx(at_rest.error, rel=1e-9)
+    sliding = results["1e-3"].measures["tangential_stiffness"]
+    assert sliding.value == pytest.approx(at_rest.value, rel=1e-12)
+    assert sliding.error == pytest.approx(at_rest.error, rel=1e-9)
 
 
-def test_exact_a_joint_that_sticks_everywhere_has_a_mesh_as_before():
-    """Nothing slips below the first yield of a flat joint, so that nothing is graded to a slip zone."""
+def test_exact_stuck_flat_joint_has_no_loop_area():
+    """Below the first yield of a flat joint nothing slips: the loop area is zero, and the mesh is
+    not refined at a slip zone."""
     flat = re.sub(r"\[contact.crown\]\nradius.*\n", "", SLID)
-    slid = pf.run(loads(flat, "flat.toml"))
-    assert slid.measures["loop_area"].value == pytest.approx(0.0, abs=1e-20)
-    assert slid.measures["equivalent_stiffness"].value == pytest.approx(
-        slid.measures["tangential_stiffness"].value, rel=1e-3
+    result = pf.run(loads(flat, "flat.toml"))
+    assert result.measures["loop_area"].value == pytest.approx(0.0, abs=1e-20)
+    assert result.measures["equivalent_stiffness"].value == pytest.approx(
+        result.measures["tangential_stiffness"].value, rel=1e-3
     )

@@ -1,4 +1,4 @@
-"""Benches whose last loop is not the steady one, against longer benches and closed forms."""
+"""Benches whose last loop is not the steady one, compared with longer benches and closed forms."""
 
 import pytest
 
@@ -21,25 +21,26 @@ BOUC = 'law = "bouc-wen"\nstiffness = "1e8 N/m"\nexponent = 2.0'
 CLOSED = "friction loop of the last cycle does not close"
 
 
-def warned(law: str, cycles) -> tuple:
-    done = pf.run(BENCH.format(law=law, cycles=cycles))
-    return done, [one for one in done.warnings if CLOSED in one]
+def run_with_loop_warnings(law: str, cycles) -> tuple:
+    """Return the result of a bench and its warnings about an open loop."""
+    result = pf.run(BENCH.format(law=law, cycles=cycles))
+    return result, [warning for warning in result.warnings if CLOSED in warning]
 
 
-def test_exact_a_warning_names_the_cycles_until_the_loop_is_steady():
-    first, told = warned(BOUC, 1)
-    second, none = warned(BOUC, 2)
-    third, _ = warned(BOUC, 3)
-    assert len(told) == 1 and told[0].endswith("set slide.cycles = 2") and not none
+def test_exact_warning_names_cycles_until_loop_is_steady():
+    first, warnings = run_with_loop_warnings(BOUC, 1)
+    second, no_warnings = run_with_loop_warnings(BOUC, 2)
+    third, _ = run_with_loop_warnings(BOUC, 3)
+    assert len(warnings) == 1 and warnings[0].endswith("set slide.cycles = 2") and not no_warnings
     steady = third.measures["loop_area"].value
     assert second.measures["loop_area"].value == pytest.approx(steady, rel=1e-3)
     assert abs(first.measures["loop_area"].value - steady) > 0.03 * steady
-    assert f"{1e6 * steady:.4g} uJ" in told[0]
+    assert f"{1e6 * steady:.4g} uJ" in warnings[0]
 
 
 @pytest.mark.parametrize("cycles", [1, 2, 1.5])
-def test_exact_a_rigid_loop_is_steady_from_the_first_cycle(cycles):
-    done, told = warned('law = "coulomb"', cycles)
-    assert not told and done.measures["loop_area"].value == pytest.approx(
+def test_exact_rigid_loop_is_steady_from_first_cycle(cycles):
+    result, warnings = run_with_loop_warnings('law = "coulomb"', cycles)
+    assert not warnings and result.measures["loop_area"].value == pytest.approx(
         4 * 0.3 * 115 * 2e-6, rel=1e-6
     )

@@ -1,4 +1,5 @@
-"""Pieces of unlike lengths and with shaped ends, through their scenes: corners, rounded punches, balance, swaps."""
+"""Pieces of unlike lengths and with shaped ends: corners, rounded punches, force balance and
+exchanged pieces."""
 
 from __future__ import annotations
 
@@ -37,19 +38,20 @@ TILT = '[contact.tilt]\nangle = "{}0.04 mrad"\n'
 OUTLINE = '[contact.{}]\nlength = "8 mm"\nchamfer = "0.3 mm"\n[contact.{}]\nend_radius = "1 mm"\n'
 
 
-def asked(text: str):
-    """The PatchModel of a scene."""
+def build_patch_model(text: str):
+    """Return the PatchModel of a scene."""
     return build(loads(text, "scene.toml")).patch
 
 
-def even(text: str):
-    """The patch of a scene solved on its even interface."""
-    model = asked(text)
+def solve_on_uniform_mesh(text: str):
+    """Return the solved patch of a scene on its uniform interface mesh."""
+    model = build_patch_model(text)
     return solve(model, *make_piece_meshes(model))
 
 
-def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.ndarray:
-    """Mirrored columns over |x| <= half, cells of `fine` on either side of |x| = place, growing from there."""
+def graded_columns(place: float, half: float, fine: float, growth: float = 1.2) -> np.ndarray:
+    """Return symmetric columns over |x| <= half with cells of `fine` on either side of |x| = place,
+    growing from there."""
     right = [place - np.append(0.0, np.cumsum(graded_rows(fine, place, growth)))[::-1]]
     if half > place:
         right.append(place + np.cumsum(graded_rows(fine, half - place, growth)))
@@ -59,8 +61,9 @@ def towards(place: float, half: float, fine: float, growth: float = 1.2) -> np.n
     return frozen_array(np.concatenate([-x[:0:-1], x]))
 
 
-def graded(patch, x, growth: float = 1.2, halvings: int = 0):
-    """The patch solved on columns x of its interface, rows graded alike, every cell split so often."""
+def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
+    """Return the patch solved on columns x of its interface with rows graded alike and every cell
+    halved repeatedly."""
     pieces = (
         (patch.pieces.lower,)
         if patch.pieces.are_alike
@@ -87,71 +90,77 @@ def graded(patch, x, growth: float = 1.2, halvings: int = 0):
         (UPPER + CHAMFER + LOWER + 'length = "6 mm"\n', (135, 90), None),
     ],
 )
-def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(
-    tables, angles, printed
-):
-    model = asked(BLOCK + tables)
+def test_order_of_corner_pressure_agrees_with_wedge_exponent(tables, angles, printed):
+    model = build_patch_model(BLOCK + tables)
     assert model.has_singular_ends
-    wanted = falling(*angles)
-    assert printed is None or wanted == pytest.approx(printed, abs=5e-5)
-    patch = graded(model, towards(model.pieces.length / 2, model.pieces.length / 2, 1e-8))
+    expected = falling(*angles)
+    assert printed is None or expected == pytest.approx(printed, abs=5e-5)
+    patch = solve_on_columns(
+        model, graded_columns(model.pieces.length / 2, model.pieces.length / 2, 1e-8)
+    )
     inward = patch.x[-1] - patch.x
-    near = (inward > 1e-7) & (inward < 5e-6)
-    found = -np.polyfit(np.log(inward[near]), np.log(patch.pressure.sigma_n[near]), 1)[0]
-    assert found == pytest.approx(wanted, abs=3e-3)
+    in_range = (inward > 1e-7) & (inward < 5e-6)
+    exponent = -np.polyfit(np.log(inward[in_range]), np.log(patch.pressure.sigma_n[in_range]), 1)[0]
+    assert exponent == pytest.approx(expected, abs=3e-3)
 
 
-def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
+def test_order_of_rounded_punch_error_is_one():
+    """The pressure of a stiff punch with rounded ends on a long block converges to the closed form
+    with first order."""
     flat = 1e-3
     radius = 1e-3
     load = 2e6
     young = 120e9
     poisson = 0.3
     text = BLOCK.replace("24 mm", "80 mm").replace("8 mm", "40 mm").replace("100 kN", "2000 kN")
-    model = asked(
+    model = build_patch_model(
         text + '[contact.upper]\nlength = "4 mm"\nheight = "2 mm"\nend_radius = "1 mm"\n'
         'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n'
     )
     modulus = young / (1 - poisson**2) / (1 + 1e-4)
     half = rounded_punch_half_width(load, flat, radius, modulus)
-    misses = []
+    errors = []
     for halvings in (0, 1):
-        patch = graded(model, towards(half, model.pieces.length / 2, 2e-6), halvings=halvings)
-        wanted = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
-        off = patch.pressure.sigma_n - wanted
+        patch = solve_on_columns(
+            model, graded_columns(half, model.pieces.length / 2, 2e-6), halvings=halvings
+        )
+        expected = rounded_punch_pressure(patch.x, load, flat, radius, modulus)
+        difference = patch.pressure.sigma_n - expected
         weight = patch.pieces.interface.weight
-        misses.append(np.sqrt((weight * off**2).sum() / (weight * wanted**2).sum()))
-    # first order, by the nodes where the contact ends
-    assert misses[1] < 4e-3 and misses[0] / misses[1] > 1.8
-    assert patch.pressure.sigma_n.max() == pytest.approx(wanted.max(), rel=4e-3)
+        errors.append(np.sqrt((weight * difference**2).sum() / (weight * expected**2).sum()))
+    # The nodes at the contact ends limit the convergence to first order.
+    assert errors[1] < 4e-3 and errors[0] / errors[1] > 1.8
+    assert patch.pressure.sigma_n.max() == pytest.approx(expected.max(), rel=4e-3)
     assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
     assert "steep" not in " ".join(warn_of_strains(model, patch))
 
 
-def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():
+def test_exact_stiff_sharp_block_agrees_with_flat_punch():
     text = BLOCK.replace("24 mm", "160 mm").replace("8 mm", "80 mm")
-    model = asked(
+    model = build_patch_model(
         text + '[contact.upper]\nlength = "4 mm"\nheight = "4 mm"\n'
         'substrate = {young = "1.2e6 GPa", poisson = 0.3, density = "1 kg/m^3"}\n'
     )
-    patch = graded(model, towards(2e-3, 2e-3, 1e-6))
+    patch = solve_on_columns(model, graded_columns(2e-3, 2e-3, 1e-6))
     inner = np.abs(patch.x) < 1.8e-3
-    wanted = punch_pressure(patch.x[inner], 1e5, 2e-3)
-    assert patch.pressure.sigma_n[inner] == pytest.approx(wanted, rel=5e-3)
+    expected = punch_pressure(patch.x[inner], 1e5, 2e-3)
+    assert patch.pressure.sigma_n[inner] == pytest.approx(expected, rel=5e-3)
 
 
 @pytest.mark.parametrize("text, outline", [(COATED, OUTLINE), (BLOCK, NARROW)])
-def test_exact_the_narrow_piece_may_lie_above_or_below(text, outline):
+def test_exact_narrow_piece_above_or_below_gives_same_pressure(text, outline):
     a, b = (
-        even(text + outline.format(*sides) + TILT.format(""))
+        solve_on_uniform_mesh(text + outline.format(*sides) + TILT.format(""))
         for sides in (("lower", "upper"), ("upper", "lower"))
     )
     assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n).max() <= 1e-9 * a.pressure.sigma_n.max()
     assert values(b) == pytest.approx(values(a), rel=1e-8)
 
 
-def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_piece():
-    model = asked(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
+def test_exact_load_is_transferred_at_interface_and_bond_lines():
+    """The pressure on the interface and the tractions on the bond line of each coating add up to
+    the normal load."""
+    model = build_patch_model(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
     patch = solve(model, *make_piece_meshes(model))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     assert force.sum() == pytest.approx(model.loading.load, rel=1e-10)
@@ -166,14 +175,14 @@ def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_
         )
 
 
-def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(tmp_path):
+def test_exact_written_mesh_of_shaped_pieces_gives_same_patch(tmp_path):
     text = COATED + TILT.format("")
-    model = asked(
+    model = build_patch_model(
         text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]")
     )
     bodies = make_piece_meshes(model)
     write_mesh(bodies[0], tmp_path / "pair.vtu", bodies[1])
-    again = build(
+    read_model = build(
         loads(
             text.replace('length = "12.7 mm"', f'length = "{model.pieces.length!r} m"').replace(
                 'element_size = "0.5 mm"', 'mesh = "pair.vtu"'
@@ -182,7 +191,7 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
         )
     ).patch
     a = values(solve(model, *bodies))
-    b = values(solve(again, *make_piece_meshes(again)))
+    b = values(solve(read_model, *make_piece_meshes(read_model)))
     assert b == pytest.approx(a, rel=1e-8)
 
 
@@ -190,39 +199,45 @@ def test_exact_the_written_mesh_of_shaped_pieces_is_read_back_as_the_same_patch(
 @pytest.mark.parametrize(
     "tables", [NARROW.format("upper"), UPPER + 'length = "8 mm"\nend_radius = "2 mm"\n']
 )
-def test_always_errors_of_what_has_a_bound_hold_on_meshes_that_the_tolerance_chooses(tables):
-    model = asked(BLOCK + tables)
-    rough, best = (
+def test_always_errors_of_bounded_measures_cover_finer_mesh(tables):
+    model = build_patch_model(BLOCK + tables)
+    coarse, fine = (
         estimate_measures(*solve_with_coarser(model, tolerance)) for tolerance in (2e-2, 4e-3)
     )
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "contact_fraction"):
-        assert abs(rough[name].value - best[name].value) <= rough[name].error + best[name].error, (
-            name
-        )
-        assert rough[name].error <= 0.05 * abs(rough[name].value)
+        assert (
+            abs(coarse[name].value - fine[name].value) <= coarse[name].error + fine[name].error
+        ), name
+        assert coarse[name].error <= 0.05 * abs(coarse[name].value)
 
 
 @pytest.mark.share(1, 4)
 @pytest.mark.parametrize("radius", ["2 um", "0.2 mm", "2 mm"])
 @pytest.mark.parametrize("tilt", ["", TILT.format("")])
-def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_over_it(radius, tilt):
+def test_always_errors_of_unresolved_rounding_cover_fine_mesh(radius, tilt):
+    """The errors on meshes whose elements are larger than the rounding of the ends cover the
+    results of a mesh that resolves it."""
     tables = UPPER + f'length = "8 mm"\nend_radius = "{radius}"\n' + tilt
-    model = asked(BLOCK + tables)
+    model = build_patch_model(BLOCK + tables)
     (*_, half), edge = find_rounded_edges(model)
-    true = values(graded(model, towards(half, model.pieces.length / 2, edge / 30)))
+    reference = values(
+        solve_on_columns(model, graded_columns(half, model.pieces.length / 2, edge / 30))
+    )
     for cells in (20, 150):
-        found = estimate_measures(
+        measures = estimate_measures(
             *solve_with_coarser(
-                asked(BLOCK + f'element_size = "{model.pieces.length / cells!r} m"\n' + tables),
+                build_patch_model(
+                    BLOCK + f'element_size = "{model.pieces.length / cells!r} m"\n' + tables
+                ),
                 1e-3,
             )
         )
         for name in ("pressure_peak", "contact_fraction", "contact_half_width", "approach"):
-            assert abs(found[name].value - true[name]) <= found[name].error, name
-        assert found["pressure_peak"].error < 20 * true["pressure_peak"]
+            assert abs(measures[name].value - reference[name]) <= measures[name].error, name
+        assert measures["pressure_peak"].error < 20 * reference["pressure_peak"]
 
 
-def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):
+def test_always_bench_with_shaped_pieces_writes_fields(tmp_path):
     text = (
         COATED
         + OUTLINE.format("upper", "lower")
@@ -237,7 +252,8 @@ def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):
     assert {"fields.vtkhdf", "result.nc"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 
-def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer_piece(tmp_path):
+def test_refuses_profile_shorter_than_interface(tmp_path):
+    """A profile may be shorter than the longer piece but not shorter than the interface."""
     x = np.linspace(0, 8.2, 400)
     rows = "\n".join(f"{a:.6f},{0.05 * np.sin(a):.6f}" for a in x)
     (tmp_path / "before.csv").write_text(f"x [mm],z [um]\n{rows}\n")
@@ -256,7 +272,7 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
 
 
 @pytest.mark.parametrize(
-    "more, planned, noted",
+    "more, planned, notes",
     [
         (
             "",
@@ -271,7 +287,7 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
         ),
     ],
 )
-def test_always_plan_and_result_say_what_assembles_the_pieces(more, planned, noted):
+def test_always_plan_and_result_name_assembly_of_stiffness(more, planned, notes):
     scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")
     assert [text for text in pf.plan(scene).verdict if "assemble" in text] == [planned]
-    assert [text for text in pf.run(scene).notes if "assemble" in text] == noted
+    assert [text for text in pf.run(scene).notes if "assemble" in text] == notes

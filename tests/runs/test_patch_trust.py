@@ -1,4 +1,5 @@
-"""What a static patch says of its own numbers: none where none is bounded, bars that hold, remedies that cure."""
+"""Errors and missing values of a static patch: unbounded pressures have no value, and errors cover
+a reference."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ from patchfem.export import summarise_run
 
 RIG = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 STEP = RIG + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'
-# fraction, peak [Pa], normal and tangential stiffness [N/m]: elements of order 5, a program of its own
+# Contact fraction, peak pressure [Pa], normal and tangential stiffness [N/m] of an independent
+# program with elements of order 5.
 TILTED = {
     "0.1 mrad": (0.2193469, 8317717.0, 5.349995e8, 2.289488e8),
     "1 mrad": (0.02391931, 60.84458e6, 1.698824e8, 1.196733e8),
@@ -19,32 +21,34 @@ TILTED = {
 DECISIVE = ("contact_fraction", "pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
-def test_always_null_beside_a_step_that_bears():
-    """A punch with a sharp corner has no largest pressure: null with the reason, in the result and in its summary."""
-    found = pf.run(STEP)
-    peak = found.measures["pressure_peak"]
+def test_always_peak_at_loaded_step_has_no_value():
+    """The pressure under a sharp corner is unbounded: the result and its summary have no value and
+    give the reason."""
+    result = pf.run(STEP)
+    peak = result.measures["pressure_peak"]
     assert peak.value is None
     assert "edge of the step" in peak.reason
-    assert found.measures["normal_stiffness"].value > 0
-    written = summarise_run(found)["measures"]["pressure_peak"]
-    assert written["value"] is None and "edge of the step" in written["reason"]
+    assert result.measures["normal_stiffness"].value > 0
+    entry = summarise_run(result)["measures"]["pressure_peak"]
+    assert entry["value"] is None and "edge of the step" in entry["reason"]
 
 
-def test_always_a_number_behind_a_skin():
-    """A skin yields at its peaks, so the same step leaves a largest pressure."""
+def test_always_peak_at_step_behind_skin_has_value():
+    """A skin yields under high pressure, so that the same step has a finite pressure peak."""
     skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
-    found = pf.run(STEP + skin)
-    assert found.measures["pressure_peak"].value > 0
-    assert found.measures["pressure_peak"].error is not None
+    result = pf.run(STEP + skin)
+    assert result.measures["pressure_peak"].value > 0
+    assert result.measures["pressure_peak"].error is not None
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("angle", TILTED)
-def test_bars_of_a_tilted_rig_patch_hold_an_independent_program(angle):
-    """The patch that a motion takes, on its own chosen mesh."""
-    found = pf.run(RIG + f'[contact.tilt]\nangle = "{angle}"\n').measures
-    for name, truth in zip(DECISIVE, TILTED[angle]):
-        assert abs(found[name].value - truth) <= found[name].error + 2e-6 * truth, (
+def test_always_errors_of_tilted_patch_cover_independent_program(angle):
+    """The errors of the automatic mesh of a tilted patch cover the results of an independent
+    program."""
+    measures = pf.run(RIG + f'[contact.tilt]\nangle = "{angle}"\n').measures
+    for name, reference in zip(DECISIVE, TILTED[angle]):
+        assert abs(measures[name].value - reference) <= measures[name].error + 2e-6 * reference, (
             name,
-            found[name],
+            measures[name],
         )

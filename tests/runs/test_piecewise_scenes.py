@@ -1,4 +1,5 @@
-"""Scenes behind elastic-plastic elements: exact from yield to yield beside the march, chosen where it is cheaper."""
+"""Scenes with elastic-plastic elements: exact solution from yield event to yield event against the
+march; engine choice."""
 
 from __future__ import annotations
 
@@ -25,29 +26,33 @@ import patchfem as pf
 
 IWAN = friction_of("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
-# of the same size as round-off
+# Measures that consist of round-off.
 ROUND = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")
 
 
-def both(text, *sets):
-    """Results of the exact engine and of the march."""
-    keys = dict(one.split("=", 1) for one in sets)
+def run_exact_and_march(text, *sets):
+    """Return the results of the exact engine and of the march."""
+    keys = dict(assignment.split("=", 1) for assignment in sets)
     return [pf.run(text, **keys, **{"accuracy.method": method}) for method in ("exact", "march")]
 
 
-def agree(exact, march, *besides):
-    """Measures of a march whose errors do not hold the exact values; [] if it is a single one of some twenty."""
+def list_differences(exact, march, *ignored):
+    """Return the measures whose difference exceeds the errors of exact engine and march; [] if it
+    is a single one."""
     assert exact.extra["engine"] == "piecewise" and march.extra["engine"] == "march"
-    # the map of the yields finds it where samples cannot
+    # The exact engine estimates it from its events; samples cannot.
     steady = {"relative_displacement_amplitude_steady"}
     assert set(exact.measures) - steady == set(march.measures) - steady
     out = []
-    for name, other in march.measures.items():
-        mine = exact.measures.get(name, other)
-        if name in (*ROUND, *besides) or mine.value is None or other.value is None:
+    for name, march_measure in march.measures.items():
+        exact_measure = exact.measures.get(name, march_measure)
+        if name in (*ROUND, *ignored) or exact_measure.value is None or march_measure.value is None:
             continue
-        if abs(mine.value - other.value) > 1.5 * (other.error or 0.0) + mine.error + other.floor:
-            out.append((name, mine.value, other.value, other.error))
+        if (
+            abs(exact_measure.value - march_measure.value)
+            > 1.5 * (march_measure.error or 0.0) + exact_measure.error + march_measure.floor
+        ):
+            out.append((name, exact_measure.value, march_measure.value, march_measure.error))
     return out if len(out) > 1 else []
 
 
@@ -56,11 +61,11 @@ def agree(exact, march, *besides):
     "sets",
     [(), ("drive.cycles=20.3",), ("drive.acceleration=2 g",), ("structure.mode.axial.damping=3",)],
 )
-def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
-    exact, march = both(RIG, "accuracy.tolerance=1e-4", *sets)
-    assert agree(exact, march) == []
+def test_exact_single_spring_rig_agrees_with_march(sets):
+    exact, march = run_exact_and_march(RIG, "accuracy.tolerance=1e-4", *sets)
+    assert list_differences(exact, march) == []
     assert exact.measures["energy_balance"].value < 1e-12
-    # which is extrapolated
+    # The steady amplitude is extrapolated and has a larger error.
     assert all(
         m.error <= 1e-8 * abs(m.value) + m.floor
         for name, m in exact.measures.items()
@@ -72,32 +77,36 @@ def test_exact_rig_of_one_spring_is_inside_the_bars_of_the_march(sets):
         )
 
 
-def test_exact_two_modes_and_a_release():
-    exact, march = both(
+def test_exact_two_modes_and_release_agree_with_march():
+    exact, march = run_exact_and_march(
         POINT + PLASTIC + MODE + SECOND + DRIVE, "drive.cycles=12", "accuracy.tolerance=1e-4"
     )
-    assert agree(exact, march) == []
+    assert list_differences(exact, march) == []
     free = (
         RIG[: RIG.index("[drive]")]
         + '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\ncycles = 12\n'
     )
-    exact, march = both(free, "accuracy.tolerance=1e-4")
-    assert agree(exact, march) == []
+    exact, march = run_exact_and_march(free, "accuracy.tolerance=1e-4")
+    assert list_differences(exact, march) == []
     assert exact.outcome == march.outcome
 
 
-def test_exact_two_interfaces_between_masses(monkeypatch):
+def test_exact_two_interfaces_agree_with_march(monkeypatch):
     share_one_loop(monkeypatch)
-    exact, march = both(PAIR + FORCED, "accuracy.tolerance=1e-4")
-    assert agree(exact, march) == []
+    exact, march = run_exact_and_march(PAIR + FORCED, "accuracy.tolerance=1e-4")
+    assert list_differences(exact, march) == []
     assert (
         exact.measures["slip_amplitude_2"].error <= 1e-9 * exact.measures["slip_amplitude_2"].value
     )
 
 
-def test_exact_a_level_of_a_patch_carries_the_error_of_its_mesh():
-    """The first level has the bars of a run at its force alone but for what rings on from its start, the last those of
-    the run; the onset lies within the bars of both meshes. The bars were 1e-9 of the values once."""
+def test_exact_errors_of_levels_include_mesh_error():
+    """The errors of the first level are those of a run at its force alone within a factor of 4,
+    those of the last level are those of the run. The onset levels of two meshes agree within their
+    errors.
+
+    The errors were 1e-9 of the values in an earlier version.
+    """
     text = (
         '[contact]\nlength = "40 mm"\nwidth = "30 mm"\nheight = "10 mm"\nload = "6 kN"\nsubstrate = "steel"\n'
         '[contact.crown]\nradius = "100 m"\n[contact.shear]\n'
@@ -117,56 +126,66 @@ def test_exact_a_level_of_a_patch_carries_the_error_of_its_mesh():
             coarse.measures[name].error, rel=1e-6, abs=3e-9 * abs(value)
         ), name
     assert all(1 / 4 < first.errors[name] / alone[name].error < 4 for name in first.values)
-    a, b = (one.measures["onset_level"] for one in (coarse, fine))
+    a, b = (result.measures["onset_level"] for result in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
     assert any(
         "onset_level: slip counts only if its amplitude" in note for note in coarse.extra["notes"]
     )
 
 
-def test_always_auto_takes_the_cheaper_engine():
-    def engine(text, **keys):
+def test_always_automatic_method_chooses_cheaper_engine():
+    def planned_engine(text, **keys):
         return pf.plan(
             pf.load(text + "".join(f"[accuracy]\n{k} = {v}\n" for k, v in keys.items()))
         ).engine
 
-    assert engine(RIG) == "piecewise"
-    # up to seconds the exact motion is taken
-    assert engine(RIG.replace("1 um", "1e-7 um")) == "piecewise"
-    # a spring so stiff that it rings without end
-    assert engine(RIG.replace("1 um", "1e-9 um")) == "march"
-    assert engine(POINT + IWAN + MODE + DRIVE) == "piecewise"  # 49 cells, as the tolerance asks for
-    many = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
-    # 1271 elements slip one after the other: a finer mesh is no worse motion
-    assert engine(many) == "piecewise"
-    longer = many.replace("cycles = ", "cycles = 100")
-    assert engine(longer) == "march" and engine(longer, tolerance="1e-5") == "piecewise"
-    assert engine(RIG, steps_per_cycle="400") == "march"  # steps that are named are taken
-    assert engine(POINT + PLASTIC + MODE + SWEEP) == "piecewise"
+    assert planned_engine(RIG) == "piecewise"
+    # The exact engine is chosen if it takes at most a few seconds.
+    assert planned_engine(RIG.replace("1 um", "1e-7 um")) == "piecewise"
+    # A stiff spring whose free vibration has too many events.
+    assert planned_engine(RIG.replace("1 um", "1e-9 um")) == "march"
     assert (
-        engine(POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE)
+        planned_engine(POINT + IWAN + MODE + DRIVE) == "piecewise"
+    )  # The tolerance needs 49 cells.
+    many = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
+    # 1271 elements slip one after the other; a fine mesh does not make the motion more expensive.
+    assert planned_engine(many) == "piecewise"
+    longer = many.replace("cycles = ", "cycles = 100")
+    assert (
+        planned_engine(longer) == "march"
+        and planned_engine(longer, tolerance="1e-5") == "piecewise"
+    )
+    # A prescribed number of steps selects the march.
+    assert planned_engine(RIG, steps_per_cycle="400") == "march"
+    assert planned_engine(POINT + PLASTIC + MODE + SWEEP) == "piecewise"
+    assert (
+        planned_engine(
+            POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE
+        )
         == "march"
     )
 
 
-def test_refuses_an_exact_run_without_end():
+def test_refuses_exact_run_with_unlimited_cost():
     stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
-    said = r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"
-    with pytest.raises(pf.Missing, match=said) as found:
+    pattern = r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"
+    with pytest.raises(pf.Missing, match=pattern) as error:
         pf.run(stiff)
     march = pf.plan(stiff, **{"accuracy.method": "march"}).seconds
-    seconds = float(str(found.value).partition("computing time of about ")[2].split(" s")[0])
-    assert ("accuracy.method" in str(found.value)) == (march < seconds)
+    seconds = float(str(error.value).partition("computing time of about ")[2].split(" s")[0])
+    assert ("accuracy.method" in str(error.value)) == (march < seconds)
 
 
-def test_refuses_exact_where_a_spring_bends_or_the_load_changes():
+def test_refuses_exact_method_with_nonlinear_spring_or_varying_load():
     exact = '[accuracy]\nmethod = "exact"\n'
-    bends = (
+    stiffening = (
         POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact
     )
-    assert "no exact solution exists with [structure.stiffening]" in only(bends)
-    varies = POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
-    assert "no exact solution exists with normal.amplitude" in only(varies)
+    assert "no exact solution exists with [structure.stiffening]" in only(stiffening)
+    varying_load = (
+        POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
+    )
+    assert "no exact solution exists with normal.amplitude" in only(varying_load)
     assert "no exact solution exists for law 'tanh'" in only(
         POINT
         + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'

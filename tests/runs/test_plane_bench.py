@@ -1,5 +1,5 @@
-"""A bench along a path file in two directions, and a patch in strips along one: scenes against closed forms and
-against the law stepped point by point."""
+"""Benches along a path in two directions, and patches in strips: scenes against closed forms and
+the NumPy law."""
 
 import numpy as np
 import pytest
@@ -22,18 +22,21 @@ L_SHAPE = "time [ms],displacement [um],lateral [um]\n0,0,0\n2,10,0\n6,10,20\n8,4
 
 
 @pytest.fixture
-def table(tmp_path):
-    def write(text, scene=POINT + LONGER, *sets):
+def write_path_scene(tmp_path):
+    """Return a function that writes the table of a path and loads a scene with it."""
+
+    def write_table(text, scene=POINT + LONGER, *sets):
         (tmp_path / "path.csv").write_text(text, "utf-8")
         (tmp_path / "scene.toml").write_text(scene + FILE, "utf-8")
         return load(tmp_path / "scene.toml", sets)
 
-    return write
+    return write_table
 
 
-def ring(radius, turns, rows):
-    """A circle through the origin that leaves it along +x, in um, one turn a second."""
-    angle = np.linspace(0, 2 * np.pi * turns, round(rows * turns) + 1)
+def format_circle_path(radius, revolutions, rows):
+    """Return the table of a circle through the origin that starts along +x, with radius in um and
+    one revolution per second."""
+    angle = np.linspace(0, 2 * np.pi * revolutions, round(rows * revolutions) + 1)
     lines = zip(
         (angle / (2 * np.pi)).tolist(),
         (radius * np.sin(angle)).tolist(),
@@ -48,55 +51,71 @@ def ring(radius, turns, rows):
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize(
-    "radius, size, lag", [(1, 0.447214, 63.4349), (4, 0.894427, 26.5651), (20, 0.995037, 5.7106)]
+    "radius, force_ratio, lag",
+    [(1, 0.447214, 63.4349), (4, 0.894427, 26.5651), (20, 0.995037, 5.7106)],
 )
-def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
-    """r = 0.5, 2, 10 bond lengths of 2 um: |F| and lag of the two resultants against the motion."""
-    turns = {1: 6.25, 4: 2.25, 20: 0.75}[radius]
-    model = build(table(ring(radius, turns, {1: 400, 4: 600, 20: 1500}[radius]), POINT + LONGER))
-    found = law_bench.run(model, None, 4)
-    force = (found.force[-1] + 1j * found.lateral_force[-1]) / (0.3 * found.load[0])
-    motion = np.exp(2j * np.pi * turns)
-    assert abs(force) == pytest.approx(size, abs=1e-5)
+def test_exact_friction_on_circular_path_agrees_with_closed_form(
+    write_path_scene, radius, force_ratio, lag
+):
+    """For radii of 0.5, 2 and 10 bond lengths of 2 um, the magnitude of the friction force and its
+    lag behind the motion agree with the closed form."""
+    revolutions = {1: 6.25, 4: 2.25, 20: 0.75}[radius]
+    model = build(
+        write_path_scene(
+            format_circle_path(radius, revolutions, {1: 400, 4: 600, 20: 1500}[radius]),
+            POINT + LONGER,
+        )
+    )
+    response = law_bench.run(model, None, 4)
+    force = (response.force[-1] + 1j * response.lateral_force[-1]) / (0.3 * response.load[0])
+    motion = np.exp(2j * np.pi * revolutions)
+    assert abs(force) == pytest.approx(force_ratio, abs=1e-5)
     assert -np.degrees(np.angle(force / motion)) == pytest.approx(lag, abs=2e-3)
-    assert found.values["energy_balance"] < 1e-12 and found.yaw_moment is None
+    assert response.values["energy_balance"] < 1e-12 and response.yaw_moment is None
     assert model.speed_scale == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
 
 
 @pytest.mark.parametrize("strips", ["", STRIPS])
-def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
-    """Resultants and yaw moment from the law at every node of every strip, with the pressure of that strip."""
-    model = build(table(L_SHAPE, SMALL_PATCH + strips + LONGER))
+def test_exact_patch_on_plane_path_agrees_with_pointwise_law(write_path_scene, strips):
+    """Friction forces and yaw moment agree with the law stepped at every node of every strip, with
+    the pressure of this strip."""
+    model = build(write_path_scene(L_SHAPE, SMALL_PATCH + strips + LONGER))
     patch = solve_with_coarser(model.patch, 1e-3, False)[0]
-    found = law_bench.run(model, patch, 60, 6)
+    response = law_bench.run(model, patch, 60, 6)
     pressure = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
     offsets = patch.strips.offsets if strips else np.zeros(1)
     count = len(pressure)
     flat = pressure.ravel()
     time = model.slide.samples(60)[0]
     corners = 1e-3 * np.array([0, 2, 6, 8])
-    ways = 1e-6 * np.array([[0, 10, 10, 4], [0, 0, 20, 24]])
-    path = np.stack([np.interp(time, corners, way) for way in ways], axis=1)
+    corner_points = 1e-6 * np.array([[0, 10, 10, 4], [0, 0, 20, 24]])
+    path = np.stack(
+        [np.interp(time, corners, coordinates) for coordinates in corner_points], axis=1
+    )
     law = FirstOrderBonds(Bonds(0.3, 2e-6))
     state = law.start(flat, 2)
     tractions = [np.zeros((2, flat.size))]
-    for move, span in zip(np.diff(path, axis=0), np.diff(time)):
-        state = law.step(state, move, flat, flat, span).state
+    for increment, span in zip(np.diff(path, axis=0), np.diff(time)):
+        state = law.step(state, increment, flat, flat, span).state
         tractions.append(law.traction(state))
     tractions = np.array(tractions)
     forces = tractions * np.tile(patch.pieces.interface.weight / count, count)
-    assert found.force == pytest.approx(forces[:, 0].sum(axis=1), rel=1e-9, abs=1e-9)
-    assert found.lateral_force == pytest.approx(forces[:, 1].sum(axis=1), rel=1e-9, abs=1e-9)
+    assert response.force == pytest.approx(forces[:, 0].sum(axis=1), rel=1e-9, abs=1e-9)
+    assert response.lateral_force == pytest.approx(forces[:, 1].sum(axis=1), rel=1e-9, abs=1e-9)
     yaw = forces[:, 0] @ np.repeat(offsets, patch.x.size) - forces[:, 1] @ np.tile(patch.x, count)
-    assert found.yaw_moment == pytest.approx(yaw, rel=1e-8, abs=1e-12) and np.abs(yaw).max() > 1e-3
-    mean = tractions[found.frames, 0].reshape(len(found.frames), count, -1).mean(axis=1)
-    assert found.tau == pytest.approx(mean, rel=1e-9, abs=1e-6)
+    assert (
+        response.yaw_moment == pytest.approx(yaw, rel=1e-8, abs=1e-12) and np.abs(yaw).max() > 1e-3
+    )
+    mean = tractions[response.frames, 0].reshape(len(response.frames), count, -1).mean(axis=1)
+    assert response.tau == pytest.approx(mean, rel=1e-9, abs=1e-6)
     if strips:
-        assert yaw[found.slide.argmax()] == pytest.approx(patch.strips.yaw_moment(0.3), rel=0.01)
+        assert yaw[response.slide.argmax()] == pytest.approx(patch.strips.yaw_moment(0.3), rel=0.01)
 
 
-def test_exact_histories_of_both_directions_are_written(table, tmp_path):
-    scene = table(L_SHAPE, SMALL_PATCH + STRIPS + LONGER + "[accuracy]\nsteps_per_cycle = 100\n")
+def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_path):
+    scene = write_path_scene(
+        L_SHAPE, SMALL_PATCH + STRIPS + LONGER + "[accuracy]\nsteps_per_cycle = 100\n"
+    )
     answer = cli("run", scene.path, "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     result = run(scene, estimate=False)
@@ -109,15 +128,17 @@ def test_exact_histories_of_both_directions_are_written(table, tmp_path):
             assert data[name].attrs["units"] == unit and data[name].dims == ("time",)
         assert data["lateral_force"].values == pytest.approx(result.response.lateral_force)
         assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
-    wide = table(L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER, "accuracy.steps_per_cycle=50")
+    long_path = write_path_scene(
+        L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER, "accuracy.steps_per_cycle=50"
+    )
     assert any(
         "0.189 of the width" in w or "0.19 of the width" in w
-        for w in run(wide, estimate=False).warnings
+        for w in run(long_path, estimate=False).warnings
     )
 
 
 @pytest.mark.parametrize(
-    "text, says",
+    "text, message",
     [
         (L_SHAPE + "9,4\n", ":6: three cells"),
         (L_SHAPE + "9,4,x\n", ":6: lateral: 'x' is not a finite"),
@@ -128,14 +149,14 @@ def test_exact_histories_of_both_directions_are_written(table, tmp_path):
         ("time [s],displacement [um],lateral [um]\n0,0,0\n1,0,0\n", "nothing slides"),
     ],
 )
-def test_refuses_a_broken_lateral_column(table, text, says):
+def test_refuses_faulty_lateral_column(write_path_scene, text, message):
     with pytest.raises(PatchfemError) as error:
-        plan(table(text))
-    assert "path.csv" in str(error.value) and says in str(error.value)
+        plan(write_path_scene(text))
+    assert "path.csv" in str(error.value) and message in str(error.value)
 
 
 @pytest.mark.parametrize(
-    "scene, sets, says",
+    "scene, sets, option",
     [
         (POINT, ["friction.law=coulomb"], "law 'coulomb'"),
         (POINT, ["friction.law=elastic-plastic"], "law 'elastic-plastic'"),
@@ -148,38 +169,44 @@ def test_refuses_a_broken_lateral_column(table, text, says):
         (SMALL_PATCH, ["contact.tilt.on=lower"], "a shape on the lower piece"),
     ],
 )
-def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):
-    found = table(L_SHAPE, scene + LONGER, *sets)
-    for act in (lambda: plan(found), lambda: build(found)):
+def test_refuses_unsupported_options_of_plane_path(write_path_scene, scene, sets, option):
+    path_scene = write_path_scene(L_SHAPE, scene + LONGER, *sets)
+    for call in (lambda: plan(path_scene), lambda: build(path_scene)):
         with pytest.raises(PatchfemError) as error:
-            act()
-        assert str(error.value).startswith(f"{found.where('slide.file')}: a lateral column with")
-        assert f"{says} is not supported yet; " in str(error.value)
+            call()
+        assert str(error.value).startswith(
+            f"{path_scene.where('slide.file')}: a lateral column with"
+        )
+        assert f"{option} is not supported yet; " in str(error.value)
 
 
 # ---- strips along one direction
 
 
 @pytest.mark.parametrize("side", ["upper", "lower"])
-def test_exact_level_strips_are_the_patch(side):
-    """Four level strips of a crown press as one: the bench is that of the patch without them, on either piece, and its
-    resultant that of one point, but for the edges of a contact that moves over the lower piece."""
+def test_exact_level_strips_agree_with_patch_and_point(side):
+    """Four level strips of a crown give the bench of the patch without strips, on either piece. The
+    friction force is that of a point, except for the contact edges that move over the lower piece.
+    """
     level = STRIPS.replace('roll = "0.02 mrad"\n', "")
     crown = (
         SMALL_PATCH.split("[contact.tilt]")[0]
         + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
     )
-    one, two = (bench_of(crown + more + LONGER) for more in ("", level))
-    assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
-    assert two.tau == pytest.approx(one.tau, rel=1e-6, abs=1e-6 * one.tau.max())
-    point = bench_of(POINT + LONGER)
-    assert two.force == pytest.approx(
+    patch, strips = (
+        run_bench(crown + write_path_scene + LONGER) for write_path_scene in ("", level)
+    )
+    assert strips.force == pytest.approx(patch.force, rel=1e-9, abs=1e-9 * patch.force.max())
+    assert strips.tau == pytest.approx(patch.tau, rel=1e-6, abs=1e-6 * patch.tau.max())
+    point = run_bench(POINT + LONGER)
+    assert strips.force == pytest.approx(
         point.force, abs=(1e-9 if side == "upper" else 1e-3) * point.force.max()
     )
-    assert side == "upper" or two.force != pytest.approx(point.force, rel=1e-9)
+    assert side == "upper" or strips.force != pytest.approx(point.force, rel=1e-9)
 
 
-def bench_of(text, *sets):
+def run_bench(text, *sets):
+    """Return the response of a bench of a scene with a triangular slide."""
     model = build(loads(text + TRIANGLE, sets=sets))
     patch = solve_with_coarser(model.patch, 1e-3, False)[0] if model.patch is not None else None
     return law_bench.run(model, patch, 120, 4)

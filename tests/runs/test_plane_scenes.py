@@ -1,4 +1,5 @@
-"""Interfaces that slide in a plane, `lateral`: turned motions, one direction, an independent integration, energies."""
+"""Interfaces that slide in a plane (`lateral`): rotated directions, independent integration,
+energies, refusals."""
 
 import json
 
@@ -39,41 +40,47 @@ LATERAL = "lateral = [4, 0]\n"
 TURN = np.pi / 6
 
 
-def matrices(folder, name: str, turn: float, soft: float = 1.0) -> None:
-    """Two nodes with x and y each, of which the second's directions are turned; soft: stiffness along y over that along
-    x."""
-    ground = np.diag([5e4, 5e4 * soft])
-    link = np.diag([8e4, 8e4 * soft])
-    c = np.cos(turn)
-    s = np.sin(turn)
+def write_matrices(folder, name: str, angle: float, stiffness_ratio: float = 1.0) -> None:
+    """Write the matrices of two nodes with x and y each; the directions of the second are rotated
+    by `turn` [rad].
+
+    `soft` is the stiffness along y over that along x.
+    """
+    ground = np.diag([5e4, 5e4 * stiffness_ratio])
+    link = np.diag([8e4, 8e4 * stiffness_ratio])
+    c = np.cos(angle)
+    s = np.sin(angle)
     R = np.eye(4)
-    R[2:, 2:] = [[c, s], [-s, c]]  # directions of the second node in terms of x and y
+    R[2:, 2:] = [[c, s], [-s, c]]  # Directions of the second node in terms of x and y.
     K = R @ np.block([[ground + link, -link], [-link, link]]) @ R.T
     K = (K + K.T) / 2
     np.savez(folder / f"{name}.npz", K=K, M=np.eye(4), C=1e-4 * K)
 
 
-def run_of(folder, name: str, text: str):
+def run_scene(folder, name: str, text: str):
+    """Return the result of a scene that is written to a folder."""
     (folder / f"{name}.toml").write_text(text)
     return pf.run(folder / f"{name}.toml")
 
 
-def test_exact_one_direction_turned_or_not_is_the_engine_of_one_direction(tmp_path):
-    found = {}
+def test_exact_plane_motion_along_line_agrees_with_line_engine(tmp_path):
+    """A motion along one direction gives the same measures with the engine of one direction and
+    with that of the plane, in any rotated frame."""
+    results = {}
     for name, turn, lateral in (
         ("line", 0.0, ""),
         ("plane", 0.0, LATERAL),
         ("turned", TURN, LATERAL),
     ):
-        matrices(tmp_path, name, turn)
-        found[name] = run_of(tmp_path, name, NODES.format(name=name, lateral=lateral))
-    line, plane, turned = found.values()
+        write_matrices(tmp_path, name, turn)
+        results[name] = run_scene(tmp_path, name, NODES.format(name=name, lateral=lateral))
+    line, plane, turned = results.values()
     assert line.measures.slip_amplitude.value > 1e-4
     assert line.extra["engine"] == plane.extra["engine"] == "march"
-    for name, one in line.measures.items():
-        if one.value is not None:
+    for name, measure in line.measures.items():
+        if measure.value is not None:
             assert plane.measures[name].value == pytest.approx(
-                one.value, rel=1e-9, abs=one.floor + 1e-15
+                measure.value, rel=1e-9, abs=measure.floor + 1e-15
             ), name
     for name in (
         "relative_displacement_amplitude",
@@ -100,18 +107,22 @@ def test_exact_one_direction_turned_or_not_is_the_engine_of_one_direction(tmp_pa
 
 
 @pytest.mark.share(0, 2)
-def test_exact_an_ellipse_turned_is_the_same_ellipse(tmp_path):
-    """Soft across: the force along x comes with a motion along y only where the axes are not x and y."""
-    found = []
+def test_exact_elliptic_motion_does_not_depend_on_frame(tmp_path):
+    """An elliptic motion, which arises because the structure is softer along y, has the same
+    measures in a rotated frame."""
+    results = []
     for name, turn in (("plane", 0.0), ("turned", TURN)):
-        matrices(tmp_path, name, turn, 0.7)
+        write_matrices(tmp_path, name, turn, 0.7)
         npz = dict(np.load(tmp_path / f"{name}.npz"))
-        mix = np.eye(4)
-        # the first node's directions, so that its force is along neither axis
-        mix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
-        np.savez(tmp_path / f"{name}.npz", **{key: mix @ one @ mix.T for key, one in npz.items()})
-        found.append(run_of(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
-    first, second = found
+        rotation = np.eye(4)
+        # The force on the first node acts along neither axis.
+        rotation[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]
+        np.savez(
+            tmp_path / f"{name}.npz",
+            **{key: rotation @ matrix @ rotation.T for key, matrix in npz.items()},
+        )
+        results.append(run_scene(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
+    first, second = results
     assert np.ptp(first.window.extra["lateral_slides"]) > 0.1 * np.ptp(first.window.slide) > 0
     for name in (
         "relative_displacement_amplitude",
@@ -126,41 +137,46 @@ def test_exact_an_ellipse_turned_is_the_same_ellipse(tmp_path):
         )
 
 
-SEEDS = (2, 12)  # three interfaces, one of two in a plane
+SEEDS = (2, 12)  # Seeds of chains with three interfaces, of which one or two slide in a plane.
 
 
-def test_always_errors_hold_an_independent_integration_of_the_rate_equations(tmp_path):
+def test_always_errors_of_plane_chains_cover_independent_integration(tmp_path):
     rows = [row for seed in SEEDS for row in compare_chain(seed, tmp_path)["rows"]]
     assert len(rows) >= 14 and np.mean([row.holds for row in rows]) >= 0.95
 
 
-def test_exact_energy_balances_and_force_stays_within_its_circle(tmp_path):
-    s = chain(2)
-    result = run_of(tmp_path, "chain", text_of(s))
+def test_exact_plane_friction_closes_energy_and_stays_in_circle(tmp_path):
+    """The energies of a plane interface balance, and the friction force stays within the circle of
+    radius mu N."""
+    spec = chain(2)
+    result = run_scene(tmp_path, "chain", text_of(spec))
     assert result.measures.energy_balance.value < 1e-9
     assert result.measures.energy_created.value < 1e-12
     assert result.measures.work_check.value < 1e-4
-    extra, (rubs, stored, lost, made) = result.window.extra, result.window.extra["ledger"]
-    for k, (*_, load) in enumerate(s["faces"]):
+    extra, (friction_work, stored, dissipated, created) = (
+        result.window.extra,
+        result.window.extra["ledger"],
+    )
+    for k, (*_, load) in enumerate(spec["faces"]):
         assert np.hypot(
             extra["forces"][:, k], extra["lateral_forces"][:, k]
         ).max() <= 0.4 * load * (1 + 1e-9)
-    np.testing.assert_allclose(rubs, stored + lost - made, rtol=1e-9)
+    np.testing.assert_allclose(friction_work, stored + dissipated - created, rtol=1e-9)
     elastic = sum(
-        (extra["forces"][:, k] ** 2 + extra["lateral_forces"][:, k] ** 2) / (2 * stiff)
-        for k, (*_, stiff, _) in enumerate(s["faces"])
+        (extra["forces"][:, k] ** 2 + extra["lateral_forces"][:, k] ** 2) / (2 * stiffness)
+        for k, (*_, stiffness, _) in enumerate(spec["faces"])
     )
     np.testing.assert_allclose(stored, elastic, rtol=1e-9)
 
 
-def test_always_check_plan_run_and_sweep_take_a_plane(tmp_path):
+def test_always_commands_support_plane_interfaces(tmp_path):
     path = tmp_path / "chain.toml"
     path.write_text(text_of(chain(2)))
     assert cli("check", path).code == 0
-    planned = cli("plan", path, "--json")
-    assert planned.code == 0 and json.loads(planned.out)["engine"] == "march"
-    ran = cli("run", path, "-o", tmp_path / "out")
-    assert ran.code == 0, ran.err
+    plan_answer = cli("plan", path, "--json")
+    assert plan_answer.code == 0 and json.loads(plan_answer.out)["engine"] == "march"
+    run_answer = cli("run", path, "-o", tmp_path / "out")
+    assert run_answer.code == 0, run_answer.err
     assert (
         "slip_amplitude_3"
         in json.loads((tmp_path / "out" / "summary.json").read_text())["measures"]
@@ -170,7 +186,7 @@ def test_always_check_plan_run_and_sweep_take_a_plane(tmp_path):
         force = np.hypot(data.friction_force, data.lateral_force)
         assert force.shape == data.lateral_displacement.shape and float(force.max()) > 0.5
         assert data.lateral_velocity.attrs["units"] == "m s-1"
-    swept = cli(
+    sweep_answer = cli(
         "sweep",
         path,
         "--over",
@@ -179,7 +195,7 @@ def test_always_check_plan_run_and_sweep_take_a_plane(tmp_path):
         tmp_path / "swept",
         "--no-page",
     )
-    assert swept.code == 0, swept.err
+    assert sweep_answer.code == 0, sweep_answer.err
 
 
 REFUSED = {
@@ -215,27 +231,27 @@ cycles = 4
 
 
 @pytest.mark.parametrize("keys", REFUSED)
-def test_refuses_pairs_that_are_no_second_direction(keys, tmp_path):
-    with pytest.raises(pf.SceneError, match=r"lateral|bonded") as caught:
-        run_of(tmp_path, "bad", MASSES.replace("lateral = [2, 0]", keys))
-    assert REFUSED[keys] in str(caught.value)
+def test_refuses_faulty_lateral_pairs(keys, tmp_path):
+    with pytest.raises(pf.SceneError, match=r"lateral|bonded") as error:
+        run_scene(tmp_path, "bad", MASSES.replace("lateral = [2, 0]", keys))
+    assert REFUSED[keys] in str(error.value)
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_refuses_laws_without_a_form_in_a_plane(law, tmp_path):
+def test_refuses_laws_without_plane_form(law, tmp_path):
     more = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(
         law, ""
     )
-    with pytest.raises(pf.SceneError) as caught:
-        run_of(
+    with pytest.raises(pf.SceneError) as error:
+        run_scene(
             tmp_path,
             "bad",
             MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', more),
         )
-    assert LAWS[law] in str(caught.value)
+    assert LAWS[law] in str(error.value)
 
 
-def test_refuses_a_patch_a_file_a_backbone_and_friction_elements(tmp_path):
+def test_refuses_plane_interface_with_patch_file_or_backbone(tmp_path):
     patch = MASSES.replace(
         'load = "50 N"\nlateral = [2, 0]',
         "lateral = [2, 0]\n[structure.interface.contact]\n"
@@ -244,15 +260,15 @@ def test_refuses_a_patch_a_file_a_backbone_and_friction_elements(tmp_path):
     with pytest.raises(
         pf.SceneError, match=r"lateral: not supported yet with \[structure.interface.contact\]"
     ):
-        run_of(tmp_path, "bad", patch)
+        run_scene(tmp_path, "bad", patch)
     np.savez(tmp_path / "whole.npz", M=np.eye(3), K=np.diag([4e4] * 3))
     file = '[structure]\nfile = "whole.npz"\n' + MASSES[MASSES.index("[[structure.interface]]") :]
     with pytest.raises(pf.SceneError, match=r"lateral: not supported yet with structure\.file"):
-        run_of(tmp_path, "bad", file)
+        run_scene(tmp_path, "bad", file)
     (tmp_path / "good.toml").write_text(MASSES)
     with pytest.raises(
         pf.PatchfemError, match="a backbone with interfaces that slide in a plane is not supported"
     ):
         pf.backbone(tmp_path / "good.toml")
-    wrote = cli("export", tmp_path / "good.toml", "-o", tmp_path / "rig.mat")
-    assert wrote.code == 2 and "cannot be written with structure.interface.lateral" in wrote.err
+    answer = cli("export", tmp_path / "good.toml", "-o", tmp_path / "rig.mat")
+    assert answer.code == 2 and "cannot be written with structure.interface.lateral" in answer.err

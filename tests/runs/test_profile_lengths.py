@@ -1,4 +1,4 @@
-"""A profile on the mesh that the tolerance chooses: it is averaged over cells that follow the tolerance."""
+"""Profiles on automatic meshes: they are averaged over lengths that follow the tolerance."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ SKIN = (
 )
 
 
-def pressed(tmp_path, x, z, text, *settings):
+def run_profile(tmp_path, x, z, text, *settings):
+    """Return the result of a scene with a profile x, z [m]."""
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), z.tolist()))
     (tmp_path / "trace.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
     scene = text + '[contact.profile]\nfile = "trace.csv"\n'
@@ -25,9 +26,10 @@ def pressed(tmp_path, x, z, text, *settings):
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
-def test_a_punch_with_rounded_ends_from_a_file_is_that_in_closed_form(tmp_path, tolerance):
-    """Its flat is a sixteenth of the pieces, which lowers the peak of half planes by some 1.7e-3. The averages over
-    a two-hundredth of the length were 12 % off behind a bar of 0.1 %."""
+def test_exact_rounded_punch_as_profile_agrees_with_closed_form(tmp_path, tolerance):
+    """Peak pressure and half-width agree with the closed form within the errors plus 2e-3, because
+    the flat is not small against the pieces. Averages over 1/200 of the length were wrong by 12 %
+    with an error of 0.1 %."""
     flat = 0.5e-3
     radius = 20e-3
     load = 5e4
@@ -37,63 +39,70 @@ def test_a_punch_with_rounded_ends_from_a_file_is_that_in_closed_form(tmp_path, 
         '[contact]\nlength = "16 mm"\nwidth = "1 m"\nheight = "8 mm"\nload = "50 kN"\n'
         'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
     )
-    found = pressed(tmp_path, x, z, text, f"accuracy.tolerance={tolerance}")
+    result = run_profile(tmp_path, x, z, text, f"accuracy.tolerance={tolerance}")
     modulus = closed_forms.combined_modulus(120e9, 0.32)
     half = closed_forms.rounded_punch_half_width(load, flat, radius, modulus)
-    top = closed_forms.rounded_punch_pressure(
+    peak = closed_forms.rounded_punch_pressure(
         np.linspace(flat, half, 4001), load, flat, radius, modulus
     ).max()
-    for name, truth, share in (("pressure_peak", top, 2e-3), ("contact_half_width", half, 4e-4)):
-        measure = found.measures[name]
-        assert abs(measure.value - truth) <= measure.error + share * truth, name
-        assert measure.error <= tolerance * truth or found.warnings
+    for name, reference, rel_tol in (
+        ("pressure_peak", peak, 2e-3),
+        ("contact_half_width", half, 4e-4),
+    ):
+        measure = result.measures[name]
+        assert abs(measure.value - reference) <= measure.error + rel_tol * reference, name
+        assert measure.error <= tolerance * reference or result.warnings
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("size", ["", "32 um"])
-def test_beside_asperities_the_stiffness_does_not_hang_on_the_cells(tmp_path, size):
-    """The trace ends and the law begins at a hundredth of the length, whatever the mesh; a note names it."""
+def test_exact_stiffness_with_asperities_does_not_depend_on_mesh(tmp_path, size):
+    """Waves of the profile that are longer than 1/100 of the length form the gap on every mesh;
+    shorter ones belong to the asperity law. A warning names this length."""
     x = np.linspace(-6.35e-3, 6.35e-3, 3176)
     z = 0.2e-6 * np.cos(2 * np.pi * x / 1.27e-3) + 0.1e-6 * np.cos(2 * np.pi * x / 90e-6)
     text = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + SKIN
-    even = pressed(tmp_path, x, z, text, "contact.element_size=16 um").measures["normal_stiffness"]
-    found = pressed(tmp_path, x, z, text, *([f"contact.element_size={size}"] if size else []))
-    mine = found.measures["normal_stiffness"]
-    assert abs(mine.value - even.value) <= mine.error + even.error
-    assert mine.value == pytest.approx(even.value, rel=5e-3)
+    uniform_mesh = run_profile(tmp_path, x, z, text, "contact.element_size=16 um").measures[
+        "normal_stiffness"
+    ]
+    result = run_profile(tmp_path, x, z, text, *([f"contact.element_size={size}"] if size else []))
+    stiffness = result.measures["normal_stiffness"]
+    assert abs(stiffness.value - uniform_mesh.value) <= stiffness.error + uniform_mesh.error
+    assert stiffness.value == pytest.approx(uniform_mesh.value, rel=5e-3)
     assert any(
-        "waves longer than 127 um give the shape of the gap" in text for text in found.warnings
+        "waves longer than 127 um give the shape of the gap" in text for text in result.warnings
     )
 
 
-# studies/contact/order_four.py, an independent program: contact interval [m], approach [m], peak [Pa], stiffness [N/m]
+# Contact length [m], approach [m], peak [Pa] and stiffness [N/m] of the independent program
+# studies/contact/order_four.py.
 CROWN = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)
 
 
-def on_points(tmp_path, x, z, text, *settings):
-    """Static measures of a profile from points as fine as its file, (value, error) by name."""
+def solve_profile_on_points(tmp_path, x, z, text, *settings):
+    """Return name -> (value, error) of a profile solved on points as fine as its file."""
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), z.tolist()))
     (tmp_path / "trace.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
-    asked = build(
+    patch_model = build(
         loads(
             text + '[contact.profile]\nfile = "trace.csv"\n', tmp_path / "scene.toml", sets=settings
         )
     ).patch
-    assert trace.can_use_points(asked)
-    return trace.solve_on_points(asked, lambda found: True).measures
+    assert trace.can_use_points(patch_model)
+    return trace.solve_on_points(patch_model, lambda found: True).measures
 
 
-def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):
-    """A crown of 1 m read from a file of 1001 samples, on the coated pieces of the rig."""
+def test_exact_profile_on_points_agrees_with_independent_program(tmp_path):
+    """A crown of 1 m, read from a file of 1001 samples, on the coated pieces of the rig."""
     x = np.linspace(-6.35e-3, 6.35e-3, 1001)
-    found = on_points(
+    measures = solve_profile_on_points(
         tmp_path, x, x**2 / 2, PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
     )
     names = ("contact_half_width", "approach", "pressure_peak", "normal_stiffness")
-    for name, truth in zip(names, (CROWN[0] / 2, *CROWN[1:]), strict=True):
-        value, error, _ = found[name]
-        assert abs(value - truth) <= error + 5e-6 * truth, name
-        assert error <= 1e-3 * truth, name
+    for name, reference in zip(names, (CROWN[0] / 2, *CROWN[1:]), strict=True):
+        value, error, _ = measures[name]
+        assert abs(value - reference) <= error + 5e-6 * reference, name
+        assert error <= 1e-3 * reference, name
 
 
 @pytest.mark.parametrize(
@@ -104,16 +113,20 @@ def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):
         pytest.param("contact.plane=stress", marks=pytest.mark.slow),
     ],
 )
-def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
-    """A wave of a tenth of the length under a free rotation, of unlike pieces, in plane stress."""
+def test_exact_profile_on_points_agrees_with_mesh_within_errors(tmp_path, pieces):
+    """A profile with a wavelength of a tenth of the length, with free rotation, unlike pieces or
+    plane stress, agrees between points and elements."""
     x = np.linspace(-6.35e-3, 6.35e-3, 1271)
     z = 0.1e-6 * np.cos(2 * np.pi * x / 1.27e-3)
     text = PIECE + 'load = "500 N"\nsubstrate = "steel"\n' + COATING
-    points = on_points(tmp_path, x, z, text, pieces)
-    even = pressed(tmp_path, x, z, text, pieces, "contact.element_size=16 um").measures
-    # the shear of unlike pieces is left to the cells
+    points = solve_profile_on_points(tmp_path, x, z, text, pieces)
+    uniform_mesh = run_profile(tmp_path, x, z, text, pieces, "contact.element_size=16 um").measures
+    # The shear stiffness of unlike pieces is computed on the mesh only.
     assert len(points) == (11 if "lower" in pieces else 12)
     for name, (value, error, _) in points.items():
-        assert abs(value - even[name].value) <= error + even[name].error + even[name].floor, name
+        assert (
+            abs(value - uniform_mesh[name].value)
+            <= error + uniform_mesh[name].error + uniform_mesh[name].floor
+        ), name
         if name in ("approach", "pressure_peak", "normal_stiffness"):
             assert error <= 2e-3 * abs(value), name

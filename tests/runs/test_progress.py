@@ -1,4 +1,4 @@
-"""Progress is said on the way and changes nothing: a run on a terminal answers as one in a pipe does."""
+"""A progress callback is called during a run and does not change its result."""
 
 import pytest
 from scene_texts import KEYS
@@ -9,7 +9,8 @@ from patchfem.scene import loads, read_template
 LAWS = "coulomb", "elastic-plastic", "nonlocal", "tanh", "lugre", "iwan"
 
 
-def scene(law, *sets):
+def load_rig(law, *sets):
+    """Return the scene of the rig template with a friction law."""
     return loads(
         read_template("rig").replace('"coulomb"', f'"{law}"\n{KEYS[law]}'),
         sets=("drive.cycles=40", *sets),
@@ -20,16 +21,16 @@ def scene(law, *sets):
 @pytest.mark.parametrize(
     "law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))]
 )
-def test_exact_a_progress_callback_changes_no_result(law, sets):
-    alone = pf.run(scene(law, *sets))
-    seen = pf.run(scene(law, *sets), progress=lambda share: None)
-    assert {name: (one.value, one.error) for name, one in alone.measures.items()} == {
-        name: (one.value, one.error) for name, one in seen.measures.items()
-    }
+def test_exact_progress_callback_changes_no_result(law, sets):
+    without_callback = pf.run(load_rig(law, *sets))
+    with_callback = pf.run(load_rig(law, *sets), progress=lambda share: None)
+    assert {
+        name: (measure.value, measure.error) for name, measure in without_callback.measures.items()
+    } == {name: (measure.value, measure.error) for name, measure in with_callback.measures.items()}
 
 
-def test_always_a_long_run_reports_its_progress():
-    """Under a sweep, for a motion that repeats is not run to its end."""
+def test_always_long_run_reports_progress():
+    """A sweep reports its progress on the way; a run that becomes steady would end early."""
     head, drive = (
         read_template("rig")
         .replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}')
@@ -39,8 +40,8 @@ def test_always_a_long_run_reports_its_progress():
         '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "160 Hz"\nrate = "2 Hz/s"\n'
         'acceleration = "5 g"\n[accuracy]' + drive.split("[accuracy]")[1]
     )
-    shares = []
-    pf.run(loads(head + drive), progress=shares.append)
-    assert sum(0.2 < share < 0.9 for share in shares) >= 1
-    assert shares == sorted(shares)
-    assert shares[-1] <= 1.0
+    fractions = []
+    pf.run(loads(head + drive), progress=fractions.append)
+    assert sum(0.2 < fraction < 0.9 for fraction in fractions) >= 1
+    assert fractions == sorted(fractions)
+    assert fractions[-1] <= 1.0

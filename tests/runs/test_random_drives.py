@@ -1,4 +1,4 @@
-"""Random drives from the scene to the result: the motion against scipy's, energies under friction, refusals."""
+"""Random vibration: the motion against SciPy's linear filter, energies with friction, refusals."""
 
 import numpy as np
 import pytest
@@ -30,55 +30,64 @@ SHAKEN = (
 )
 
 
-def test_exact_the_motion_is_that_of_its_record():
-    """The same record through scipy's linear filter gives the motion, its root mean square and its spectrum."""
+def test_exact_random_response_agrees_with_scipy_lsim():
+    """The motion under a random record and its root mean square agree with SciPy's linear filter of
+    this record, and its spectrum is consistent with both."""
     result = pf.run(RIG)
     drive = result.plan.model.rig.drive.signal
     omega = 2 * np.pi * 100
     zeta = 0.02
-    _, place, _ = lsim(
+    _, displacement, _ = lsim(
         lti([[0, 1], [-(omega**2), -2 * zeta * omega]], [[0], [-1]], [[1, 0]], [[0]]),
         drive.value,
         drive.time,
         interp=True,
     )
-    first = result.window.time[0]
-    # three decay times, up to a cycle less
-    assert first == pytest.approx(3 / (zeta * omega), abs=0.011)
-    steps = result.response.time / drive.time[1]
-    at_rows = np.abs(steps - np.round(steps)) < 1e-6
-    true = np.interp(result.response.time, drive.time, place)
-    assert np.abs(result.response.output - true)[at_rows].max() < 1e-9 * np.abs(place).max()
-    found = {name: result.measures[name] for name in SHAKEN}
-    assert found["relative_displacement_rms"].value == pytest.approx(
-        place[drive.time >= first].std(), rel=2e-3
+    start = result.window.time[0]
+    # The window starts after three decay times, up to one cycle less.
+    assert start == pytest.approx(3 / (zeta * omega), abs=0.011)
+    sample_index = result.response.time / drive.time[1]
+    at_samples = np.abs(sample_index - np.round(sample_index)) < 1e-6
+    expected = np.interp(result.response.time, drive.time, displacement)
+    assert (
+        np.abs(result.response.output - expected)[at_samples].max()
+        < 1e-9 * np.abs(displacement).max()
+    )
+    measures = {name: result.measures[name] for name in SHAKEN}
+    assert measures["relative_displacement_rms"].value == pytest.approx(
+        displacement[drive.time >= start].std(), rel=2e-3
     )
     assert (
-        abs(found["response_frequency"].value - 100)
+        abs(measures["response_frequency"].value - 100)
         < 2 * result.measures["response_frequency_scatter"].value
     )
-    assert all(one.error is not None for one in found.values()) and result.outcome == "done"
+    assert (
+        all(measure.error is not None for measure in measures.values()) and result.outcome == "done"
+    )
     data = result.to_xarray()
     assert data["absolute_acceleration_spectrum"].attrs["units"] == "m2 s-3"
     power = data["relative_displacement_spectrum"]
     assert np.sqrt(power.sum() * power.frequency[0]) == pytest.approx(
-        found["relative_displacement_rms"].value, rel=0.1
+        measures["relative_displacement_rms"].value, rel=0.1
     )
 
 
-def test_exact_energies_balance_under_elastic_plastic_friction():
+def test_exact_random_vibration_energies_balance():
     result = pf.run(RIG | PLASTIC)
-    m = result.measures
-    assert m["energy_balance"].value < 1e-11 and m["work_check"].value < 1e-9
+    measures = result.measures
+    assert measures["energy_balance"].value < 1e-11 and measures["work_check"].value < 1e-9
     ledger = result.to_xarray()[["friction_work", "energy_dissipated", "energy_stored"]].isel(
         time=-1
     )
     assert float(ledger.friction_work) == pytest.approx(
         float(ledger.energy_dissipated + ledger.energy_stored), 1e-9
     )
-    assert m["friction_work"].value == pytest.approx(float(ledger.friction_work), rel=1e-9)
-    # stuck 164.2 Hz
-    assert 100 < m["response_frequency"].value < 165 and m["response_damping"].value > 0.02
+    assert measures["friction_work"].value == pytest.approx(float(ledger.friction_work), rel=1e-9)
+    # The natural frequency of the stuck rig is 164.2 Hz.
+    assert (
+        100 < measures["response_frequency"].value < 165
+        and measures["response_damping"].value > 0.02
+    )
     stuck = pf.run(
         RIG | PLASTIC | {"friction": {"law": "coulomb", "static": 0.9}}, **{"normal.load": "900 N"}
     )
@@ -87,40 +96,41 @@ def test_exact_energies_balance_under_elastic_plastic_friction():
     )
 
 
-def test_each_seed_gives_its_own_reproducible_record():
-    first, again, other = (
+def test_exact_seed_determines_random_record():
+    first, repeated, other = (
         pf.run(RIG, **{"drive.seed": seed, "drive.duration": "1 s"}).measures for seed in (1, 1, 2)
     )
-    assert first["relative_displacement_rms"].value == again["relative_displacement_rms"].value
+    assert first["relative_displacement_rms"].value == repeated["relative_displacement_rms"].value
     assert first["relative_displacement_rms"].value != other["relative_displacement_rms"].value
     swept = pf.sweep(RIG, {"drive.seed": [1, 2], "drive.duration": ["1 s"]})
     assert swept["relative_displacement_rms"].values.ravel() == pytest.approx(
-        [one["relative_displacement_rms"].value for one in (first, other)], rel=1e-12
+        [measures["relative_displacement_rms"].value for measures in (first, other)], rel=1e-12
     )
 
 
-def test_exact_a_table_of_one_level_is_the_spectrum_of_that_level(tmp_path):
+def test_exact_constant_spectrum_table_agrees_with_single_level(tmp_path):
     path = tmp_path / "spectrum.csv"
     path.write_text("frequency [Hz],level [g^2/Hz]\n10,0.01\n0.4e3,0.01\n", "utf-8")
     drive = {name: one for name, one in RIG["drive"].items() if name != "spectrum"} | {
         "file": str(path)
     }
     one, other = (
-        pf.build(RIG | {"drive": each}).rig.drive.signal for each in (RIG["drive"], drive)
+        pf.build(RIG | {"drive": drive_keys}).rig.drive.signal
+        for drive_keys in (RIG["drive"], drive)
     )
     assert other.value == pytest.approx(one.value, rel=1e-9) and other.band == one.band
-    for text, said in (
+    for text, message in (
         ("frequency [Hz],level [g^2/Hz]\n10,0.01\n5,0.01\n", r"csv:3: frequencies must be above"),
         ("frequency [Hz],level [g]\n10,0.01\n50,0.01\n", "unknown unit"),
         ("frequency [Hz],level [g^2/Hz]\n50,0.01\n100,0.01\n", "reach beyond the spectrum"),
     ):
         path.write_text(text, "utf-8")
-        with pytest.raises(pf.PatchfemError, match=said):
+        with pytest.raises(pf.PatchfemError, match=message):
             pf.run(RIG | {"drive": drive})
 
 
 @pytest.mark.parametrize(
-    "given, said",
+    "changes, message",
     [
         ({"kind": "force"}, r"drive\.kind: waveform .random. can only shake the base"),
         ({"to": "20 Hz"}, "is not above"),
@@ -134,7 +144,7 @@ def test_exact_a_table_of_one_level_is_the_spectrum_of_that_level(tmp_path):
         ({"duration": "0.01 s"}, "short for a band"),
     ],
 )
-def test_refuses_a_random_drive_that_none_can_be(given, said):
-    drive = {name: one for name, one in (RIG["drive"] | given).items() if one is not None}
-    with pytest.raises(pf.PatchfemError, match=said):
+def test_refuses_faulty_random_drive(changes, message):
+    drive = {name: value for name, value in (RIG["drive"] | changes).items() if value is not None}
+    with pytest.raises(pf.PatchfemError, match=message):
         pf.run(RIG | {"drive": drive})

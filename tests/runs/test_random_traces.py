@@ -1,4 +1,5 @@
-"""Bars of static measures under random traces, nothing pinned, against cells alone."""
+"""Errors of static measures under random profiles with default settings, against solutions on
+elements alone."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ SEEDS = range(3000, 3060)
 
 @pytest.mark.share(3)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_bars_of_a_random_trace_hold_cells_alone(seed, tmp_path):
-    """All intervals of a trace overlap those of the cells."""
+def test_always_errors_of_random_profile_cover_element_solution(seed, tmp_path):
+    """The error intervals of all measures of a random profile overlap those of the solution on
+    elements."""
     rows = compare_trace(seed, tmp_path)["rows"]
     assert rows and not [row for row in rows if not row.holds]

@@ -1,4 +1,5 @@
-"""Scenes of every kind through the command line: exit codes, the results folder, and what must hold inside it."""
+"""Scenes of every kind through the command line: exit codes, the results folder and the consistency
+of its files."""
 
 import json
 import socket
@@ -37,40 +38,43 @@ WITH_FIELDS = ["patch", "bench patch", "rig patch"]
 
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory):
-    """name -> (results folder, answer of --json) of every scene, each run once."""
+def run_case(tmp_path_factory):
+    """Return a function name -> (results folder, answer of --json) that runs each scene once."""
     base = tmp_path_factory.mktemp("runs")
-    out = {}
+    results = {}
 
     def of(name):
-        if name not in out:
+        if name not in results:
             path = base / f"{name}.toml"
             path.write_text(SCENES[name], "utf-8")
             answer = cli("run", path, "-o", base / name, "--json")
             assert answer.code == 0, answer.err
-            out[name] = base / name, answer
-        return out[name]
+            results[name] = base / name, answer
+        return results[name]
 
     return of
 
 
 @pytest.fixture
-def written(tmp_path):
-    def write(text, name="scene.toml"):
+def write_scene(tmp_path):
+    """Return a function that writes a scene to a file."""
+
+    def write_text(text, name="scene.toml"):
         path = tmp_path / name
         path.write_text(text, "utf-8")
         return path
 
-    return write
+    return write_text
 
 
-def netcdf(folder):
+def read_netcdf(folder):
+    """Return the dataset result.nc of a results folder."""
     with xr.open_dataset(folder / "result.nc", engine="h5netcdf") as data:
         return data.load()
 
 
-class Fields:
-    """fields.vtkhdf as VTK's own reader gives it: blocks of arrays."""
+class FieldReader:
+    """Blocks of arrays of fields.vtkhdf as VTK's own reader returns them."""
 
     def __init__(self, folder):
         self.reader = vtkHDFReader()
@@ -81,12 +85,12 @@ class Fields:
     def frame(self, step):
         self.reader.SetStep(step)
         self.reader.Update()
-        out = self.reader.GetOutputDataObject(0)
-        named = {
-            out.GetMetaData(k).Get(vtkCompositeDataSet.NAME()): self._block(out.GetBlock(k))
-            for k in range(out.GetNumberOfBlocks())
+        blocks = self.reader.GetOutputDataObject(0)
+        blocks_by_name = {
+            blocks.GetMetaData(k).Get(vtkCompositeDataSet.NAME()): self._block(blocks.GetBlock(k))
+            for k in range(blocks.GetNumberOfBlocks())
         }
-        return SimpleNamespace(time=self.reader.GetTimeValue(), **named)
+        return SimpleNamespace(time=self.reader.GetTimeValue(), **blocks_by_name)
 
     @staticmethod
     def _block(grid):
@@ -107,16 +111,16 @@ class Fields:
         )
 
 
-# what every run leaves behind
+# Files that every run writes.
 
 
 @pytest.mark.share(0, 1, 2, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_summary(done, name):
-    folder, answer = done(name)
+def test_exact_summary_agrees_with_output_and_scene(run_case, name):
+    folder, answer = run_case(name)
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
     assert json.loads(answer.out) == summary and len(answer.out.strip().splitlines()) == 1
-    always = {
+    common_keys = {
         "patchfem",
         "title",
         "kind",
@@ -129,20 +133,22 @@ def test_exact_summary(done, name):
         "seconds",
         "numerics",
     }
-    parts = {"contact"} if "contact_fraction" in summary["measures"] else set()
-    assert set(summary) == always | parts | ({"loop"} if name == "bench patch" else set())
+    contact_keys = {"contact"} if "contact_fraction" in summary["measures"] else set()
+    assert set(summary) == common_keys | contact_keys | (
+        {"loop"} if name == "bench patch" else set()
+    )
     assert summary["kind"] == name.split()[0] and summary["outcome"] in set(Outcome)
-    for one in summary["measures"].values():
-        assert set(one) == {"value", "unit", "error", "floor"} | (
-            {"reason"} if one["value"] is None else set()
+    for entry in summary["measures"].values():
+        assert set(entry) == {"value", "unit", "error", "floor"} | (
+            {"reason"} if entry["value"] is None else set()
         )
     seconds = summary["seconds"]
     assert ("contact" in seconds) == ("[contact]" in SCENES[name])
     assert 0 < seconds.get("contact", seconds["total"]) <= seconds["total"]
-    named = [one["effect"] for one in summary["effects"]]
-    assert all(set(one) == {"effect", "equations", "seconds"} for one in summary["effects"])
-    assert named == load(folder.with_suffix(".toml")).effect_names()
-    assert set(summary["not_in_scene"]) == {*EFFECTS} - set(named)
+    effect_names = [entry["effect"] for entry in summary["effects"]]
+    assert all(set(entry) == {"effect", "equations", "seconds"} for entry in summary["effects"])
+    assert effect_names == load(folder.with_suffix(".toml")).effect_names()
+    assert set(summary["not_in_scene"]) == {*EFFECTS} - set(effect_names)
     fields = {"fields.vtkhdf"} if name in WITH_FIELDS else set()
     assert {path.name for path in folder.iterdir()} == {
         "summary.json",
@@ -166,13 +172,13 @@ MEASURES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_measures_of_the_kind(done, name):
-    measures = json.loads(done(name)[1].out)["measures"]
-    wanted = MEASURES[name.split()[0]].split() + (
+def test_exact_run_has_measures_of_its_kind(run_case, name):
+    measures = json.loads(run_case(name)[1].out)["measures"]
+    expected = MEASURES[name.split()[0]].split() + (
         MEASURES["patch"].split() if name in WITH_FIELDS else []
     )
-    assert set(wanted) <= set(measures)
-    assert all(measures[key]["value"] is not None for key in wanted)
+    assert set(expected) <= set(measures)
+    assert all(measures[key]["value"] is not None for key in expected)
     if "energy_balance" in measures:
         assert measures["energy_balance"]["value"] <= 1e-10
     if "normal_load" in measures:
@@ -180,18 +186,20 @@ def test_exact_measures_of_the_kind(done, name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_resolved_scene_is_the_scene(done, name):
-    folder, _ = done(name)
+def test_exact_resolved_scene_equals_scene(run_case, name):
+    folder, _ = run_case(name)
     first = load(folder.with_suffix(".toml"))
-    again = load(folder / "scene.resolved.toml")
-    assert again.effect_names() == first.effect_names() and again.resolved() == first.resolved()
+    resolved = load(folder / "scene.resolved.toml")
+    assert (
+        resolved.effect_names() == first.effect_names() and resolved.resolved() == first.resolved()
+    )
 
 
 @pytest.mark.share(0, 1, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_netcdf(done, name):
-    folder, answer = done(name)
-    data = netcdf(folder)
+def test_exact_netcdf_file_has_units_and_balanced_fields(run_case, name):
+    folder, answer = run_case(name)
+    data = read_netcdf(folder)
     kind = name.split()[0]
     summary = json.loads(answer.out)
     assert all(
@@ -199,11 +207,11 @@ def test_exact_netcdf(done, name):
         for variable in data.variables.values()
         if variable.dtype.kind == "f"
     )
-    wanted = {"relative_displacement": "m", "relative_velocity": "m s-1"} if kind != "patch" else {}
+    units = {"relative_displacement": "m", "relative_velocity": "m s-1"} if kind != "patch" else {}
     if kind in ("bench", "rig"):
-        wanted |= {"friction_force": "N", "normal_load": "N"}
+        units |= {"friction_force": "N", "normal_load": "N"}
     if kind in ("linear", "rig"):
-        wanted |= {
+        units |= {
             "absolute_acceleration": "m s-2",
             "base_acceleration": "m s-2",
             "modal_coordinate": "m",
@@ -212,7 +220,7 @@ def test_exact_netcdf(done, name):
             "axial"
         ]
     if name in WITH_FIELDS:
-        wanted |= {"weight": "m2", "normal_stress": "Pa", "gap": "m"}
+        units |= {"weight": "m2", "normal_stress": "Pa", "gap": "m"}
         np.testing.assert_allclose((data.weight * data.normal_stress).sum("x"), LOAD, rtol=1e-10)
         assert float(data.weight.sum()) == pytest.approx(WIDTH * 0.0127, rel=1e-12)
         assert (data.normal_stress >= 0).all()
@@ -221,7 +229,7 @@ def test_exact_netcdf(done, name):
         centre = float((data.x * data.weight * data.normal_stress).sum("x")[0]) / LOAD
         assert centre == pytest.approx(summary["measures"]["pressure_centre"]["value"], rel=1e-9)
         assert ((data.status == 0) == (data.normal_stress == 0)).all()
-    assert {key: data[key].attrs["units"] for key in wanted} == wanted
+    assert {key: data[key].attrs["units"] for key in units} == units
     assert kind == "patch" or ((np.diff(data.time) > 0).all() and data.time[0] == 0)
     assert data.attrs["Conventions"].startswith("CF-")
     assert data.attrs["outcome"] == summary["outcome"]
@@ -232,47 +240,55 @@ def test_exact_netcdf(done, name):
 
 
 @pytest.mark.parametrize("name", ["rig", "rig march", "rig patch", "linear"])
-def test_exact_newton_holds_at_every_sample(done, name):
-    """m (a_abs) = -k q - c v - F at each kept sample."""
-    data = netcdf(done(name)[0])
+def test_exact_equation_of_motion_holds_at_every_sample(run_case, name):
+    """The absolute acceleration times the mass equals -k q - c v - F at each stored sample."""
+    data = read_netcdf(run_case(name)[0])
     mass = 0.884
     force = data.friction_force if name != "linear" else 0.0
-    wanted = (
+    expected = (
         -(OMEGA**2) * data.relative_displacement
         - 2 * 0.003 * OMEGA * data.relative_velocity
         - force / mass
     )
     np.testing.assert_allclose(
-        data.absolute_acceleration, wanted, rtol=0, atol=1e-9 * float(np.abs(wanted).max())
+        data.absolute_acceleration, expected, rtol=0, atol=1e-9 * float(np.abs(expected).max())
     )
 
 
-def test_exact_shear_frames_carry_the_friction_force(done):
-    data = netcdf(done("rig patch")[0])
+def test_exact_shear_stress_sums_to_friction_force(run_case):
+    data = read_netcdf(run_case("rig patch")[0])
     total = (data.weight * data.shear_stress).sum("x").values
-    at = np.interp(data.frame_time.values[1:], data.time.values, data.friction_force.values)
-    np.testing.assert_allclose(total[1:], at, rtol=0, atol=1e-8 * 0.3 * LOAD)
+    expected = np.interp(data.frame_time.values[1:], data.time.values, data.friction_force.values)
+    np.testing.assert_allclose(total[1:], expected, rtol=0, atol=1e-8 * 0.3 * LOAD)
     limit = 0.3 * data.normal_stress
     assert float((np.abs(data.shear_stress) - limit).max()) <= 1e-9 * float(limit.max())
 
 
-# fields
+# Field files.
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
-def test_exact_the_interface_closes_where_it_is_pressed(done, name):
-    folder, _ = done(name)
-    fields = Fields(folder)
-    data = netcdf(folder)
+def test_exact_displacements_of_both_pieces_close_the_gap(run_case, name):
+    folder, _ = run_case(name)
+    fields = FieldReader(folder)
+    data = read_netcdf(folder)
     for step in (0, fields.steps - 1):
         frame = fields.frame(step)
-        low, high = (np.flatnonzero(body.place[:, 1] == 0) for body in (frame.lower, frame.upper))
-        np.testing.assert_allclose(frame.lower.place[low], frame.upper.place[high], atol=1e-15)
-        np.testing.assert_allclose(frame.lower.place[low], frame.interface.place, atol=1e-15)
-        np.testing.assert_allclose(
-            frame.interface.displacement, frame.lower.displacement[low], atol=1e-15
+        lower_nodes, upper_nodes = (
+            np.flatnonzero(body.place[:, 1] == 0) for body in (frame.lower, frame.upper)
         )
-        opening = frame.upper.displacement[high, 1] - frame.lower.displacement[low, 1]
+        np.testing.assert_allclose(
+            frame.lower.place[lower_nodes], frame.upper.place[upper_nodes], atol=1e-15
+        )
+        np.testing.assert_allclose(
+            frame.lower.place[lower_nodes], frame.interface.place, atol=1e-15
+        )
+        np.testing.assert_allclose(
+            frame.interface.displacement, frame.lower.displacement[lower_nodes], atol=1e-15
+        )
+        opening = (
+            frame.upper.displacement[upper_nodes, 1] - frame.lower.displacement[lower_nodes, 1]
+        )
         np.testing.assert_allclose(opening, frame.interface.gap, atol=1e-12)
         np.testing.assert_allclose(opening[data.normal_stress[step] > 0], 0.0, atol=1e-12)
         np.testing.assert_allclose(
@@ -281,11 +297,12 @@ def test_exact_the_interface_closes_where_it_is_pressed(done, name):
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
-def test_exact_every_row_of_cells_carries_the_load(done, name):
-    """A horizontal cut through either body balances the load and the friction force, tension > 0."""
-    folder, _ = done(name)
-    fields = Fields(folder)
-    data = netcdf(folder)
+def test_exact_every_row_of_elements_carries_the_load(run_case, name):
+    """The stresses on a horizontal section through either piece balance the normal load and the
+    friction force."""
+    folder, _ = run_case(name)
+    fields = FieldReader(folder)
+    data = read_netcdf(folder)
     for step in range(0, fields.steps, 5):
         frame = fields.frame(step)
         shear = (
@@ -308,20 +325,21 @@ def test_exact_every_row_of_cells_carries_the_load(done, name):
             )
 
 
-# numbers that must agree with each other
+# Numbers of different ways that must agree.
 
 
-def test_exact_pressure_on_the_upper_piece_is_one_point(monkeypatch):
-    """Rigid slide, constant load: the path of every interface point gives the resultant of the lumped contact."""
+def test_exact_rigid_patch_agrees_with_point_contact(monkeypatch):
+    """For a rigid slide under constant load, the friction of every interface point adds up to that
+    of a point contact."""
     text = SMALL_PATCH + NONLOCAL + STRUCTURE + STEPS
     lumped = run(loads(text), estimate=False)
     point = run(loads(POINT + NONLOCAL + STRUCTURE + STEPS), estimate=False)
-    with monkeypatch.context() as changed:
-        changed.setattr(
+    with monkeypatch.context() as patched:
+        patched.setattr(
             rig, "choose_numerics", lambda model: replace(choose_numerics(model), per_point=True)
         )
-        each = run(loads(text), estimate=False)
-    assert not any("the shape of the patch does not affect" in text for text in each.warnings)
+        per_point = run(loads(text), estimate=False)
+    assert not any("the shape of the patch does not affect" in text for text in per_point.warnings)
     for name in (
         "relative_displacement_amplitude",
         "absolute_acceleration_peak",
@@ -330,26 +348,28 @@ def test_exact_pressure_on_the_upper_piece_is_one_point(monkeypatch):
         "friction_force_peak",
         "equivalent_stiffness",
     ):
-        assert each.measures[name].value == pytest.approx(point.measures[name].value, rel=1e-10)
+        assert per_point.measures[name].value == pytest.approx(
+            point.measures[name].value, rel=1e-10
+        )
     for name in ("slide", "force", "slip", "acceleration"):
-        mine = getattr(each.response, name)
-        other = getattr(point.response, name)
-        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-10 * np.abs(other).max())
+        actual = getattr(per_point.response, name)
+        expected = getattr(point.response, name)
+        np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
     assert any("the shape of the patch does not affect" in sentence for sentence in lumped.warnings)
     assert lumped.measures["loop_area"].value == pytest.approx(
         point.measures["loop_area"].value, rel=1e-10
     )
 
 
-def test_exact_mesh_round_trip(written, tmp_path):
-    """The patch on the mesh that was written is the patch on the mesh that was made."""
-    scene = written(SMALL_PATCH)
+def test_exact_written_mesh_gives_same_patch(write_scene, tmp_path):
+    """The patch on a mesh that was written to a file agrees with the patch on the generated mesh."""
+    scene = write_scene(SMALL_PATCH)
     answer = cli("mesh", scene, "-o", tmp_path / "pair.msh")
     assert answer.code == 0 and "pair.msh" in answer.out
-    made = run(load(scene), estimate=False).measures
-    read = run(load(scene, ["contact.mesh=pair.msh"]), estimate=False).measures
-    for key in made:
-        assert read[key].value == pytest.approx(made[key].value, rel=1e-9, abs=1e-18), key
+    generated = run(load(scene), estimate=False).measures
+    from_file = run(load(scene, ["contact.mesh=pair.msh"]), estimate=False).measures
+    for key in generated:
+        assert from_file[key].value == pytest.approx(generated[key].value, rel=1e-9, abs=1e-18), key
     assert (
         cli(
             "run",
@@ -370,14 +390,14 @@ def test_exact_mesh_round_trip(written, tmp_path):
 )
 def test_always_shipped_scenes_load_and_plan(path):
     scene = load(path)
-    found = plan(scene)
-    assert found.kind == scene.kind and set(found.effects) <= set(EFFECTS)
+    run_plan = plan(scene)
+    assert run_plan.kind == scene.kind and set(run_plan.effects) <= set(EFFECTS)
     assert scene.measured is None or scene.resolve_path(scene.measured.file).is_file()
 
 
-def test_exact_plan_as_json(written):
-    answer = cli("plan", written(SCENES["rig patch"]), "--json")
-    found = json.loads(answer.out)
+def test_exact_json_of_plan_has_groups_and_stiffness(write_scene):
+    answer = cli("plan", write_scene(SCENES["rig patch"]), "--json")
+    output = json.loads(answer.out)
     assert answer.code == 0
     assert {
         "kind",
@@ -389,16 +409,16 @@ def test_exact_plan_as_json(written):
         "bytes",
         "stiffness_chain",
         "groups",
-    } <= set(found)
-    assert found["groups"]["D"] == pytest.approx(0.3 * LOAD / (0.884 * 5 * G_N), rel=1e-12)
-    assert found["stiffness_chain"]["bonds"] == pytest.approx(0.3 * LOAD / 1e-6, rel=1e-12)
+    } <= set(output)
+    assert output["groups"]["D"] == pytest.approx(0.3 * LOAD / (0.884 * 5 * G_N), rel=1e-12)
+    assert output["stiffness_chain"]["bonds"] == pytest.approx(0.3 * LOAD / 1e-6, rel=1e-12)
 
 
-# exit codes
+# Exit codes.
 
 
-def test_refuses_mistakes_with_one_line_each(written, tmp_path):
-    scene = written(SMALL_PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
+def test_refuses_faulty_scene_with_one_line_per_fault(write_scene, tmp_path):
+    scene = write_scene(SMALL_PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
     answer = cli("run", scene, "-o", tmp_path / "out")
     assert answer.code == 2 and answer.out == ""
     lines = answer.err.splitlines()
@@ -406,24 +426,24 @@ def test_refuses_mistakes_with_one_line_each(written, tmp_path):
     assert cli("check", scene).err == answer.err and not (tmp_path / "out").exists()
 
 
-def test_refuses_resume_and_a_mesh_without_a_patch(written, tmp_path):
-    scene = written(POINT + COULOMB + STRUCTURE)
+def test_refuses_resume_mesh_and_exact_method_without_support(write_scene, tmp_path):
+    scene = write_scene(POINT + COULOMB + STRUCTURE)
     assert "only a run with [wear]" in cli("run", scene, "--resume").err
     assert cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
-    exact = cli(
+    answer = cli(
         "run",
-        written(POINT + NONLOCAL + STRUCTURE),
+        write_scene(POINT + NONLOCAL + STRUCTURE),
         "--set",
         "accuracy.method=exact",
         "-o",
         tmp_path / "o",
     )
-    assert exact.code == 2 and "no exact solution" in exact.err
+    assert answer.code == 2 and "no exact solution" in answer.err
 
 
-def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
-    scene = written(POINT + NONLOCAL + STRUCTURE)
-    costly = cli(
+def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
+    scene = write_scene(POINT + NONLOCAL + STRUCTURE)
+    answer = cli(
         "run",
         scene,
         "--set",
@@ -433,60 +453,62 @@ def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
         "-o",
         tmp_path / "out",
     )
-    assert costly.code == 4 and "list of bonds" in costly.err
-    assert cli("run", written(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
+    assert answer.code == 4 and "list of bonds" in answer.err
+    assert cli("run", write_scene(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
 
 
-def test_exact_an_old_folder_survives_a_failing_run(written, tmp_path):
-    scene = written(SCENES["rig patch"])
+def test_exact_failing_run_keeps_previous_results_folder(write_scene, tmp_path):
+    scene = write_scene(SCENES["rig patch"])
     out = tmp_path / "out"
 
-    def state():
+    def read_files():
         return {path.name: path.read_bytes() for path in out.iterdir()}
 
     assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5").code == 0
-    before = state()
-    with limited(1000):  # room for no file of results
-        full_disk = cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5")
-    assert full_disk.code == 4 and state() == before
+    before = read_files()
+    with limited(1000):  # The limit leaves no space for a results file.
+        answer = cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5")
+    assert answer.code == 4 and read_files() == before
     assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=6").code == 0
-    assert state()["summary.json"] != before["summary.json"]
+    assert read_files()["summary.json"] != before["summary.json"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
 
 
-def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_path, monkeypatch):
+def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monkeypatch):
     from patchfem.dynamics.march import march as marching
 
     out = tmp_path / "out"
-    steps = marching.Run._march_steps
+    march_steps = marching.Run._march_steps
 
-    def missing(self, count, rows):  # the loop books one step that missed
-        done = steps(self, count, rows)
+    def march_steps_with_fault(self, count, rows):  # One step is recorded as not converged.
+        run_case = march_steps(self, count, rows)
         self.ledger[7] += 1
-        return done
+        return run_case
 
-    monkeypatch.setattr(marching.Run, "_march_steps", missing)
-    failed = cli("run", written(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5")
-    assert failed.code == 3 and "above the permitted" in failed.err
+    monkeypatch.setattr(marching.Run, "_march_steps", march_steps_with_fault)
+    answer = cli(
+        "run", write_scene(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5"
+    )
+    assert answer.code == 3 and "above the permitted" in answer.err
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert summary["outcome"] == "not_converged" and (out / "fields.vtkhdf").is_file()
-    motion = summary["measures"]["relative_displacement_amplitude"]
-    # kept, but no error is claimed for it
-    assert motion["error"] is None and motion["value"] is not None
+    amplitude = summary["measures"]["relative_displacement_amplitude"]
+    # The value is written, but no error is stated.
+    assert amplitude["error"] is None and amplitude["value"] is not None
 
 
-def test_refuses_to_replace_what_is_not_a_results_folder(written, tmp_path, monkeypatch):
-    scene = written(POINT + COULOMB + SLIDE)
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    (mine / "data.txt").write_text("years of work", "utf-8")
-    for target in (mine, mine / "data.txt", tmp_path):
-        refused = cli("run", scene, "-o", target)
-        assert refused.code == 2 and len(refused.err.splitlines()) == 1
-    assert (mine / "data.txt").read_text("utf-8") == "years of work"
-    monkeypatch.chdir(mine)
+def test_refuses_to_replace_other_folders(write_scene, tmp_path, monkeypatch):
+    scene = write_scene(POINT + COULOMB + SLIDE)
+    user_folder = tmp_path / "mine"
+    user_folder.mkdir()
+    (user_folder / "data.txt").write_text("years of work", "utf-8")
+    for target in (user_folder, user_folder / "data.txt", tmp_path):
+        answer = cli("run", scene, "-o", target)
+        assert answer.code == 2 and len(answer.err.splitlines()) == 1
+    assert (user_folder / "data.txt").read_text("utf-8") == "years of work"
+    monkeypatch.chdir(user_folder)
     for target in (".", "..", ""):
         assert cli("run", scene, "-o", target).code == 2
-    (tmp_path / ".next.writer").write_text("1", "utf-8")  # a process that lives
-    busy = cli("run", scene, "-o", tmp_path / "next")
-    assert busy.code == 4 and "another run" in busy.err
+    (tmp_path / ".next.writer").write_text("1", "utf-8")  # The number of a running process.
+    locked_answer = cli("run", scene, "-o", tmp_path / "next")
+    assert locked_answer.code == 4 and "another run" in locked_answer.err

@@ -1,4 +1,4 @@
-"""Sentences and bars of plans and motions that found scenes showed to be false."""
+"""Sentences and errors of plans and motions that were wrong in earlier versions."""
 
 from types import SimpleNamespace
 
@@ -62,37 +62,42 @@ cycles = 6
 
 
 @pytest.mark.parametrize(
-    ("outcome", "share", "said"),
+    ("outcome", "breakaway", "has_warning"),
     [(Outcome.STEADY, 0.0, True), (Outcome.STEADY, 0.3, True), (Outcome.TRANSIENT, 0.0, False)],
 )
-def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome, share, said):
-    """A breakaway of up to 0.9 left the drift of a found scene, 62 nm a cycle, as it was: it is no cure."""
-    found = warn_of_creep(
-        Bonds(0.3, 1e-6, breakaway=share), outcome, {"drift_per_cycle": Measure(1e-7, "m", 1e-9)}
+def test_exact_drift_warning_does_not_advise_breakaway(outcome, breakaway, has_warning):
+    """A steady motion that drifts gives a warning for any breakaway. The warning does not advise a
+    breakaway, because up to 0.9 it did not change the drift of a scene, 62 nm per cycle."""
+    warnings = warn_of_creep(
+        Bonds(0.3, 1e-6, breakaway=breakaway),
+        outcome,
+        {"drift_per_cycle": Measure(1e-7, "m", 1e-9)},
     )
-    assert bool(found) == said and "breakaway" not in "".join(found)
+    assert bool(warnings) == has_warning and "breakaway" not in "".join(warnings)
 
 
 @pytest.mark.parametrize(
-    ("length", "said"),
+    ("length", "sentence"),
     [
         (4e-5, "the interface is elastic: its stiffness (bonds) is 1e+05 N/m"),
         (3e-7, "friction should hold the block"),
     ],
 )
-def test_exact_a_block_on_bonds_as_soft_as_its_mode_is_not_said_to_stick(length, said):
-    """The mode has 1.916e5 N/m, the bonds mu N over their length: 4 N over 40 and 0.3 um."""
-    found = pf.plan(load(RIG.format(law=BONDS.format(length), load=4 / 0.3)))
-    assert any(said in line for line in found.verdict)
+def test_exact_plan_calls_interface_with_soft_bonds_elastic(length, sentence):
+    """The mode has a stiffness of 1.916e5 N/m and the bonds mu N over their length, 4 N over 40 um
+    or 0.3 um. The plan calls the first interface elastic and predicts sticking for the second."""
+    run_plan = pf.plan(load(RIG.format(law=BONDS.format(length), load=4 / 0.3)))
+    assert any(sentence in line for line in run_plan.verdict)
 
 
-def test_exact_a_plan_has_a_link_of_every_interface():
+def test_exact_plan_lists_stiffness_of_every_interface():
     chain = pf.plan(load(PAIR)).chain
     assert chain["bonds"] == "none: it creeps" and chain["bonds_2"] == pytest.approx(2.6e5)
 
 
-def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
-    """Bonds of order 0 swing their traction, and so what is called slip, over a slide that is round-off."""
+def test_exact_motion_of_round_off_has_no_slip_or_loop():
+    """With bonds of order 0, traction and slip vary although the relative displacement is
+    round-off; slip and loop area are then zero."""
     wave = np.sin(np.linspace(0, 4 * np.pi, 145))
     window = SimpleNamespace(
         slide=1e-22 * wave,
@@ -101,10 +106,11 @@ def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
         time=np.arange(145.0),
         extra={},
     )
-    still = LastCycles(
+    last_cycles = LastCycles(
         window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0)
     )
-    assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {
-        "loop_area": 0.0
-    }
+    assert last_cycles.slip == {
+        "slip_amplitude": 0.0,
+        "stick_fraction": 1.0,
+    } and last_cycles.cycle == {"loop_area": 0.0}
     assert relative_gap(1e-22, 2e-22, 2e-22) == 0 < relative_gap(1e-12, 2e-12, 2e-12)

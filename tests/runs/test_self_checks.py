@@ -1,4 +1,5 @@
-"""What a run notices by itself: faults put into the chain end as not_converged, right runs raise no alarm."""
+"""Self-checks of a run: faults planted in the program lead to the outcome not_converged; correct
+runs raise none."""
 
 from dataclasses import replace
 
@@ -94,9 +95,9 @@ SCENES = {
 }
 
 
-def test_a_right_run_raises_no_alarm():
-    """Each scene runs to its own outcome, and together they make every check compare numbers."""
-    made = set()
+def test_always_correct_runs_pass_all_self_checks():
+    """Each scene keeps its outcome, and together the scenes exercise every self-check."""
+    exercised = set()
     for text in SCENES.values():
         result = pf.run(text)
         assert result.outcome is not Outcome.NOT_CONVERGED
@@ -104,19 +105,20 @@ def test_a_right_run_raises_no_alarm():
         for check in checks.CHECKS:
             findings = list(check(evidence))
             assert not any(finding.has_failed for finding in findings)
-            made |= {check} if findings else set()
-    assert made == set(checks.CHECKS)
+            exercised |= {check} if findings else set()
+    assert exercised == set(checks.CHECKS)
 
 
-def test_a_wrong_participation_ends_as_not_converged(monkeypatch):
-    """Twice the slide of a mode: both numbers stand in the warning."""
-    real = modes.build_basis
+def test_always_wrong_mode_shape_is_detected(monkeypatch):
+    """Twice the sliding component of a mode leads to not_converged; the warning states the wrong
+    and the right value."""
+    build_basis = modes.build_basis
 
-    def wrong(given, mass):
-        found = real(given, mass)
+    def build_wrong_basis(given, mass):
+        found = build_basis(given, mass)
         return replace(found, slide=2 * found.slide)
 
-    monkeypatch.setattr("patchfem.structure.modes.build_basis", wrong)
+    monkeypatch.setattr("patchfem.structure.modes.build_basis", build_wrong_basis)
     result = pf.run(SCENES["exact"].replace("8 g", "8.1 g"))
     assert result.outcome is Outcome.NOT_CONVERGED
     text = next(text for text in result.warnings if "self-check" in text)
@@ -124,13 +126,16 @@ def test_a_wrong_participation_ends_as_not_converged(monkeypatch):
     assert all(measure.error is None for measure in result.measures.values())
 
 
-def test_a_wrong_energy_balance_ends_as_not_converged(monkeypatch):
-    """A sum with a millionth too much of the friction loss; no setting is known to mend it, so none is named."""
-    balance = march.Run.energy_balance
+def test_always_wrong_energy_balance_is_detected(monkeypatch):
+    """A friction loss that is 1e-6 too large leads to not_converged; the warning names no key,
+    because no setting is a remedy."""
+    energy_balance = march.Run.energy_balance
     monkeypatch.setattr(
         march.Run,
         "energy_balance",
-        lambda run: balance(run) | {"friction": (1 + 1e-6) * balance(run)["friction"]},
+        lambda run: (
+            energy_balance(run) | {"friction": (1 + 1e-6) * energy_balance(run)["friction"]}
+        ),
     )
     result = pf.run(SCENES["march"].replace("8 g", "8.1 g"))
     assert result.outcome is Outcome.NOT_CONVERGED
@@ -140,13 +145,14 @@ def test_a_wrong_energy_balance_ends_as_not_converged(monkeypatch):
     assert all(measure.error is None for measure in result.measures.values())
 
 
-def test_a_wrong_measure_ends_as_not_converged(monkeypatch):
-    """Twice every number of the loop, as a wrong factor in its harmonics would make it."""
-    real = rows.interface_loop
+def test_always_wrong_loop_measures_are_detected(monkeypatch):
+    """Loop measures that are twice too large, as by a wrong factor of the harmonics, lead to
+    not_converged."""
+    interface_loop = rows.interface_loop
     monkeypatch.setattr(
         rows,
         "interface_loop",
-        lambda *given: {name: 2 * value for name, value in real(*given).items()},
+        lambda *given: {name: 2 * value for name, value in interface_loop(*given).items()},
     )
     result = pf.run(SCENES["march"])
     assert result.outcome is Outcome.NOT_CONVERGED
@@ -154,8 +160,9 @@ def test_a_wrong_measure_ends_as_not_converged(monkeypatch):
     assert any("equivalent_stiffness" in text for text in result.warnings)
 
 
-def test_always_a_displacement_of_the_base_is_checked_without_a_fault():
-    """The check of the force balance asked for the acceleration of the drive, which this scene does not name."""
+def test_always_self_checks_support_base_displacement():
+    """The check of the force balance supports a drive by base displacement, which states no
+    acceleration."""
     text = (
         '[normal]\nload = "275 N"\n[friction]\nlaw = "bouc-wen"\nstatic = 0.8\nstiffness = "9e6 N/m"\n'
         '[structure]\nmoving_mass = "0.8 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "40 Hz"\n'

@@ -1,5 +1,5 @@
-"""One mesh for all cases of a sweep: whatever the order, as good as each case's own, and the same answers as a cold
-run on it."""
+"""Shared meshes of a sweep: they do not depend on the order of the cases and give the results of
+single runs."""
 
 from dataclasses import replace
 
@@ -29,53 +29,63 @@ tolerance = 1e-2
 )
 
 
-def model(angle=1e-4, load=100.0, keys="", tail=""):
+def build_model(angle=1e-4, load=100.0, keys="", tail=""):
+    """Return the model of a patch with a tilt [rad] and a load [N]."""
     return build(
         scene.loads(TEXT.format(load, angle, tail).replace("substrate", keys + "substrate", 1))
     )
 
 
-def family(*angles, **keys):
-    return [model(angle, **keys) for angle in angles]
+def build_family(*angles, **keys):
+    """Return models of all angles."""
+    return [build_model(angle, **keys) for angle in angles]
 
 
 @pytest.mark.parametrize("angle", [1e-6, 1e-3])
-def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
-    one = next(
-        m for m in with_shared_meshes(family(1e-6, 1e-5, 1e-3)) if m.patch.gap.angle == angle
+def test_exact_cached_run_agrees_with_fresh_run_on_shared_mesh(angle):
+    case = next(
+        expected
+        for expected in with_shared_meshes(build_family(1e-6, 1e-5, 1e-3))
+        if expected.patch.gap.angle == angle
     )
-    run(one)
-    warm = run(one)
-    cold = run(one, fresh=True)
-    assert warm.patch.x.size == cold.patch.x.size
-    for name, m in cold.measures.items():
-        same = warm.measures[name]
-        assert same.value == pytest.approx(m.value, rel=1e-12, abs=1e-12 * m.floor), name
-        assert same.error == pytest.approx(m.error, rel=1e-12, abs=1e-12 * abs(m.value)), name
+    run(case)
+    cached = run(case)
+    fresh = run(case, fresh=True)
+    assert cached.patch.x.size == fresh.patch.x.size
+    for name, expected in fresh.measures.items():
+        actual = cached.measures[name]
+        assert actual.value == pytest.approx(
+            expected.value, rel=1e-12, abs=1e-12 * expected.floor
+        ), name
+        assert actual.error == pytest.approx(
+            expected.error, rel=1e-12, abs=1e-12 * abs(expected.value)
+        ), name
 
 
-def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
-    plane = family(1e-4, 1e-5, keys='plane = "stress"\n')
+def test_exact_single_cases_keep_their_own_mesh():
+    """Only cases with the same pieces share a mesh; a single case, a prescribed mesh and a refused
+    case are left unchanged."""
+    plane = build_family(1e-4, 1e-5, keys='plane = "stress"\n')
     fault = PatchfemError("a case that was refused")
-    found = with_shared_meshes(
-        [*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')]
+    models = with_shared_meshes(
+        [*build_family(1e-4), fault, *plane, *build_family(1e-4, keys='element_size = "0.4 mm"\n')]
     )
-    assert found[1] is fault
-    cases = [found[0], *found[2:]]
-    assert [one.patch.mesh.shared is None for one in cases] == [True, False, False, True]
+    assert models[1] is fault
+    cases = [models[0], *models[2:]]
+    assert [case.patch.mesh.shared is None for case in cases] == [True, False, False, True]
 
 
 @pytest.mark.filterwarnings("error")
-def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
-    good = family(1e-5, 1e-4)
+def test_always_case_that_tips_over_keeps_shared_mesh_of_others():
+    valid = build_family(1e-5, 1e-4)
     tipped = [
-        replace(one, patch=one.patch.with_loading(load=100.0, line_moment=10.0, can_rotate=True))
-        for one in good[:1]
+        replace(case, patch=case.patch.with_loading(load=100.0, line_moment=10.0, can_rotate=True))
+        for case in valid[:1]
     ]
-    found = with_shared_meshes([*good, *tipped])
-    assert found[0].patch.mesh.shared.name == with_shared_meshes(good)[0].patch.mesh.shared.name
+    models = with_shared_meshes([*valid, *tipped])
+    assert models[0].patch.mesh.shared.name == with_shared_meshes(valid)[0].patch.mesh.shared.name
     with pytest.raises(PatchfemError, match="tips over"):
-        run(found[2])
+        run(models[2])
 
 
 JOINT = (
@@ -92,22 +102,24 @@ tolerance = 1e-2
 )
 
 
-def test_always_loops_of_a_sweep_have_errors_like_those_of_single_runs():
+def test_always_loop_errors_of_sweep_are_close_to_single_runs():
     cases = [build(scene.loads(JOINT.format(size))) for size in (0.2, 1.4, 10.0)]
-    for own, shared in zip(cases, with_shared_meshes(cases), strict=True):
-        alone, found = (run(one).measures["loop_area"] for one in (own, shared))
-        assert found.error <= 1.5 * alone.error
-        assert abs(found.value - alone.value) <= found.error + alone.error
+    for single_case, shared_case in zip(cases, with_shared_meshes(cases), strict=True):
+        single, on_shared_mesh = (
+            run(case).measures["loop_area"] for case in (single_case, shared_case)
+        )
+        assert on_shared_mesh.error <= 1.5 * single.error
+        assert abs(on_shared_mesh.value - single.value) <= on_shared_mesh.error + single.error
 
 
-def test_always_cases_of_a_sweep_have_the_remedies_of_single_runs():
-    """A shared mesh has other nodes, so that errors differ a little; what cures them is the same."""
+def test_always_remedies_of_sweep_agree_with_single_runs():
+    """A shared mesh has other nodes, so that errors differ a little, but the remedies are the same."""
     text = JOINT.replace("tolerance = 1e-2", "tolerance = 1e-3")
     cases = [build(scene.loads(text.format(size))) for size in (0.2, 1.4)]
-    for own, shared in zip(cases, with_shared_meshes(cases), strict=True):
-        alone = run(own)
-        found = run(shared)
-        assert any("the mesh (" in one for one in alone.warnings)
-        assert [one.rpartition("; ")[2] for one in found.warnings] == [
-            one.rpartition("; ")[2] for one in alone.warnings
+    for single_case, shared_case in zip(cases, with_shared_meshes(cases), strict=True):
+        single = run(single_case)
+        on_shared_mesh = run(shared_case)
+        assert any("the mesh (" in warning for warning in single.warnings)
+        assert [warning.rpartition("; ")[2] for warning in on_shared_mesh.warnings] == [
+            warning.rpartition("; ")[2] for warning in single.warnings
         ]

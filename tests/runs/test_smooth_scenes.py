@@ -1,4 +1,5 @@
-"""Rigs under smooth laws: which of them the integrator of high order takes, and its measures against the march."""
+"""Rigs with smooth friction laws: the choice of the high-order integrator, and its agreement with
+the march."""
 
 import numpy as np
 import pytest
@@ -40,7 +41,9 @@ STEPS = "cycles = 30\n[accuracy]\n"
         ("march", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
     ],
 )
-def test_exact_smooth_laws_are_integrated_at_high_order_and_others_marched(name, old, new):
+def test_exact_smooth_laws_use_high_order_integrator(name, old, new):
+    """Smooth friction laws are integrated by the engine `smooth`; laws and drives with jumps, and
+    prescribed steps, by the march."""
     text = SCENE.replace(old, new)
     text = text.replace(LENGTH, "") if old == NAME else text
     text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
@@ -48,27 +51,31 @@ def test_exact_smooth_laws_are_integrated_at_high_order_and_others_marched(name,
 
 
 @pytest.mark.parametrize("law", [LENGTH, GROWTH])
-def test_always_the_integrator_and_the_march_agree_within_their_bars(law):
+def test_always_smooth_engine_and_march_agree_within_errors(law):
     text = SCENE.replace(LENGTH, law)
-    fine = pf.run(text)
+    smooth = pf.run(text)
     march = pf.run(text, **{"accuracy.steps_per_cycle": 1600})
-    assert (fine.extra["engine"], march.extra["engine"]) == (
+    assert (smooth.extra["engine"], march.extra["engine"]) == (
         "smooth",
         "march",
-    ) and fine.outcome == march.outcome
-    assert fine.measures.keys() == march.measures.keys()
-    for name, one in fine.measures.items():
-        other = march.measures[name]
-        if one.value is not None and name not in ("work_check", "energy_balance"):
-            assert abs(one.value - other.value) <= one.error + 2 * other.error + other.floor, name
-    main = fine.measures["relative_displacement_amplitude"]
-    assert main.error < 1e-6 * main.value and fine.measures["energy_balance"].value < 1e-8
-    times = fine.window.time
+    ) and smooth.outcome == march.outcome
+    assert smooth.measures.keys() == march.measures.keys()
+    for name, smooth_measure in smooth.measures.items():
+        march_measure = march.measures[name]
+        if smooth_measure.value is not None and name not in ("work_check", "energy_balance"):
+            assert (
+                abs(smooth_measure.value - march_measure.value)
+                <= smooth_measure.error + 2 * march_measure.error + march_measure.floor
+            ), name
+    main = smooth.measures["relative_displacement_amplitude"]
+    assert main.error < 1e-6 * main.value and smooth.measures["energy_balance"].value < 1e-8
+    times = smooth.window.time
     assert np.allclose(np.diff(times), times[1] - times[0], rtol=1e-6) and times.size > 400
 
 
-def test_always_a_motion_that_all_but_stands_at_a_reversal_goes_on():
-    """Its rate and its acceleration vanish together, so either way it seems to turn at once; a march agrees."""
+def test_always_vanishing_acceleration_at_reversal_agrees_with_march():
+    """A motion whose velocity and acceleration vanish together, so that it would reverse at once in
+    either direction, continues and agrees with a march."""
     text = """
 [normal]
 load = "84.82758620689656 N"
@@ -85,8 +92,13 @@ frequency = "143 Hz"
 acceleration = "33.333333333333336 m/s^2"
 cycles = 20
 """
-    found = pf.run(text)
+    smooth = pf.run(text)
     marched = pf.run(text, **{"accuracy.method": "march"})
-    one, other = (run.measures["relative_displacement_amplitude"] for run in (found, marched))
-    assert found.extra["engine"] == "smooth"
-    assert abs(one.value - other.value) <= one.error + other.error
+    smooth_measure, march_measure = (
+        run.measures["relative_displacement_amplitude"] for run in (smooth, marched)
+    )
+    assert smooth.extra["engine"] == "smooth"
+    assert (
+        abs(smooth_measure.value - march_measure.value)
+        <= smooth_measure.error + march_measure.error
+    )

@@ -1,4 +1,5 @@
-"""Bars of static patches against truths: narrow contacts, steps, peaks; random scenes by an independent program."""
+"""Errors of static patches cover references: narrow contacts, steps, peaks, and random scenes of an
+independent program."""
 
 from __future__ import annotations
 
@@ -52,48 +53,53 @@ WORN = (
 
 
 @cache
-def measures(text: str, tolerance: float) -> dict:
+def run_measures(text: str, tolerance: float) -> dict:
+    """Return the measures of a scene at a tolerance."""
     return pf.run(text, **{"accuracy.tolerance": tolerance}).measures
 
 
-def test_exact_a_pad_beside_a_step_bears_its_load_evenly():
-    """Rigid pieces on a skin, 8.35 of 12.7 mm touch: an even pressure, which no node and no parabola exceeds."""
+def test_exact_rigid_pad_at_step_has_uniform_pressure():
+    """Rigid pieces on a skin touch on 8.35 of 12.7 mm: the pressure is uniform, and the peak does
+    not exceed it by an extrapolation."""
     run = pf.run(PAD)
-    even = 2000 / (8.35e-3 * 12.7e-3)
-    found = run.measures
-    truths = {
-        "pressure_peak": even,  # to the 1e-5 that the pieces give
+    uniform_pressure = 2000 / (8.35e-3 * 12.7e-3)
+    measures_ = run.measures
+    references = {
+        "pressure_peak": uniform_pressure,  # The deformation of the pieces changes this by 1e-5.
         "contact_fraction": 8.35 / 12.7,
         "contact_half_width": 4.175e-3,
         "moment": -2000 * 2.175e-3,
-        "approach": even / 1e12,
+        "approach": uniform_pressure / 1e12,
         "normal_stiffness": 1e12 * 8.35e-3 * 12.7e-3,
     }
-    for name, truth in truths.items():
-        assert abs(found[name].value - truth) <= found[name].error + 1e-5 * abs(truth), (
+    for name, reference in references.items():
+        assert abs(measures_[name].value - reference) <= measures_[name].error + 1e-5 * abs(
+            reference
+        ), (
             name,
-            found[name],
+            measures_[name],
         )
-        assert found[name].error <= 1e-4 * abs(truth)
+        assert measures_[name].error <= 1e-4 * abs(reference)
     assert (
-        found["pressure_peak"].value
-        <= run.patch.pressure.sigma_n.max() + found["pressure_peak"].error
+        measures_["pressure_peak"].value
+        <= run.patch.pressure.sigma_n.max() + measures_["pressure_peak"].error
     )
 
 
-def test_bars_of_a_narrow_contact_hold_a_half_plane_of_finite_height():
-    """Half-width .4162623 mm, of a spectral program; a third mesh extrapolated by one ratio alone was 1.46 bars off."""
-    found = measures(NARROW, 1e-3)
-    for name, truth in (
+def test_always_errors_of_narrow_contact_cover_spectral_reference():
+    """The half-width of a spectral program is 0.4162623 mm. An extrapolation by one ratio of three
+    meshes missed it by 1.46 errors."""
+    narrow = run_measures(NARROW, 1e-3)
+    for name, reference in (
         ("contact_half_width", 4.162623e-4),
         ("contact_fraction", 4.162623e-4 / 20e-3),
     ):
-        assert abs(found[name].value - truth) <= found[name].error <= 1e-3 * truth
+        assert abs(narrow[name].value - reference) <= narrow[name].error <= 1e-3 * reference
 
 
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize(
-    "text, name, truth",
+    "text, name, reference",
     [
         (COATED, "moment", -8.2501e-3),
         (COATED, "contact_half_width", 9.5556e-4),
@@ -101,21 +107,22 @@ def test_bars_of_a_narrow_contact_hold_a_half_plane_of_finite_height():
         (CROWNED, "contact_fraction", 0.258252),
     ],
 )
-def test_bars_beside_a_step_hold_and_do_not_widen(text, name, truth):
-    """The truths are the reference's of `static_reference`; a node of the step that counts as half was 1.2 to 1.6 bars
-    off, and a tighter tolerance had the wider bar."""
-    last = np.inf
+def test_always_errors_at_step_cover_reference_and_decrease(text, name, reference):
+    """The errors cover the values of `static_reference` and do not grow as the tolerance decreases.
+    When a node at the step counted as half, they were 1.2 to 1.6 times too small."""
+    previous_error = np.inf
     for tolerance in (1e-2, 1e-3, 1e-4):
-        found = measures(text, tolerance)[name]
+        measure = run_measures(text, tolerance)[name]
         assert (
-            abs(found.value - truth) <= found.error + 1e-5 * abs(truth) and found.error <= last
+            abs(measure.value - reference) <= measure.error + 1e-5 * abs(reference)
+            and measure.error <= previous_error
         ), tolerance
-        last = found.error
+        previous_error = measure.error
 
 
 @pytest.mark.share(0, 2, 4)
 @pytest.mark.parametrize(
-    "seed, name, truth, own",
+    "seed, name, reference, reference_error",
     [
         (7005, "moment", 0.17521083, 1e-5),
         (7017, "moment", -6.73948e-5, 1.4e-9),
@@ -125,53 +132,59 @@ def test_bars_beside_a_step_hold_and_do_not_widen(text, name, truth):
         (7059, "rotational_stiffness", 201.2822, 0.063),
     ],
 )
-def test_bars_of_steps_hold_and_do_not_widen_where_a_stretch_comes_on_a_finer_mesh(
-    seed, name, truth, own
+def test_always_errors_cover_contact_interval_of_one_element(
+    seed, name, reference, reference_error
 ):
-    """Truths by the reference. A stretch of one cell that two of three meshes saw was 6 bars off in the stiffnesses."""
-    last = np.inf
+    """The errors cover the reference, and do not grow, if a contact interval of one element exists
+    only on the finer meshes. The error of the stiffness was 6 times too small in an earlier
+    version."""
+    previous_error = np.inf
     text = text_of(drawn(seed))
     for tolerance in (1e-3, 1e-4) if seed == 7017 else (1e-2, 1e-3):
-        found = measures(text, tolerance)[name]
+        measure = run_measures(text, tolerance)[name]
         assert (
-            abs(found.value - truth) <= found.error + own
-            and found.error <= last * (1 + 1e-6) + 1e-14
+            abs(measure.value - reference) <= measure.error + reference_error
+            and measure.error <= previous_error * (1 + 1e-6) + 1e-14
         ), tolerance
-        last = found.error
+        previous_error = measure.error
 
 
 # Errors that do not hold, by seed: (measure, tolerance). The program promises that 95 % hold; of 60 fresh scenes
 # (seeds 8300000 to 8300059) 99.4 % do at 1e-2 and 98.3 % at 1e-3. The ratios of successive changes of the stiffness of
 # seed 601 are 2.8, 5.8 and 4.3: the first one is steady enough to extrapolate by, and not that of the order.
 MISSES = {601: {("rotational_stiffness", 1e-3)}}
-MAX_MISS = 1.5  # largest true error of a miss over the stated one
+MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("seed", range(600, 600 + len(KINDS)))
-def test_bars_of_a_random_scene_hold_an_independent_program(seed):
-    """One scene of each kind (even pieces always; steps above, by truths of the same program): every bar holds but for
-    the MISSES, none widens."""
+def test_always_errors_of_random_patch_cover_independent_program(seed):
+    """For one random scene of each kind, the errors cover an independent program, apart from
+    MISSES, and do not grow as the tolerance decreases."""
     scene = drawn(seed)
-    true, doubt = solve_reference(scene, 2e-3)
-    last = dict.fromkeys(JUDGED, np.inf)
+    reference, reference_error = solve_reference(scene, 2e-3)
+    previous_errors = dict.fromkeys(JUDGED, np.inf)
     for tolerance in (1e-2, 1e-3, 1e-4):
-        found = measures(text_of(scene), tolerance)
-        rows = judged_rows(found, true, doubt)
+        measures_ = run_measures(text_of(scene), tolerance)
+        rows = judged_rows(measures_, reference, reference_error)
         misses = [row for row in rows if not row.holds]
         assert {(row.name, tolerance) for row in misses} <= MISSES.get(seed, set())
         assert all(row.true_error <= MAX_MISS * row.error + row.doubt for row in misses)
-        known = [name for name in JUDGED if found[name].value is not None]
+        names = [name for name in JUDGED if measures_[name].value is not None]
         assert len(rows) > 3
-        for name in known:
-            assert found[name].error <= last[name] * (1 + 1e-6) + 1e-14, (name, tolerance)
-            last[name] = found[name].error
+        for name in names:
+            assert measures_[name].error <= previous_errors[name] * (1 + 1e-6) + 1e-14, (
+                name,
+                tolerance,
+            )
+            previous_errors[name] = measures_[name].error
 
 
-def test_always_unlike_pieces_say_what_friction_would_change():
-    """Dundurs' beta of a rigid face on one of nu 0 is 1/2; alike pieces say nothing."""
+def test_always_unlike_pieces_have_note_with_dundurs_parameter():
+    """A note for unlike pieces states Dundurs' beta, which is 1/2 for a rigid piece on one with a
+    Poisson ratio of 0, and the effect of friction; like pieces have no note."""
 
-    def notes(nu):
+    def run_notes(nu):
         hard = '{young = "1e6 GPa", poisson = 0.3, density = "1 kg/m^3"}'
         soft = f'{{young = "1 GPa", poisson = {nu}, density = "1 kg/m^3"}}'
         return pf.run(
@@ -180,27 +193,31 @@ def test_always_unlike_pieces_say_what_friction_would_change():
             f"substrate = {soft}\n"
         ).extra["notes"]
 
-    (one,) = [text for text in notes(0.0) if "Dundurs" in text]
-    assert "beta 0.5 at the interface" in one
-    assert float(one.split("normal_stiffness would be ")[1].split(" %")[0]) > 0
+    (note,) = [text for text in run_notes(0.0) if "Dundurs" in text]
+    assert "beta 0.5 at the interface" in note
+    assert float(note.split("normal_stiffness would be ")[1].split(" %")[0]) > 0
     assert not any("Dundurs" in text for text in pf.run(NARROW).extra["notes"])
 
 
-def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
-    """Hertz worn in one jump: 39.4 MPa where 30.6 MPa are left (19 jumps); the bar was 7.7 MPa."""
-    worn = pf.run(WORN).measures["pressure_peak"]
-    assert abs(worn.value - 30.56e6) <= worn.error <= 0.5 * worn.value
+def test_always_error_of_single_wear_step_covers_peak():
+    """A Hertz contact worn in a single step has a peak of 39.4 MPa instead of 30.6 MPa (19 steps);
+    the error covers the difference."""
+    peak = pf.run(WORN).measures["pressure_peak"]
+    assert abs(peak.value - 30.56e6) <= peak.error <= 0.5 * peak.value
 
 
-@pytest.mark.parametrize("worn, said", [(0.0, 0), (4e-9, 1)])
-def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
-    """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
-    asked = build(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM).patch
-    pair = condense(asked, *make_piece_meshes(asked))
+@pytest.mark.parametrize("amplitude, n_notes", [(0.0, 0), (4e-9, 1)])
+def test_always_alternating_pressure_gives_ripple_note(amplitude, n_notes):
+    """A joint of unlike meshes is expected to have a ripple of 6.7 %: a smooth pressure gives no
+    note, a pressure that alternates between nodes gives one."""
+    patch_model = build(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM).patch
+    pair = condense(patch_model, *make_piece_meshes(patch_model))
     pair = replace(
         pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")
     )
-    patch = press_patch(asked, pair, worn * (-1.0) ** np.arange(pair.compliance.interface.x.size))
-    assert [text for text in patch.notes if "ripple" in text] == said * [
+    patch = press_patch(
+        patch_model, pair, amplitude * (-1.0) ** np.arange(pair.compliance.interface.x.size)
+    )
+    assert [text for text in patch.notes if "ripple" in text] == n_notes * [
         "contact.mesh: is expected to ripple by 6.7 %"
     ]

@@ -1,4 +1,5 @@
-"""Curves of steady motions and levels of a drive by the engine `harmonic`: what they show at every point, with bars."""
+"""Frequency response curves and drive levels by the engine `harmonic`: values and errors at every
+point."""
 
 import numpy as np
 import pytest
@@ -16,51 +17,55 @@ G, LIMIT = 9.80665, 0.3 * 26 * 4.4482216152605
 GIVES = PLASTIC.replace("1 um", "20 um")
 
 
-def curve_of(text, **keys):
+def run_curve(text, **keys):
+    """Return the curve of a scene by the harmonic engine."""
     return pf.run(text, **STEADY, **keys).extra["curve"]
 
 
-def linear(frequency, rows=(1.0,), own=(143.0,), zeta=(0.003,), base=(1.0,), level=3 * G):
-    """Amplitude [m] and absolute acceleration [m s-2] of the sum `rows` of the motions of modes without friction."""
+def linear_response(
+    frequency, rows=(1.0,), frequencies=(143.0,), zeta=(0.003,), base=(1.0,), level=3 * G
+):
+    """Return amplitude [m] and absolute acceleration [m/s^2] of the sum `rows` of modes without
+    friction."""
     w = 2 * np.pi * np.asarray(frequency)[:, None]
-    own = 2 * np.pi * np.array(own)
-    z = -level * np.array(base) / (own**2 - w**2 + 2j * np.array(zeta) * own * w)
+    frequencies = 2 * np.pi * np.array(frequencies)
+    z = -level * np.array(base) / (frequencies**2 - w**2 + 2j * np.array(zeta) * frequencies * w)
     return np.abs(z @ rows), np.abs(level - w[:, 0] ** 2 * (z @ rows))
 
 
 @pytest.fixture
-def few(monkeypatch):
-    """Curves of 13 points, but where they bend."""
+def reduced_point_count(monkeypatch):
+    """Reduce curves to 13 points, apart from refinement at bends."""
     monkeypatch.setattr(curves, "N_SWEEP_POINTS", 13)
 
 
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("reduced_point_count")
 @pytest.mark.parametrize("more", ["", SECOND.replace("slide = 0.1", "slide = 0.1\nbase = 0.1")])
-def test_exact_a_curve_without_friction_in_closed_form(more):
+def test_exact_curve_without_friction_agrees_with_closed_form(more):
     base = {"structure.mode.axial.base": "0.9"} if more else {}
-    found = curve_of(MODE + more + SWEEP.replace('to = "150 Hz"', 'to = "126 Hz"'), **base)
-    given = (
+    curve = run_curve(MODE + more + SWEEP.replace('to = "150 Hz"', 'to = "126 Hz"'), **base)
+    modes = (
         {"rows": (1.0, 0.0), "own": (143.0, 990.0), "zeta": (0.003, 0.01), "base": (0.9, 0.1)}
         if more
         else {}
     )
-    size, felt = linear(found["frequency"], **given)
-    assert found["amplitude"] == pytest.approx(size, rel=1e-8)
-    assert found["acceleration_peak"] == pytest.approx(felt, rel=1e-8)
-    assert found["acceleration_fundamental"] == pytest.approx(felt, rel=1e-8)
-    assert np.all(found["acceleration_distortion"] <= found["acceleration_distortion_error"])
+    amplitude, acceleration = linear_response(curve["frequency"], **modes)
+    assert curve["amplitude"] == pytest.approx(amplitude, rel=1e-8)
+    assert curve["acceleration_peak"] == pytest.approx(acceleration, rel=1e-8)
+    assert curve["acceleration_fundamental"] == pytest.approx(acceleration, rel=1e-8)
+    assert np.all(curve["acceleration_distortion"] <= curve["acceleration_distortion_error"])
 
 
 @pytest.mark.share(1)
-@pytest.mark.usefixtures("few")
+@pytest.mark.usefixtures("reduced_point_count")
 @pytest.mark.parametrize("law", [COULOMB, GIVES], ids=["coulomb", "elastic-plastic"])
-def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
-    found = curve_of(POINT + law + MODE + HARD)
+def test_exact_point_of_curve_agrees_with_sine_run(law):
+    curve = run_curve(POINT + law + MODE + HARD)
     drive = '[drive]\nkind = "base"\nfrequency = "{!r} Hz"\nacceleration = "6 g"\ncycles = 10\n'
-    for k in (0, len(found["level"]) // 2, -1):
-        run = pf.run(POINT + law + MODE + drive.format(float(found["frequency"][k])), **STEADY)
+    for k in (0, len(curve["level"]) // 2, -1):
+        run = pf.run(POINT + law + MODE + drive.format(float(curve["frequency"][k])), **STEADY)
         for column, name in COLUMN_MEASURES.items():
-            assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (
+            assert curve[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (
                 k,
                 column,
             )
@@ -68,8 +73,9 @@ def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law", [COULOMB, PLASTIC], ids=["coulomb", "elastic-plastic"])
-def test_exact_levels_are_those_of_a_long_run(law):
-    """Raised from a stuck level and lowered again: every measure of the table as an exact run of 150 cycles a level."""
+def test_exact_levels_agree_with_long_exact_run(law):
+    """For levels that rise from stick and fall again, every measure agrees with an exact run of 150
+    cycles per level."""
     text = (
         POINT
         + law
@@ -78,17 +84,17 @@ def test_exact_levels_are_those_of_a_long_run(law):
     )
     steady = pf.run(text, **STEADY)
     run = pf.run(text, **{"accuracy.method": "exact"})
-    ours = steady.extra["levels"]
-    theirs = run.extra["levels"]
-    assert [one.outcome for one in ours] == ["stuck", "steady", "steady", "steady"]
+    steady_levels = steady.extra["levels"]
+    run_levels = run.extra["levels"]
+    assert [level.outcome for level in steady_levels] == ["stuck", "steady", "steady", "steady"]
     assert (
-        [one.drive for one in ours]
-        == [one.drive for one in theirs]
+        [level.drive for level in steady_levels]
+        == [level.drive for level in run_levels]
         == pytest.approx(G * np.array([3, 5, 7, 5]))
     )
-    assert [one.stuck for one in ours] == [one.stuck for one in theirs]
+    assert [level.stuck for level in steady_levels] == [level.stuck for level in run_levels]
     round_off = {"equivalent_damping": 1e-14, "loop_area": 1e-18}
-    for a, b in zip(ours, theirs):
+    for a, b in zip(steady_levels, run_levels):
         assert (
             set(a.errors)
             == set(a.values)
@@ -99,38 +105,39 @@ def test_exact_levels_are_those_of_a_long_run(law):
             assert value == pytest.approx(
                 b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)
             ), (b.drive, name)
-    # the motion at a level is the only one
+    # The motion at each level is unique.
     assert abs(steady.measures["level_hysteresis"].value) < 1e-12
 
 
-def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
-    """It slips where its spring bears the limit: |q| = limit/k in the motion that it holds as a spring; what counts is
-    a slip of 1e-3 bond lengths."""
+def test_exact_onset_of_slip_agrees_with_closed_form():
+    """An element slips when its spring reaches the friction limit, |q| = limit/k, in the motion of
+    the stuck rig; the onset counts from a slip of 1e-3 bond lengths."""
     text = POINT + GIVES + MODE + LEVELS.format('"0.2 g", "6 g"', 12) + 'onset = "slip"\n'
-    found = pf.run(text, **STEADY).measures["onset_level"]
-    own = 2 * np.pi * 143
+    onset = pf.run(text, **STEADY).measures["onset_level"]
+    omega = 2 * np.pi * 143
     w = 2 * np.pi * 143
     stiffness = LIMIT / 20e-6
-    size = 1 / abs(own**2 + stiffness / 0.884 - w**2 + 2j * 0.003 * own * w)
-    first = 20e-6 / size
-    assert first - found.error <= found.value <= 1.002 * first + found.error
-    assert found.error < 1e-3 * first
+    receptance = 1 / abs(omega**2 + stiffness / 0.884 - w**2 + 2j * 0.003 * omega * w)
+    expected = 20e-6 / receptance
+    assert expected - onset.error <= onset.value <= 1.002 * expected + onset.error
+    assert onset.error < 1e-3 * expected
 
 
-def test_exact_a_level_without_a_bounded_motion_has_the_outcome_grows():
-    """Without damping at resonance friction bounds the motion to a/mu N < 4/pi and not beyond."""
+def test_exact_level_with_unbounded_motion_grows():
+    """Without damping, friction bounds the motion at resonance only up to a/mu N = 4/pi."""
     text = POINT + COULOMB + MODE.replace("0.003", "0") + LEVELS.format('"3 g", "4.5 g", "6 g"', 12)
     run = pf.run(text, **STEADY)
-    assert [one.outcome for one in run.extra["levels"]] == ["stuck", "steady", "grows"]
+    assert [level.outcome for level in run.extra["levels"]] == ["stuck", "steady", "grows"]
     assert run.outcome == "steady" and np.isnan(run.extra["curve"]["amplitude"][2])
     with_elements = pf.run(text.replace(COULOMB, PLASTIC), **STEADY)
-    assert [one.outcome for one in with_elements.extra["levels"]] == [
+    assert [level.outcome for level in with_elements.extra["levels"]] == [
         "stuck",
         "steady",
         "not_converged",
     ]
     assert any(
-        "1 of 3 drive levels" in said and "undamped mode" in said for said in with_elements.warnings
+        "1 of 3 drive levels" in warning and "undamped mode" in warning
+        for warning in with_elements.warnings
     )
 
 
@@ -143,34 +150,39 @@ LOCKED = (
 SINE = '[drive]\nkind = "base"\nfrequency = "{} Hz"\nacceleration = "5 g"\ncycles = {}\n'
 
 
-def test_exact_of_several_balanced_motions_the_stable_one_is_shown():
-    """Beside an interlock of 80 um three motions balance at 180 Hz, 58, 83 and 125 um, and the balance comes to the
-    second one, whose disturbances grow eightfold a cycle. A march from rest comes to the third, the only one that
-    lasts."""
+def test_exact_stable_steady_state_is_chosen_from_several():
+    """With an interlock of 80 um, three steady states exist at 180 Hz, with 58, 83 and 125 um. The
+    harmonic balance converges to the second, which is unstable; the result is the third, the stable
+    one, to which a march from rest also settles."""
     steady = pf.run(LOCKED + SINE.format(180, 10), **STEADY)
     march = pf.run(LOCKED + SINE.format(180, 400), **{"accuracy.method": "march"})
     assert steady.outcome == march.outcome == "steady"
     assert np.abs(steady.extra["multipliers"]).max() < 1
     assert any(
-        "3 steady motions exist" in said and "1 of them stable" in said for said in steady.warnings
+        "3 steady motions exist" in warning and "1 of them stable" in warning
+        for warning in steady.warnings
     )
     for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area"):
-        ours = steady.measures[name]
-        theirs = march.measures[name]
-        assert abs(ours.value - theirs.value) <= ours.error + theirs.error, name
+        steady_measure = steady.measures[name]
+        march_measure = march.measures[name]
+        assert (
+            abs(steady_measure.value - march_measure.value)
+            <= steady_measure.error + march_measure.error
+        ), name
 
 
-def test_always_a_balanced_motion_is_not_steady_where_none_lasts():
-    """At 200 Hz the one motion that balances is left, and a march does not settle."""
-    found = pf.run(LOCKED + SINE.format(200, 10), **STEADY)
-    assert found.outcome == "not_converged" and "unstable" in found.extra["regime"]
-    assert any("is unstable" in said and "march" in said for said in found.warnings)
+def test_always_unstable_steady_state_is_not_converged():
+    """At 200 Hz the only steady state is unstable, and a march does not settle; the outcome is
+    not_converged."""
+    result = pf.run(LOCKED + SINE.format(200, 10), **STEADY)
+    assert result.outcome == "not_converged" and "unstable" in result.extra["regime"]
+    assert any("is unstable" in warning and "march" in warning for warning in result.warnings)
     levels = pf.run(
         LOCKED + LEVELS.format('"2 g", "5 g"', 12).replace("143 Hz", "200 Hz"), **STEADY
     )
-    assert [one.outcome for one in levels.extra["levels"]] == ["stuck", "not_converged"]
+    assert [level.outcome for level in levels.extra["levels"]] == ["stuck", "not_converged"]
     assert levels.outcome == "stuck" and any(
-        "1 of 2 drive levels" in said for said in levels.warnings
+        "1 of 2 drive levels" in warning for warning in levels.warnings
     )
 
 
@@ -183,8 +195,9 @@ def test_always_a_balanced_motion_is_not_steady_where_none_lasts():
     ],
     ids=["stiffening", "interlock"],
 )
-def test_exact_coulomb_behind_shear_balances_beside_a_spring_that_bends(spring):
-    """Behind the shear of the pieces Coulomb's law is a set of springs that slip: a march ends in the balance."""
+def test_exact_sheared_patch_with_nonlinear_spring_agrees_with_march(spring):
+    """With [contact.shear], Coulomb's law acts as a set of springs that slip; with a nonlinear
+    spring the harmonic balance agrees with a march."""
     text = (
         COATED
         + '[contact.tilt]\nangle = "0.02 mrad"\n'
@@ -205,6 +218,10 @@ def test_exact_coulomb_behind_shear_balances_beside_a_spring_that_bends(spring):
         "absolute_acceleration_fundamental",
         "loop_area",
     ):
-        ours = steady.measures[name]
-        theirs = march.measures[name]
-        assert abs(ours.value - theirs.value) <= ours.error + theirs.error < 0.1 * ours.value, name
+        steady_measure = steady.measures[name]
+        march_measure = march.measures[name]
+        assert (
+            abs(steady_measure.value - march_measure.value)
+            <= steady_measure.error + march_measure.error
+            < 0.1 * steady_measure.value
+        ), name

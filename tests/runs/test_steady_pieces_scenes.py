@@ -1,4 +1,4 @@
-"""Scenes whose steady motion behind elastic-plastic elements is found by the map from yield to yield."""
+"""Scenes with elastic-plastic elements whose steady state is found from yield event to yield event."""
 
 import numpy as np
 import pytest
@@ -20,19 +20,19 @@ from patchfem.export import summarise_run
 
 RIG = POINT + PLASTIC + MODE + DRIVE
 STEADY = {"accuracy.method": "harmonic"}
-WORKS = ("friction_work", "energy_stored", "energy_dissipated")  # of the whole run
-PHASES = ("drift_per_cycle", "energy_balance", "work_check")  # round-off
+WORKS = ("friction_work", "energy_stored", "energy_dissipated")  # Measures of the whole run.
+PHASES = ("drift_per_cycle", "energy_balance", "work_check")  # Measures that consist of round-off.
 
 
-def agree(steady, run, share=1e-8):
-    """Measures of a long run that are not those of its steady motion."""
+def list_differences(steady, run, rel_tol=1e-8):
+    """Return the measures of a long run that differ from those of its steady state."""
     return [
         (name, m.value, steady.measures[name].value)
         for name, m in run.measures.items()
         if name in steady.measures
         and name not in (*PHASES, *WORKS)
         and m.value is not None
-        and abs(m.value - steady.measures[name].value) > share * abs(m.value) + 1e-14
+        and abs(m.value - steady.measures[name].value) > rel_tol * abs(m.value) + 1e-14
     ]
 
 
@@ -41,11 +41,11 @@ def agree(steady, run, share=1e-8):
     [(RIG, 300), (POINT + PLASTIC + MODE + SECOND + DRIVE, 300), (PAIR + FORCED, 300)],
     ids=["one mode", "two modes", "two interfaces"],
 )
-def test_exact_a_long_run_ends_in_the_steady_motion(text, cycles):
+def test_exact_long_run_settles_to_steady_state(text, cycles):
     steady = pf.run(text, **STEADY)
     run = pf.run(text, **{"accuracy.method": "exact", "drive.cycles": str(cycles)})
     assert steady.outcome == run.outcome == "steady" and steady.extra["map"] == "yields"
-    assert agree(steady, run) == []
+    assert list_differences(steady, run) == []
     assert steady.measures["loop_area"].value == pytest.approx(
         run.measures["loop_area"].value, rel=1e-9
     )
@@ -56,7 +56,7 @@ def test_exact_a_long_run_ends_in_the_steady_motion(text, cycles):
     assert np.abs(steady.extra["multipliers"]).max() < 1 and steady.extra["residual"] < 1e-12
 
 
-def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
+def test_exact_balance_with_prescribed_harmonics_is_within_errors():
     exact = pf.run(RIG, **STEADY)
     balance = pf.run(RIG, **STEADY, **{"accuracy.harmonics": "31"})
     assert "map" not in summarise_run(balance)["numerics"] and balance.extra["harmonics"] == 31
@@ -67,15 +67,16 @@ def test_exact_the_balance_of_named_harmonics_is_within_its_bars():
         "loop_area",
         "friction_force_peak",
     ):
-        mine = exact.measures[name]
-        other = balance.measures[name]
-        assert abs(mine.value - other.value) <= other.error + mine.error, name
-    first = np.abs(exact.extra["multipliers"][:2]), np.abs(balance.extra["multipliers"][:2])
-    assert first[0] == pytest.approx(first[1], rel=1e-2)
+        expected = exact.measures[name]
+        actual = balance.measures[name]
+        assert abs(expected.value - actual.value) <= actual.error + expected.error, name
+    moduli = np.abs(exact.extra["multipliers"][:2]), np.abs(balance.extra["multipliers"][:2])
+    assert moduli[0] == pytest.approx(moduli[1], rel=1e-2)
 
 
-def test_exact_a_patch_behind_its_shear_shows_its_own_stress():
-    """The frames of the steady motion are those of a long run, node by node."""
+def test_exact_stress_of_sheared_patch_agrees_with_long_run():
+    """The shear stress of every node in the frames of the steady state agrees with that of a long
+    run."""
     text = COATED + SHEAR + PLASTIC + KILOGRAM + DRIVE
     keys = {"contact.element_size": "0.4 mm"}
     keys |= {"drive.frequency": "120 Hz", "structure.mode.axial.damping": "0.05"}
@@ -83,33 +84,39 @@ def test_exact_a_patch_behind_its_shear_shows_its_own_stress():
         pf.run(text, **keys, **more)
         for more in (STEADY, {"accuracy.method": "exact", "drive.cycles": "120"})
     )
-    assert steady.extra["map"] == "yields" and agree(steady, run, 1e-7) == []
-    ours = steady.fields["shear_stress"][1:]
-    theirs = run.fields["shear_stress"][1:]
-    np.testing.assert_allclose(ours, theirs, atol=1e-7 * np.abs(theirs).max())
-    assert steady.measures["relative_displacement_amplitude"].error > 0  # the mesh has its share
+    assert steady.extra["map"] == "yields" and list_differences(steady, run, 1e-7) == []
+    steady_stress = steady.fields["shear_stress"][1:]
+    run_stress = run.fields["shear_stress"][1:]
+    np.testing.assert_allclose(steady_stress, run_stress, atol=1e-7 * np.abs(run_stress).max())
+    # The error includes that of the mesh.
+    assert steady.measures["relative_displacement_amplitude"].error > 0
 
 
-def test_refuses_no_motion_that_grows():
-    """Below pi/4 an undamped mode at its own frequency is bounded by nothing: the balance says so."""
+def test_refuses_steady_state_of_unbounded_motion():
+    """An undamped mode driven at its natural frequency is unbounded for a friction limit below pi/4
+    of the drive; the harmonic engine raises NotConverged."""
     with pytest.raises(pf.NotConverged, match="undamped mode"):
         pf.run(RIG, **STEADY, **{"structure.mode.axial.damping": "0", "drive.acceleration": "8 g"})
 
 
 @pytest.mark.parametrize("level", ["6 g", "8 g"])
-def test_exact_the_steady_amplitude_of_an_unsettled_run_is_that_of_the_map(level):
-    """Thirty cycles at resonance are far from enough, beyond the knee too: the steady amplitude is that of the map."""
+def test_exact_steady_amplitude_of_transient_run(level):
+    """Thirty cycles at resonance do not reach the steady state; the estimated steady amplitude
+    agrees with that of the harmonic engine."""
     run, steady = (
         pf.run(RIG, **{"drive.acceleration": level, "accuracy.method": method})
         for method in ("exact", "harmonic")
     )
     assert run.outcome == "transient"
-    told, there = (
-        one.measures[name]
-        for one, name in (
+    estimate, reference = (
+        result.measures[name]
+        for result, name in (
             (run, "relative_displacement_amplitude_steady"),
             (steady, "relative_displacement_amplitude"),
         )
     )
-    assert told.value == pytest.approx(there.value, rel=1e-9) and told.error < 1e-8 * told.value
-    assert run.measures["relative_displacement_amplitude"].value < 0.9 * told.value
+    assert (
+        estimate.value == pytest.approx(reference.value, rel=1e-9)
+        and estimate.error < 1e-8 * estimate.value
+    )
+    assert run.measures["relative_displacement_amplitude"].value < 0.9 * estimate.value

@@ -1,4 +1,5 @@
-"""The stick fraction and the phase of the first slip: one rule, by event times and by samples."""
+"""Stick fraction and phase of the first slip: the same definition from event times and from
+samples."""
 
 from math import pi
 
@@ -30,24 +31,26 @@ cycles = {cycles}
 SECOND = '[[structure.mode]]\nname = "b"\nfrequency = "0.55 Hz"\ndamping = 0.02\nslide = 0.4\nbase = 0.0\noutput = 0.2'
 
 
-def text(law, omega, more="", cycles=20):
+def format_scene(law, omega, more="", cycles=20):
+    """Return the scene of a block with a friction law and a drive of angular frequency `omega`
+    [rad/s]."""
     return SCENE.format(law=law, more=more, own=0.5 / pi, drive=omega / (2 * pi), cycles=cycles)
 
 
-def both(scene, steps: int) -> list:
-    """(stick fraction, phase) by the engine of events and by the march, and whether the first was no march."""
-    out = []
-    for more in ("", f'[accuracy]\nmethod = "march"\nsteps_per_cycle = {steps}\n'):
-        found = run(loads(scene + more), estimate=False)
-        out.append(
+def run_exact_and_march(scene, steps: int) -> list:
+    """Return (stick fraction, phase, engine) by the exact engine and by the march."""
+    rows = []
+    for accuracy in ("", f'[accuracy]\nmethod = "march"\nsteps_per_cycle = {steps}\n'):
+        result = run(loads(scene + accuracy), estimate=False)
+        rows.append(
             (
-                found.measures["stick_fraction"].value,
-                found.measures["slip_start_phase"].value,
-                found.extra["engine"],
+                result.measures["stick_fraction"].value,
+                result.measures["slip_start_phase"].value,
+                result.extra["engine"],
             )
         )
-    assert out[0][2] != "march" == out[1][2]
-    return out
+    assert rows[0][2] != "march" == rows[1][2]
+    return rows
 
 
 @pytest.mark.share(0, 2, 4)
@@ -62,12 +65,15 @@ def both(scene, steps: int) -> list:
         ('law = "elastic-plastic"\nbond_length = "0.05 m"', 0.5, SECOND),
     ],
 )
-def test_order_stick_by_samples_comes_to_stick_by_events(law, omega, more):
-    """By samples an event lies within its step: 1/steps of a cycle and 2 pi/steps of phase for each, four a cycle."""
+def test_order_of_stick_fraction_from_samples(law, omega, more):
+    """Each event is uncertain by one step: the stick fraction from samples agrees within four steps
+    per cycle with that from events, and the phase within 4 pi/steps."""
     for steps in (400, 3200):
-        (exact, start, _), (found, phase, _) = both(text(law, omega, more), steps)
-        assert 0.02 < exact < 0.98 and abs(found - exact) < 4 / steps
-        if "0.2\n" in f"{law}\n":  # it slips several times in half a cycle
+        (exact, start, _), (sampled, phase, _) = run_exact_and_march(
+            format_scene(law, omega, more), steps
+        )
+        assert 0.02 < exact < 0.98 and abs(sampled - exact) < 4 / steps
+        if "0.2\n" in f"{law}\n":  # The block slips several times per half cycle.
             assert phase is None and start is None
             continue
         assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
@@ -85,12 +91,15 @@ NULLS = (
 @pytest.mark.parametrize(
     "load, reason", [("0.8 N", "never sticks"), ("8 N", "the whole interface sticks throughout")]
 )
-def test_exact_a_phase_wants_a_slip_out_of_a_stick(load, reason):
-    """Far above the limit it slides through; below it nothing slips, and the loop has no width."""
-    scene = text('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')
-    found = run(loads(scene)).measures
-    assert found["slip_start_phase"].value is None and reason in found["slip_start_phase"].reason
-    held = load == "8 N"
-    assert found["stick_fraction"].value == held
+def test_exact_slip_phase_needs_stick_and_slip(load, reason):
+    """Far above the friction limit the block never sticks, far below it never slips: neither motion
+    has a phase of the first slip."""
+    scene = format_scene('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')
+    measures = run(loads(scene)).measures
+    assert (
+        measures["slip_start_phase"].value is None and reason in measures["slip_start_phase"].reason
+    )
+    is_stuck = load == "8 N"
+    assert measures["stick_fraction"].value == is_stuck
     for name in NULLS[:3]:
-        assert (found[name].value is None) is held, name
+        assert (measures[name].value is None) is is_stuck, name

@@ -1,5 +1,8 @@
-"""Law elastic-plastic given its stiffness beside the bond length that makes one under the same load: every kind of run
-gives the same answers, and a sweep of the load leaves the stiffness where it is."""
+"""The law elastic-plastic with a given stiffness agrees with the equivalent bond length, in every
+kind of run.
+
+In a sweep of the load the stiffness stays constant.
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from scene_texts import FORCED, MODE, PAIR, POINT, SHEAR, SMALL_PATCH, TRIANGLE,
 import patchfem as pf
 from patchfem.scene import loads
 
-LOAD, STIFF = 26 * 0.45359237 * 9.80665, 7e6  # N, N/m
+LOAD, STIFF = 26 * 0.45359237 * 9.80665, 7e6  # Load [N] and stiffness [N/m].
 LAW = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "180 Hz"\nacceleration = "8 g"\ncycles = 20\n'
 RIG = POINT + LAW + MODE + DRIVE
@@ -27,8 +30,8 @@ RUNS = {
 }
 
 
-def both(text: str) -> tuple:
-    """The scene with the stiffness, and with the bond length."""
+def format_both_ways(text: str) -> tuple:
+    """Return the scene with the stiffness and with the equivalent bond length."""
     stiff = f'stiffness = "{STIFF} N/m"\n'
     length = 'bond_length = "{!r} m"\n'
     if "%s" in text:
@@ -39,38 +42,42 @@ def both(text: str) -> tuple:
 
 
 @pytest.mark.parametrize("name", RUNS)
-def test_exact_stiffness_and_bond_length_say_the_same(name):
-    mine, theirs = (pf.run(loads(text)) for text in both(RUNS[name]))
-    assert mine.outcome == theirs.outcome and mine.measures.keys() == theirs.measures.keys()
-    for key, one in mine.measures.items():
-        if one.value is not None:
-            assert one.value == pytest.approx(
-                theirs.measures[key].value, rel=1e-9, abs=1e-15, nan_ok=True
+def test_exact_stiffness_agrees_with_equivalent_bond_length(name):
+    with_stiffness, with_length = (pf.run(loads(text)) for text in format_both_ways(RUNS[name]))
+    assert (
+        with_stiffness.outcome == with_length.outcome
+        and with_stiffness.measures.keys() == with_length.measures.keys()
+    )
+    for key, measure in with_stiffness.measures.items():
+        if measure.value is not None:
+            assert measure.value == pytest.approx(
+                with_length.measures[key].value, rel=1e-9, abs=1e-15, nan_ok=True
             ), key
 
 
-def test_exact_a_sweep_of_the_load_leaves_the_stiffness():
-    """Lanes of 64 loads: some held, whose force is STIFF times the slide, and some that slip."""
+def test_exact_load_sweep_keeps_stiffness():
+    """In a sweep of 64 loads in lanes, the secant stiffness of the stuck cases is the given
+    stiffness, and the others agree with single runs."""
     values = np.geomspace(20, 5e3, 64)
-    found = pf.sweep(loads(both(RIG)[0]), {"normal.load": values})
+    sweep = pf.sweep(loads(format_both_ways(RIG)[0]), {"normal.load": values})
     for case in (0, 20, 40, 63):
-        one = pf.run(
-            loads(both(RIG)[1]),
+        single = pf.run(
+            loads(format_both_ways(RIG)[1]),
             **{"normal.load": values[case], "friction.bond_length": 0.3 * values[case] / STIFF},
         )
         for name in ("friction_force_peak", "relative_displacement_amplitude", "loop_area"):
-            error = float(found[f"{name}_error"][case]) + one.measures[name].error
-            assert abs(float(found[name][case]) - one.measures[name].value) <= error + 1e-12, (
+            error = float(sweep[f"{name}_error"][case]) + single.measures[name].error
+            assert abs(float(sweep[name][case]) - single.measures[name].value) <= error + 1e-12, (
                 case,
                 name,
             )
-    held = found["outcome"].values == "stuck"
-    np.testing.assert_allclose(found["secant_stiffness"].values[held], STIFF, rtol=1e-6)
-    assert 5 < held.sum() < 60
+    is_stuck = sweep["outcome"].values == "stuck"
+    np.testing.assert_allclose(sweep["secant_stiffness"].values[is_stuck], STIFF, rtol=1e-6)
+    assert 5 < is_stuck.sum() < 60
 
 
 @pytest.mark.parametrize(
-    "sets, key, says",
+    "sets, key, message",
     [
         (
             ["friction.bond_length=1 um"],
@@ -90,20 +97,20 @@ def test_exact_a_sweep_of_the_load_leaves_the_stiffness():
         (["friction.static=0"], "friction.static", "static: must be > 0"),
     ],
 )
-def test_refuses_a_stiffness_that_is_not_one(sets, key, says):
-    text = both(RIG)[0]
-    found = mistakes(both(RIG)[0], *sets)
-    assert len(found) == 1 and f": {key}: " in found[0] and says in found[0]
-    if "give" in says:  # what it says serves
+def test_refuses_stiffness_with_incompatible_keys(sets, key, message):
+    text = format_both_ways(RIG)[0]
+    messages = mistakes(format_both_ways(RIG)[0], *sets)
+    assert len(messages) == 1 and f": {key}: " in messages[0] and message in messages[0]
+    if "give" in message:  # The advice of the message works.
         loads(text.replace(f'stiffness = "{STIFF} N/m"', 'bond_length = "5 um"'), "a.toml", sets)
 
 
-def test_refuses_a_stiffness_under_an_approach_and_one_that_wears():
-    text = both(SMALL_PATCH + LAW + TRIANGLE)[0].replace('load = "26 lbf"', "")
+def test_refuses_stiffness_with_approach_or_worn_bonds():
+    text = format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0].replace('load = "26 lbf"', "")
     text += '[contact.approach]\ndistance = "0.2 um"\n'
     assert "or contact.load in place of [contact.approach]" in mistakes(text)[0]
     worn = (
-        both(SMALL_PATCH + LAW + TRIANGLE)[0]
+        format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0]
         + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e5\n'
         '[wear.friction]\ndepth = ["0 um", "1 um"]\nbond_length_factor = [1, 2]\n'
     )

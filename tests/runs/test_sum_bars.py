@@ -1,4 +1,4 @@
-"""The error of the sum over bonds, of its tail and of merging, inside the bars of rigs and benches."""
+"""Errors of rigs and benches include the error of the sum over bonds: truncation and merging."""
 
 import pytest
 
@@ -19,36 +19,36 @@ PRINTED = 'reading = "report"\ninitial_bonds = 0\nkinetic = 0.2\nrest_growth = "
 
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
-    "knobs", [["accuracy.merge=0.3"], ["accuracy.quadrature=truncated", "accuracy.tail=0.05"]]
+    "settings", [["accuracy.merge=0.3"], ["accuracy.quadrature=truncated", "accuracy.tail=0.05"]]
 )
 @pytest.mark.parametrize("law", ["order = 0.5\n", PRINTED])
-def test_exact_the_bars_of_a_rig_hold_the_error_of_the_sum(law, knobs):
-    """Against the sum of every bond at the same steps: a tail of 5 % moves the amplitude by 7 %, which the bars of the
-    steps alone did not hold, nor those of ten other measures."""
+def test_exact_errors_of_rig_cover_truncated_and_merged_bonds(law, settings):
+    """The errors cover the difference from the sum over all bonds with the same steps. A truncation
+    of 5 % changes the amplitude by 7 %, which the errors of the steps alone did not cover."""
     text = RIG.format(law=law)
     fine = ["accuracy.quadrature=truncated", "accuracy.tail=1e-9"]
-    whole = run(loads(text, sets=fine), estimate=False).measures
-    found = run(loads(text, sets=knobs)).measures
-    for name, one in found.items():
-        if one.value is not None and one.error is not None and name in whole:
-            assert abs(one.value - whole[name].value) <= one.error, name
+    reference = run(loads(text, sets=fine), estimate=False).measures
+    measures = run(loads(text, sets=settings)).measures
+    for name, measure in measures.items():
+        if measure.value is not None and measure.error is not None and name in reference:
+            assert abs(measure.value - reference[name].value) <= measure.error, name
 
 
-def test_exact_the_bound_of_every_engine_that_sums_bonds():
-    """A sum in NumPy, where the pressure of a point changes on the way, has the tail of the scene; the recursion and a
-    sum of every bond lose nothing."""
+def test_exact_bond_sum_error_of_every_engine():
+    """The NumPy sum, used for a pressure that varies, has the truncation of the scene; the
+    recursion and the direct sum have no error."""
     text = (
         '[normal]\nload = "90 N"\namplitude = "9 N"\nfrequency = "10 Hz"\n[friction]\nstatic = 0.3\n'
         'law = "nonlocal"\nbond_length = "20 um"\norder = 2\n[slide]\nkind = "sine"\namplitude = "20 um"\n'
         'frequency = "10 Hz"\n'
     )
 
-    def bound(*sets, where=text):
+    def sum_error(*sets, where=text):
         model = build(loads(where, sets=sets))
         return bond_sum_error(model, bench_engine(model, model.slide.samples(100)[1]))
 
-    assert bound() == 1e-6 and bound("accuracy.tail=0.05") == 0.05
-    assert bound("accuracy.quadrature=direct") == bound("friction.order=1") == 0.0
+    assert sum_error() == 1e-6 and sum_error("accuracy.tail=0.05") == 0.05
+    assert sum_error("accuracy.quadrature=direct") == sum_error("friction.order=1") == 0.0
     steady = text.replace('amplitude = "9 N"\nfrequency = "10 Hz"\n', "")
-    assert 0 < bound(where=steady) <= 1e-4
-    assert bound("accuracy.quadrature=truncated", "accuracy.tail=0.05", where=steady) == 0.05
+    assert 0 < sum_error(where=steady) <= 1e-4
+    assert sum_error("accuracy.quadrature=truncated", "accuracy.tail=0.05", where=steady) == 0.05

@@ -1,4 +1,5 @@
-"""What a plan foresees of a tolerance: it says so where runs miss it, and its cure makes them meet it."""
+"""Forecasts of a plan about the tolerance: they agree with runs, and their remedies make runs meet
+the tolerance."""
 
 import pytest
 from command_line import cli
@@ -48,11 +49,13 @@ BONDS = BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"
 PATCH = read_template("patch").partition("[accuracy]")[0]
 
 
-def asked(text: str, tolerance: float, keys: str = "") -> str:
+def add_tolerance(text: str, tolerance: float, keys: str = "") -> str:
+    """Return a scene with a tolerance and further keys of [accuracy]."""
     return f"{text}[accuracy]\ntolerance = {tolerance:g}\n{keys}"
 
 
-def foreseen(text: str) -> dict:
+def forecast(text: str) -> dict:
+    """Return the forecast of the plan about the tolerance."""
     return pf.plan(pf.load(text)).as_json()["tolerance"]
 
 
@@ -60,40 +63,42 @@ def foreseen(text: str) -> dict:
     "text, cure",
     [
         pytest.param(
-            asked(TANH, 1e-3, "steps_per_cycle = 100\n"),
+            add_tolerance(TANH, 1e-3, "steps_per_cycle = 100\n"),
             {"accuracy.steps_per_cycle": None},
             id="tanh rig",
         ),
         pytest.param(
-            asked(SPRING, 1e-4, "steps_per_cycle = 200\n"),
+            add_tolerance(SPRING, 1e-4, "steps_per_cycle = 200\n"),
             {"accuracy.steps_per_cycle": None},
             id="spring rig",
         ),
         pytest.param(
-            asked(BONDS, 1e-4, "steps_per_cycle = 100\n"),
+            add_tolerance(BONDS, 1e-4, "steps_per_cycle = 100\n"),
             {"accuracy.steps_per_cycle": 2600},
             id="bench",
         ),
         pytest.param(
-            asked(PATCH.replace("[contact]\n", '[contact]\nelement_size = "0.1 mm"\n'), 1e-3),
+            add_tolerance(
+                PATCH.replace("[contact]\n", '[contact]\nelement_size = "0.1 mm"\n'), 1e-3
+            ),
             {"contact.element_size": None},
             id="patch",
         ),
         pytest.param(
-            asked(SOFT, 1e-3, "steps_per_cycle = 200\n"),
+            add_tolerance(SOFT, 1e-3, "steps_per_cycle = 200\n"),
             {"accuracy.steps_per_cycle": 1600},
             id="rig with shear",
         ),
     ],
 )
-def test_exact_what_is_foreseen_as_missed_is_missed_and_its_cure_meets_the_tolerance(
-    text, cure, tmp_path
-):
-    found = foreseen(text)
-    assert found["missed"] and found["cure"].items() >= cure.items() and misses(text)
-    better = cured(text, found["cure"])
-    assert not misses(better)
-    assert foreseen(better) | {"asked": 0} == {
+def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, cure, tmp_path):
+    """If the plan predicts that a run misses its tolerance, the run misses it, and with the remedy
+    it meets it."""
+    prediction = forecast(text)
+    assert prediction["missed"] and prediction["cure"].items() >= cure.items() and misses(text)
+    remedied = cured(text, prediction["cure"])
+    assert not misses(remedied)
+    assert forecast(remedied) | {"asked": 0} == {
         "asked": 0,
         "missed": False,
         "cure": {},
@@ -101,27 +106,30 @@ def test_exact_what_is_foreseen_as_missed_is_missed_and_its_cure_meets_the_toler
     }
     scene = tmp_path / "scene.toml"
     scene.write_text(text, "utf-8")
-    assert f"says     {found['sentence']}\n" in cli("plan", scene).out
+    assert f"says     {prediction['sentence']}\n" in cli("plan", scene).out
 
 
 @pytest.mark.share(1, 2, 3)
 @pytest.mark.parametrize(
     "text",
     [
-        asked(TANH, 1e-3),
-        asked(BONDS, 1e-4, "steps_per_cycle = 2600\n"),
-        asked(PATCH, 1e-4),
-        asked(SOFT, 1e-2, "steps_per_cycle = 800\n"),
+        add_tolerance(TANH, 1e-3),
+        add_tolerance(BONDS, 1e-4, "steps_per_cycle = 2600\n"),
+        add_tolerance(PATCH, 1e-4),
+        add_tolerance(SOFT, 1e-2, "steps_per_cycle = 800\n"),
         read_template("rig"),
         read_template("linear"),
         read_template("joint"),
     ],
 )
-def test_always_nothing_is_foreseen_of_a_tolerance_that_is_met(text):
-    assert not foreseen(text)["missed"] and not misses(text)
+def test_always_met_tolerance_is_not_predicted_as_missed(text):
+    assert not forecast(text)["missed"] and not misses(text)
 
 
-def test_exact_a_tolerance_below_any_mesh_is_cured_by_the_tolerance():
-    found = foreseen(asked(PATCH, 1e-8))
-    assert found["cure"] == {"accuracy.tolerance": 1e-3} and "by any mesh" in found["sentence"]
-    assert not misses(cured(asked(PATCH, 1e-8), found["cure"]))
+def test_exact_remedy_of_unreachable_tolerance_is_larger_tolerance():
+    prediction = forecast(add_tolerance(PATCH, 1e-8))
+    assert (
+        prediction["cure"] == {"accuracy.tolerance": 1e-3}
+        and "by any mesh" in prediction["sentence"]
+    )
+    assert not misses(cured(add_tolerance(PATCH, 1e-8), prediction["cure"]))

@@ -1,4 +1,5 @@
-"""Several tones at once: superposition of closed forms, beats, energies under friction, refusals."""
+"""Drives with several tones: superposition of closed forms, beats, energies with friction,
+refusals."""
 
 import numpy as np
 import pytest
@@ -24,53 +25,58 @@ PLASTIC = {
 }
 
 
-def from_rest(t, omega, zeta, parts):
-    """Displacement of an oscillator from rest under tones (f, a, phase) of the base, in closed form."""
-    own = omega * np.sqrt(1 - zeta**2)
-    out = 0.0
+def response_from_rest(t, omega, zeta, parts):
+    """Return the displacement of an oscillator from rest under base tones (f, a, phase), in closed
+    form."""
+    omega_damped = omega * np.sqrt(1 - zeta**2)
+    displacement = 0.0
     for f, a, phi in parts:
         w = 2 * np.pi * f
         steady = -a * np.exp(1j * phi) / (omega**2 - w * w + 2j * zeta * omega * w)
-        place = steady.imag
-        rate = (1j * w * steady).imag
-        free = place * np.cos(own * t) + (rate + zeta * omega * place) / own * np.sin(own * t)
-        out = out + (steady * np.exp(1j * w * t)).imag - np.exp(-zeta * omega * t) * free
-    return out
+        initial = steady.imag
+        initial_rate = (1j * w * steady).imag
+        free = initial * np.cos(omega_damped * t) + (
+            initial_rate + zeta * omega * initial
+        ) / omega_damped * np.sin(omega_damped * t)
+        displacement = (
+            displacement + (steady * np.exp(1j * w * t)).imag - np.exp(-zeta * omega * t) * free
+        )
+    return displacement
 
 
-def test_exact_tones_on_a_linear_rig_are_the_sum_of_each():
+def test_exact_linear_response_to_tones_is_superposition():
     result = pf.run(RIG)
-    parts = ((96, 9.80665, 0), (102, 9.80665 / 2, np.radians(40)))
-    true = from_rest(result.response.time, 2 * np.pi * 100, 0.02, parts)
-    assert np.abs(result.response.output - true).max() < 1e-6 * np.abs(true).max()
-    # one beat of 1/6 s in cycles of 96 Hz
+    tones = ((96, 9.80665, 0), (102, 9.80665 / 2, np.radians(40)))
+    expected = response_from_rest(result.response.time, 2 * np.pi * 100, 0.02, tones)
+    assert np.abs(result.response.output - expected).max() < 1e-6 * np.abs(expected).max()
+    # The window is one beat of 1/6 s, in cycles of 96 Hz.
     assert result.outcome == "steady" and result.extra["window"] == 16
     t = np.linspace(10, 10 + 1 / 6, 20001)
-    late = from_rest(t, 2 * np.pi * 100, 0.02, parts)
+    steady = response_from_rest(t, 2 * np.pi * 100, 0.02, tones)
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
-        np.ptp(late) / 2, rel=1e-5
+        np.ptp(steady) / 2, rel=1e-5
     )
 
 
-def test_exact_energies_balance_under_two_tones():
-    m = pf.run(RIG | PLASTIC).measures
-    assert m["drift_per_cycle"].value is None
-    assert "within their beat without any drift" in m["drift_per_cycle"].reason
-    assert m["energy_balance"].value < 1e-11
-    assert m["energy_dissipated"].value > 0
-    assert m["work_check"].value < 1e-9
+def test_exact_energies_under_two_tones_balance():
+    measures = pf.run(RIG | PLASTIC).measures
+    assert measures["drift_per_cycle"].value is None
+    assert "within their beat without any drift" in measures["drift_per_cycle"].reason
+    assert measures["energy_balance"].value < 1e-11
+    assert measures["energy_dissipated"].value > 0
+    assert measures["work_check"].value < 1e-9
 
 
 @pytest.mark.parametrize(
     "frequencies, cycles",
     [((96.0, 102.0), 16), ((100.0, 90.0, 110.0), 10), ((0.3, 0.2), 3), ((1e-9, 2e-9), 1)],
 )
-def test_exact_a_beat_is_the_shortest_time_after_which_all_tones_repeat(frequencies, cycles):
+def test_exact_beat_is_shortest_common_period(frequencies, cycles):
     assert count_beat_cycles(frequencies) == cycles
 
 
 @pytest.mark.parametrize(
-    "given, said",
+    "changes, message",
     [
         ({"kind": "force"}, "can only shake the base"),
         ({"accelerations": ["1 g"]}, "accelerations"),
@@ -81,9 +87,9 @@ def test_exact_a_beat_is_the_shortest_time_after_which_all_tones_repeat(frequenc
         ({"frequencies": [96.0, "1 um"]}, "frequency"),
     ],
 )
-def test_refuses_tones_that_none_can_be(given, said):
-    drive = {name: one for name, one in (RIG["drive"] | given).items() if one is not None}
-    with pytest.raises(pf.PatchfemError, match=said):
+def test_refuses_faulty_tones(changes, message):
+    drive = {name: value for name, value in (RIG["drive"] | changes).items() if value is not None}
+    with pytest.raises(pf.PatchfemError, match=message):
         pf.run(RIG | {"drive": drive})
     with pytest.raises(pf.PatchfemError, match="under a sine"):
         pf.run(RIG, **{"accuracy.method": "harmonic"})

@@ -1,4 +1,5 @@
-"""A rough measured trace has one answer: by run and by sweep, in the measures and in the fields."""
+"""A rough measured profile gives the same results by run and by sweep, in the measures and in the
+fields."""
 
 import json
 
@@ -27,8 +28,8 @@ tolerance = 1e-1
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory):
-    """A scene under waves with noise of 50 nm, which no mesh that is worth its time resolves."""
+def rough_scene(tmp_path_factory):
+    """Return a scene with a profile of waves and noise of 50 nm, which no affordable mesh resolves."""
     folder = tmp_path_factory.mktemp("rough")
     x = np.linspace(-LENGTH / 2, LENGTH / 2, SAMPLES)
     noise = np.random.default_rng(5).standard_normal(SAMPLES)
@@ -40,34 +41,39 @@ def scene(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def result(scene):
-    return pf.run(scene)
+def run_result(rough_scene):
+    return pf.run(rough_scene)
 
 
-def test_a_sweep_has_the_numbers_of_the_run(scene, result):
-    """On the mesh that all cases share the peak was less than half of that of the run, outside both errors."""
-    sweep = pf.sweep(scene, {"contact.load": ["20 N", "30 N"]})
-    for name, one in result.measures.items():
-        assert float(sweep[name][0]) == pytest.approx(one.value, rel=1e-9, abs=one.floor), name
+def test_exact_sweep_of_rough_profile_agrees_with_run(rough_scene, run_result):
+    """The measures and errors of a sweep agree with those of the run. On a mesh shared by all cases
+    the peak was less than half of that of the run."""
+    sweep = pf.sweep(rough_scene, {"contact.load": ["20 N", "30 N"]})
+    for name, measure in run_result.measures.items():
+        assert float(sweep[name][0]) == pytest.approx(measure.value, rel=1e-9, abs=measure.floor), (
+            name
+        )
         assert float(sweep[f"{name}_error"][0]) == pytest.approx(
-            one.error, rel=1e-6, abs=one.floor
+            measure.error, rel=1e-6, abs=measure.floor
         ), name
 
 
-def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measures(result, tmp_path):
-    peak = result.measures["pressure_peak"]
-    fraction = result.measures["contact_fraction"]
-    data = result.to_xarray()
+def test_exact_fields_of_rough_profile_agree_with_measures(run_result, tmp_path):
+    """The peak pressure and the contact fraction in the dataset, the field file and the summary
+    agree with the measures."""
+    peak = run_result.measures["pressure_peak"]
+    fraction = run_result.measures["contact_fraction"]
+    data = run_result.to_xarray()
     assert abs(float(data.normal_stress.max()) - peak.value) <= peak.error
     assert float((data.weight * data.normal_stress[0]).sum()) == pytest.approx(20.0, rel=1e-10)
     assert not (data.normal_stress > 0)[0].values[data.gap[0] > 0].any()
-    result.save(tmp_path / "out")
+    run_result.save(tmp_path / "out")
     with h5py.File(tmp_path / "out" / "fields.vtkhdf") as file:
-        found = []
+        arrays = []
         file.visititems(
-            lambda name, one: found.append(one[()]) if name.endswith("normal_stress") else None
+            lambda name, one: arrays.append(one[()]) if name.endswith("normal_stress") else None
         )
-    assert np.nanmax(np.concatenate([one.ravel() for one in found])) == pytest.approx(
+    assert np.nanmax(np.concatenate([item.ravel() for item in arrays])) == pytest.approx(
         float(data.normal_stress.max()), rel=1e-3
     )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
@@ -76,11 +82,12 @@ def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measure
     )
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "near the narrow pressure peaks of up to" in page
-    assert any("whose largest pressure is" in note for note in result.notes)
+    assert any("whose largest pressure is" in note for note in run_result.notes)
 
 
-def test_a_value_that_is_not_known_is_not_done(tmp_path):
-    """A contact far narrower than its elements."""
+def test_always_unresolved_contact_is_not_converged(tmp_path):
+    """A contact much narrower than its elements has the outcome not_converged, in a run and in a
+    sweep."""
     text = (
         SCENE.split("[contact.tilt]")[0].replace("20 N", "1 N")
         + """\
@@ -90,16 +97,16 @@ radius = "2 mm"
 """
     )
     (tmp_path / "scene.toml").write_text(text)
-    ended = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
+    answer = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
-    assert (ended.code, summary["outcome"]) == (3, "not_converged")
-    assert "is as large as the value, so it is not known" in ended.out and "0 to" in ended.out
+    assert (answer.code, summary["outcome"]) == (3, "not_converged")
+    assert "is as large as the value, so it is not known" in answer.out and "0 to" in answer.out
     assert any("at least its value" in text for text in summary["warnings"])
     sweep = pf.sweep(tmp_path / "scene.toml", {"contact.load": ["1 N", "1.1 N"]})
     assert set(sweep.outcome.values.tolist()) == {"not_converged"}
-    ended = cli(
+    answer = cli(
         "sweep", tmp_path / "scene.toml", "--over", "contact.load=1 N", "-o", tmp_path / "s"
     )
-    assert ended.code == 3 and "1 not_converged" in ended.out
-    bars = pf.plot.sweep(sweep, "pressure_peak").containers[0].lines[2][0]
-    assert min(segment[:, 1].min() for segment in bars.get_segments()) >= 0
+    assert answer.code == 3 and "1 not_converged" in answer.out
+    error_bars = pf.plot.sweep(sweep, "pressure_peak").containers[0].lines[2][0]
+    assert min(segment[:, 1].min() for segment in error_bars.get_segments()) >= 0

@@ -1,4 +1,5 @@
-"""Scenes whose contact pushes and turns the modes as well as it rubs, and rigs under a load that swings."""
+"""Rigs with modes that change the normal load (pitch, heave), and rigs with a prescribed varying
+load."""
 
 import numpy as np
 import pytest
@@ -18,11 +19,12 @@ POINT = STRUCTURE + BENCH.split("[slide]")[0]
 SWING = ["normal.amplitude=60 N", "normal.frequency=50 Hz"]
 
 
-def result_of(text, *sets, estimate=False):
+def run_text(text, *sets, estimate=False):
+    """Return the result of a scene with --set options."""
     return run(loads(text, "a.toml", sets), estimate=estimate)
 
 
-@pytest.mark.share(0, 2)  # Coulomb and tanh: each a loop to compile
+@pytest.mark.share(0, 2)  # The Coulomb and tanh cases would each compile a loop.
 @pytest.mark.parametrize(
     "law",
     [
@@ -32,40 +34,50 @@ def result_of(text, *sets, estimate=False):
         '"tanh"\nreference_speed = "1 mm/s"',
     ],
 )
-def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
-    """Balance <= 1e-10; every frame is the unilateral solution at its gap: forces and gaps exclude each other."""
+def test_exact_pitching_mode_balances_energy_and_fields(law):
+    """The energy balance closes within 1e-10, and in every frame pressure and gap exclude each
+    other."""
     text = PITCH.replace('"nonlocal"', law).replace(
         'static = 0.3\nbond_length = "1 um"', "static = 0.3"
     )
-    found = result_of(text, *FEW)
-    assert found.measures["energy_balance"].value <= 1e-10
-    assert found.measures["energy_created"].value == 0
-    fields = found.fields
-    patch = found.patch
-    load = found.response.extra["normal_load"]
+    result = run_text(text, *FEW)
+    assert result.measures["energy_balance"].value <= 1e-10
+    assert result.measures["energy_created"].value == 0
+    fields = result.fields
+    patch = result.patch
+    load = result.response.extra["normal_load"]
     sums = fields["normal_stress"] @ patch.pieces.interface.weight
     assert sums[0] == pytest.approx(patch.pressure.load) and np.ptp(sums) > 0
     assert load.min() - 1e-9 <= sums.min() and sums.max() <= load.max() + 1e-9
     assert (fields["gap"] >= 0).all() and not (fields["gap"] * fields["normal_stress"]).any()
     assert (np.abs(fields["shear_stress"]) <= 0.3 * fields["normal_stress"] + 1e-6).all()
-    kept, _ = collect_histories(found)
-    assert kept["normal_load"] is load and np.ptp(load) > 1e-3 * load[0]
+    histories, _ = collect_histories(result)
+    assert histories["normal_load"] is load and np.ptp(load) > 1e-3 * load[0]
 
 
-def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
-    """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
-    words = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
-    patch = result_of(PITCH, *FEW, *words, "drive.cycles=1").patch
-    found = make_contact_sets(patch, 2e4)
+def test_exact_holder_spring_acts_in_series_with_pitch():
+    """At a given rotation of the holder, the piece rotates by this angle minus the moment over the
+    spring stiffness."""
+    settings = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
+    patch = run_text(PITCH, *FEW, *settings, "drive.cycles=1").patch
+    contact_set = make_contact_sets(patch, 2e4)
     x = patch.x
-    turn = 2e-6
+    holder_rotation = 2e-6
     spring = 2e4
-    force = solve_forces(found.c, found.x, found.opening + turn * found.x, np.zeros(0))[0]
-    own = turn + (force @ x - patch.pressure.moment) / spring
-    before = patch.pressure.sigma_n * patch.pieces.interface.weight
-    gap = patch.pressure.gap - patch.pieces.normal @ before + own * x
-    want = solve_forces(patch.pieces.normal, x, gap, np.zeros(0))[0]
-    assert np.abs(force - want).max() <= 1e-11 * patch.pressure.load and own < 0.9 * turn
+    force = solve_forces(
+        contact_set.c,
+        contact_set.x,
+        contact_set.opening + holder_rotation * contact_set.x,
+        np.zeros(0),
+    )[0]
+    piece_rotation = holder_rotation + (force @ x - patch.pressure.moment) / spring
+    initial_force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    gap = patch.pressure.gap - patch.pieces.normal @ initial_force + piece_rotation * x
+    expected = solve_forces(patch.pieces.normal, x, gap, np.zeros(0))[0]
+    assert (
+        np.abs(force - expected).max() <= 1e-11 * patch.pressure.load
+        and piece_rotation < 0.9 * holder_rotation
+    )
 
 
 @pytest.mark.share(1)
@@ -74,24 +86,25 @@ def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     [(), ("friction.law=elastic-plastic", "friction.bond_length=1 um")],
     ids=["coulomb", "elastic-plastic"],
 )
-def test_exact_a_rig_under_a_swinging_load(law):
-    """normal_load follows its formula, the balance closes, and friction keeps below mu N."""
-    found = result_of(POINT, *SWING, *law, estimate=True)
-    time = found.response.time
-    load = found.response.extra["normal_load"]
+def test_exact_rig_under_varying_load_closes_energy(law):
+    """The normal load follows its formula, the energy balance closes, and friction stays below mu
+    N."""
+    result = run_text(POINT, *SWING, *law, estimate=True)
+    time = result.response.time
+    load = result.response.extra["normal_load"]
     assert load == pytest.approx(
         26 * 4.4482216152605 + 60 * np.cos(2 * np.pi * 50 * time), abs=1e-9
     )
-    assert found.measures["energy_balance"].value <= 1e-12
-    assert (np.abs(found.response.force) <= 0.3 * load + 1e-9).all()
+    assert result.measures["energy_balance"].value <= 1e-12
+    assert (np.abs(result.response.force) <= 0.3 * load + 1e-9).all()
     assert all(
         (m.error is None) == bool(m.reason)
-        for name, m in found.measures.items()
+        for name, m in result.measures.items()
         if not name.endswith("steady")
     )
 
 
-def test_refuses_heave_and_pitch_beside_a_point():
+def test_refuses_normal_motion_of_point_contact():
     message = only(POINT, "structure.mode.axial.normal=0.1")
     assert message.startswith("--set: structure.mode.axial.normal: ")
     assert "use [contact] in place of" in message

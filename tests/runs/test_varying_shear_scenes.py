@@ -1,4 +1,4 @@
-"""Scenes of coated pieces that give way in shear while pitch and heave change their load."""
+"""Coated pieces with shear under a normal load that changes with pitch and heave."""
 
 import numpy as np
 import pytest
@@ -16,60 +16,73 @@ PLASTIC = "friction.law=elastic-plastic"
 SKIN = 'contact.asperities={law="linear", normal_stiffness="2e14 Pa/m", tangential_ratio=0.8}'
 
 
-def result_of(*sets, estimate=False):
+def run_rig(*sets, estimate=False):
+    """Return the result of the rig with --set options."""
     return run(loads(MOVING, "a.toml", sets), estimate=estimate)
 
 
-def amplitude(found) -> float:
-    return found.measures["relative_displacement_amplitude"].value
+def displacement_amplitude(result) -> float:
+    """Return the amplitude of the relative displacement [m]."""
+    return result.measures["relative_displacement_amplitude"].value
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("law", ["friction.law=nonlocal", PLASTIC])
-def test_order_the_amplitude_settles_with_the_number_of_modes(law):
-    """Against all 65 modes: 8 modes within 3e-4, 32 within 1e-5, and a piece rigid in shear is far off."""
-    found = {k: result_of(*SETS, law, f"accuracy.shear_modes={k}") for k in (8, 32, 65)}
-    near = [abs(amplitude(found[k]) / amplitude(found[65]) - 1) for k in (8, 32)]
-    assert near[0] <= 3e-4 and near[1] <= 1e-5 and near[1] < near[0]
-    assert abs(amplitude(result_of(*SETS[:2], law)) / amplitude(found[65]) - 1) > 3e-3
-    for one in found.values():
-        assert one.measures["energy_balance"].value <= 1e-10
-        assert one.measures["energy_created"].value == 0
-        assert np.ptp(one.response.extra["normal_load"]) > 0.5 * one.patch.pressure.load
+def test_order_of_amplitude_in_number_of_shear_modes(law):
+    """The amplitude converges with the number of shear modes: 8 of 65 modes agree within 3e-4 and
+    32 within 1e-5, while a piece without shear differs by more than 3e-3."""
+    results = {k: run_rig(*SETS, law, f"accuracy.shear_modes={k}") for k in (8, 32, 65)}
+    deviations = [
+        abs(displacement_amplitude(results[k]) / displacement_amplitude(results[65]) - 1)
+        for k in (8, 32)
+    ]
+    assert deviations[0] <= 3e-4 and deviations[1] <= 1e-5 and deviations[1] < deviations[0]
+    assert (
+        abs(
+            displacement_amplitude(run_rig(*SETS[:2], law)) / displacement_amplitude(results[65])
+            - 1
+        )
+        > 3e-3
+    )
+    for result in results.values():
+        assert result.measures["energy_balance"].value <= 1e-10
+        assert result.measures["energy_created"].value == 0
+        assert np.ptp(result.response.extra["normal_load"]) > 0.5 * result.patch.pressure.load
 
 
-def test_exact_fields_of_a_patch_with_shear():
-    """The holder's slide is slip, what the pieces take of the compliance itself and the stretch of the springs, which
-    is at most that of springs of stiffness mu sigma/eps_0; friction keeps below mu of the pressure there."""
-    found = result_of(*SETS, PLASTIC, "accuracy.shear_modes=65")
-    fields = found.fields
-    weight = found.patch.pieces.interface.weight
-    seen = 0
+def test_exact_fields_of_sheared_patch_satisfy_friction_law():
+    """The displacement of the holder is the sum of slip, elastic displacement of the pieces and
+    bond stretch. The stretch is at most that of springs of stiffness mu sigma/eps_0, and the
+    traction at most mu times the pressure."""
+    result = run_rig(*SETS, PLASTIC, "accuracy.shear_modes=65")
+    fields = result.fields
+    weight = result.patch.pieces.interface.weight
+    n_checked = 0
     for tau, sigma, slip, slide in zip(
         *(fields[key][1:] for key in ("shear_stress", "normal_stress", "slip", "holder_slide"))
     ):
-        on = sigma > 0
+        in_contact = sigma > 0
         assert (np.abs(tau) <= 0.3 * sigma * (1 + 1e-12)).all()
-        stretch = (slide - slip - found.patch.giving @ (tau * weight))[on] / (
-            1e-6 * tau[on] / (0.3 * sigma[on])
+        stretch = (slide - slip - result.patch.giving @ (tau * weight))[in_contact] / (
+            1e-6 * tau[in_contact] / (0.3 * sigma[in_contact])
         )
         assert (stretch > 0).all() and stretch.max() <= 1 + 1e-6
-        seen += on.sum()
-    assert seen > 100
+        n_checked += in_contact.sum()
+    assert n_checked > 100
 
 
-def test_exact_a_run_names_its_tangential_modes_and_bounds_their_error():
-    """A sentence names how many modes stand for what gives way; half as many, coarser steps and a coarser mesh give the
-    error of every measure."""
-    found = result_of(*SETS, SKIN, estimate=True)
-    said = [line for line in found.warnings if "tangential modes" in line]
-    assert len(said) == 1 and said[0].startswith(
+def test_exact_run_states_shear_modes_and_includes_their_error():
+    """A warning states the number of tangential modes; the error of every measure includes half as
+    many modes, coarser steps and a coarser mesh."""
+    result = run_rig(*SETS, SKIN, estimate=True)
+    warnings = [line for line in result.warnings if "tangential modes" in line]
+    assert len(warnings) == 1 and warnings[0].startswith(
         "[contact.shear]: the normal load changes with the"
     )
-    main = found.measures["relative_displacement_amplitude"]
-    assert 0 < main.error < 0.1 * main.value
-    planned = plan(loads(MOVING, "a.toml", [*SETS, SKIN, PLASTIC]))
-    assert [line for line in planned.verdict if "tangential modes" in line] and planned.unknowns[
+    amplitude_measure = result.measures["relative_displacement_amplitude"]
+    assert 0 < amplitude_measure.error < 0.1 * amplitude_measure.value
+    run_plan = plan(loads(MOVING, "a.toml", [*SETS, SKIN, PLASTIC]))
+    assert [line for line in run_plan.verdict if "tangential modes" in line] and run_plan.unknowns[
         "shear_modes"
     ] == 4
     assert not [
@@ -82,18 +95,23 @@ def test_exact_a_run_names_its_tangential_modes_and_bounds_their_error():
     ]
 
 
-def test_exact_the_spring_of_the_holder_is_one_mode():
-    """A tangential spring before a rigid piece: one mode whatever is asked, and the answer of a stiff one is that
-    without it."""
-    stiff, none = (
-        result_of(*SETS[:2], *more)
-        for more in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
+def test_exact_holder_spring_of_rigid_piece_is_one_mode():
+    """The tangential spring of the holder with a rigid piece is one mode for any number of shear
+    modes; a very stiff spring changes nothing."""
+    stiff, without_spring = (
+        run_rig(*SETS[:2], *more) for more in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
     )
-    assert amplitude(stiff) == pytest.approx(amplitude(none), rel=1e-5)
-    one, many = (
-        result_of(
+    assert displacement_amplitude(stiff) == pytest.approx(
+        displacement_amplitude(without_spring), rel=1e-5
+    )
+    one_mode, many_modes = (
+        run_rig(
             *SETS[:2], "contact.holder.tangential_stiffness=2e7 N/m", f"accuracy.shear_modes={k}"
         )
         for k in (1, 16)
     )
-    assert amplitude(one) == amplitude(many) and abs(amplitude(one) / amplitude(none) - 1) > 0.01
+    assert (
+        displacement_amplitude(one_mode) == displacement_amplitude(many_modes)
+        and abs(displacement_amplitude(one_mode) / displacement_amplitude(without_spring) - 1)
+        > 0.01
+    )

@@ -1,4 +1,4 @@
-"""The jumps of a wear run before it runs, and the pressure axis of its picture."""
+"""Wear steps that a plan estimates before the run."""
 
 import pytest
 
@@ -30,7 +30,8 @@ coefficient = "1e-14 m^2/N"
 TILT, CROWN = '[contact.tilt]\nangle = "{}"\n', '[contact.crown]\nradius = "{}"\n'
 
 
-def model_of(shape: str, more: str):
+def build_wear_model(shape: str, more: str):
+    """Return the model of a worn bench with a shape of the gap."""
     return pf.build(SCENE.replace("[friction]", shape + "[friction]") + more)
 
 
@@ -44,14 +45,19 @@ def model_of(shape: str, more: str):
         (CROWN.format("10 m"), 1e7),
     ],
 )
-def test_always_a_plan_estimates_the_jumps_of_wear_within_half(shape, cycles):
-    model = model_of(shape, f"cycles = {cycles:g}\n")
+def test_always_plan_estimates_number_of_wear_steps(shape, cycles):
+    """The plan estimates the number of wear steps within a factor of 1.5."""
+    model = build_wear_model(shape, f"cycles = {cycles:g}\n")
     patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
-    taken = len(compute_wear(model, patch, (None, None)).moments) - 1
-    assert 1 / 1.5 < estimate_jumps(model) / taken < 1.5
+    actual = len(compute_wear(model, patch, (None, None)).moments) - 1
+    assert 1 / 1.5 < estimate_jumps(model) / actual < 1.5
 
 
-def test_exact_jumps_of_a_scene_and_of_asperities_in_full_contact():
-    assert estimate_jumps(model_of(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
+def test_exact_wear_steps_if_prescribed_or_in_full_contact():
+    """The plan takes the prescribed number of wear steps, and a fixed number for asperities in full
+    contact."""
+    assert (
+        estimate_jumps(build_wear_model(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
+    )
     rough = '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n'
-    assert estimate_jumps(model_of(rough, "cycles = 1e8\n")) == N_SMOOTH_JUMPS
+    assert estimate_jumps(build_wear_model(rough, "cycles = 1e8\n")) == N_SMOOTH_JUMPS

@@ -1,4 +1,4 @@
-"""Scenes with [wear]: volumes in closed form, the patch after wear, shakedown, what is refused and what is written."""
+"""Scenes with [wear]: volumes in closed form, the worn patch, shakedown, refusals and files."""
 
 import io
 import json
@@ -38,7 +38,7 @@ SOFT_RIG = (
     + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
 )
 LONG = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
-THIN_COAT = TILTED + COULOMB + SINE + LONG  # the coating is gone before the last of its cycles
+THIN_COAT = TILTED + COULOMB + SINE + LONG  # The coating is worn through before the last cycle.
 WORN_CROWN = """[contact]
 length = "6 mm"
 width = "8 mm"
@@ -66,45 +66,47 @@ static = 0.6
 LOOSE = "[accuracy]\ntolerance = 2e-2\n"
 
 
-def ran(text, **sets):
+def run_text(text, **sets):
+    """Return the result of a scene with some keys replaced."""
     return pf.run(loads(text, "wear.toml"), **sets)
 
 
-def test_exact_bench_volume_is_coefficient_load_path():
-    found = ran(TILTED + COULOMB + SINE + WEAR)
-    volume = found.measures["worn_volume"]
+def test_exact_worn_volume_is_coefficient_times_load_times_path():
+    worn = run_text(TILTED + COULOMB + SINE + WEAR)
+    volume = worn.measures["worn_volume"]
     assert volume.value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
     assert 0 < volume.error <= 1e-3 * volume.value
-    new = ran(TILTED + COULOMB + SINE)
-    assert found.measures["contact_fraction"].value > 1.4 * new.measures["contact_fraction"].value
-    assert found.measures["pressure_peak"].value < 0.6 * new.measures["pressure_peak"].value
-    assert found.measures["loop_area"].value == pytest.approx(
-        new.measures["loop_area"].value, rel=1e-12
+    unworn = run_text(TILTED + COULOMB + SINE)
+    assert worn.measures["contact_fraction"].value > 1.4 * unworn.measures["contact_fraction"].value
+    assert worn.measures["pressure_peak"].value < 0.6 * unworn.measures["pressure_peak"].value
+    assert worn.measures["loop_area"].value == pytest.approx(
+        unworn.measures["loop_area"].value, rel=1e-12
     )
 
 
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
-def test_exact_one_point_wears_by_its_load_and_path(motion):
-    found = ran(POINT + COULOMB + motion + WEAR)
-    amplitude = found.measures["slip_amplitude"].value
-    assert found.measures["worn_volume"].value == pytest.approx(
+def test_exact_point_contact_wear_agrees_with_archard(motion):
+    result = run_text(POINT + COULOMB + motion + WEAR)
+    amplitude = result.measures["slip_amplitude"].value
+    assert result.measures["worn_volume"].value == pytest.approx(
         KAPPA * LOAD * 4 * amplitude * CYCLES, rel=2e-3
     )
-    assert "worn_depth_max" not in found.measures
+    assert "worn_depth_max" not in result.measures
 
 
-def test_exact_energy_form_is_archard_with_coefficient_times_friction():
-    one = ran(TILTED + COULOMB + SINE + WEAR)
-    two = ran(
+def test_exact_energy_form_agrees_with_archard():
+    """The form 'energy' with the coefficient kappa/mu agrees with Archard's law."""
+    archard = run_text(TILTED + COULOMB + SINE + WEAR)
+    energy = run_text(
         TILTED + COULOMB + SINE + WEAR.replace("1e-14", repr(KAPPA / 0.3)) + 'form = "energy"\n'
     )
     for name in ("worn_volume", "worn_depth_max", "pressure_peak"):
-        assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
+        assert energy.measures[name].value == pytest.approx(archard.measures[name].value, rel=1e-9)
 
 
 @pytest.mark.share(0, 2, 3, 4)
 @pytest.mark.parametrize(
-    "beside",
+    "table",
     [
         '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n',
         '[contact.asperities]\nlaw = "hertz"\nradius = "10 um"\ndensity = "1e10 1/m^2"\nheight_deviation = "0.5 um"\n',
@@ -114,9 +116,9 @@ def test_exact_energy_form_is_archard_with_coefficient_times_friction():
     ],
     ids=["exponential", "hertz", "linear", "holder", "crown"],
 )
-def test_exact_every_skin_and_shape_wears_by_its_load(beside):
-    found = ran(TILTED + beside + COULOMB + SINE + WEAR)
-    assert found.measures["worn_volume"].value == pytest.approx(
+def test_exact_worn_volume_does_not_depend_on_skin_or_shape(table):
+    result = run_text(TILTED + table + COULOMB + SINE + WEAR)
+    assert result.measures["worn_volume"].value == pytest.approx(
         KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12
     )
 
@@ -137,17 +139,17 @@ def test_exact_every_skin_and_shape_wears_by_its_load(beside):
     ],
     ids=["constant", "dwell", "triangle"],
 )
-def test_exact_a_slide_that_does_not_repeat_is_one_cycle(slide, path):
+def test_exact_non_periodic_slide_counts_as_one_wear_cycle(slide, path):
     for contact in (TILTED, TILTED + SHEAR):
-        found = ran(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
-        assert found.value == pytest.approx(
+        volume = run_text(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
+        assert volume.value == pytest.approx(
             KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06
         )
 
 
 @pytest.fixture(scope="module")
 def worn_folder(tmp_path_factory):
-    """The results folder of a worn bench."""
+    """Return the results folder of a worn bench."""
     scene = tmp_path_factory.mktemp("worn") / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
     answer = cli("run", scene, "-o", scene.parent / "out", "-q")
@@ -155,7 +157,7 @@ def worn_folder(tmp_path_factory):
     return scene.parent / "out"
 
 
-def test_exact_files_hold_the_history_of_the_wear(worn_folder):
+def test_exact_dataset_contains_wear_history(worn_folder):
     with xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
         load = (data.weight * data.normal_stress).sum("x")
         assert load.values == pytest.approx(LOAD, rel=1e-10)
@@ -169,8 +171,9 @@ def test_exact_files_hold_the_history_of_the_wear(worn_folder):
         assert (np.diff(data.frame_time.values) > 0).all()
 
 
-def test_exact_bodies_close_over_the_worn_gap_in_every_frame(worn_folder):
-    """The distance of both interfaces changes from frame to frame as the remaining gap less the worn depth."""
+def test_exact_piece_displacements_agree_with_gap_and_worn_depth(worn_folder):
+    """The distance between the displaced interfaces changes from frame to frame by the gap minus
+    the worn depth."""
     with (
         h5py.File(worn_folder / "fields.vtkhdf") as file,
         xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data,
@@ -179,22 +182,28 @@ def test_exact_bodies_close_over_the_worn_gap_in_every_frame(worn_folder):
         sides = []
         for body in (file["VTKHDF/lower"], file["VTKHDF/upper"]):
             points = body["Points"][:]
-            flat = np.flatnonzero(np.abs(points[:, 1]) < 1e-12)
-            assert flat.size == nodes
+            on_interface = np.flatnonzero(np.abs(points[:, 1]) < 1e-12)
+            assert on_interface.size == nodes
             sides.append(
-                body["PointData/displacement"][:].reshape(frames, len(points), 3)[:, flat, 1]
+                body["PointData/displacement"][:].reshape(frames, len(points), 3)[
+                    :, on_interface, 1
+                ]
             )
-        apart = sides[1] - sides[0]
+        distance = sides[1] - sides[0]
         expected = data.gap.values - data.worn_depth.values
         change = np.ptp(expected, axis=0).max()
-        assert np.abs((apart - apart[0]) - (expected - expected[0])).max() < 1e-5 * change
+        assert np.abs((distance - distance[0]) - (expected - expected[0])).max() < 1e-5 * change
 
 
 @pytest.mark.slow
-def test_exact_shakedown_of_a_crown_under_a_tangential_force():
-    """Cattaneo-Mindlin with Q = 0.6 mu P: the stick zone c = a0 sqrt(0.4) stays, all pressure moves into it, and its
-    middle tends to c/a0 + 0.6 P/(pi c p0) of the Hertz peak: Hertz under 0.4 P and a flat punch under the rest.
-    Normal and tangential compliance are alike, as of two half-planes (Ciavarella and Hills, 1999)."""
+def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
+    """For a Cattaneo-Mindlin contact with Q = 0.6 mu P, the stick zone c = a0 sqrt(0.4) stays and
+    finally carries the whole load.
+
+    The pressure in the middle tends to c/a0 + 0.6 P/(pi c p0) of the Hertz peak: Hertz pressure
+    under 0.4 P and a flat punch under the rest. Normal and tangential compliance are equal, as for
+    two half-planes (Ciavarella and Hills, 1999).
+    """
     width = 10e-3
     radius = 0.05
     line = 1e5
@@ -231,58 +240,61 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
         slips = (limit > 0) & (shear > limit * (1 - 1e-9))
         return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 
-    asked = WearProblem(press, path, area, 1e-13, 1e9)
-    state = start_wear(asked)
+    problem = WearProblem(press, path, area, 1e-13, 1e9)
+    state = start_wear(problem)
     count = 0
-    at_first = state.path @ state.force
-    while state.cycle < asked.cycles:
-        state = take_jump(asked, state, 1e-2)
+    initial_work = state.path @ state.force
+    while state.cycle < problem.cycles:
+        state = take_jump(problem, state, 1e-2)
         count = count + 1
     inside = np.abs(x) < stick
     assert count < 60
     assert (state.path[inside] == 0).all() and not state.depth[inside].any()
     assert state.force[inside].sum() == pytest.approx(load, rel=1e-9)
-    assert state.path @ state.force < 1e-9 * at_first
-    found = (state.force / area)[np.argmin(np.abs(x))] / peak
-    assert found == pytest.approx(stick / half + 0.6 * line / (np.pi * stick * peak), abs=2e-3)
+    assert state.path @ state.force < 1e-9 * initial_work
+    centre_ratio = (state.force / area)[np.argmin(np.abs(x))] / peak
+    assert centre_ratio == pytest.approx(
+        stick / half + 0.6 * line / (np.pi * stick * peak), abs=2e-3
+    )
 
 
-def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
-    """The patch before wear chooses the mesh; by the worn one the warning named a tolerance that led to the same."""
+def test_exact_recommended_tolerance_refines_mesh_under_wear():
+    """The warning of a worn patch recommends a tolerance with a finer mesh. The mesh is chosen for
+    the unworn patch; a tolerance derived from the worn patch led to the same mesh."""
     text = WORN_CROWN.format(tolerance=1e-2)
-    found = ran(text)
-    told = [one for one in found.warnings if "finer mesh" in one]
+    result = run_text(text)
+    warnings = [warning for warning in result.warnings if "finer mesh" in warning]
     nodes, tolerance = re.search(
-        r"\((\d+) interface nodes\).*accuracy\.tolerance = (\S+) for", told[0]
+        r"\((\d+) interface nodes\).*accuracy\.tolerance = (\S+) for", warnings[0]
     ).groups()
-    assert int(nodes) == found.patch.x.size
-    asked = build(loads(WORN_CROWN.format(tolerance=tolerance), "s.toml")).patch
-    assert solve_with_coarser(asked, float(tolerance))[0].x.size > int(nodes)
+    assert int(nodes) == result.patch.x.size
+    patch_model = build(loads(WORN_CROWN.format(tolerance=tolerance), "s.toml")).patch
+    assert solve_with_coarser(patch_model, float(tolerance))[0].x.size > int(nodes)
 
 
-def test_refuses_what_wear_does_not_go_with():
+def test_refuses_wear_without_steady_motion():
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
-    free = (
+    release = (
         POINT
         + COULOMB
         + MODE
         + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n'
         + WEAR
     )
-    assert "steady motion" in only(free)
+    assert "steady motion" in only(release)
 
 
-def test_always_a_motion_without_bounds_wears_nothing():
+def test_always_unbounded_motion_has_no_wear():
     for contact, outcome in ((TILTED, "leaves_contact"), (POINT, "grows")):
-        found = ran(
+        result = run_text(
             contact
             + COULOMB
             + MODE.replace("0.003", "0.0")
             + '[drive]\nkind = "base"\nfrequency = "143 Hz"\n'
             'acceleration = "9 g"\ncycles = 100\n' + WEAR
         )
-        assert found.outcome == outcome and "worn_volume" not in found.measures
-        assert any("nothing was worn" in line for line in found.warnings)
+        assert result.outcome == outcome and "worn_volume" not in result.measures
+        assert any("nothing was worn" in line for line in result.warnings)
 
 
 @pytest.mark.share(0, 1, 4)
@@ -297,20 +309,21 @@ def test_always_a_motion_without_bounds_wears_nothing():
     ],
     ids=["bench_jumps", "rig_jumps", "bench", "rig", "worn_through"],
 )
-def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, monkeypatch, text):
-    """The last state among them, after which no jump is left."""
+def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, text):
+    """A run that is resumed from any saved state, also from the last one, writes the same bytes as
+    the uninterrupted run."""
     scene = tmp_path / "worn.toml"
     states = []
     scene.write_text(text)
 
     save = evolve.save_state
 
-    def noted(path, *more):
+    def save_and_record(path, *more):
         save(path, *more)
         states.append(path.read_bytes())
 
     with monkeypatch.context() as patched:
-        patched.setattr(evolve, "save_state", noted)
+        patched.setattr(evolve, "save_state", save_and_record)
         assert cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
     assert len(states) >= 2
     for state in states:
@@ -322,53 +335,58 @@ def test_exact_a_run_goes_on_from_every_kept_state_to_the_same_bytes(tmp_path, m
             assert (tmp_path / "out" / name).read_bytes() == (
                 tmp_path / "whole" / name
             ).read_bytes(), name
-        one, two = (
+        full_summary, resumed_summary = (
             json.loads((tmp_path / name / "summary.json").read_text()) for name in ("whole", "out")
         )
-        assert {**one, "seconds": 0, "effects": 0} == {**two, "seconds": 0, "effects": 0}
+        assert {**full_summary, "seconds": 0, "effects": 0} == {
+            **resumed_summary,
+            "seconds": 0,
+            "effects": 0,
+        }
 
 
 @pytest.mark.share(2)
-@pytest.mark.parametrize("more", ["jumps = 3\n", "", "upper_share = 0.2\njumps = 40\n"])
-def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
-    """The volume is that of the cycles so far, the depth at the deepest place the coating of the piece that loses
-    most."""
-    found = ran(THIN_COAT + more)
-    cycle = found.measures["worn_through_cycle"]
+@pytest.mark.parametrize("wear_keys", ["jumps = 3\n", "", "upper_share = 0.2\njumps = 40\n"])
+def test_exact_worn_through_coating_ends_run(wear_keys):
+    """A run ends when the coating is worn through: the volume is that of the cycles so far, and the
+    largest depth is the coating thickness of the piece that wears more."""
+    result = run_text(THIN_COAT + wear_keys)
+    cycle = result.measures["worn_through_cycle"]
     coating = 6 * 25.4e-6
-    share = 0.8 if "share" in more else 0.5
-    assert found.outcome == "worn_through" and 0 < cycle.value < 1e9
-    assert found.measures["worn_depth_max"].value * share == pytest.approx(coating, rel=1e-6)
-    volume = found.measures["worn_volume"].value
+    share = 0.8 if "share" in wear_keys else 0.5
+    assert result.outcome == "worn_through" and 0 < cycle.value < 1e9
+    assert result.measures["worn_depth_max"].value * share == pytest.approx(coating, rel=1e-6)
+    volume = result.measures["worn_volume"].value
     assert volume == pytest.approx(1e-13 * LOAD * 40e-6 * cycle.value, rel=1e-12)
-    assert found.extra["wear"]["cycle"][-1] == cycle.value
+    assert result.extra["wear"]["cycle"][-1] == cycle.value
     assert (
         any(
-            f"lower piece, {152.4:.4g} um, is worn through" in text for text in found.extra["notes"]
+            f"lower piece, {152.4:.4g} um, is worn through" in text
+            for text in result.extra["notes"]
         )
         or share == 0.5
     )
-    # two coatings of flat pieces that wear evenly: the patch sinks by its volume over its area, and by the tilt
-    even = volume / (12.7e-3) ** 2
-    assert even < found.measures["worn_depth_max"].value < even + 0.1e-3 * 12.7e-3
-    apart = [
-        ran(THIN_COAT.replace("1e9", repr(cycle.value + off)) + more)
-        for off in (-cycle.error, cycle.error)
+    # The mean depth is the volume over the area; the tilt adds to the largest depth.
+    mean_depth = volume / (12.7e-3) ** 2
+    assert mean_depth < result.measures["worn_depth_max"].value < mean_depth + 0.1e-3 * 12.7e-3
+    results = [
+        run_text(THIN_COAT.replace("1e9", repr(cycle.value + offset)) + wear_keys)
+        for offset in (-cycle.error, cycle.error)
     ]
-    assert [one.outcome == "worn_through" for one in apart] == [False, True]
+    assert [result_.outcome == "worn_through" for result_ in results] == [False, True]
 
 
-def test_refuses_to_resume_the_run_of_another_scene(tmp_path, monkeypatch):
+def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     scene = tmp_path / "worn.toml"
     save = evolve.save_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
-    def interrupted(*asked):
+    def save_and_interrupt(*asked):
         save(*asked)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(evolve, "save_state", interrupted)
+        patched.setattr(evolve, "save_state", save_and_interrupt)
         answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]
@@ -381,9 +399,9 @@ def test_refuses_to_resume_the_run_of_another_scene(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)]
+    "quiet, state, n_messages", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)]
 )
-def test_exact_a_new_run_says_once_that_it_discards_a_saved_state(tmp_path, quiet, state, told):
+def test_exact_new_run_reports_discarded_state_once(tmp_path, quiet, state, n_messages):
     scene = tmp_path / "plain.toml"
     scene.write_text(SINE + COULOMB + '[normal]\nload = "10 N"\n')
     (tmp_path / "out.partial").mkdir()
@@ -393,20 +411,20 @@ def test_exact_a_new_run_says_once_that_it_discards_a_saved_state(tmp_path, quie
     assert answer.code == 0, answer.err
     assert (
         answer.err.count("out.partial held the state of an interrupted run, which is now discarded")
-        == told
+        == n_messages
     )
     assert not (tmp_path / "out.partial").exists() and not (tmp_path / "out" / "wear.npz").exists()
 
 
-def test_refuses_to_go_on_where_nothing_is_kept(tmp_path):
+def test_refuses_to_resume_without_valid_state(tmp_path):
     scene = tmp_path / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
     answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
     assert answer.code == 2 and "no interrupted run" in answer.err
     (tmp_path / "out.partial").mkdir(exist_ok=True)
-    whole = io.BytesIO()
-    np.savez(whole, key=np.zeros(1000))
-    for damaged in (whole.getvalue()[:-200], b"", b"PK nothing"):
+    archive = io.BytesIO()
+    np.savez(archive, key=np.zeros(1000))
+    for damaged in (archive.getvalue()[:-200], b"", b"PK nothing"):
         (tmp_path / "out.partial" / "wear.npz").write_bytes(damaged)
         answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
         assert answer.code == 2 and "cannot be read" in answer.err
@@ -415,15 +433,16 @@ def test_refuses_to_go_on_where_nothing_is_kept(tmp_path):
     assert cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2
 
 
-def test_exact_wear_beside_a_step_is_that_of_an_independent_program():
-    """Truth: `wear_scenes.answer`, a finite-element program of its own that integrates Archard's law."""
-    measures = ran(wear_scenes.text_of(wear_scenes.draw(522015))).measures
-    for name, truth, uncertainty in (
+def test_exact_wear_at_step_agrees_with_independent_program():
+    """The reference is `wear_scenes.answer`, an independent finite-element program that integrates
+    Archard's law."""
+    measures = run_text(wear_scenes.text_of(wear_scenes.draw(522015))).measures
+    for name, reference, uncertainty in (
         ("approach", 1.1330e-6, 3.3e-10),
         ("normal_stiffness", 2.90147e9, 2e5),
         ("tangential_stiffness", 4.60476e8, 1e4),
         ("rotational_stiffness", 47219.2, 1.2),
     ):
         measure = measures[name]
-        assert abs(measure.value - truth) <= measure.error + uncertainty, name
+        assert abs(measure.value - reference) <= measure.error + uncertainty, name
         assert measure.error < 1e-3 * measure.value, name

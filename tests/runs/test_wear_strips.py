@@ -1,4 +1,5 @@
-"""Wear beside strips: every strip by its own pressure and slip, against one dense problem and closed forms."""
+"""Wear of patches in strips, each by its own pressure and slip: comparison with the single patch
+and closed forms."""
 
 import h5py
 import numpy as np
@@ -21,37 +22,45 @@ DRIVEN = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncy
 LOAD, VOLUME = 26 * 4.4482216152605, 1e-14 * 26 * 4.4482216152605 * 40e-6 * 135723
 
 
-def ran(text, **sets):
+def run_text(text, **sets):
+    """Return the result of a scene with some keys replaced."""
     return pf.run(loads(text, "strips.toml"), **sets)
 
 
-def worn(result) -> np.ndarray:
+def final_depth(result) -> np.ndarray:
+    """Return the worn depth of the last frame [m]."""
     return result.fields["worn_depth"][-1]
 
 
-def test_exact_strips_without_roll_wear_as_one_patch():
-    plain, strips = (
-        ran(TILTED + beside + COULOMB + SINE + WEAR + LOOSE) for beside in ("", STRIPS)
+def test_exact_wear_of_level_strips_agrees_with_patch():
+    patch, strips = (
+        run_text(TILTED + table + COULOMB + SINE + WEAR + LOOSE) for table in ("", STRIPS)
     )
-    assert worn(strips).shape == (4, worn(plain).size)
-    assert np.abs(worn(strips) - worn(plain)).max() < 1e-13 * worn(plain).max()
+    assert final_depth(strips).shape == (4, final_depth(patch).size)
+    assert np.abs(final_depth(strips) - final_depth(patch)).max() < 1e-13 * final_depth(patch).max()
     for name in ("worn_volume", "worn_depth_max", "pressure_peak", "approach", "normal_stiffness"):
-        assert strips.measures[name].value == pytest.approx(plain.measures[name].value, rel=1e-9)
+        assert strips.measures[name].value == pytest.approx(patch.measures[name].value, rel=1e-9)
 
 
-def test_exact_volume_and_depth_of_rolled_strips_mirror_with_the_roll():
-    one, other = (
-        ran(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LOOSE)
+def test_exact_worn_depth_of_strips_mirrors_with_roll():
+    positive, negative = (
+        run_text(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LOOSE)
         for roll in ("0.1", "-0.1")
     )
-    assert one.measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
-    assert np.abs(worn(one) - worn(other)[::-1]).max() < 1e-9 * worn(one).max()
-    assert worn(one).max(axis=1)[0] == one.measures["worn_depth_max"].value
-    assert (np.diff(worn(one).max(axis=1)) <= 0).all()  # a roll opens at +y
+    assert positive.measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
+    assert (
+        np.abs(final_depth(positive) - final_depth(negative)[::-1]).max()
+        < 1e-9 * final_depth(positive).max()
+    )
+    assert final_depth(positive).max(axis=1)[0] == positive.measures["worn_depth_max"].value
+    assert (
+        np.diff(final_depth(positive).max(axis=1)) <= 0
+    ).all()  # A positive roll opens the contact at +y.
 
 
-def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
-    """Winkler: p = p_mean + (p_0 - p_mean) exp(-kappa s k N) in full contact, on pieces that hardly give way."""
+def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
+    """On a Winkler foundation in full contact, the pressure tends to the mean: p = p_mean + (p_0 -
+    p_mean) exp(-kappa s k N)."""
     stiff = (
         PIECE
         + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, '
@@ -60,7 +69,7 @@ def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
     skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e12 Pa/m"\n'
     k = 1e12
     n = 5e4
-    found = ran(
+    result = run_text(
         stiff
         + skin
         + ROLLED.replace("0.1", "0.05")
@@ -71,17 +80,19 @@ def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
     )
     y = (np.arange(4) - 1.5) * 12.7e-3 / 4
     mean = LOAD / 12.7e-3**2
-    first = -k * 0.05e-3 * y
-    assert (mean + first > 0).all()
-    share = 1e-14 * 40e-6 * n
-    expected = mean * share + first / k * (1 - np.exp(-share * k))
-    assert np.abs(worn(found) - expected[:, None]).max() < 2e-4 * expected.max()
+    pressure_deviation = -k * 0.05e-3 * y
+    assert (mean + pressure_deviation > 0).all()
+    wear_per_pressure = 1e-14 * 40e-6 * n
+    expected = mean * wear_per_pressure + pressure_deviation / k * (
+        1 - np.exp(-wear_per_pressure * k)
+    )
+    assert np.abs(final_depth(result) - expected[:, None]).max() < 2e-4 * expected.max()
 
 
 @pytest.mark.parametrize("yaw", ["0", "20"])
-def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
+def test_exact_strips_of_rig_wear_by_their_own_slip(yaw):
     mode = MODE + f'yaw = "{yaw} rad/m"\n'
-    found = ran(
+    result = run_text(
         COATED
         + STRIPS
         + COULOMB
@@ -91,31 +102,31 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
         + "jumps = 1\n"
         + LOOSE
     )
-    slides = found.window.extra.get("slides")
-    last = found.window.time >= found.window.time[-1] - (1 + 1e-9) / 143
-    volumes = worn(found).mean(axis=1) * 12.7e-3**2 / 4
+    slides = result.window.extra.get("slides")
+    last = result.window.time >= result.window.time[-1] - (1 + 1e-9) / 143
+    volumes = final_depth(result).mean(axis=1) * 12.7e-3**2 / 4
     if yaw == "0":
         assert slides is None
-        expected = np.full(4, found.measures["slip_amplitude"].value)
+        expected = np.full(4, result.measures["slip_amplitude"].value)
     else:
         expected = np.ptp(slides[last], axis=0) / 2
         assert np.ptp(expected) > 1e-2 * expected.mean()
     assert volumes == pytest.approx(1e-14 * LOAD / 4 * 4 * expected * 1e3, rel=5e-3)
-    said = [note for note in found.extra["notes"] if "across x" in note]
-    assert len(said) == (yaw != "0")
-    if said:  # the path is longer by the mean of (20 x)^2/2, weighted by the load
-        swing, share = estimate_lateral_motion(found.patch, found.window, 1 / 143)
-        assert swing == pytest.approx(
-            20 * 6.35e-3 * found.measures["relative_displacement_amplitude"].value, rel=0.05
+    notes = [note for note in result.extra["notes"] if "across x" in note]
+    assert len(notes) == (yaw != "0")
+    if notes:  # Lateral motion lengthens the path by the load-weighted mean of (20 x)^2/2.
+        lateral_amplitude, fraction = estimate_lateral_motion(result.patch, result.window, 1 / 143)
+        assert lateral_amplitude == pytest.approx(
+            20 * 6.35e-3 * result.measures["relative_displacement_amplitude"].value, rel=0.05
         )
-        load = found.patch.strips.force.sum(axis=0)
-        expected_share = load @ (20 * found.patch.x) ** 2 / (2 * load.sum())
-        assert share == pytest.approx(expected_share, rel=0.01)
-        assert f"lengthen the sliding path of the last cycle by {100 * share:.2g} %" in said[0]
-        assert "the friction and the wear are computed without" in said[0]
+        load = result.patch.strips.force.sum(axis=0)
+        expected_fraction = load @ (20 * result.patch.x) ** 2 / (2 * load.sum())
+        assert fraction == pytest.approx(expected_fraction, rel=0.01)
+        assert f"lengthen the sliding path of the last cycle by {100 * fraction:.2g} %" in notes[0]
+        assert "the friction and the wear are computed without" in notes[0]
 
 
-def test_exact_files_hold_the_depth_of_every_strip(tmp_path):
+def test_exact_files_contain_worn_depth_of_every_strip(tmp_path):
     scene = tmp_path / "strips.toml"
     scene.write_text(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE)
     assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
@@ -133,12 +144,12 @@ def test_exact_files_hold_the_depth_of_every_strip(tmp_path):
         )
         block = file["VTKHDF/strips"]
         sides = block["Points"][:].reshape(4, 2, -1, 3)
-        held = block["PointData/worn_depth"][:].reshape(len(depth), 4, 2, -1)
+        stored = block["PointData/worn_depth"][:].reshape(len(depth), 4, 2, -1)
         assert np.abs(sides[..., 2].mean(axis=1) - data.strip_offset.values[:, None]).max() < 1e-9
-        assert np.abs(held - depth[:, :, None]).max() < 1e-6 * depth.max()
+        assert np.abs(stored - depth[:, :, None]).max() < 1e-6 * depth.max()
     assert "in every strip over the width" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_refuses_what_strips_do_not_wear_beside():
-    soft = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
-    assert any("contact.strips with [contact.shear]" in line for line in mistakes(soft))
+def test_refuses_wear_of_strips_with_shear():
+    sheared = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
+    assert any("contact.strips with [contact.shear]" in line for line in mistakes(sheared))

@@ -1,4 +1,5 @@
-"""The check of the friction work of rigs: the trapezoidal rule on the samples against the ledger, in every engine."""
+"""The work check of rigs: the trapezoidal rule on the samples against the integrated friction work,
+in every engine."""
 
 import re
 
@@ -29,44 +30,51 @@ PAIR = (
 )
 
 
-def checked(text, *sets):
-    found = run(loads(text, sets=sets), estimate=False)
-    return found.measures["work_check"].value, found
+def run_with_work_check(text, *sets):
+    """Return the value of the work check and the result of a scene."""
+    result = run(loads(text, sets=sets), estimate=False)
+    return result.measures["work_check"].value, result
 
 
 @pytest.mark.share(0, 1, 2, 4)
 @pytest.mark.parametrize("law", LAWS)
-def test_order_of_the_work_check_of_a_march_is_two(law):
-    """A ledger whose path mean were off by a constant share would stay off by it at any step."""
+def test_order_of_work_check_of_march_is_two(law):
+    """The work check converges with second order; a wrong factor in the friction work would leave a
+    constant difference."""
     steps = (400, 1600) if law != "list" else (300, 900)
     coarse, fine = (
-        checked(POINT + LAWS[law] + RIG, f"accuracy.steps_per_cycle={n}")[0] for n in steps
+        run_with_work_check(POINT + LAWS[law] + RIG, f"accuracy.steps_per_cycle={n}")[0]
+        for n in steps
     )
     assert fine < 1e-3 and np.log(coarse / fine) / np.log(steps[1] / steps[0]) > 1.7
 
 
-@pytest.mark.parametrize("method, within", [("exact", 1e-12), ("march", 3e-4), ("harmonic", 1e-12)])
-def test_exact_coulomb_closes_both_books_in_every_engine(method, within):
-    """The samples of events hold both sides of a jump, and between them the force of a slip is constant."""
-    value, found = checked(POINT + 'law = "coulomb"\n' + RIG, f"accuracy.method={method}")
-    assert found.measures["loop_area"].value > 1e-3 and value < within
+@pytest.mark.parametrize("method, limit", [("exact", 1e-12), ("march", 3e-4), ("harmonic", 1e-12)])
+def test_exact_coulomb_work_check_closes_in_every_engine(method, limit):
+    """The samples at an event contain both sides of a jump of the force, and between events the
+    force of a slip is constant."""
+    value, result = run_with_work_check(
+        POINT + 'law = "coulomb"\n' + RIG, f"accuracy.method={method}"
+    )
+    assert result.measures["loop_area"].value > 1e-3 and value < limit
 
 
-def test_exact_a_march_that_holds_more_at_rest_closes_both_books():
-    """The jump from the static to the kinetic force at every start of a slip costs the check nothing."""
-    value, found = checked(
+def test_exact_work_check_allows_force_drop_at_slip_start():
+    """The drop from the static to the kinetic friction force at the start of a slip does not affect
+    the work check."""
+    value, result = run_with_work_check(
         POINT + 'law = "coulomb"\nkinetic = 0.15\n' + RIG,
         "accuracy.method=march",
         "drive.frequency=40 Hz",
         "drive.acceleration=4 g",
         "accuracy.steps_per_cycle=400",
     )
-    assert found.measures["stick_fraction"].value > 0.02 and value < 1e-3
+    assert result.measures["stick_fraction"].value > 0.02 and value < 1e-3
 
 
-def test_exact_several_interfaces_close_both_books_together(monkeypatch):
+def test_exact_work_check_of_two_interfaces_closes(monkeypatch):
     share_one_loop(monkeypatch)
-    value, _ = checked(PAIR, "accuracy.steps_per_cycle=800")
+    value, _ = run_with_work_check(PAIR, "accuracy.steps_per_cycle=800")
     assert 0 < value < 5e-4
 
 
@@ -78,10 +86,12 @@ def test_exact_several_interfaces_close_both_books_together(monkeypatch):
         '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n',
     ],
 )
-def test_exact_the_remedy_of_a_gap_between_the_books_cures_it(text):
-    value, found = checked(text, "accuracy.steps_per_cycle=60")
-    said = [line for line in found.warnings if line.startswith("work_check")]
-    assert value > 1e-3 and len(said) == 1 and "limit 0.001" in said[0]
-    steps = re.search(r"steps_per_cycle = (\d+)", said[0])[1]
-    again, found = checked(text, f"accuracy.steps_per_cycle={steps}")
-    assert again < 1e-3 and not [line for line in found.warnings if line.startswith("work_check")]
+def test_exact_remedy_of_failed_work_check_works(text):
+    value, result = run_with_work_check(text, "accuracy.steps_per_cycle=60")
+    warnings = [line for line in result.warnings if line.startswith("work_check")]
+    assert value > 1e-3 and len(warnings) == 1 and "limit 0.001" in warnings[0]
+    steps = re.search(r"steps_per_cycle = (\d+)", warnings[0])[1]
+    remedied, result = run_with_work_check(text, f"accuracy.steps_per_cycle={steps}")
+    assert remedied < 1e-3 and not [
+        line for line in result.warnings if line.startswith("work_check")
+    ]

@@ -1,4 +1,5 @@
-"""Friction that changes with the worn depth: a run-in in closed form, jumps and rows, resumed runs, refusals."""
+"""Friction that changes with the worn depth: run-in in closed form, wear steps and table rows,
+refusals."""
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from patchfem.runs.wear.plan import estimate_jumps
 from patchfem.scene import loads
 
 LOAD, AREA, PATH = 26 * 4.4482216152605, 12.7e-3**2, 40e-6
-ALPHA, MU, DEPTH, CYCLES = 1e-13, 0.4, 10e-6, 5e6  # friction falls to nothing at DEPTH
+ALPHA, MU, DEPTH, CYCLES = 1e-13, 0.4, 10e-6, 5e6  # Friction falls to zero at the depth DEPTH [m].
 SCENE = f"""
 [contact]
 length = "12.7 mm"
@@ -48,23 +49,27 @@ TABLE = [
 ]
 
 
-def ran(*sets):
+def run_scene(*sets):
+    """Return the result of the scene with --set options."""
     return pf.run(loads(SCENE, "a.toml", sets))
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-def test_exact_friction_that_falls_with_wear_runs_in_exponentially(tolerance):
-    """dh/dn = alpha mu_0 (1 - h/H) p s of the mean depth: h = H (1 - exp(-alpha mu_0 p s n/H)), at every jump."""
-    found = ran(f"accuracy.tolerance={tolerance}")
-    law = found.measures["static_coefficient"]
-    volume = found.measures["worn_volume"]
-    history = found.extra["wear"]
+def test_exact_run_in_agrees_with_exponential_closed_form(tolerance):
+    """The mean worn depth agrees with h = H (1 - exp(-alpha mu_0 p s n/H)), the solution of dh/dn =
+    alpha mu_0 (1 - h/H) p s, at every wear step."""
+    result = run_scene(f"accuracy.tolerance={tolerance}")
+    coefficient = result.measures["static_coefficient"]
+    volume = result.measures["worn_volume"]
+    history = result.extra["wear"]
     depth = DEPTH * -np.expm1(-ALPHA * MU * LOAD / AREA * PATH * history["cycle"] / DEPTH)
     assert abs(volume.value - depth[-1] * AREA) <= volume.error < tolerance * volume.value
     assert history["worn_volume"] == pytest.approx(depth * AREA, rel=tolerance, abs=0)
-    assert abs(law.value - MU * (1 - depth[-1] / DEPTH)) <= law.error < tolerance * MU
-    assert law.value < 0.7 * MU
-    loop = found.measures["loop_area"]
+    assert (
+        abs(coefficient.value - MU * (1 - depth[-1] / DEPTH)) <= coefficient.error < tolerance * MU
+    )
+    assert coefficient.value < 0.7 * MU
+    loop = result.measures["loop_area"]
     assert (
         abs(loop.value - PATH * LOAD * MU * (1 - depth[-1] / DEPTH))
         <= loop.error
@@ -72,63 +77,69 @@ def test_exact_friction_that_falls_with_wear_runs_in_exponentially(tolerance):
     )
 
 
-def test_exact_archard_wear_leaves_the_volume_and_changes_the_loop():
-    """The slide is prescribed, so Archard's volume is that of any friction, to round-off."""
-    found = ran("wear.form=archard", "wear.friction.coefficient_factor=[1,1.8]", "wear.cycles=1e6")
+def test_exact_archard_volume_does_not_depend_on_friction():
+    """The slide is prescribed, so that Archard's volume does not depend on friction; the friction
+    force follows the worn depth."""
+    result = run_scene(
+        "wear.form=archard", "wear.friction.coefficient_factor=[1,1.8]", "wear.cycles=1e6"
+    )
     volume = ALPHA * LOAD * PATH * 1e6
-    # bonds stretch by 1e-9
-    assert found.measures["worn_volume"].value == pytest.approx(volume, rel=1e-8, abs=0)
-    assert found.measures["friction_force_peak"].value == pytest.approx(
+    # The bond stretch changes the volume by 1e-9.
+    assert result.measures["worn_volume"].value == pytest.approx(volume, rel=1e-8, abs=0)
+    assert result.measures["friction_force_peak"].value == pytest.approx(
         MU * LOAD * (1 + 0.8 * volume / AREA / 8e-6), rel=1e-8
     )
 
 
-def test_always_jumps_do_not_pass_a_row_unseen():
-    """A peak of friction between two depths is seen by every automatic run; plan counts the jumps with it."""
+def test_always_wear_steps_resolve_rows_of_friction_table():
+    """Automatic wear steps resolve a peak of friction between two depths, and the plan counts these
+    steps; prescribed steps that pass two rows give a warning."""
     model = pf.build(
         loads(SCENE, "a.toml", [*TABLE, "wear.cycles=1e6", "contact.element_size=0.1 mm"])
     )
     patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     moments = compute_wear(model, patch, (None, None)).moments
-    assert max(one.values["static_coefficient"] for one in moments) > 1.4 * MU
+    assert max(item.values["static_coefficient"] for item in moments) > 1.4 * MU
     assert 1 / 1.5 < estimate_jumps(model) / (len(moments) - 1) < 1.5
-    few = ran(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
+    few = run_scene(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
     assert [
-        one
-        for one in few.warnings
-        if "one jump of the wear passes 2 rows of the table wear.friction" in one
+        item
+        for item in few.warnings
+        if "one jump of the wear passes 2 rows of the table wear.friction" in item
     ]
 
 
-def test_exact_the_bond_length_changes_with_wear():
-    found = ran(
+def test_exact_bond_length_follows_worn_depth():
+    result = run_scene(
         "wear.form=archard",
         "friction.bond_length=4 um",
         "wear.cycles=1e6",
         "wear.friction.coefficient_factor=[1,1]",
         "wear.friction.bond_length_factor=[1,0.1]",
     )
-    grown = 1 - 0.9 * found.measures["worn_volume"].value / AREA / 8e-6
-    assert found.measures["bond_length"].value == pytest.approx(4e-6 * grown, rel=1e-12, abs=0)
-    assert grown < 0.81
-    # elastic-plastic: loop 4 mu N (a - eps)
-    assert found.measures["loop_area"].value == pytest.approx(
-        4 * MU * LOAD * (10e-6 - 4e-6 * grown), rel=1e-3
+    factor = 1 - 0.9 * result.measures["worn_volume"].value / AREA / 8e-6
+    assert result.measures["bond_length"].value == pytest.approx(4e-6 * factor, rel=1e-12, abs=0)
+    assert factor < 0.81
+    # Loop area of an elastic-plastic element: 4 mu N (a - eps).
+    assert result.measures["loop_area"].value == pytest.approx(
+        4 * MU * LOAD * (10e-6 - 4e-6 * factor), rel=1e-3
     )
 
 
-def test_always_wear_beyond_the_table_gives_a_warning():
-    found = ran('wear.friction.depth=["0 um","1 um"]', "wear.friction.coefficient_factor=[1,0.9]")
-    assert found.measures["static_coefficient"].value == pytest.approx(0.9 * MU, rel=1e-12)
+def test_always_wear_beyond_friction_table_gives_warning():
+    result = run_scene(
+        'wear.friction.depth=["0 um","1 um"]', "wear.friction.coefficient_factor=[1,0.9]"
+    )
+    assert result.measures["static_coefficient"].value == pytest.approx(0.9 * MU, rel=1e-12)
     assert [
-        one
-        for one in found.warnings
-        if "is larger than the last value of wear.friction.depth, 1 um" in one
+        warning
+        for warning in result.warnings
+        if "is larger than the last value of wear.friction.depth, 1 um" in warning
     ]
 
 
 @pytest.mark.parametrize(
-    "sets, told",
+    "sets, message",
     [
         (
             ['wear.friction.depth=["1 um","2 um"]'],
@@ -160,13 +171,13 @@ def test_always_wear_beyond_the_table_gives_a_warning():
         ),
     ],
 )
-def test_refuses_a_table_that_makes_no_sense(sets, told):
+def test_refuses_faulty_friction_table(sets, message):
     with pytest.raises(SceneError) as error:
         loads(SCENE, "a.toml", sets)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
-def test_refuses_friction_over_the_wear_of_a_point():
+def test_refuses_friction_table_of_point_contact():
     text = '[normal]\nload = "100 N"\n' + SCENE[SCENE.index("[friction]") :]
     with pytest.raises(
         SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"
@@ -174,7 +185,7 @@ def test_refuses_friction_over_the_wear_of_a_point():
         loads(text, "a.toml")
 
 
-def test_exact_a_sweep_takes_tables(tmp_path):
+def test_exact_sweep_over_friction_tables(tmp_path):
     scene = tmp_path / "a.toml"
     scene.write_text(SCENE)
     answer = cli(

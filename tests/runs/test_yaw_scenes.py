@@ -1,4 +1,4 @@
-"""Strips that a mode yaws: scenes by the event engine, by the march, and where the yaw vanishes."""
+"""Strips under a yaw mode: exact engine against the march, and the limit without yaw."""
 
 import numpy as np
 import pytest
@@ -41,18 +41,21 @@ method = "{method}"
 
 @pytest.fixture
 def one_loop(monkeypatch):
+    """Let all marches share one compiled time loop."""
     share_one_loop(monkeypatch)
 
 
-def found(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
+def run_with_measures(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
+    """Return the result of a scene and its measures."""
     result = run(load(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method)))
     return result, result.measures
 
 
-def test_exact_strips_by_events_and_by_the_march(one_loop):
-    """Rolled strips, Coulomb: the two engines agree within their errors; the yaw moment is sum y f of the friction."""
-    result, exact = found()
-    _, march = found(method="march")
+def test_exact_yawing_strips_agree_between_engines(one_loop):
+    """For rolled strips with Coulomb's law the exact engine and the march agree within their
+    errors; the yaw moment is sum y f of the friction forces."""
+    result, exact = run_with_measures()
+    _, march = run_with_measures(method="march")
     for name in (
         "relative_displacement_amplitude",
         "loop_area",
@@ -67,25 +70,25 @@ def test_exact_strips_by_events_and_by_the_march(one_loop):
     offsets = (np.arange(4) - 1.5) * 12.7e-3 / 4
     np.testing.assert_allclose(extra["yaw_moment"], extra["forces"] @ offsets, atol=1e-12)
     np.testing.assert_allclose(result.window.force, extra["forces"].sum(axis=1), atol=1e-9)
-    # q_j = q - y_j yaw
-    yawed = (extra["slides"][:, 0] - extra["slides"][:, -1]) / (offsets[-1] - offsets[0])
-    assert np.abs(yawed).max() > 1e-4
+    # Displacement of strip j: q_j = q - y_j yaw.
+    yaw_angle = (extra["slides"][:, 0] - extra["slides"][:, -1]) / (offsets[-1] - offsets[0])
+    assert np.abs(yaw_angle).max() > 1e-4
 
 
-def test_refuses_a_yaw_without_strips_and_with_laws_a_strip_cannot_have():
-    bare = TEXT.format(law="coulomb", keys="", yaw="30 rad/m", roll="0 rad", method="auto")
+def test_refuses_yaw_without_strips_or_with_bond_list():
+    text = TEXT.format(law="coulomb", keys="", yaw="30 rad/m", roll="0 rad", method="auto")
     assert any(
         "structure.mode.yaw.yaw" in line and "contact.strips" in line
-        for line in mistakes(bare.replace('[contact.strips]\ncount = 4\nroll = "0 rad"\n', ""))
+        for line in mistakes(text.replace('[contact.strips]\ncount = 4\nroll = "0 rad"\n', ""))
     )
-    listed = TEXT.format(
+    with_bond_list = TEXT.format(
         law="nonlocal",
         keys='bond_length = "1 um"\norder = 2',
         yaw="30 rad/m",
         roll="0 rad",
         method="auto",
     )
-    assert any("structure.mode.yaw.yaw" in line for line in mistakes(listed))
+    assert any("structure.mode.yaw.yaw" in line for line in mistakes(with_bond_list))
 
 
 SOFT = (
@@ -122,19 +125,21 @@ BEHIND = pytest.mark.parametrize(
 )
 
 
-def behind_shear(law, strips="", yaw="", method="march"):
+def run_sheared_strips(law, strips="", yaw="", method="march"):
+    """Return the result of a patch with shear, with or without strips and a yaw mode."""
     return run(load(SOFT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False)
 
 
 @BEHIND
 @pytest.mark.parametrize("method", ["march", "exact", "harmonic"])
-def test_exact_even_strips_behind_shear_are_the_patch_behind_shear(law, method, one_loop):
-    """Every strip is as many times as compliant as the width, under as many parts of the load."""
-    whole = behind_shear(law, method=method).measures
-    cases = [behind_shear(law, STRIPS.format("0 rad"), method=method)]
+def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
+    """With four strips, each is four times as compliant and carries a quarter of the load: the
+    measures agree with those of the patch."""
+    patch_measures = run_sheared_strips(law, method=method).measures
+    cases = [run_sheared_strips(law, STRIPS.format("0 rad"), method=method)]
     if method == "march":
-        cases.append(behind_shear(law, STRIPS.format("0 rad"), TURNS))
-    for found in cases:
+        cases.append(run_sheared_strips(law, STRIPS.format("0 rad"), TURNS))
+    for result in cases:
         for name in (
             "relative_displacement_amplitude",
             "absolute_acceleration_peak",
@@ -144,86 +149,95 @@ def test_exact_even_strips_behind_shear_are_the_patch_behind_shear(law, method, 
             "friction_force_peak",
             "tangential_stiffness",
         ):
-            assert found.measures[name].value == pytest.approx(whole[name].value, rel=5e-12), name
+            assert result.measures[name].value == pytest.approx(
+                patch_measures[name].value, rel=5e-12
+            ), name
 
 
 @BEHIND
 @pytest.mark.parametrize("roll", ["0.01 mrad", "0.2 mrad"])
-def test_exact_rolled_strips_behind_shear_turn_by_the_forces_of_their_own_elements(
-    law, roll, one_loop
-):
-    """Slide q - y yaw, force of a set of elements made by hand of C = 4 C_t and the strip's own forces, torque
-    sum y f, and a yaw mode that this torque alone drives; at 0.2 mrad strips are open."""
-    result = behind_shear(law, STRIPS.format(roll), TURNS)
+def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law, roll, one_loop):
+    """The friction force of each strip agrees with contact elements of the compliance 4 C_t
+    computed here, under the displacement q - y yaw. The yaw moment is sum y f; at a roll of 0.2
+    mrad some strips are open."""
+    result = run_sheared_strips(law, STRIPS.format(roll), TURNS)
     extra = result.response.extra
     patch = result.patch
-    found = result.response
-    assert found.time.size == 201 and (patch.strips.force.sum(axis=1) == 0).any() == (
+    response = result.response
+    assert response.time.size == 201 and (patch.strips.force.sum(axis=1) == 0).any() == (
         roll == "0.2 mrad"
     )
     y = (np.arange(4) - 1.5) * 12.7e-3 / 4
     np.testing.assert_allclose(
         extra["slides"],
-        found.modal[:, :1] - 30 * np.outer(found.modal[:, 1], y),
+        response.modal[:, :1] - 30 * np.outer(response.modal[:, 1], y),
         atol=1e-13 * np.abs(extra["slides"]).max(),
     )
     length = 1e-6 if "elastic" in law else 0.0
-    most = np.abs(extra["forces"]).max()
+    peak_force = np.abs(extra["forces"]).max()
     for k, normal in enumerate(patch.strips.force):
-        force = by_hand(
+        force = step_yielding_points(
             4 * patch.pair.compliance.tangential, 0.3 * normal, length, extra["slides"][:, k]
         )
-        np.testing.assert_allclose(extra["forces"][:, k], force, atol=1e-9 * most)
+        np.testing.assert_allclose(extra["forces"][:, k], force, atol=1e-9 * peak_force)
     np.testing.assert_allclose(extra["yaw_moment"], extra["forces"] @ y, atol=1e-15)
     assert np.abs(extra["yaw_moment"]).max() > 0.05
     assert result.measures["energy_balance"].value < 1e-10
     assert "shear_stress" not in result.fields and any(
-        "no common" in one for one in result.extra["notes"]
+        "no common" in note for note in result.extra["notes"]
     )
 
 
-def by_hand(compliance, limit, length, slide):
-    """Force [N] along a slide (k,) [m] of points that yield at limit (m,) [N] behind compliance (m, m) [m/N] and a
-    stretch of `length` [m] at the limit: each step a linear problem with bounds, solved set by set."""
+def step_yielding_points(compliance, limit, length, slide):
+    """Return the force (k,) [N] of points that yield at `limit` (m,) [N] along a relative
+    displacement `slide` (k,) [m].
+
+    The points have the compliance (m, m) [m/N] and stretch by `length` [m] at the limit; each step
+    is a linear problem with bounds that is solved by an active-set method.
+    """
     points = np.flatnonzero(limit > 0)
-    most = limit[points]
-    carried = np.zeros(points.size)
-    out = [0.0]
+    limits = limit[points]
+    forces = np.zeros(points.size)
+    history = [0.0]
     if not points.size:
         return np.zeros(slide.size)
-    inner = compliance[np.ix_(points, points)] + np.diag(length / most)
-    for move in np.diff(slide):
+    flexibility = compliance[np.ix_(points, points)] + np.diag(length / limits)
+    for increment in np.diff(slide):
         free = np.ones(points.size, bool)
-        left = move
-        while left:
+        remaining = increment
+        while remaining:
             rate = np.zeros(points.size)
             rate[free] = (
-                np.linalg.solve(inner[np.ix_(free, free)], np.ones(free.sum()))
+                np.linalg.solve(flexibility[np.ix_(free, free)], np.ones(free.sum()))
                 if free.any()
                 else 0.0
             )
-            way = np.sign(left) * rate
+            direction = np.sign(remaining) * rate
             with np.errstate(divide="ignore", invalid="ignore"):
-                room = np.where(free & (way != 0), (np.sign(way) * most - carried) / way, np.inf)
-            step = min(room.min(), abs(left))
-            carried = carried + way * step
-            free &= room > step * (1 + 1e-12)
-            left = 0.0 if step == abs(left) else left - np.sign(left) * step
-        out.append(carried.sum())
-    return np.array(out)
+                max_steps = np.where(
+                    free & (direction != 0),
+                    (np.sign(direction) * limits - forces) / direction,
+                    np.inf,
+                )
+            step = min(max_steps.min(), abs(remaining))
+            forces = forces + direction * step
+            free &= max_steps > step * (1 + 1e-12)
+            remaining = 0.0 if step == abs(remaining) else remaining - np.sign(remaining) * step
+        history.append(forces.sum())
+    return np.array(history)
 
 
-def test_refuses_strips_beside_shear_that_no_set_of_elements_stands_for():
-    for law, said in (
+def test_refuses_unsupported_strips_with_shear():
+    for law, key in (
         ('"nonlocal"\nbond_length = "1 um"', "contact.strips"),
         ('"coulomb"\nkinetic = 0.2', "kinetic"),
     ):
         text = SOFT.format(law=law, strips=STRIPS.format("0 rad"), yaw=TURNS, method="auto")
-        assert any(said in line for line in mistakes(text))
-    held = SOFT.format(
+        assert any(key in line for line in mistakes(text))
+    with_holder = SOFT.format(
         law='"coulomb"',
         strips=STRIPS.format("0 rad") + '[contact.holder]\ntangential_stiffness = "5e6 N/m"\n',
         yaw="",
         method="auto",
     )
-    assert any("contact.strips" in line for line in mistakes(held))
+    assert any("contact.strips" in line for line in mistakes(with_holder))

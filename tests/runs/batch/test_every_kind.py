@@ -1,4 +1,4 @@
-"""Random cases of every kind, many at once as a sweep has them, against runs of their own that share nothing."""
+"""Batches of random cases of every kind of run agree with single runs of the same cases."""
 
 import numpy as np
 import pytest
@@ -28,12 +28,12 @@ TEXTS = {
     "bench": PATCH + SHEAR + PLASTIC + SLIDE,
     "bench wear": PATCH + PLASTIC + SLIDE + WEAR,
 }
-# of the pressure at an end of bare pieces, the mean over a cell: its digits end there
+# Relative tolerance of measures of the end pressure of uncoated pieces, a mean over one cell.
 ENDS = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 
 
-def cases(kind: str, seed: int, count: int) -> list:
-    """Models of a kind, two to three loads, tilts or levels to a patch as the axes of a sweep have them."""
+def draw_models(kind: str, seed: int, count: int) -> list:
+    """Return `count` random models of a kind; as in a sweep, several models share a tilt or a load."""
     r = np.random.default_rng(seed)
     out = []
     tilts = 10 ** r.uniform(-6, -2.3, max(2, count // 5))
@@ -54,47 +54,57 @@ def cases(kind: str, seed: int, count: int) -> list:
     return with_shared_meshes(out)
 
 
-def alone(model):
-    """Answers of a run that finds nothing kept."""
+def solve_single(model):
+    """Return the results of a single run that starts with an empty cache."""
     store.clear_cache()
     return one_by_one.solve([model])
 
 
-def held_against_own_runs(kind: str, seed: int, count: int) -> int:
-    """Cases whose answers, bars, floors, reasons and words in the batch were those of their own runs: all are held."""
-    models = cases(kind, seed, count)
-    found = batches.solve_models(models)
+def assert_equal_to_single_runs(kind: str, seed: int, count: int) -> int:
+    """Assert that a batch agrees with single runs of its cases; return the number of cases.
+
+    Outcomes, texts and reasons are equal; values, errors and floors agree within round-off.
+    """
+    models = draw_models(kind, seed, count)
+    batch = batches.solve_models(models)
     for case, model in enumerate(models):
-        own = alone(model)
-        assert found.outcome[case] == own.outcome[0] != "failed", (case, found.messages.get(case))
-        for mine, theirs in (
-            (found.warnings, own.warnings),
-            (found.notes, own.notes),
-            (found.numerics, own.numerics),
+        single = solve_single(model)
+        assert batch.outcome[case] == single.outcome[0] != "failed", (
+            case,
+            batch.messages.get(case),
+        )
+        for result, reference in (
+            (batch.warnings, single.warnings),
+            (batch.notes, single.notes),
+            (batch.numerics, single.numerics),
         ):
-            assert mine.get(case) == theirs.get(0), case
-        assert {name for name in found.values if found.has(name, case)} == {
-            name for name in own.values if own.has(name, 0)
+            assert result.get(case) == reference.get(0), case
+        assert {name for name in batch.values if batch.has(name, case)} == {
+            name for name in single.values if single.has(name, 0)
         }
-        for name, values in own.values.items():
-            assert found.reasons.get(name, {}).get(case) == own.reasons.get(name, {}).get(0)
-            near = ENDS.get(name, 1e-12) * (abs(values[0]) + own.floors[name][0])
-            for column, wanted in (
-                (found.values, values),
-                (found.errors, own.errors[name]),
-                (found.floors, own.floors[name]),
+        for name, values in single.values.items():
+            assert batch.reasons.get(name, {}).get(case) == single.reasons.get(name, {}).get(0)
+            tolerance = ENDS.get(name, 1e-12) * (abs(values[0]) + single.floors[name][0])
+            for column, expected in (
+                (batch.values, values),
+                (batch.errors, single.errors[name]),
+                (batch.floors, single.floors[name]),
             ):
                 assert column[name][case] == pytest.approx(
-                    wanted[0], rel=0, abs=near, nan_ok=True
+                    expected[0], rel=0, abs=tolerance, nan_ok=True
                 ), (case, name)
     return len(models)
 
 
 @pytest.mark.parametrize("kind", TEXTS)
-def test_exact_many_are_runs_of_their_own(kind):
-    assert held_against_own_runs(kind, 1, 2) == 2
+def test_exact_batch_agrees_with_single_runs(kind):
+    assert assert_equal_to_single_runs(kind, 1, 2) == 2
 
 
-def test_exact_benches_that_stay_as_they_are_pressed_share_that():
-    taken = {kind: batches.choose_batch(cases(kind, 1, 2)[0]) for kind in ("bench", "bench wear")}
-    assert taken["bench"].name == "benches" and taken["bench wear"] is None
+def test_exact_benches_without_wear_form_a_batch():
+    """Benches without wear share one pressed patch and form a batch; benches with wear run one by
+    one."""
+    batch_by_kind = {
+        kind: batches.choose_batch(draw_models(kind, 1, 2)[0]) for kind in ("bench", "bench wear")
+    }
+    assert batch_by_kind["bench"].name == "benches" and batch_by_kind["bench wear"] is None

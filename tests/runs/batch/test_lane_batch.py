@@ -1,6 +1,8 @@
-"""Lumped cases in lanes beside the exact engine: their bars hold, and what they cannot tell goes to it.
+"""Lumped cases that are integrated together (in lanes) agree with the exact engine within their
+errors.
 
-The whole campaign, beside single runs, is `lanes` of tests/support/campaigns.py.
+Cases whose errors are too large are solved by the exact engine. The long campaign against single
+runs is `lanes` of tests/support/campaigns.py.
 """
 
 import numpy as np
@@ -20,60 +22,70 @@ from patchfem.runs.batch.lumped import (
 )
 from patchfem.scene import format_assignments
 
-# beside others, without an exact batch, stand single runs
+# Laws with an exact batch; other laws are compared with single runs.
 EXACT = ("coulomb", "weakening", "elastic-plastic", "iwan")
 
 
-def models(law: str, seed: int, count: int) -> list:
-    """Random cases of a law that lanes take."""
+def draw_models(law: str, seed: int, count: int) -> list:
+    """Return random models with a friction law that lanes support."""
     return draw_points(law, seed, count)
 
 
-def missed(found, ones) -> int:
-    """Cases of lanes with a measure beyond the sum of both bars, or with another outcome, or of which one says more."""
+def count_deviating_cases(lanes, reference) -> int:
+    """Return the number of cases with another outcome, or with a measure that differs by more than
+    the sum of both errors."""
     return sum(
-        found.outcome[case] != ones.outcome[case] or not all(row.holds for row in some)
-        for case, some in enumerate(rows(found, ones))
+        lanes.outcome[case] != reference.outcome[case] or not all(row.holds for row in case_rows)
+        for case, case_rows in enumerate(rows(lanes, reference))
     )
 
 
-def held(law: str, seed: int, count: int, most: int | None = None) -> None:
-    """most: of the cases in lanes so many are compared; all without it."""
-    cases = models(law, seed, count)
-    found = batches.solve_models(cases)
-    mine = [case for case in range(count) if found.numerics[case]["engine"] == "lanes"]
-    assert len(mine) > count / 3 and not any(
-        "the fast" in one for notes in found.notes.values() for one in notes
+def assert_lanes_agree(law: str, seed: int, count: int, max_cases: int | None = None) -> None:
+    """Assert that 97 % of the measures of random cases in lanes agree with the reference within
+    both errors.
+
+    At most `most` of the cases in lanes are compared; None compares all.
+    """
+    cases = draw_models(law, seed, count)
+    results = batches.solve_models(cases)
+    in_lanes = [case for case in range(count) if results.numerics[case]["engine"] == "lanes"]
+    assert len(in_lanes) > count / 3 and not any(
+        "the fast" in note for notes in results.notes.values() for note in notes
     )
-    mine = mine[:most]
-    some = [cases[case] for case in mine]
-    ones = solve_by_group(some) if law in EXACT else one_by_one.solve(some)
-    lanes_of = found.select(np.array(mine))
-    assert (lanes_of.outcome == ones.outcome).all()
-    assert np.mean([row.holds for some in rows(lanes_of, ones) for row in some]) >= 0.97
+    in_lanes = in_lanes[:max_cases]
+    compared = [cases[case] for case in in_lanes]
+    reference = solve_by_group(compared) if law in EXACT else one_by_one.solve(compared)
+    lanes = results.select(np.array(in_lanes))
+    assert (lanes.outcome == reference.outcome).all()
+    assert np.mean([row.holds for compared in rows(lanes, reference) for row in compared]) >= 0.97
 
 
-# each other law is a loop in lanes and one of single runs to compile
+# The other laws need two more compiled loops each: one for lanes and one for single runs.
 @pytest.mark.share(0, 1, 2, 4, 5)
 @pytest.mark.parametrize("law", LAWS)
 def test_always_97_of_100_measures_lie_within_both_errors(law):
-    few = law not in EXACT[:3]  # what stands beside Iwan or in single runs takes seconds
-    held(law, 1, 64 if few else 150, 20 if few else None)
+    """At least 97 % of the measures of random cases in lanes agree with the exact engine within the
+    sum of both errors."""
+    is_slow = law not in EXACT[:3]  # References for the Iwan law and single runs take seconds.
+    assert_lanes_agree(law, 1, 64 if is_slow else 150, 20 if is_slow else None)
 
 
-def test_exact_few_cases_are_those_of_single_runs():
-    cases = models("coulomb", 3, 31)
-    assert all(batches.choose_batch(one, 31).name == "lumped.lumped" for one in cases)
-    assert all(batches.choose_batch(one, 64).name == "lumped.lanes" for one in cases)
-    found = batches.solve_models(cases)
-    ones = solve_by_group(cases)
-    for name, values in ones.values.items():
-        np.testing.assert_array_equal(found.values[name], values)
+def test_exact_small_study_is_solved_by_exact_batch():
+    """A study of 31 cases is solved by the exact batch, with its values to the last bit; 64 cases
+    are solved in lanes."""
+    cases = draw_models("coulomb", 3, 31)
+    assert all(batches.choose_batch(model, 31).name == "lumped.lumped" for model in cases)
+    assert all(batches.choose_batch(model, 64).name == "lumped.lanes" for model in cases)
+    results = batches.solve_models(cases)
+    exact = solve_by_group(cases)
+    for name, values in exact.values.items():
+        np.testing.assert_array_equal(results.values[name], values)
 
 
-def test_exact_chunks_of_a_study_are_its_whole():
-    """To the last bit, and a chunk of few cases too: what is beside a case does not touch it."""
-    cases = models("coulomb", 4, 80)
+def test_exact_chunks_of_study_agree_with_whole():
+    """The values of a case do not depend on the other cases of its chunk: chunks of 1, 29 and 50
+    cases agree with the whole study to the last bit."""
+    cases = draw_models("coulomb", 4, 80)
     whole = batches.solve_models(cases)
     parts = [batches.solve_models(part, study=80) for part in (cases[:1], cases[1:30], cases[30:])]
     for name, values in whole.values.items():
@@ -83,73 +95,77 @@ def test_exact_chunks_of_a_study_are_its_whole():
         np.testing.assert_array_equal(joined, values)
 
 
-def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
-    """Where the exact engine finds another motion in a case that it checks, all are its, and say so."""
-    cases = models("coulomb", 5, 64)
-    real = lane_runs.collect_runs
+def test_always_failed_lane_check_makes_batch_exact(monkeypatch):
+    """If the checked cases differ from the exact engine, all cases are solved by the exact engine,
+    and a note says so."""
+    cases = draw_models("coulomb", 5, 64)
+    collect_runs = lane_runs.collect_runs
 
-    def wrong(models, *given):
-        runs, *rest = real(models, *given)
+    def collect_wrong_runs(models, *given):
+        runs, *rest = collect_runs(models, *given)
         runs.values["loop_area"][:] *= 1.01
         return runs, *rest
 
-    monkeypatch.setattr(lane_runs, "collect_runs", wrong)
-    found = batches.solve_models(cases)
-    ones = solve_by_group(cases)
-    assert all(one["engine"] == "exact" for one in found.numerics.values())
+    monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
+    results = batches.solve_models(cases)
+    exact = solve_by_group(cases)
+    assert all(numerics["engine"] == "exact" for numerics in results.numerics.values())
     assert all(
         "checked against the exact engine and" in notes[-1] and "loop_area" in notes[-1]
-        for notes in found.notes.values()
+        for notes in results.notes.values()
     )
-    assert len(found.notes) == 64
-    np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
+    assert len(results.notes) == 64
+    np.testing.assert_array_equal(results.values["loop_area"], exact.values["loop_area"])
 
 
-def test_always_only_the_case_that_is_contradicted_is_exact(monkeypatch):
-    """A single wrong case among those that are checked is computed anew, and the others stay as they are."""
-    cases = models("coulomb", 7, 96)
+def test_always_single_failed_lane_check_replaces_only_this_case(monkeypatch):
+    """If a single checked case differs from the exact engine, only this case is solved again; the
+    others keep their values."""
+    cases = draw_models("coulomb", 7, 96)
     untouched = batches.solve_models(cases)
     numbers = np.column_stack(lane_numbers.make_cases(cases)[0])
     is_fast = np.array([untouched.numerics[case]["engine"] == "lanes" for case in range(96)])
     checked = lane_check.select_checked_cases(numbers, is_fast)[0]
-    real = lane_runs.collect_runs
+    collect_runs = lane_runs.collect_runs
 
-    def wrong(models, *given):
-        runs, *rest = real(models, *given)
+    def collect_wrong_runs(models, *given):
+        runs, *rest = collect_runs(models, *given)
         is_checked = np.array([model is cases[checked] for model in models])
         runs.values["loop_area"][is_checked] *= 1.01
         return runs, *rest
 
-    monkeypatch.setattr(lane_runs, "collect_runs", wrong)
-    found = batches.solve_models(cases)
-    assert found.numerics[checked]["engine"] == "exact"
-    assert "differed from it in 1, in loop_area of this case" in found.notes[checked][-1]
+    monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
+    results = batches.solve_models(cases)
+    assert results.numerics[checked]["engine"] == "exact"
+    assert "differed from it in 1, in loop_area of this case" in results.notes[checked][-1]
     others = np.arange(96) != checked
     for name, values in untouched.values.items():
-        np.testing.assert_array_equal(found.values[name][others], values[others])
+        np.testing.assert_array_equal(results.values[name][others], values[others])
 
 
 @pytest.mark.parametrize("law", EXACT[:3])
-def test_exact_lanes_answer_stuck_cases(law):
-    """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
+def test_exact_stuck_cases_in_lanes_agree_with_exact_batch(law):
+    """Cases that end stuck, with free vibration, agree with the exact batch within the errors and
+    have the same measures."""
     base = get_base_scene(load(SCENE.format(law=LAWS[law])))
     cases = [
         build(base.override([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))
         for load in (300, 1000, 3000)
         for damping in (0.003, 0.03)
     ]
-    found = batches.solve_models(cases, study=64)
-    ones = solve_by_group(cases)
-    assert np.sum(found.outcome == "stuck") > 2 and all(
-        one["engine"] == "lanes" for one in found.numerics.values()
+    lanes = batches.solve_models(cases, study=64)
+    exact = solve_by_group(cases)
+    assert np.sum(lanes.outcome == "stuck") > 2 and all(
+        numerics["engine"] == "lanes" for numerics in lanes.numerics.values()
     )
-    assert missed(found, ones) == 0
-    assert ("ring_frequency" in found.values) == (law == "elastic-plastic")
+    assert count_deviating_cases(lanes, exact) == 0
+    assert ("ring_frequency" in lanes.values) == (law == "elastic-plastic")
 
 
-def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
-    """It slips in the last of its 30 cycles, and sticks once it has settled. An extrapolation of the cycles in which it
-    slips was off by 4 of its bars."""
+def test_exact_steady_amplitude_after_last_slip_is_within_error():
+    """The estimated steady amplitude agrees within its error with that after 6000 cycles for a case
+    that slips in the last of its 30 cycles and sticks later. An extrapolation of the cycles that
+    slip was wrong by four times its error."""
     law = 'law = "elastic-plastic"\nstatic = 0.3\nstiffness = "176715.00010433397 N/m"'
     base = get_base_scene(load(SCENE.format(law=law)))
     sets = {
@@ -160,7 +176,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
         "drive.frequency": 100.0,
         "accuracy.tolerance": 0.01,
     }
-    found = run_many(
+    results = run_many(
         [
             build(
                 base.override(
@@ -170,7 +186,7 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
             for level in (2.090740650793879, *np.geomspace(1, 60, 71).tolist())
         ]
     )
-    far = build(
+    long_run = build(
         base.override(
             format_assignments(
                 sets | {"drive.cycles": 6000, "drive.acceleration": 2.090740650793879}
@@ -178,19 +194,20 @@ def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():
         )
     )
     name = "relative_displacement_amplitude"
-    end = lumped.solve([far]).values[name][0]
-    assert end == pytest.approx(1.697322e-4, rel=1e-6)
+    final_amplitude = lumped.solve([long_run]).values[name][0]
+    assert final_amplitude == pytest.approx(1.697322e-4, rel=1e-6)
     assert (
-        abs(found.values[name + "_steady"][0] - end)
-        <= found.errors[name + "_steady"][0]
-        < 1e-3 * end
+        abs(results.values[name + "_steady"][0] - final_amplitude)
+        <= results.errors[name + "_steady"][0]
+        < 1e-3 * final_amplitude
     )
 
 
-def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():
-    """Motions that grow have no friction loop; the damping ratio was held against it, and the whole batch was lost."""
-    cases = models("lugre", 5, 3)
-    found = CaseResults.blank(3)
-    found.measure("equivalent_damping", "1")
-    assert "loop_area" not in found.values
-    assert not lane_refinement.has_large_error(cases, found).any()
+def test_always_unbounded_motions_need_no_loop_area():
+    """Motions that grow have no friction loop. The check of their errors must not need `loop_area`,
+    otherwise the whole batch fails."""
+    cases = draw_models("lugre", 5, 3)
+    results = CaseResults.blank(3)
+    results.measure("equivalent_damping", "1")
+    assert "loop_area" not in results.values
+    assert not lane_refinement.has_large_error(cases, results).any()

@@ -1,4 +1,4 @@
-"""Lumped cases in one compiled call, beside the same cases run one by one."""
+"""Lumped cases in one compiled call agree with the same cases solved one by one."""
 
 import numpy as np
 import pytest
@@ -22,8 +22,9 @@ LAWS = {
 SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
 
 
-def models(law: str, seed: int, count: int) -> list:
-    """Random cases of a law: sizes that stick, that stop and that slide all the time, near resonance and away."""
+def draw_models(law: str, seed: int, count: int) -> list:
+    """Return random models with a friction law that stick, stop or slide all the time, near and
+    away from resonance."""
     r = np.random.default_rng(seed)
     out = []
     for _ in range(count):
@@ -54,41 +55,41 @@ def models(law: str, seed: int, count: int) -> list:
 
 
 def solve_by_group(cases) -> CaseResults:
-    """Return the answers of the exact batch of lumped cases, group by group."""
-    found = CaseResults.blank(len(cases))
+    """Return the results of the exact batch of lumped cases, group by group."""
+    results = CaseResults.blank(len(cases))
     groups = {}
     for case, model in enumerate(cases):
         assert lumped.refuses(model) == ""
         groups.setdefault(lumped.group(model), []).append(case)
     for places in groups.values():
-        found.insert(places, lumped.solve([cases[case] for case in places]))
-    return found
+        results.insert(places, lumped.solve([cases[case] for case in places]))
+    return results
 
 
 @pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
 @pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 20) for law in LAWS])
-def test_exact_batch_is_the_single_runs(law, count):
-    cases = models(law, 1, count)
+def test_exact_batch_agrees_with_single_runs(law, count):
+    cases = draw_models(law, 1, count)
     held_against(cases, one_by_one.solve(cases), solve_by_group(cases))
 
 
-def test_always_errors_of_few_cells_hold_the_result_of_many():
-    """Cells of a density that a tolerance asks for: the answers of a far smaller tolerance lie within the errors, where
-    small cycles slip too, for which the first cells are too few."""
+def test_always_errors_of_coarse_iwan_cells_cover_fine_cells():
+    """The results with the number of Iwan cells for a tolerance of 1e-3 agree within their errors
+    with those for 1e-6, also for small cycles that slip only the first cells."""
     base = get_base_scene(
         load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"]))
     )
     for push in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
-        few, many = (
+        coarse_model, fine_model = (
             build(base.override([f"drive.acceleration={push}", f"accuracy.tolerance={tolerance}"]))
             for tolerance in (1e-3, 1e-6)
         )
-        found = lumped.solve([few])
-        best = lumped.solve([many])
-        for name, value in found.values.items():
+        coarse = lumped.solve([coarse_model])
+        fine = lumped.solve([fine_model])
+        for name, value in coarse.values.items():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
                 assert (
-                    abs(value[0] - best.values[name][0])
-                    <= found.errors[name][0] + found.floors[name][0]
+                    abs(value[0] - fine.values[name][0])
+                    <= coarse.errors[name][0] + coarse.floors[name][0]
                 ), name
-                assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name
+                assert coarse.errors[name][0] <= 1e-3 * abs(value[0]) + coarse.floors[name][0], name

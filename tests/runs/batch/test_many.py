@@ -1,4 +1,4 @@
-"""Many models at once against single runs of each."""
+"""Many models solved together agree with single runs of each model."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ from patchfem.runs.batch import batches
 RIG = POINT + COULOMB + SHORT
 
 
-class StandIn(batches.Batch):
-    """Batch whose functions a test gives."""
+class StubBatch(batches.Batch):
+    """Batch with functions that a test provides."""
 
     def __init__(self, name, refuses, group, solve):
         super().__init__(name, "")
@@ -22,42 +22,48 @@ class StandIn(batches.Batch):
 
 
 @pytest.fixture(autouse=True)
-def use_batches(monkeypatch):
-    """Return a function that sets the only batch; without a call each case runs by itself."""
+def set_batch(monkeypatch):
+    """Return a function that sets the only batch; if it is not called, each case runs by itself."""
 
-    def use(*given) -> None:
-        monkeypatch.setattr(batches, "BATCHES", (StandIn(*given),))
+    def replace_batch(*functions) -> None:
+        monkeypatch.setattr(batches, "BATCHES", (StubBatch(*functions),))
 
     monkeypatch.setattr(batches, "BATCHES", ())
-    return use
+    return replace_batch
 
 
-def same(found: CaseResults, case: int, single) -> None:
-    """The case has the outcome, measures, errors, floors and reasons of a single run, to the last bit."""
-    assert found.outcome[case] == single.outcome
-    assert {name for name in found.values if found.has(name, case)} == set(single.measures)
-    for name, one in single.measures.items():
-        got = found.values[name][case], found.errors[name][case], found.floors[name][case]
-        want = [np.nan if part is None else part for part in (one.value, one.error, one.floor)]
-        np.testing.assert_array_equal(got, want, name)
-        assert found.units[name] == one.unit
-        assert found.reasons.get(name, {}).get(case, "") == one.reason
+def assert_equal_to_run(results: CaseResults, case: int, single) -> None:
+    """Assert that a case has the outcome, measures, errors, floors and reasons of a single run, to
+    the last bit."""
+    assert results.outcome[case] == single.outcome
+    assert {name for name in results.values if results.has(name, case)} == set(single.measures)
+    for name, measure in single.measures.items():
+        actual = results.values[name][case], results.errors[name][case], results.floors[name][case]
+        expected = [
+            np.nan if part is None else part
+            for part in (measure.value, measure.error, measure.floor)
+        ]
+        np.testing.assert_array_equal(actual, expected, name)
+        assert results.units[name] == measure.unit
+        assert results.reasons.get(name, {}).get(case, "") == measure.reason
 
 
-def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
+def test_exact_mixed_cases_agree_with_single_runs_in_order():
+    """Cases of different kinds keep their order and agree with single runs; a model that is an
+    error fails with its message."""
     texts = [RIG, BENCH, POINT + PLASTIC + SHORT, RIG.replace("26 lbf", "1 N")]
     models = [pf.build(text) for text in texts]
     models.insert(1, PatchfemError("friction.static: refused here"))
-    found = batches.solve_models(models)
-    assert found.outcome[1] == FAILED_OUTCOME and found.messages == {
+    results = batches.solve_models(models)
+    assert results.outcome[1] == FAILED_OUTCOME and results.messages == {
         1: "friction.static: refused here"
     }
     for case, text in zip((0, 2, 3, 4), texts):
         single = pf.run(text)
-        same(found, case, single)
-        assert found.warnings.get(case, []) == single.warnings
-        assert found.notes.get(case, []) == single.notes
-        assert found.numerics[case]["engine"] == single.extra["engine"]
+        assert_equal_to_run(results, case, single)
+        assert results.warnings.get(case, []) == single.warnings
+        assert results.notes.get(case, []) == single.notes
+        assert results.numerics[case]["engine"] == single.extra["engine"]
 
 
 @pytest.mark.parametrize(
@@ -69,60 +75,67 @@ def test_exact_cases_are_single_runs_in_the_order_they_were_asked():
     ],
     ids=["solve", "group", "refuses"],
 )
-def test_always_a_fault_of_a_batch_is_made_up_for_by_single_runs_and_noted(
-    refuses, group, solve, failure, use_batches
-):
-    """Said once, and in a note of each of the benches; the rig, which the batch refuses, is not counted."""
-    use_batches(
+def test_always_batch_fault_falls_back_to_single_runs(refuses, group, solve, failure, set_batch):
+    """If a batch fails, its cases run one by one. The fault is printed once and noted for each
+    bench; the rig, which the batch refuses, has no note."""
+    set_batch(
         "faulty", lambda model: "no" if model.kind == "rig" else refuses(model.kind), group, solve
     )
     texts = (BENCH, RIG, BENCH, BENCH)
-    said = []
-    found = batches.solve_models([pf.build(text) for text in texts], say=said.append)
+    messages = []
+    results = batches.solve_models([pf.build(text) for text in texts], say=messages.append)
     for case, text in enumerate(texts):
-        same(found, case, pf.run(text))
-        has_note = any(failure in note for note in found.notes.get(case, ()))
+        assert_equal_to_run(results, case, pf.run(text))
+        has_note = any(failure in note for note in results.notes.get(case, ()))
         assert has_note == (text is BENCH)
-    (sentence,) = [text for text in said if "one by one" in text]
+    (sentence,) = [text for text in messages if "one by one" in text]
     assert sentence.startswith("3 cases are run one by one") and failure in sentence
 
 
-def test_exact_the_error_of_a_case_is_no_fault_of_its_batch(use_batches):
+def test_exact_case_error_is_not_noted_as_batch_fault(set_batch):
+    """A PatchfemError that a case raises in a batch leads to the result of a single run without a
+    note."""
+
     def refuse(models, say):
         raise PatchfemError("friction.static: refused here")
 
-    use_batches("honest", lambda model: "", lambda model: 0, refuse)
-    found = batches.solve_models([pf.build(BENCH)])
-    same(found, 0, pf.run(BENCH))
-    assert not found.notes
+    set_batch("honest", lambda model: "", lambda model: 0, refuse)
+    results = batches.solve_models([pf.build(BENCH)])
+    assert_equal_to_run(results, 0, pf.run(BENCH))
+    assert not results.notes
 
 
-def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(use_batches):
-    seen = []
+def test_exact_groups_of_batch_return_in_case_order(set_batch):
+    """A batch receives its cases group by group, and the results have the order of the cases."""
+    groups = []
 
     def solve(models, say):
-        seen.append([model.point.load for model in models])
+        groups.append([model.point.load for model in models])
         out = CaseResults(np.full(len(models), "done", object))
         out.measure("load", "N")
-        out.values["load"][:] = seen[-1]
+        out.values["load"][:] = groups[-1]
         return out
 
     loads = [1.0, 2.0, 3.0, 4.0]
     models = [pf.build(BENCH, **{"normal.load": load}) for load in loads]
-    use_batches("parity", lambda model: "", lambda model: model.point.load % 2, solve)
+    set_batch("parity", lambda model: "", lambda model: model.point.load % 2, solve)
     assert batches.solve_models(models).values["load"].tolist() == loads
-    assert seen == [[1.0, 3.0], [2.0, 4.0]]
+    assert groups == [[1.0, 3.0], [2.0, 4.0]]
 
 
-def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):
+def test_always_fault_of_one_case_keeps_other_results(monkeypatch):
+    """An internal error of one case makes this case fail; the other case has the result of a single
+    run."""
     from patchfem.runs.batch import one_by_one
 
-    real = one_by_one.run
+    run_plan = one_by_one.run
     monkeypatch.setattr(
         one_by_one,
         "run",
-        lambda what, say, **more: 1 / 0 if what.kind == "bench" else real(what, say, **more),
+        lambda what, say, **more: 1 / 0 if what.kind == "bench" else run_plan(what, say, **more),
     )
-    found = batches.solve_models([pf.build(BENCH), pf.build(RIG)])
-    assert found.outcome.tolist()[0] == FAILED_OUTCOME and "ZeroDivisionError" in found.messages[0]
-    same(found, 1, pf.run(RIG))
+    results = batches.solve_models([pf.build(BENCH), pf.build(RIG)])
+    assert (
+        results.outcome.tolist()[0] == FAILED_OUTCOME and "ZeroDivisionError" in results.messages[0]
+    )
+    assert_equal_to_run(results, 1, pf.run(RIG))

@@ -1,4 +1,4 @@
-"""Every kind of batch computes its cases together: none of them falls back to single runs."""
+"""Every kind of batch solves its cases together; no kind falls back to single runs."""
 
 from pathlib import Path
 
@@ -32,30 +32,32 @@ tolerance = 1e-2
 """
 
 
-def vary(text: str, key: str, values) -> list:
+def build_variants(text: str, key: str, values) -> list:
     """Return models of a scene with different values of a key, on shared meshes."""
     return with_shared_meshes([pf.build(text, **{key: value}) for value in values])
 
 
-MODELS = {  # name of the batch -> function that makes its models
-    "patches": lambda: vary(SMALL_PATCH, "contact.load", (50.0, 60.0, 70.0)),
-    "benches": lambda: vary(SHEARED_BENCH, "slide.amplitude", (2e-6, 3e-6)),
+MODELS = {  # Name of the batch: function that builds its models.
+    "patches": lambda: build_variants(SMALL_PATCH, "contact.load", (50.0, 60.0, 70.0)),
+    "benches": lambda: build_variants(SHEARED_BENCH, "slide.amplitude", (2e-6, 3e-6)),
     "lumped.lanes": lambda: draw_points("coulomb", 7, 64),
     "lumped.lumped": lambda: draw_points("coulomb", 7, 4),
     "lumped.tabled": lambda: draw_patches("tilt x friction", 7, 64),
     "lumped.sheared": lambda: draw_patches("tilt x friction", 7, 4),
-    "gathered": lambda: vary(
+    "gathered": lambda: build_variants(
         (STUDIES / "rig" / "rig.toml").read_text("utf-8"),
         "friction.static",
         [0.2 + 0.005 * case for case in range(32)],
     ),
 }
-LANES = {"lumped.lanes", "lumped.tabled"}  # these leave some cases to the exact engine
+# Batches that solve some of their cases with the exact engine.
+LANES = {"lumped.lanes", "lumped.tabled"}
 
 
 @pytest.fixture
 def single_runs(monkeypatch) -> list:
-    """Plans that are run by themselves, while the folder is that of the shipped rig."""
+    """Return the list of plans that run one by one; the working directory is that of the shipped
+    rig."""
     plans = []
     run = one_by_one.run
 
@@ -68,18 +70,19 @@ def single_runs(monkeypatch) -> list:
     return plans
 
 
-def test_exact_every_batch_is_asked():
+def test_exact_every_batch_has_models():
     assert [batch.name for batch in batches.BATCHES] == list(MODELS)
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_always_a_batch_computes_its_cases_together(name, single_runs):
-    """At most a few cases that stick or ring are run singly; of benches, the patches are pressed together."""
+def test_always_batch_solves_its_cases_together(name, single_runs):
+    """At most a quarter of the cases, which stick or vibrate freely, run one by one; all patches of
+    benches are pressed together."""
     models = MODELS[name]()
     assert batches.choose_batch(models[0], len(models)).name == name
-    said = []
-    results = batches.solve_models(models, say=said.append)
-    assert not [line for line in said if "one by one" in line]
+    messages = []
+    results = batches.solve_models(models, say=messages.append)
+    assert not [line for line in messages if "one by one" in line]
     if name == "benches":
         assert all(plan.model.patch.solved is not None for plan in single_runs)
     else:
@@ -102,15 +105,14 @@ def test_always_a_batch_computes_its_cases_together(name, single_runs):
         ("gathered", gathered, "reduce_to_few_points"),
     ],
 )
-def test_always_a_fault_of_a_batch_stands_in_the_notes_of_its_cases(
-    name, module, function, single_runs, monkeypatch
-):
-    """Wherever it fails, the cases are computed, and everybody who reads their notes learns why it took so long."""
+def test_always_batch_fault_is_noted_in_each_case(name, module, function, single_runs, monkeypatch):
+    """If a step of a batch fails, its cases run one by one, and a note of each case names the
+    fault."""
     models = MODELS[name]()
     monkeypatch.setattr(module, function, lambda *given, **options: 1 / 0)
     monkeypatch.setattr(
         one_by_one, "run", lambda plan, *given, **options: pf.run(BENCH)
-    )  # a result, whichever
+    )  # Any result will do: the test reads only the notes.
     results = batches.solve_models(models)
     for case in range(len(models)):
         assert f"{name}: ZeroDivisionError: division by zero" in results.notes[case][-1]

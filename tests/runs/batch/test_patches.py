@@ -1,4 +1,5 @@
-"""Static patches pressed together, held against their own single runs: values, bars, warnings and notes."""
+"""Static patches that are pressed together agree with single runs in values, errors, warnings and
+notes."""
 
 from pathlib import Path
 
@@ -27,44 +28,50 @@ SKIN = (
 )
 CROWN = '[contact.crown]\nradius = "2 m"\n'
 HOLDER = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
-PEAK = 1e-11  # of the pressure at an end of bare pieces, the mean over a cell of a micron: 1.5e-12 was seen
-PINNED = 'element_size = "0.2 mm"\n'  # no mesh has to be chosen
+# Relative tolerance of the end pressure of uncoated pieces, a mean over a cell of 1 um (largest difference: 1.5e-12).
+PEAK = 1e-11
+# A given element size, so that no mesh is chosen automatically.
+PINNED = 'element_size = "0.2 mm"\n'
 
 
-def family(tables, *values, loads=(100.0, 600.0), size=PINNED):
+def build_family(tables, *values, loads=(100.0, 600.0), size=PINNED):
+    """Return models on shared meshes for all values of the tables and all loads."""
     texts = [TEXT.format(size, load, tables.format(value)) for value in values for load in loads]
     return with_shared_meshes([build(scene.loads(text)) for text in texts])
 
 
-def same(models, together=None):
-    """Answers of both ways; every case is held against its own run."""
-    if together is None:
+def assert_equal_to_single_runs(models, solve_together=None):
+    """Solve models together and one by one, assert that all results agree, and return the former.
+
+    `together` solves the models together; by default this is the program's choice of batch.
+    """
+    if solve_together is None:
         messages = []
-        mine = batches.solve_models(models, say=messages.append)
+        results = batches.solve_models(models, say=messages.append)
         assert not any("run one by one" in message for message in messages), messages
     else:
-        mine = together(models)
+        results = solve_together(models)
     single = one_by_one.solve(models)
-    assert mine.outcome.tolist() == single.outcome.tolist()
-    assert (mine.warnings, mine.notes, mine.numerics, mine.units) == (
+    assert results.outcome.tolist() == single.outcome.tolist()
+    assert (results.warnings, results.notes, results.numerics, results.units) == (
         single.warnings,
         single.notes,
         single.numerics,
         single.units,
     )
     for name, values in single.values.items():
-        near = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
-        # the larger terms that a value is the difference of
+        tolerance = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
+        # Size of the terms whose difference is the value.
         size = np.abs(values) + single.floors[name]
-        if name == "rotation":  # the closings of both ends, over the length
+        if name == "rotation":  # Difference of the approaches of both ends, divided by the length.
             size = size + np.abs(single.values["approach"]) / models[0].patch.pieces.length
-        for column, wanted in (
-            (mine.values, values),
-            (mine.errors, single.errors[name]),
-            (mine.floors, single.floors[name]),
+        for column, expected in (
+            (results.values, values),
+            (results.errors, single.errors[name]),
+            (results.floors, single.floors[name]),
         ):
-            assert (np.abs(column[name] - wanted) <= near * size).all(), name
-    return mine
+            assert (np.abs(column[name] - expected) <= tolerance * size).all(), name
+    return results
 
 
 @pytest.mark.parametrize(
@@ -76,23 +83,26 @@ def same(models, together=None):
         (TILT + HOLDER, (1e-5, -2e-4)),
     ],
 )
-def test_exact_together_as_one_by_one(tables, values):
-    models = family(tables, *values)
+def test_exact_patches_pressed_together_agree_with_single_runs(tables, values):
+    models = build_family(tables, *values)
     assert all(patches.refuses(model) == "" for model in models)
     assert all(
-        one is not None
-        for one in patches.static_batch.solve_alike_patches([model.patch for model in models], 1e-2)
+        patch is not None
+        for patch in patches.static_batch.solve_alike_patches(
+            [model.patch for model in models], 1e-2
+        )
     )
-    same(models)
+    assert_equal_to_single_runs(models)
 
 
-def test_exact_together_as_one_by_one_on_a_mesh_chosen_for_them():
-    same(family(TILT + SKIN, -1e-4, 1e-3, loads=(100.0,), size=""))
+def test_exact_patches_on_automatic_mesh_agree_with_single_runs():
+    assert_equal_to_single_runs(build_family(TILT + SKIN, -1e-4, 1e-3, loads=(100.0,), size=""))
 
 
-def test_exact_cases_of_every_kind_beside_each_other():
-    """Skins, tolerances, tilts and load lines that no group may mix; pieces so tall and pressed so hard that a single
-    run says so, and keys without a use."""
+def test_exact_mixed_patches_agree_with_single_runs():
+    """Cases with different skins, tolerances, tilts and load lines, which cannot share a group,
+    agree with single runs. Warnings about tall pieces and large strains, and notes about keys
+    without meaning, are kept."""
     soft = SKIN.replace("1e14", "1e13")
     parts = [
         (TILT.format(1e-4), ""),
@@ -114,9 +124,11 @@ def test_exact_cases_of_every_kind_beside_each_other():
         tall.replace("2e7", "2e6"),
     ]
     texts.append(texts[0] + 'quadrature = "merged"\n')
-    mine = same(with_shared_meshes([build(scene.loads(text)) for text in texts]))
-    said = [
-        " ".join(mine.warnings.get(case, []) + mine.notes.get(case, []))
+    results = assert_equal_to_single_runs(
+        with_shared_meshes([build(scene.loads(text)) for text in texts])
+    )
+    texts_by_case = [
+        " ".join(results.warnings.get(case, []) + results.notes.get(case, []))
         for case in range(len(texts))
     ]
     for part in (
@@ -124,35 +136,42 @@ def test_exact_cases_of_every_kind_beside_each_other():
         "times as tall as it is",
         "accuracy.quadrature = 'merged' has no meaning",
     ):
-        assert any(part in one for one in said), part
+        assert any(part in line for line in texts_by_case), part
 
 
 @pytest.mark.parametrize("tables", [TILT, TILT + SKIN])
-def test_exact_patches_solved_together_are_those_of_their_own(tables):
-    """What moves a patch takes of it: pressure, gap, compliance, and the rest that the pressed patch carries."""
-    models = family(tables, -1e-4, 1e-5, 3e-4)
-    for model, other in zip(models, patches.press_together(models)):
-        assert model.patch.solved is None and other.patch.solved is not None
-        for mine, own in zip(other.patch.solved.patches, solve_with_coarser(model.patch, 1e-2)):
-            top = own.pressure.sigma_n.max()
-            assert np.abs(mine.pressure.sigma_n - own.pressure.sigma_n).max() < 1e-11 * top
-            np.testing.assert_array_equal(mine.active, own.active)
-            np.testing.assert_array_equal(mine.unloaded_gap, own.unloaded_gap)
-            np.testing.assert_array_equal(mine.giving, own.giving)
-            assert mine.pressure.gap == pytest.approx(
-                own.pressure.gap, rel=1e-9, abs=1e-9 * np.ptp(own.unloaded_gap)
+def test_exact_pressed_patches_agree_with_separate_solutions(tables):
+    """Pressure, gap, compliance and the remaining fields of patches that are pressed together agree
+    with separate solutions; motions start from these fields."""
+    models = build_family(tables, -1e-4, 1e-5, 3e-4)
+    for model, pressed in zip(models, patches.press_together(models)):
+        assert model.patch.solved is None and pressed.patch.solved is not None
+        for together, separate in zip(
+            pressed.patch.solved.patches, solve_with_coarser(model.patch, 1e-2)
+        ):
+            peak_pressure = separate.pressure.sigma_n.max()
+            assert (
+                np.abs(together.pressure.sigma_n - separate.pressure.sigma_n).max()
+                < 1e-11 * peak_pressure
+            )
+            np.testing.assert_array_equal(together.active, separate.active)
+            np.testing.assert_array_equal(together.unloaded_gap, separate.unloaded_gap)
+            np.testing.assert_array_equal(together.giving, separate.giving)
+            assert together.pressure.gap == pytest.approx(
+                separate.pressure.gap, rel=1e-9, abs=1e-9 * np.ptp(separate.unloaded_gap)
             )
             for name in ("approach", "rotation", "load", "moment"):
-                assert getattr(mine.pressure, name) == pytest.approx(
-                    getattr(own.pressure, name), rel=1e-11
+                assert getattr(together.pressure, name) == pytest.approx(
+                    getattr(separate.pressure, name), rel=1e-11
                 )
-            assert contact_extent(mine).places == pytest.approx(
-                contact_extent(own).places, rel=1e-9
+            assert contact_extent(together).places == pytest.approx(
+                contact_extent(separate).places, rel=1e-9
             )
 
 
-def test_exact_a_sweep_in_columns_is_that_of_its_models():
-    """The cases of a sweep are one model with columns of numbers; here the same as models of their own."""
+def test_exact_columns_of_sweep_agree_with_separate_models():
+    """A sweep stored as one model with columns of numbers agrees with separate models of its cases
+    within 1e-12."""
     values = [(-4.5, 2.0, 300.0), (-3.2, 0.4, 700.0), (-3.9, 20.0, 90.0)]
     text = TEXT.format(PINNED, 100.0, TILT.format(1e-4) + CROWN)
     keys = {
@@ -161,24 +180,25 @@ def test_exact_a_sweep_in_columns_is_that_of_its_models():
         "contact.load": [f"{load!r} N" for _, _, load in values],
     }
     cases = Cases(tuple(make_axis(key, texts, distinct=False) for key, texts in keys.items()), True)
-    found = compute_in_memory(SweepScene(Path("patch.toml"), text), cases, LocalExecutor())
+    results = compute_in_memory(SweepScene(Path("patch.toml"), text), cases, LocalExecutor())
     models = with_shared_meshes(
         [
             build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))
             for k in range(3)
         ]
     )
-    wanted = batches.solve_models(models)
-    for name, column in wanted.values.items():
-        for mine, other in (
-            (found.values[name], column),
-            (found.errors[name], wanted.errors[name]),
+    expected = batches.solve_models(models)
+    for name, column in expected.values.items():
+        for actual, reference in (
+            (results.values[name], column),
+            (results.errors[name], expected.errors[name]),
         ):
-            assert mine == pytest.approx(other, rel=1e-12), name
+            assert actual == pytest.approx(reference, rel=1e-12), name
 
 
-def test_refuses_a_profile_to_be_pressed_with_others(tmp_path):
-    """What it is averaged over stands in its own bars."""
+def test_refuses_measured_profile_in_patch_batch(tmp_path):
+    """A patch with a measured profile is not pressed with others, because its errors contain the
+    variation along the profile."""
     (tmp_path / "waves.csv").write_text(
         "x [mm],z [um]\n" + "".join(f"{0.1 * k},{k % 3}\n" for k in range(-70, 71))
     )
@@ -189,12 +209,14 @@ def test_refuses_a_profile_to_be_pressed_with_others(tmp_path):
     assert "profile" in patches.refuses(models[0])
 
 
-def test_refuses_what_is_not_pressed_together():
-    lonely = build(scene.loads(TEXT.format("", 100.0, TILT.format(1e-4))))
-    assert "its own" in patches.refuses(lonely)
+def test_refuses_own_mesh_or_hertz_skin_in_patch_batch():
+    """A patch with a mesh of its own, or with a nonlinear skin, is not pressed together with
+    others."""
+    own_mesh = build(scene.loads(TEXT.format("", 100.0, TILT.format(1e-4))))
+    assert "its own" in patches.refuses(own_mesh)
     assert (
         patches.refuses(
-            family(
+            build_family(
                 TILT
                 + SKIN.replace("linear", "hertz").replace(
                     'normal_stiffness = "1e14 Pa/m"',

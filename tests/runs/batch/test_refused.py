@@ -1,4 +1,4 @@
-"""Lumped cases of every kind, batch or not, beside single runs; and cases that end in every way that a batch knows."""
+"""Lumped cases of every kind, with every possible outcome, agree with single runs."""
 
 import numpy as np
 import pytest
@@ -30,8 +30,8 @@ cycles = 20
 """
 
 
-def changed(*pairs) -> str:
-    """The rig with parts of its text replaced."""
+def replace_in_rig(*pairs) -> str:
+    """Return the text of the rig with parts replaced."""
     text = RIG
     for old, new in pairs:
         assert old in text
@@ -39,40 +39,44 @@ def changed(*pairs) -> str:
     return text
 
 
-# digits of the larger terms they are parts of
+# Absolute tolerance of measures that are differences of larger terms.
 LAST = {"acceleration_distortion": 1e-13, "drift_per_cycle": 1e-16}
 KINDS = {
     "wear": RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n',
     "two modes": POINT + COULOMB + MODE + SECOND + DRIVE,
     "a second load path": RIG
     + '[structure.bonded]\nstiffness = "4.6e6 N/m"\ndamping = "20 N s/m"\n',
-    "a stop of the flexure": changed(("moving_mass", 'travel = "10 um"\nmoving_mass')),
-    "levels": changed(('acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]')),
-    "a sweep": changed(('frequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n', SWEEP)),
-    "a release": changed(
+    "a stop of the flexure": replace_in_rig(("moving_mass", 'travel = "10 um"\nmoving_mass')),
+    "levels": replace_in_rig(
+        ('acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]')
+    ),
+    "a sweep": replace_in_rig(('frequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n', SWEEP)),
+    "a release": replace_in_rig(
         (
             'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"',
             'kind = "free"\ndisplacement = "1 mm"',
         )
     ),
-    "a part of a cycle": changed(("cycles = 20", "cycles = 20.5")),
-    "few cycles": changed(("cycles = 20", "cycles = 12")),
-    "no load": changed(("26 lbf", "0 N")),
-    "no friction": changed(("static = 0.3", "static = 0")),
-    "no drive": changed(("slide = 1.0", "slide = 1.0\nbase = 0")),
-    "no output": changed(("slide = 1.0", "slide = 1.0\noutput = 0")),
-    "a gauge of its own": changed(("slide = 1.0", "slide = 1.0\ngauge = 0.5")),
+    "a part of a cycle": replace_in_rig(("cycles = 20", "cycles = 20.5")),
+    "few cycles": replace_in_rig(("cycles = 20", "cycles = 12")),
+    "no load": replace_in_rig(("26 lbf", "0 N")),
+    "no friction": replace_in_rig(("static = 0.3", "static = 0")),
+    "no drive": replace_in_rig(("slide = 1.0", "slide = 1.0\nbase = 0")),
+    "no output": replace_in_rig(("slide = 1.0", "slide = 1.0\noutput = 0")),
+    "a gauge of its own": replace_in_rig(("slide = 1.0", "slide = 1.0\ngauge = 0.5")),
     "a mass": MASS,
-    "an averaged law": changed(('law = "coulomb"', 'law = "convolution"\nbond_length = "1 um"')),
+    "an averaged law": replace_in_rig(
+        ('law = "coulomb"', 'law = "convolution"\nbond_length = "1 um"')
+    ),
 }
 MARCHED = {
-    "a load that varies": changed(
+    "a load that varies": replace_in_rig(
         ('"26 lbf"\n', '"26 lbf"\namplitude = "10 N"\nfrequency = "50 Hz"\n')
     ),
     "a spring that stiffens": RIG + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n',
     "the march by name": RIG + '[accuracy]\nmethod = "march"\n',
 }
-ENDS = {  # what is changed, the outcome and, where there is one, that its steady amplitude is estimated
+ENDS = {  # Name: (replacements in the rig, outcome, whether the steady amplitude is estimated).
     "grows": ((("0.003", "0"), ("26 lbf", "1 lbf")), "grows", False),
     "settles": (
         (("cycles = 20", "cycles = 60"), ("0.003", "0.01"), ("26 lbf", "12 lbf")),
@@ -95,57 +99,58 @@ ENDS = {  # what is changed, the outcome and, where there is one, that its stead
 }
 
 
-def alike(model):
-    """Answers of a batch, held against those of a single run: what is said, and every number to 1e-10 of its size."""
-    said = []
-    found = batches.solve_models([model], say=said.append)
-    one = one_by_one.solve([model])
-    assert [line for line in said if "one by one" in line] == []
-    assert found.outcome.tolist() == one.outcome.tolist() and found.messages == one.messages
-    assert (found.warnings, found.notes, found.numerics, found.reasons) == (
-        one.warnings,
-        one.notes,
-        one.numerics,
-        one.reasons,
+def assert_equal_to_single_run(model):
+    """Solve a model as a batch and alone; assert equal texts and numbers that agree within 1e-10,
+    and return the batch."""
+    messages = []
+    batch = batches.solve_models([model], say=messages.append)
+    single = one_by_one.solve([model])
+    assert [line for line in messages if "one by one" in line] == []
+    assert batch.outcome.tolist() == single.outcome.tolist() and batch.messages == single.messages
+    assert (batch.warnings, batch.notes, batch.numerics, batch.reasons) == (
+        single.warnings,
+        single.notes,
+        single.numerics,
+        single.reasons,
     )
-    names = [name for name in one.values if one.has(name, 0)]
-    assert {name for name in found.values if found.has(name, 0)} == set(names)
-    for name in set(names) - {"energy_balance", "work_check"}:  # round-off alone
-        size = 1e-10 * abs(one.values[name][0]) + LAST.get(name, 0.0)
+    names = [name for name in single.values if single.has(name, 0)]
+    assert {name for name in batch.values if batch.has(name, 0)} == set(names)
+    for name in set(names) - {"energy_balance", "work_check"}:  # Both measures are round-off.
+        size = 1e-10 * abs(single.values[name][0]) + LAST.get(name, 0.0)
         np.testing.assert_allclose(
-            found.values[name], one.values[name], rtol=0, atol=size, err_msg=name
+            batch.values[name], single.values[name], rtol=0, atol=size, err_msg=name
         )
         np.testing.assert_allclose(
-            found.errors[name], one.errors[name], rtol=1e-6, atol=size, err_msg=name
+            batch.errors[name], single.errors[name], rtol=1e-6, atol=size, err_msg=name
         )
-    return found
+    return batch
 
 
 @pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8, 10, 12, 14)
 @pytest.mark.parametrize("kind", KINDS)
-def test_exact_a_case_of_any_kind_is_its_single_run(kind):
-    alike(build(KINDS[kind]))
+def test_exact_batch_agrees_with_single_run_for_every_kind(kind):
+    assert_equal_to_single_run(build(KINDS[kind]))
 
 
 @pytest.mark.parametrize("kind", MARCHED)
-def test_refuses_what_is_marched(kind):
+def test_refuses_marched_cases_in_batches(kind):
     assert batches.choose_batch(build(MARCHED[kind])) is None
 
 
 @pytest.mark.parametrize("end", ENDS)
-def test_exact_a_batch_ends_as_single_runs_do(end):
+def test_exact_batch_outcomes_agree_with_single_runs(end):
     pairs, outcome, estimated = ENDS[end]
-    model = build(changed(*pairs))
-    found = alike(model)
-    assert batches.choose_batch(model) is not None and found.outcome[0] == outcome
-    assert ("relative_displacement_amplitude_steady" in found.values) == estimated
-    assert bool(found.warnings) == (end == "remarked on")
+    model = build(replace_in_rig(*pairs))
+    results = assert_equal_to_single_run(model)
+    assert batches.choose_batch(model) is not None and results.outcome[0] == outcome
+    assert ("relative_displacement_amplitude_steady" in results.values) == estimated
+    assert bool(results.warnings) == (end == "remarked on")
 
 
 @pytest.mark.parametrize("end", ENDS)
-def test_exact_a_batch_of_elements_ends_as_single_runs_do(end):
-    """The same cases behind an elastic-plastic element, however they end."""
-    text = changed(*ENDS[end][0])
+def test_exact_elastic_plastic_outcomes_agree_with_single_runs(end):
+    """The same cases with an elastic-plastic element have the outcomes of single runs."""
+    text = replace_in_rig(*ENDS[end][0])
     model = build(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"'))
     assert batches.choose_batch(model) is not None
-    alike(model)
+    assert_equal_to_single_run(model)

@@ -1,4 +1,4 @@
-"""Patches that slip part by part, many in one compiled call, beside the same cases run one by one."""
+"""Patches that slip partially agree with single runs when many are solved in one compiled call."""
 
 import numpy as np
 import pytest
@@ -22,8 +22,8 @@ SKIN = (
 )
 
 
-def models(law: str, seed: int, count: int) -> list:
-    """Random tilts, loads and levels, near resonance and away, on meshes of their own, pinned or shared."""
+def draw_models(law: str, seed: int, count: int) -> list:
+    """Return random models near and away from resonance, on their own, prescribed or shared meshes."""
     r = np.random.default_rng(seed)
     out = []
     for k in range(count):
@@ -42,23 +42,26 @@ def models(law: str, seed: int, count: int) -> list:
     return with_shared_meshes(out) if seed % 2 else out
 
 
-def held(law: str, seed: int, count: int) -> int:
-    """Cases held against runs of their own; how many the batch answered itself."""
-    cases = models(law, seed, count)
-    alone = []
-    real = one_by_one.solve
-    assert all(batches.choose_batch(one).name == "lumped.sheared" for one in cases)
+def count_cases_solved_in_batch(law: str, seed: int, count: int) -> int:
+    """Assert that a batch agrees with single runs; return how many cases the batch solved without a
+    single run."""
+    cases = draw_models(law, seed, count)
+    single_cases = []
+    solve_one_by_one = one_by_one.solve
+    assert all(batches.choose_batch(model).name == "lumped.sheared" for model in cases)
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(
             one_by_one,
             "solve",
-            lambda models, *given, **more: alone.extend(models) or real(models, *given, **more),
+            lambda draw_models, *given, **more: (
+                single_cases.extend(draw_models) or solve_one_by_one(draw_models, *given, **more)
+            ),
         )
-        found = batches.solve_models(cases)
-    held_against(cases, real(cases), found)
-    return count - len(alone)
+        results = batches.solve_models(cases)
+    held_against(cases, solve_one_by_one(cases), results)
+    return count - len(single_cases)
 
 
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_batch_of_patches_is_the_single_runs(law):
-    assert held(law, 1, 6) >= 3
+def test_exact_batch_of_patches_agrees_with_single_runs(law):
+    assert count_cases_solved_in_batch(law, 1, 6) >= 3

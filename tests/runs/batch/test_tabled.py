@@ -1,6 +1,7 @@
-"""Patches of elements in lanes, beside the exact batch and where they have to leave a case to it.
+"""Patches of contact elements in lanes agree with the exact batch, which solves the cases that
+lanes cannot.
 
-The whole campaign, beside single runs, is `lanes` of tests/support/campaigns.py.
+The long campaign against single runs is `lanes` of tests/support/campaigns.py.
 """
 
 import numpy as np
@@ -14,38 +15,41 @@ from patchfem.runs.batch.lumped import sheared, tabled
 from patchfem.scene import format_assignments
 
 
-def missed(family: str, seed: int, count: int) -> tuple:
-    """(Answers of random cases in lanes, measures beyond the sum of both bars, all that were compared)."""
+def compare_lanes_with_exact(family: str, seed: int, count: int) -> tuple:
+    """Return the results of random cases in lanes, the measures that differ by more than both
+    errors, and the number of measures."""
     models = meshes.with_shared_meshes(draw_patches(family, seed, count))
-    assert all(batches.choose_batch(one, 64).name == "lumped.tabled" for one in models)
-    assert all(batches.choose_batch(one, 63).name == "lumped.sheared" for one in models)
-    found = tabled.solve(models)
-    ones = sheared.solve(models)
-    assert list(found.outcome) == list(ones.outcome) and not found.messages
-    pairs = [row for some in rows(found, ones) for row in some]
-    return found, [row for row in pairs if not row.holds], len(pairs)
+    assert all(batches.choose_batch(model, 64).name == "lumped.tabled" for model in models)
+    assert all(batches.choose_batch(model, 63).name == "lumped.sheared" for model in models)
+    lanes = tabled.solve(models)
+    exact = sheared.solve(models)
+    assert list(lanes.outcome) == list(exact.outcome) and not lanes.messages
+    all_rows = [row for case_rows in rows(lanes, exact) for row in case_rows]
+    return lanes, [row for row in all_rows if not row.holds], len(all_rows)
 
 
 @pytest.mark.parametrize("family", ["tilt x friction"])
-def test_always_97_of_100_measures_lie_within_both_bars(family):
-    found, misses, count = missed(family, 7, 6)
-    assert sum(one["engine"] == "lanes" for one in found.numerics.values()) >= 4
+def test_always_97_of_100_measures_lie_within_both_errors(family):
+    lanes, misses, count = compare_lanes_with_exact(family, 7, 6)
+    assert sum(numerics["engine"] == "lanes" for numerics in lanes.numerics.values()) >= 4
     assert len(misses) <= 0.03 * count
 
 
-def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
-    """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
+def test_always_patch_larger_than_table_is_solved_exactly(monkeypatch):
+    """A patch with more contact elements than the table has room for, as on a finer mesh, is
+    integrated from yield event to yield event."""
     models = meshes.with_shared_meshes(draw_patches("frequency x load", 9, 3))
     monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"N_YIELDS": 8}))
-    found = tabled.solve(models)
-    ones = sheared.solve(models)
-    assert all(one["engine"] == "piecewise" for one in found.numerics.values())
-    for name, column in ones.values.items():
-        np.testing.assert_array_equal(found.values[name], column)
+    lanes = tabled.solve(models)
+    exact = sheared.solve(models)
+    assert all(numerics["engine"] == "piecewise" for numerics in lanes.numerics.values())
+    for name, column in exact.values.items():
+        np.testing.assert_array_equal(lanes.values[name], column)
 
 
-def test_always_a_patch_that_sticks_is_answered_in_lanes():
-    """Its loop is a small difference, which changes by more than itself with the steps; the amplitude does not."""
+def test_always_stuck_patch_is_solved_in_lanes():
+    """A stuck patch is solved in lanes although the relative change of its loop area with the steps
+    is large: the loop area is a small difference, and only the amplitude decides."""
     base = get_base_scene(pf.load(PATCH))
     sets = [
         {
@@ -56,17 +60,18 @@ def test_always_a_patch_that_sticks_is_answered_in_lanes():
         for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))
     ]
     models = meshes.with_shared_meshes(
-        [pf.build(base.override(format_assignments(one))) for one in sets]
+        [pf.build(base.override(format_assignments(assignments))) for assignments in sets]
     )
-    found = tabled.solve(models)
-    ones = sheared.solve(models)
-    assert all(one["engine"] == "lanes" for one in found.numerics.values())
-    assert list(found.outcome) == list(ones.outcome) == 3 * ["stuck"]
+    lanes = tabled.solve(models)
+    exact = sheared.solve(models)
+    assert all(assignments["engine"] == "lanes" for assignments in lanes.numerics.values())
+    assert list(lanes.outcome) == list(exact.outcome) == 3 * ["stuck"]
     for name in ("relative_displacement_amplitude", "friction_force_peak", "ring_frequency"):
-        apart = np.abs(found.values[name] - ones.values[name])
-        assert (apart <= found.errors[name] + ones.errors[name]).all()
-        # those of the exact batch are of the mesh alone
-        steps = found.errors[name] - 1.1 * ones.errors[name]
+        differences = np.abs(lanes.values[name] - exact.values[name])
+        assert (differences <= lanes.errors[name] + exact.errors[name]).all()
+        # The errors of the exact batch come only from the mesh.
+        step_errors = lanes.errors[name] - 1.1 * exact.errors[name]
         assert (
-            steps <= models[0].accuracy.tolerance * np.abs(ones.values[name]) + found.floors[name]
+            step_errors
+            <= models[0].accuracy.tolerance * np.abs(exact.values[name]) + lanes.floors[name]
         ).all()
