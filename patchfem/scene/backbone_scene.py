@@ -70,13 +70,21 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
     """Read the parts of a mode; ValueError if one is not a quantity of its kind."""
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")
-    slide = None if slide is None else float(slide)
-    mode = GivenMode(float(frequency), float(damping), slide)
+    slide = None if slide is None else _parse_ratio(slide)
+    mode = GivenMode(float(frequency), _parse_ratio(damping), slide)
     if not (0 < mode.frequency < float("inf") and -1 < mode.damping < 1 and slide != 0):
         raise ValueError(
             "a frequency above 0, a damping ratio between -1 and 1 and no slide of 0 are needed"
         )
     return mode
+
+
+def _parse_ratio(value) -> float:
+    """Read a damping ratio or a slide; ValueError if it is not a number."""
+    try:
+        return float(value)
+    except ValueError:
+        raise ValueError(f"{value!r} is not a number without a unit; 1 % is 0.01") from None
 
 
 def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:

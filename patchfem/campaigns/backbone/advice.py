@@ -5,6 +5,7 @@ import numpy as np
 from ...formatting import format_length, format_quantity
 from .band import Band, forced_mode_ratio
 from .joint import Joint
+from .notes import REPORT_OTHER_MODES
 from .records import ROUND_OFF_ERROR, match_amplitudes
 
 AGREEMENT = 0.02  # Relative difference of the damping below which two methods agree.
@@ -37,7 +38,8 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = curves[band.method]
     sentences = [
-        f"Use the bold curve, method {band.method}: {PURPOSES[band.method]}.",
+        f"Use method {band.method}, the bold curve of the page: {PURPOSES[band.method]}.",
+        *_describe_slip(joint, curve),
         _describe_width(band, curve),
         *_describe_agreement(band, curves),
         *_describe_ring_down(joint, band, curves),
@@ -47,6 +49,22 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
     for method, reason in missing.items():
         sentences.append(f"Method {method} has no curve here: {reason}.")
     return tuple(sentences)
+
+
+def _describe_slip(joint: Joint, curve) -> list:
+    """Say where the sticking contact reaches its friction limit, and up to where friction dissipates nothing."""
+    if not joint.friction_limit or joint.is_rigid:
+        return []
+    edge = format_length(joint.slip_amplitude, 3)
+    sentences = [f"A contact that sticks reaches its friction limit at {edge}."]
+    slips = curve.loss > ROUND_OFF_ERROR * joint.spring * (curve.amplitude / joint.reach) ** 2
+    count = int(np.argmax(slips)) if slips.any() else curve.amplitude.size
+    if count and not np.isnan(curve.loss).any():
+        edge = format_length(curve.amplitude[count - 1], 3)
+        sentences.append(
+            f"Up to {edge} friction dissipates nothing, and the damping ratio is that of the structure."
+        )
+    return sentences
 
 
 def _describe_width(band: Band, curve) -> str:
@@ -86,35 +104,53 @@ def _describe_agreement(band: Band, curves: dict) -> list:
 
 
 def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
-    """Describe how the damping of a ring-down differs from that of the steady vibration, and why."""
-    ring_down = band.ring_down
-    if ring_down is None:
-        return []
+    """Describe how the damping of a ring-down, computed or predicted, differs from that of the curve, and why."""
     curve = curves[band.method]
-    is_known = (ring_down.damping > 0) & (curve.damping > curve.damping_error + ROUND_OFF_ERROR)
+    if band.ring_down is None:
+        return []
+    damping = band.ring_down.damping
+    errors = np.zeros(curve.amplitude.size)
+    is_computed = "decay" in curves
+    if is_computed:
+        here, there = match_amplitudes(curve, curves["decay"])
+        damping = np.full(curve.amplitude.size, np.nan)
+        damping[here] = curves["decay"].damping[there]
+        errors[here] = curves["decay"].damping_error[there] + curve.damping_error[here]
+    is_known = (damping > 0) & (curve.damping > curve.damping_error + ROUND_OFF_ERROR)
     if not is_known.any():
         return ["How the damping of a ring-down differs is not known at these amplitudes."]
-    ratio = np.where(is_known, ring_down.damping / curve.damping, 1.0)
-    k = int(np.argmax(np.abs(np.log(ratio))))
+    is_known &= np.abs(damping - curve.damping) > errors
+    ratio = np.where(is_known, damping / curve.damping, 1.0)
+    k = int(np.argmax(np.abs(ratio - 1)))
     if abs(ratio[k] - 1) <= AGREEMENT:
-        return ["A ring-down has the same damping (method decay holds as well)."]
+        verb = "has" if is_computed else "is predicted to have"
+        return [
+            f"A ring-down (method decay) {verb} the same damping within {100 * AGREEMENT:g} % and the numerical error."
+        ]
     reasons = []
     if ratio[k] > 1 and not joint.is_rigid:
         reasons.append(
             "the joint stiffens as the amplitude falls, so the amplitude loses more than the energy"
         )
-    lost_fraction = -np.expm1(-2 * np.pi * ring_down.damping[k])
+    lost_fraction = -np.expm1(-2 * np.pi * damping[k])
     if lost_fraction > MIN_STATED_LOSS:
         reasons.append(
             f"a cycle takes {100 * lost_fraction:.2g} % of the amplitude, so the decay gives means over unequal motions"
         )
     size = f"{100 * abs(ratio[k] - 1):.2g} % {'more' if ratio[k] > 1 else 'less'}"
-    edge = "upper" if ratio[k] > 1 else "lower"
     because = f": {'; '.join(reasons)}" if reasons else ""
+    place = format_length(curve.amplitude[k], 3)
+    if is_computed:
+        return [
+            f"The ring-down (method decay) reads {size} damping at {place}, where it differs most{because}."
+        ]
+    coupled = ""
+    if joint.modes.omega.size > 1:
+        coupled = ", and neglects the exchange of energy between the modes"
     return [
-        f"A ring-down (method decay) reads up to {size} damping, most at {format_length(curve.amplitude[k], 3)}"
-        f"{because}. The band contains it, but its {edge} limit lies farther out; for the curve of a ring-down, "
-        "run --method decay."
+        f"A ring-down (method decay) is predicted to read {size} damping at {place}, where it differs most{because}. "
+        f"This is an estimate without a run of the decay{coupled}; the band allows for its error. "
+        "For the curve of a ring-down, run --method decay."
     ]
 
 
@@ -167,9 +203,12 @@ def _describe_coupling(joint: Joint, band: Band, curve) -> list:
     if ratio.max() >= 1:
         size = "as much as the mode itself"
     shape = ""
-    if band.ring_down is not None and not joint.is_rigid:
-        shape = f", and a cycle of a ring-down changes its shape by up to {100 * change:.2g} %"
+    if change > REPORT_OTHER_MODES and not joint.is_rigid:
+        shape = (
+            f", and a cycle of a ring-down changes its shape by up to {100 * change:.2g} %, so that the modes "
+            "exchange energy"
+        )
     return [
         f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes "
-        f"{size}{shape}, so that the modes exchange energy; a test reads the curve only if it isolates the mode."
+        f"{size}{shape}; a test reads the curve only if it isolates the mode."
     ]

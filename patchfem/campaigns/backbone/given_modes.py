@@ -142,9 +142,11 @@ def _note_slides(n_modes: int, stiffness: float | None) -> tuple:
         return (
             "`slide` is assumed to be 1 for each mode given without it: the contact moves as far as the output",
         )
+    fraction = 100 * _assumed_fraction(n_modes)
     return (
         f"for each mode given without it, `slide` is assumed such that the sticking joint, of "
-        f"{format_quantity(stiffness, 'N/m', 3)}, contributes {100 * _assumed_fraction(n_modes):.3g} % of the "
-        "stiffness of the mode; the frequencies without the contact, the damping and the amplitude of slip depend on "
-        "it: give the motion of the contact per motion of the output as a third number, as 120 Hz:0.01:0.02",
+        f"{format_quantity(stiffness, 'N/m', 3)}, contributes {fraction:.3g} % of the stiffness of the mode. This part "
+        "grows with the square of `slide`, as do about the fall of the frequency and the damping by friction; the "
+        f"amplitude of slip is inversely proportional: half the `slide` gives {fraction / 4:.3g} % and twice the "
+        "amplitude. Give the motion of the contact per motion of the output as a third number, as 120 Hz:0.01:0.02",
     )
