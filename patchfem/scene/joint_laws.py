@@ -124,7 +124,7 @@ JOINT_LAWS = (
     ),
     JointLaw(
         ("rest",),
-        ("ageing", "loss", "force-limit"),
+        ("ageing", "force-limit"),
         "nonlocal",
         ("bond_length", "kinetic", "rest_growth", "rest_speed", "slip_growth"),
         "bonds that grow during a rest, exponentially with the time constant rest_speed / rest_growth",
@@ -265,6 +265,8 @@ def describe_choice(choice: Choice) -> list[str]:
     missing = [word for word in row.known if word not in choice.known]
     # every law has the coefficient (key `static`); another word may be a key of the law
     used = {*row.known, *row.keys, "coefficient", NOTHING}
+    if "bond_length" in row.keys:
+        used.add("stiffness")
     unused = [word for word in choice.known if word not in used]
     unanswered = [word for word in choice.wanted if word not in row.wanted]
     sentences = [

@@ -133,6 +133,7 @@ def _report_unknown(
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
     if suggestion := _suggest_name(draft, model, raw, key, table_key):
         advice = f"did you mean '{suggestion}'?"
+        draft.suggested_keys.add(f"{table_key}.{suggestion}")
     draft.add_mistake(path, f"unknown {'table' if is_table else 'key'}; {advice}")
 
 

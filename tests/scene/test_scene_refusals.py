@@ -201,6 +201,13 @@ def test_refuses_a_key_missing_for_the_selector(sets, key, says):
     assert f": {key}: missing" in message and says in message
 
 
+def test_refuses_a_misspelled_alternative_as_that_key_only():
+    """The other alternative, bond_length, is not reported as missing."""
+    law = '"elastic-plastic"\nstifness = "2e6 N/m"'
+    text = BENCH.replace('"coulomb"', law)
+    assert only(text).endswith("friction.stifness: unknown key; did you mean 'stiffness'?")
+
+
 @pytest.mark.parametrize("law", ["tanh", "elastic-plastic", "convolution"])
 def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     found = mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
@@ -271,7 +278,10 @@ COMBINATIONS = [
     (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs this table"),
     (LINEAR[LINEAR.index("[drive]") :], "a.toml: missing [structure]: [drive] needs this table"),
     (PATCH + LINEAR, "a.toml: missing [friction]: "),
-    (BENCH[: BENCH.index("[slide]")], "a.toml: missing [slide]: friction needs a motion"),
+    (
+        BENCH[: BENCH.index("[slide]")],
+        "a.toml: missing [slide]: friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone`",
+    ),
     (BENCH[BENCH.index("[friction]") :], "a.toml: missing [contact]: friction needs a normal load"),
     (
         BENCH[: BENCH.index("[friction]")] + BENCH[BENCH.index("[slide]") :],

@@ -208,7 +208,8 @@ def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> Non
         draft.add_missing_table("contact", "friction needs a normal load, [contact] or [normal]")
     if not has_rig and "slide" not in tables:
         draft.add_missing_table(
-            "slide", "friction needs a motion, [slide] or [structure] with [drive]"
+            "slide",
+            "friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone` needs neither",
         )
 
 

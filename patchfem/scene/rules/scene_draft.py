@@ -62,6 +62,8 @@ class SceneDraft:
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}
         self.read_now: dict[int, tuple[dict, Any]] = {}
+        # keys that an unknown key probably means; they are not reported as missing
+        self.suggested_keys: set[str] = set()
         # keys (order, line of text); a dict lists each mistake only once
         self._mistakes: dict[tuple[int, str], None] = {}
 

@@ -113,7 +113,11 @@ def check_selector(facts: TableFacts, selector: Selector) -> None:
     reason = f"{selector.key} '{value}'"
     for word in selector.choices[value][0].split():
         alternatives = word.split("|")
-        written = [key for key in alternatives if facts.has(key)]
+        written = [
+            key
+            for key in alternatives
+            if facts.has(key) or f"{facts.table_key}.{key}" in draft.suggested_keys
+        ]
         if not written:
             first, *others = alternatives
             needs = " or ".join((f"{reason} needs this key", *others))
