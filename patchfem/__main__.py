@@ -79,7 +79,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
 from .commands import compare, import_, profile, run, scene, start, study, sweep, view_export
-from .commands.shared import Ended, Refused, print_message
+from .commands.shared import CommandExit, UsageError, print_message
 from .commands.streams import make_printable, prepare_streams
 from .formatting import rewrite_powers_of_ten
 
@@ -275,7 +275,7 @@ def run_command(arguments: list, before=lambda: None) -> int:
             print(format_first_screen(), flush=True)
             return 0
         if removed := _describe_removed_option(arguments):
-            raise Refused(removed)
+            raise UsageError(removed)
         register_verbs(arguments)
         try:
             app(arguments, exit_on_error=False, print_error=False)
@@ -284,14 +284,14 @@ def run_command(arguments: list, before=lambda: None) -> int:
                 raise
         sys.stdout.flush()
         return 0
-    except (Refused, CycloptsError) as error:
+    except (UsageError, CycloptsError) as error:
         unused = getattr(error, "unused_tokens", None)
         message = str(error)
         if unused:
             message = _describe_unexpected_arguments(arguments[0], unused)
         print_message(make_printable(f"patchfem: {' '.join(message.split())}"))
         return 2
-    except Ended as end:
+    except CommandExit as end:
         return end.code
     except KeyboardInterrupt:
         print_message(_describe_interrupt())

@@ -690,7 +690,9 @@ class SweepPlots:
             raise PatchfemError(
                 "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors"
             )
-        figure = pictures.draw_charts.figure([sweep_charts.sweep_chart(dataset, measure)], onto=ax)
+        figure = pictures.draw_charts.figure(
+            [sweep_charts.sweep_chart(dataset, measure)], axes_to_use=ax
+        )
         return figure.axes[0] if ax is None else ax
 
     @staticmethod
@@ -736,7 +738,7 @@ class SweepPlots:
                 "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
                 + (f"; {reason}" if reason else "")
             )
-        figure = pictures.draw_charts.figure(backbone_files.backbone_charts(curves), onto=ax)
+        figure = pictures.draw_charts.figure(backbone_files.backbone_charts(curves), axes_to_use=ax)
         return figure.axes[0] if ax is None else ax
 
 
@@ -1134,13 +1136,13 @@ def import_(
 
     file = _require_path(file, "import_")
     out = _require_path(out, "import_: out")
-    names = imported.Estimate._fields
+    names = imported.EstimateOptions._fields
     if unknown := set(how) - set(names):
         raise PatchfemError(
             f"import_: {unknown.pop()}: unknown setting; use map, zero, {', '.join(sorted(names))}"
         )
     texts = {name: _require_string(value, f"import_: {name}") for name, value in how.items()}
-    estimate = imported.Estimate(decay=decay, **texts)
+    estimate = imported.EstimateOptions(decay=decay, **texts)
     channels = _require_strings(map, "import_: map")
     return {"file": str(out), **imported.convert_file(file, out, channels, zero, estimate)}
 

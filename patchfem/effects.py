@@ -131,9 +131,8 @@ class Waveform(NamedTuple):
         return self.is_sine or self.has_levels or self.is_swept
 
 
-GAP_MODULE = (
-    "patchfem.contact.gaps"  # has a function of the coordinates x and the table for each gap shape
-)
+# Has a function of the coordinates x and the table for each gap shape.
+GAP_MODULE = "patchfem.contact.gaps"
 GROOVE_EQUATION = (
     "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 )

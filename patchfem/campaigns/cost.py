@@ -54,9 +54,8 @@ EQUAL_COST_RATIO = 1.1  # Ratio of CPU times up to which two runs count as equal
 TIMING_SCATTER = 2e-3  # Difference of the CPU times of repeated runs of a short scene [s].
 NO_EFFECT_RATIO = 0.9  # Ratio of smallest to largest error above which a setting does not help.
 UNCHANGED_TOL = 1e-11  # Relative change of a measure below which a setting does not affect it.
-ROUND_OFF_FRACTION = (
-    1e-6  # fraction of the floor of a measure below which a change of it is round-off
-)
+# Fraction of the floor of a measure below which a change of it is round-off.
+ROUND_OFF_FRACTION = 1e-6
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -10,8 +10,8 @@ Read `run` first.
 # names that other folders use, by module
 PUBLIC = {
     "shared": (
-        "Ended",
-        "Refused",
+        "CommandExit",
+        "UsageError",
         "print_message",
     ),
     "streams": (

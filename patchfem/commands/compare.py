@@ -16,24 +16,24 @@ from ..surface import profile
 from ..surface.compare import pairs as tables
 from ..surface.compare import verdict
 from .shared import (
-    Ended,
+    CommandExit,
     Json,
-    NotReached,
+    NotConvergedExit,
     Out,
     Quiet,
-    Refused,
     Sets,
     Units,
+    UsageError,
     choose_folder,
-    flag,
+    flag_option,
     load_model,
     load_scene,
     note,
-    pair,
+    parse_quantity,
+    parse_units,
     print_message,
     progress_bar,
-    quantity,
-    word,
+    text_option,
 )
 from .streams import make_printable
 
@@ -51,19 +51,19 @@ def compare(
             "in the columns `before` and `after`"
         ),
     ] = None,
-    direction: word(
+    direction: text_option(
         "axis along which the traces run, x or y; it names the direction in the answer and "
         "may be left out"
     ) = "",
     units: Units = "",
-    shift: word(
+    shift: text_option(
         'known shift of the second trace (x of AFTER minus x of BEFORE), such as "0 mm" if both traces '
         "start at the same mark"
     ) = "",
-    keep_spikes: flag(
+    keep_spikes: flag_option(
         "keep spikes, dropouts and dust; without this option they are removed from traces"
     ) = False,
-    datum: word(
+    datum: text_option(
         "what is known of the datum of the instrument, such as straight; then no bow is subtracted "
         "from traces"
     ) = "",
@@ -84,7 +84,7 @@ def compare(
             "over that of the traces, and the wear coefficient is fitted"
         ),
     ] = None,
-    piece: word(
+    piece: text_option(
         "piece of which the traces are, such as upper (or lower), for --predicted; it may be left out if "
         "both pieces wear alike (wear.upper_share = 0.5)"
     ) = "",
@@ -103,34 +103,36 @@ def compare(
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
     if direction not in ("", "x", "y"):
-        raise Refused(f"compare --direction {direction}: the direction must be x or y")
+        raise UsageError(f"compare --direction {direction}: the direction must be x or y")
     if datum not in ("", "straight"):
-        raise Refused(
+        raise UsageError(
             f"compare --datum {datum}: give --datum straight, or leave it out if the datum may be bent"
         )
     how = {
-        "units": pair(units),
-        "shift": quantity(shift, "length", "compare --shift"),
+        "units": parse_units(units),
+        "shift": parse_quantity(shift, "length", "compare --shift"),
         "keep_spikes": keep_spikes,
         "datum": datum,
     }
     files = [path for path in (before, after, *other) if path is not None]
     if piece and predicted is None:
-        raise Refused(f"compare --piece {piece}: this option needs --predicted")
+        raise UsageError(f"compare --piece {piece}: this option needs --predicted")
     if pairs is not None:
         if files or scene is not None or predicted is not None:
             other_option = "--scene" if scene is not None else "--predicted"
-            raise Refused(
+            raise UsageError(
                 f"compare --pairs {pairs}: give the table alone, without "
                 f"{'other files' if files else other_option}"
             )
         _compare_table(pairs, direction, how, choose_folder(out, pairs.stem), json_, quiet)
         return
     if len(files) < 2:
-        raise Refused("compare: give two files BEFORE and AFTER, or a table of pairs with --pairs")
+        raise UsageError(
+            "compare: give two files BEFORE and AFTER, or a table of pairs with --pairs"
+        )
     folders = before.is_dir(), after.is_dir()
     if any(folders) and len(files) == 2 and not all(folders):
-        worn_runs.compare_runs(before, after)  # this raises the error for a file next to a folder
+        worn_runs.compare_runs(before, after)  # raises the error for a pair of a file and a folder
     if any(folders):
         _refuse_surface_options(
             {
@@ -240,16 +242,16 @@ def _compare_table(
     for row in failed:
         print_message(make_printable(f"{path}:{row['line']}: {row['message']}"))
     if len(failed) == len(rows):
-        raise Ended(2)
+        raise CommandExit(2)
     if failed:
-        raise NotReached
+        raise NotConvergedExit
 
 
 def _refuse_surface_options(options: dict):
     """Refuse options for measured surfaces if results folders are compared."""
     for name, value in options.items():
         if value:
-            raise Refused(
+            raise UsageError(
                 f"compare: {name} can only be used for measured surfaces, not for results folders; "
                 "leave it out"
             )
@@ -276,12 +278,12 @@ def _compare_runs(before: Path, after: Path, out, json_: bool):
 def _press_surfaces(scene: Path, sets, part, target: Path, quiet: bool):
     """Run a scene with each surface as its profile; the traces are written into the folder."""
     if not isinstance(part.before, profile.Profile):
-        raise Refused(
+        raise UsageError(
             "compare --scene: the contact can be computed only for traces; write one line of heights of "
             "each scan to a file of its own"
         )
     if load_scene(scene, sets).contact is None:
-        raise Refused(
+        raise UsageError(
             f"compare --scene {scene}: the scene has no [contact], so it has no patch to press"
         )
     models = []

@@ -8,27 +8,27 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from ..export.lab import imported
-from .shared import Json, flag, note, texts, word
+from .shared import Json, flag_option, note, repeated_option, text_option
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimateOptions:
     """Options of a frequency response and its modes."""
 
-    segment: word(
+    segment: text_option(
         'length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
         "at rest, otherwise an eighth of the record"
     ) = ""
-    window: word(
+    window: text_option(
         "window function of the segments, such as hann; possible values: hann, none; default: hann if the "
         "record is cut into several segments, otherwise none"
     ) = ""
-    band: word('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
-    decay: flag(
+    band: text_option('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
+    decay: flag_option(
         "treat the record as a free decay; frequency and damping are then computed without a record of the "
         "input"
     ) = False
-    begin: word(
+    begin: text_option(
         'time at which the free decay begins, such as "0.2 s"; default: time of the largest '
         "value of the record"
     ) = ""
@@ -46,14 +46,16 @@ def import_(
             "response.uff",
         ),
     ],
-    map_: texts(
+    map_: repeated_option(
         'quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
         '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; or, for mode shapes, '
         "slide=12:+x; may be repeated; without this option the labels of the channels are used",
         "--map",
     ) = (),
-    zero: flag("subtract the time and the displacement of the first row from all rows") = False,
-    modes: Annotated[Estimate, Parameter(name="*")] = Estimate(),
+    zero: flag_option(
+        "subtract the time and the displacement of the first row from all rows"
+    ) = False,
+    modes: Annotated[EstimateOptions, Parameter(name="*")] = EstimateOptions(),
     json_: Json = False,
 ):
     """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as
@@ -64,7 +66,9 @@ def import_(
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """
-    conversion = imported.convert_file(file, out, map_, zero, imported.Estimate(**vars(modes)))
+    conversion = imported.convert_file(
+        file, out, map_, zero, imported.EstimateOptions(**vars(modes))
+    )
     summary = conversion.pop("told")
     if json_:
         print(json.dumps({"file": str(out), **conversion}, ensure_ascii=False))

@@ -9,24 +9,34 @@ from ..export.surfaces import roughness
 from ..surface.files import read
 from ..surface.roughness import form as forms
 from ..surface.roughness import report as roughness_report
-from .shared import Json, Refused, Units, flag, note, out_option, pair, quantity, word
+from .shared import (
+    Json,
+    Units,
+    UsageError,
+    flag_option,
+    note,
+    out_option,
+    parse_quantity,
+    parse_units,
+    text_option,
+)
 
 
 def profile(
     file: Path,
     /,
     *more: Path,
-    cutoff: word(
+    cutoff: text_option(
         'wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"'
     ) = "",
-    form: word(
+    form: text_option(
         "form to subtract first: a polynomial, given by its degree from 1 (line or plane) to 9, such "
         "as 2; or `cylinder`"
     ) = "1",
-    s_filter: word(
+    s_filter: text_option(
         'wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first'
     ) = "",
-    window: word(
+    window: text_option(
         'part to evaluate, between two positions such as "468 um,733 um"; a scan needs four '
         "positions, first the two in x, then the two in y"
     ) = "",
@@ -35,7 +45,7 @@ def profile(
         "folder for a page, a table of the parameters and the levelled heights, such as out/trace"
     ) = None,
     json_: Json = False,
-    verbose: flag("print the definition of each parameter", "-v", "--verbose") = False,
+    verbose: flag_option("print the definition of each parameter", "-v", "--verbose") = False,
 ):
     """Print the roughness parameters of each FILE, with intervals estimated from this one file. For several files,
     print also the mean of each parameter.
@@ -44,12 +54,12 @@ def profile(
     """
     options = {"window": _window(window) if window else None}
     for key, name, text in (("cutoff", "cutoff", cutoff), ("short", "s-filter", s_filter)):
-        options[key] = quantity(text, "length", f"profile --{name}")
+        options[key] = parse_quantity(text, "length", f"profile --{name}")
         if options[key] is not None and options[key] <= 0:
-            raise Refused(f"profile --{name} {text}: a length above zero is needed")
+            raise UsageError(f"profile --{name} {text}: a length above zero is needed")
     options["form"] = forms.parse_form(form)
     reports = [
-        roughness_report.make_report(read.read_surface(path, pair(units)), **options)
+        roughness_report.make_report(read.read_surface(path, parse_units(units)), **options)
         for path in (file, *more)
     ]
     for report in reports:
@@ -77,11 +87,11 @@ def profile(
 
 
 def _window(text: str) -> tuple:
-    """Read the positions of a window [m]; Refused unless there are two or four."""
+    """Read the positions of a window [m]; UsageError unless there are two or four."""
     positions = text.split(",")
     if len(positions) not in (2, 4) or not all(map(str.strip, positions)):
-        raise Refused(
+        raise UsageError(
             f"profile --window '{text}': "
             "two positions are needed, such as '468 um,733 um'; a scan needs four"
         )
-    return tuple(quantity(word, "length", "profile --window") for word in positions)
+    return tuple(parse_quantity(word, "length", "profile --window") for word in positions)

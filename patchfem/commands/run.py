@@ -10,16 +10,16 @@ from ..export import folder, summary
 from ..export.pages import driven, released, sentences
 from ..runs import plan
 from .shared import (
-    Ended,
+    CommandExit,
     Json,
     NoPage,
-    NotReached,
+    NotConvergedExit,
     Out,
     Quiet,
-    Refused,
     Sets,
+    UsageError,
     choose_folder,
-    flag,
+    flag_option,
     load_scene,
     note,
     print_message,
@@ -34,15 +34,15 @@ def run(
     out: Out = None,
     set_: Sets = (),
     json_: Json = False,
-    resume: flag(
+    resume: flag_option(
         "continue an interrupted run; possible with [wear] and for a run that is integrated in time"
     ) = False,
-    fresh: flag(
+    fresh: flag_option(
         "compute the stiffness of the pieces again instead of taking it from the cache"
     ) = False,
     no_page: NoPage = False,
     quiet: Quiet = False,
-    verbose: flag(
+    verbose: flag_option(
         "print also the computing time of each part of the run", "-v", "--verbose"
     ) = False,
 ):
@@ -53,7 +53,7 @@ def run(
     talk = (lambda text: None) if quiet else print_message
     run_plan = plan.plan(load_scene(scene, set_))
     if resume and not folder.saves_state(run_plan):
-        raise Refused(
+        raise UsageError(
             "run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
             "state; run the scene again without --resume"
         )
@@ -71,11 +71,11 @@ def run(
         if json_:
             print(json.dumps(run_summary, ensure_ascii=False), flush=True)
         if run_summary["outcome"] == "not_converged":
-            raise NotReached
+            raise NotConvergedExit
         return
     with progress_bar(quiet or json_) as progress:
-        written = folder.run_into(run_plan, target, talk, progress, fresh, resume)
-    run_summary = written.summary
+        stored_run = folder.run_into(run_plan, target, talk, progress, fresh, resume)
+    run_summary = stored_run.summary
     try:
         if quiet and not json_:
             pass
@@ -83,27 +83,27 @@ def run(
             print(json.dumps(run_summary, ensure_ascii=False), flush=True)
         else:
             _print_answer(
-                written, target, verbose, " (without report.html: --no-page)" if no_page else ""
+                stored_run, target, verbose, " (without report.html: --no-page)" if no_page else ""
             )
         if not no_page:
-            _draw(written, target)
+            _draw(stored_run, target)
     except KeyboardInterrupt:
         print_message(
             f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
         )
-        raise Ended(130) from None
+        raise CommandExit(130) from None
     if run_summary["outcome"] == "not_converged":
         for text in (
             run_summary["warnings"] if quiet else ()
         ):  # a quiet run prints only these warnings
             print_message(f"warning: {text}")
-        raise NotReached
+        raise NotConvergedExit
 
 
-def _draw(written, target: Path) -> None:
+def _draw(stored_run, target: Path) -> None:
     """Write the page at the end, so that an error in it does not lose results or messages."""
     try:
-        folder.write_run_page(written, target)
+        folder.write_run_page(stored_run, target)
     except (OSError, MemoryError, atomic_write.WriteError) as error:
         reason = (
             str(error)
@@ -111,26 +111,26 @@ def _draw(written, target: Path) -> None:
             else f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
         )
         print_message(f"{reason}; the results are complete except for the page")
-        raise Ended(4) from None
+        raise CommandExit(4) from None
 
 
-def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
+def _print_answer(stored_run, target: Path, verbose: bool, page: str) -> None:
     """Print the verdict, then the tolerance, all measures in groups, notes, and the paths."""
-    run_summary = written.summary
+    run_summary = stored_run.summary
     if run_summary["title"]:
-        sets = written.result.plan.model.source.sets
+        sets = stored_run.result.plan.model.source.sets
         print(
             f"{run_summary['title']}{f'; changed: {driven.list_changed_keys(sets)}' if sets else ''}"
         )
     print(f"{run_summary['outcome']}: {sentences.verdict_sentence(run_summary)}")
     if text := sentences.headline_sentence(
         run_summary,
-        summary.count_cycles(written.result),
-        released=released.describe_release(written.result),
+        summary.count_cycles(stored_run.result),
+        released=released.describe_release(stored_run.result),
     ):
         print(text)
     sys.stdout.flush()
-    if text := sentences.tolerance_sentence(written.result):
+    if text := sentences.tolerance_sentence(stored_run.result):
         print(text, flush=True)
     for text in run_summary["warnings"]:
         print_message(f"warning: {text}")

@@ -17,8 +17,8 @@ from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import faces, result
 from ..scene.files import list_named_files
-from .shared import Json, Refused, Sets, flag, load_model, load_scene, note, print_message
-from .sweep import Over
+from .shared import Json, Sets, UsageError, flag_option, load_model, load_scene, note, print_message
+from .sweep import CaseOptions
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
@@ -32,7 +32,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
         scene, set_, lambda tables, folder, whole: _find_file_mistakes(tables, folder, whole, notes)
     )
     notes = [rewrite_powers_of_ten(text) for text in dict.fromkeys([*checked_scene.notes, *notes])]
-    cases = len(_read_sweep(scene, set_, Over())[1]) if checked_scene.sweep else None
+    cases = len(_read_sweep(scene, set_, CaseOptions())[1]) if checked_scene.sweep else None
     for remark in checked_scene.remarks:
         print_message(f"{scene}: {remark}")
     for text in notes:
@@ -56,19 +56,19 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
         )
 
 
-def _read_sweep(scene: Path, sets, what: Over) -> tuple:
+def _read_sweep(scene: Path, sets, what: CaseOptions) -> tuple:
     """Return what the cases of a sweep share, and the cases."""
     return parse_request.read_sweep(scene, sets, what.request())
 
 
-def _find_file_mistakes(tables, folder: Path, whole: bool, notes: list) -> list:
+def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list) -> list:
     """Return the mistakes of the files that a scene names, and add notes of a run to `notes`.
 
     Without such files nothing is imported.
     """
     if not list_named_files(tables):
         return []
-    return model_files.find_file_faults(tables, folder, whole, notes)
+    return model_files.find_file_faults(tables, folder, is_complete, notes)
 
 
 def plan(
@@ -76,49 +76,51 @@ def plan(
     /,
     *,
     set_: Sets = (),
-    what: Over | None = None,
+    what: CaseOptions | None = None,
     json_: Json = False,
-    probe: flag(
+    probe: flag_option(
         "measure the speed of this machine, and compute the stiffness of the static patch"
     ) = False,
-    verbose: flag("list also the effects that the scene does not name", "-v", "--verbose") = False,
+    verbose: flag_option(
+        "list also the effects that the scene does not name", "-v", "--verbose"
+    ) = False,
 ):
     """Print what a run of SCENE would compute: sizes, cost, the stiffnesses in series and dimensionless groups. With
     --over, or if SCENE has a table [sweep], plan the whole sweep.
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
     """
-    over = what if what is not None and what.selects_cases() else None
-    read = load_scene(scene, set_) if over is None else None
-    if over is not None or read.sweep:
+    case_options = what if what is not None and what.selects_cases() else None
+    loaded_scene = load_scene(scene, set_) if case_options is None else None
+    if case_options is not None or loaded_scene.sweep:
         if probe:
-            raise Refused(
+            raise UsageError(
                 "--probe works for a single case, not for a sweep; give the values of this case with --set "
                 "and no --over"
             )
-        _plan_sweep(scene, set_, over or Over(), json_, verbose)
+        _plan_sweep(scene, set_, case_options or CaseOptions(), json_, verbose)
         return
-    run_plan = plans.plan(read)
+    run_plan = plans.plan(loaded_scene)
     plan_data = run_plan.as_json()
     if probe:
         plan_data["seconds"] = round(
             plan_data["seconds"] * cost_model.measure_machine_time_ratio(), 2
         )
-    if probe and (solved := faces.static_measures_without_errors(run_plan.model)):
+    if probe and (static_measures := faces.static_measures_without_errors(run_plan.model)):
         chain = plan_data["stiffness_chain"]
         chain |= {
-            name: solved[name.replace("pieces_shear", "tangential_stiffness")]
+            name: static_measures[name.replace("pieces_shear", "tangential_stiffness")]
             for name, link in chain.items()
             if name.startswith("pieces_shear") and link != "rigid"
         }
-        plan_data["probe"], plan_data["modes"] = solved, run_plan.modes(chain)
+        plan_data["probe"], plan_data["modes"] = static_measures, run_plan.modes(chain)
     if json_:
         print(json.dumps(plan_data))
         return
     _print_plan(plan_data, probe, verbose)
 
 
-def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> None:
+def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool) -> None:
     """Print the plan of a sweep."""
     sweep_scene, cases = _read_sweep(scene, sets, what)
     plan_data = estimate.estimate_sweep(sweep_scene, cases)
@@ -227,7 +229,7 @@ def mesh(
     """
     scene_model = load_model(scene, set_)
     if scene_model.patch is None:
-        raise Refused(
+        raise UsageError(
             f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "
             "interface as the [contact] of a separate scene"
         )

@@ -13,21 +13,21 @@ from ..scene.keys import quantities
 from .streams import make_printable
 
 
-def flag(text: str, *names: str) -> type:
+def flag_option(text: str, *names: str) -> type:
     """Return the type of an option without a value; text: its help."""
     return Annotated[
         bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
     ]
 
 
-def texts(text: str, name: str | None = None) -> type:
+def repeated_option(text: str, name: str | None = None) -> type:
     """Return the type of an option that takes a text and may be repeated; text: its help."""
     return Annotated[
         tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)
     ]
 
 
-def word(text: str, name: str | None = None) -> type:
+def text_option(text: str, name: str | None = None) -> type:
     """Return the type of an option that takes a text, "" by default; text: its help.
 
     The value may begin with a hyphen, as a negative position does.
@@ -42,15 +42,17 @@ def out_option(text: str) -> type:
     return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
 
 
-Sets = texts('change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set")
-Json = flag("print the answer as one JSON object", "--json")
+Sets = repeated_option(
+    'change a value of the scene, such as "contact.load=30 lbf"; may be repeated', "--set"
+)
+Json = flag_option("print the answer as one JSON object", "--json")
 Out = out_option("folder of the results, such as out/mine")
-Quiet = flag("print only errors", "-q", "--quiet")
-Units = word(
+Quiet = flag_option("print only errors", "-q", "--quiet")
+Units = text_option(
     'units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights: pixel '
     'size and unit of z, such as "0.8 um,nm"'
 )
-NoPage = flag("leave out report.html", "--no-page")
+NoPage = flag_option("leave out report.html", "--no-page")
 
 
 def choose_folder(out: Path | None, name: str) -> Path:
@@ -58,7 +60,7 @@ def choose_folder(out: Path | None, name: str) -> Path:
     return out if out is not None else Path("out") / name
 
 
-def quantity(text: str, kind: str, option: str) -> float | None:
+def parse_quantity(text: str, kind: str, option: str) -> float | None:
     """Return the value of an option as a quantity in SI; None if it is "".
 
     Parameters
@@ -72,21 +74,21 @@ def quantity(text: str, kind: str, option: str) -> float | None:
 
     Raises
     ------
-    Refused
+    UsageError
         If the text is not such a quantity.
     """
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
-        raise Refused(f"{option}: {error}") from None
+        raise UsageError(f"{option}: {error}") from None
 
 
-def pair(units: str) -> tuple | None:
+def parse_units(units: str) -> tuple | None:
     """Return the units of x and z in --units; None if the option is not given."""
     return tuple(word.strip() for word in units.split(",")) if units else None
 
 
-class Ended(Exception):
+class CommandExit(Exception):
     """Raised when a command has reported everything and ends with an exit code."""
 
     def __init__(self, code: int):
@@ -94,14 +96,14 @@ class Ended(Exception):
         self.code = code
 
 
-class NotReached(Ended):
+class NotConvergedExit(CommandExit):
     """Raised if the results are written but marked not_converged: exit code 3."""
 
     def __init__(self):
         super().__init__(3)
 
 
-class Refused(Exception):
+class UsageError(Exception):
     """Raised for a request that the command line itself refuses: exit code 2."""
 
 
@@ -170,7 +172,7 @@ class progress_bar:
         if self.silent:
             return None
         if self.bar is None:
-            return Lines()
+            return ProgressLines()
         self.bar.start()
         return lambda fraction: self.bar.update(self.task, completed=fraction)
 
@@ -179,7 +181,7 @@ class progress_bar:
             self.bar.stop()
 
 
-class Lines:
+class ProgressLines:
     """Progress as lines: the completed fraction and the remaining time, one per SECONDS at most.
 
     The speed is measured from the first call, because compilation before this call says nothing

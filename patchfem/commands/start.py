@@ -10,7 +10,17 @@ from ..scene import scene as scenes
 from ..scene import schema as schemas
 from . import examine, sources
 from .run import run
-from .shared import Json, NoPage, Out, Refused, choose_folder, flag, out_option, print_message, word
+from .shared import (
+    Json,
+    NoPage,
+    Out,
+    UsageError,
+    choose_folder,
+    flag_option,
+    out_option,
+    print_message,
+    text_option,
+)
 
 
 def new(
@@ -18,11 +28,11 @@ def new(
     /,
     *,
     out: out_option("file to write, such as mine.toml; default: the screen") = None,
-    ask: flag(
+    ask: flag_option(
         "list the answers, and ask what you know about a joint and what you want to compute"
     ) = False,
-    know: word("answer to the first question of --ask, such as loop,roughness") = "",
-    want: word("answer to the second question of --ask, such as loss,squeal") = "",
+    know: text_option("answer to the first question of --ask, such as loop,roughness") = "",
+    want: text_option("answer to the second question of --ask, such as loss,squeal") = "",
 ):
     """Print a template scene of this KIND; without KIND, list the kinds.
 
@@ -55,15 +65,15 @@ def _write_scene(text: str, out: Path | None, description: list[str], verb: str)
 
 
 def _refuse_existing(out: Path | None) -> None:
-    """Raise Refused if the file to write exists."""
+    """Raise UsageError if the file to write exists."""
     if out is not None and out.exists():
-        raise Refused(f"{out}: already exists; choose another file with -o, or remove it")
+        raise UsageError(f"{out}: already exists; choose another file with -o, or remove it")
 
 
 def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
     """Write the scene of a joint for the answers to two questions; an answer that is "" is asked for."""
     if kind != "joint":
-        raise Refused("--ask, --know and --want are for a joint: patchfem new joint --ask")
+        raise UsageError("--ask, --know and --want are for a joint: patchfem new joint --ask")
     _refuse_existing(out)
     known = known or _ask("--know", "What do you know about the joint?", joint_laws.KNOWLEDGE)
     wanted = wanted or _ask("--want", "What do you want to compute?", joint_laws.WISHES)
@@ -86,15 +96,15 @@ def _ask(option: str, question: str, answers: dict[str, str]) -> str:
 
     Raises
     ------
-    Refused
+    UsageError
         If there is no terminal, or if the input ends before the answer.
     """
     print_message(joint_laws.format_question(question, answers))
     if sys.stdin is None or not sys.stdin.isatty():
-        raise Refused(f"--ask: no terminal to ask at; give {option}, from {', '.join(answers)}")
+        raise UsageError(f"--ask: no terminal to ask at; give {option}, from {', '.join(answers)}")
     line = sys.stdin.buffer.readline()
     if not line:
-        raise Refused(f"--ask: the input ended before the answer; give {option}")
+        raise UsageError(f"--ask: the input ended before the answer; give {option}")
     return line.decode("utf-8", "replace").strip()
 
 

@@ -22,7 +22,7 @@ def prepare_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # it gets the lowest free number, which is this one
+            # The null device gets the lowest free file descriptor, which is that of the closed stream.
             os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

@@ -21,19 +21,19 @@ from ..scene import axes
 from .shared import (
     Json,
     NoPage,
-    NotReached,
+    NotConvergedExit,
     Out,
     Quiet,
-    Refused,
     Sets,
+    UsageError,
     choose_folder,
-    flag,
+    flag_option,
     load_model,
     load_scene,
     print_message,
     progress_bar,
-    texts,
-    word,
+    repeated_option,
+    text_option,
 )
 
 
@@ -41,8 +41,10 @@ def cost(
     scene: Path,
     /,
     *,
-    over: word("vary only one setting: element_size, steps_per_cycle, shear_modes or jumps") = "",
-    verbose: flag(
+    over: text_option(
+        "vary only one setting: element_size, steps_per_cycle, shear_modes or jumps"
+    ) = "",
+    verbose: flag_option(
         "vary also each setting alone, and print the errors of several measures", "-v", "--verbose"
     ) = False,
     out: Out = None,
@@ -57,7 +59,7 @@ def cost(
     """
     scene_model = load_model(scene, set_)
     if over and over not in numerical_settings.NUMERICAL_SETTINGS:
-        raise Refused(
+        raise UsageError(
             f"cost --over {over}: unknown key; use one of {', '.join(numerical_settings.NUMERICAL_SETTINGS)}"
         )
     knobs = [over or cost_curves.TOLERANCE]
@@ -86,10 +88,10 @@ def backbone(
     scene: Path,
     /,
     *,
-    mode: word(
+    mode: text_option(
         "name of the mode, such as axial, or its number in a rig of masses; default: the first mode"
     ) = "",
-    amplitudes: word(
+    amplitudes: text_option(
         'amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
         "the onset of slip"
     ) = "",
@@ -100,7 +102,7 @@ def backbone(
             "takes longest; default: balance, with quasi-static beside it"
         ),
     ] = None,
-    modes: word(
+    modes: text_option(
         'frequency, damping ratio and optionally slide of modes that replace those of the scene, such as "120 Hz:0.01, '
         '170 Hz:0.02"; the frequencies are those of the bolted joint'
     ) = "",
@@ -145,14 +147,14 @@ def backbone(
             print(f"note: {text}")
         print(f"results: {target}")
     if not backbone_result.curves:
-        raise NotReached
+        raise NotConvergedExit
 
 
 @dataclass(frozen=True)
-class Rows:
+class RowFitOptions:
     """Options of a fit of a rig to rows."""
 
-    leave_out: word(
+    leave_out: text_option(
         "column for cross-validation, such as frequency, input or run: each value of the column is left "
         "out in turn, and the fit to the other rows is scored on the rows left out"
     ) = ""
@@ -172,46 +174,48 @@ class Rows:
             "rows)"
         ),
     ] = "bound"
-    placebo: texts(
+    placebo: repeated_option(
         'repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
         "check whether the value in the scene fits the measured rows best"
     ) = ()
-    resume: flag("continue an interrupted fit; starts already finished are not repeated") = False
+    resume: flag_option("continue an interrupted fit; starts already finished are not repeated") = (
+        False
+    )
 
 
 def fit(
     scene: Path,
     /,
     *,
-    to: word(
+    to: text_option(
         'measurements; for a scene with [slide]: loop.csv with the columns "time [s],displacement [um],force [N]", '
         "or a loop written by export; for a rig: rows.csv, or decay.csv written by import --decay; for a scene "
         'with [wear]: compare.json, or a depth such as "worn_depth_max=2.5 um..3.5 um"'
     ) = "",
-    free: texts(
+    free: repeated_option(
         'key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated'
     ) = (),
-    from_patch: flag(
+    from_patch: flag_option(
         "in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
         "of the scene's own patch; each law is written as a scene, with the error of the law"
     ) = False,
-    amplitudes: word(
+    amplitudes: text_option(
         'with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
         "default: amplitudes from the onset of slip upwards"
     ) = "",
-    hold: texts(
+    hold: repeated_option(
         'rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
         'Hz"'
     ) = (),
-    offset: texts(
+    offset: repeated_option(
         "for a loop: offset to fit as well, such as force (a constant force over the whole record) or "
         "displacement (distance of the first row from the stress-free position); may be repeated"
     ) = (),
-    warm_up: flag(
+    warm_up: flag_option(
         "for a loop: compute the whole cycles of the record once, as a run-in, before the fitted "
         "cycles"
     ) = False,
-    rows: Annotated[Rows, Parameter(name="*")] = Rows(),
+    rows: Annotated[RowFitOptions, Parameter(name="*")] = RowFitOptions(),
     out: Out = None,
     set_: Sets = (),
     json_: Json = False,
@@ -245,4 +249,4 @@ def fit(
         print(f"page: {target / 'report.html'}")
         print(f"results: {target}")
     if files.answer["outcome"] == "not_converged":
-        raise NotReached
+        raise NotConvergedExit

@@ -17,20 +17,20 @@ from ..campaigns.sweeps import sweep as sweeping
 from ..export.sweeps import manifest, run
 from ..scene import axes
 from .shared import (
-    Ended,
+    CommandExit,
     Json,
     NoPage,
-    NotReached,
+    NotConvergedExit,
     Out,
     Quiet,
-    Refused,
     Sets,
+    UsageError,
     choose_folder,
-    flag,
+    flag_option,
     note,
     print_message,
-    texts,
-    word,
+    repeated_option,
+    text_option,
 )
 
 FIRST = 5  # messages of failed cases that are printed
@@ -39,10 +39,10 @@ TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
 
 @Parameter(name="*")
 @dataclass
-class Over:
+class CaseOptions:
     """Which cases."""
 
-    over: texts(
+    over: repeated_option(
         "key and its values: table.key=v1,v2,... or, for 9 values in a range, table.key=1 mm..9 mm:9 (:9log "
         "or :9lin fixes the spacing); may be repeated",
         "--over",
@@ -74,7 +74,7 @@ class Over:
         ),
     ] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
-    of: word(
+    of: text_option(
         "measure that the printed answer and the first picture of the page show, such as equivalent_damping",
         "--of",
     ) = ""
@@ -95,13 +95,13 @@ class Over:
         )
 
     def request(self):
-        """Return the request; Refused if options do not fit together."""
+        """Return the request; UsageError if options do not fit together."""
         if self.random and self.sobol:
-            raise Refused("--random and --sobol: use only one of them")
+            raise UsageError("--random and --sobol: use only one of them")
         if min(self.random, self.sobol, self.seed) < 0:
-            raise Refused("--random, --sobol and --seed must be whole numbers >= 0")
+            raise UsageError("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
-            raise Refused(
+            raise UsageError(
                 "--random and --sobol draw values from ranges; give each range by --over table.key=low..high"
             )
         return parse_request.Request(
@@ -111,23 +111,23 @@ class Over:
 
 @Parameter(name="*")
 @dataclass
-class By:
+class WorkerOptions:
     """Who works, and on which part."""
 
     jobs: Annotated[
         int, Parameter(name=["-j", "--jobs"], help="number of processes on this machine, such as 4")
     ] = 1
-    executor: word(
+    executor: text_option(
         "where the cases run: dask (a cluster on this machine) or dask:ADDRESS, such as "
         "dask:tcp://10.0.0.2:8786",
         "--executor",
     ) = ""
-    shard: word(
+    shard: text_option(
         "run only one part of the cases, such as 3/40 for the third of 40 parts; all parts write into the "
         "same folder",
         "--shard",
     ) = ""
-    collect: flag(
+    collect: flag_option(
         "run no case, only write the tables of a sweep whose cases are all done", "--collect"
     ) = False
 
@@ -137,7 +137,7 @@ class By:
             return None
         i, _, n = self.shard.partition("/")
         if not (i.isdecimal() and n.isdecimal() and 1 <= int(i) <= int(n)):
-            raise Refused(f"--shard {self.shard}: must be i/n with i from 1 to n, such as 3/40")
+            raise UsageError(f"--shard {self.shard}: must be i/n with i from 1 to n, such as 3/40")
         return int(i), int(n)
 
 
@@ -145,11 +145,11 @@ def sweep(
     scene: Path,
     /,
     *,
-    what: Over | None = None,
-    by: By | None = None,
+    what: CaseOptions | None = None,
+    by: WorkerOptions | None = None,
     out: Out = None,
     set_: Sets = (),
-    resume: flag("continue an interrupted sweep in this folder") = False,
+    resume: flag_option("continue an interrupted sweep in this folder") = False,
     keep: Annotated[
         Literal["none", "summaries", "results", "pages"] | None,
         Parameter(
@@ -168,26 +168,26 @@ def sweep(
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
     if no_page and keep == "pages":
-        raise Refused(
+        raise UsageError(
             "sweep: --no-page leaves out every report.html, but --keep pages writes one for each case; use "
             "only one of these options"
         )
-    by = by or By()
+    by = by or WorkerOptions()
     start_time = perf_counter()
     part = by.part()
     target = choose_folder(out, f"{scene.stem}-sweep")
     printed = "faults" if quiet else "words"
     if json_:
         printed = "json"
-    output = Told(target, not no_page, printed, start_time)
+    output = OutputOptions(target, not no_page, printed, start_time)
     request_hash = ""
     if not (by.collect or part or keep not in (None, "none")):
-        request_words = (what or Over()).words(*set_, f"page={not no_page}")
+        request_words = (what or CaseOptions()).words(*set_, f"page={not no_page}")
         request_hash = manifest.hash_request(scene, request_words, what and what.cases)
     if resume and (answer := manifest.read_manifest(target, request_hash)):  # all of it is there
         _print_results(answer["cases"]["count"], {}, answer, output)
         return
-    sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or Over()).request())
+    sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
     if by.collect:
         _print_stored_results(run.collect_shards(sweep_scene, cases, target, not no_page), output)
         return
@@ -214,7 +214,7 @@ def sweep(
             f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
             f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume"
         )
-        raise Ended(getattr(why, "code", 130)) from None
+        raise CommandExit(getattr(why, "code", 130)) from None
     finally:
         line.end()
     if part is not None:
@@ -231,7 +231,7 @@ def sweep(
     _print_stored_results(results, output)
 
 
-class Told(NamedTuple):
+class OutputOptions(NamedTuple):
     """How the results of a sweep are printed.
 
     target: its folder; page: whether it has one; tells: "json", "words", or only its "faults";
@@ -302,7 +302,7 @@ class Progress:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
 
-def _print_stored_results(results, output: Told) -> None:
+def _print_stored_results(results, output: OutputOptions) -> None:
     """Print the results of a sweep from its folder."""
     _print_results(
         len(results),
@@ -312,7 +312,7 @@ def _print_stored_results(results, output: Told) -> None:
     )
 
 
-def _print_results(number: int, messages: dict, answer: dict, output: Told) -> None:
+def _print_results(number: int, messages: dict, answer: dict, output: OutputOptions) -> None:
     """Print the results of a sweep, with its answer first.
 
     Parameters
@@ -323,7 +323,7 @@ def _print_results(number: int, messages: dict, answer: dict, output: Told) -> N
         Messages of failed cases.
     answer : dict
         Content of sweep.json.
-    output : Told
+    output : OutputOptions
     """
     target = output.target
     failed = sorted(messages)
@@ -370,6 +370,6 @@ def _print_results(number: int, messages: dict, answer: dict, output: Told) -> N
     if len(cases_by_message) > FIRST:
         print_message("the messages of all failed cases are in sweep.csv")
     if len(failed) == number:
-        raise Refused("sweep: no case could be run")
+        raise UsageError("sweep: no case could be run")
     if failed or "not_converged" in counts:
-        raise NotReached
+        raise NotConvergedExit

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from ..export import convert, reports
 from ..export.lab import structures
-from .shared import Refused, Sets, flag, load_model_without_sweep, out_option, word
+from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option, text_option
 
 Frame = Annotated[
     int | None,
@@ -31,10 +31,10 @@ def export(
     ],
     frame: Frame = None,
     sets: Sets = (),
-    histories: flag(
+    histories: flag_option(
         "write histories and loops as .csv, instead of the fields along the interface"
     ) = False,
-    of: word(
+    of: text_option(
         "stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
         "von_mises); 'status' shows where the interface sticks and slips",
         "--of",
@@ -47,11 +47,11 @@ def export(
     """
     if folder.suffix != ".toml":
         if sets:
-            raise Refused("--set can be used only with a scene, not with a results folder")
+            raise UsageError("--set can be used only with a scene, not with a results folder")
         print(convert.export_results(folder, out, frame, histories, of))
         return
     if frame is not None or histories or of:
-        raise Refused(
+        raise UsageError(
             "--frame, --histories and --of can be used only with a results folder; from a scene only the "
             "structure is exported"
         )

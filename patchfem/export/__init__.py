@@ -65,7 +65,7 @@ PUBLIC = {
     ),
     "histories": ("result_contents",),
     "lab.imported": (
-        "Estimate",
+        "EstimateOptions",
         "convert_file",
     ),
     "lab.structures": ("export_structure",),

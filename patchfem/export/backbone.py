@@ -52,9 +52,7 @@ LEFT_OUT_NOTE = (
     " Frequencies with errors larger than the frequency itself are left out of the picture, not "
     "of the table."
 )
-MAX_LISTED_AMPLITUDES = (
-    25  # largest number of amplitudes of a curve that the screen lists completely
-)
+MAX_LISTED_AMPLITUDES = 25  # largest number of amplitudes that the terminal lists in full
 N_LISTED_AMPLITUDES = 9  # number of amplitudes of a longer curve that the screen lists
 BAR_FLOOR_FACTOR = 0.1  # lower end of an error bar on a logarithmic axis / smallest value
 
@@ -183,7 +181,7 @@ def backbone_charts(curves: dict, band: Band | None = None) -> list:
     """
     amplitudes = np.concatenate([curve.amplitude for curve in curves.values()])
     unit, scale = formatting.choose_axis_unit(amplitudes, "m")
-    along = charts.make_axis("amplitude at the output", unit, True)
+    amplitude_axis = charts.make_axis("amplitude at the output", unit, True)
     is_log = all((curve.damping > 0).all() for curve in curves.values())
     frequency = []
     damping = []
@@ -194,16 +192,22 @@ def backbone_charts(curves: dict, band: Band | None = None) -> list:
         )
     for method, curve in curves.items():
         x = curve.amplitude * scale
-        shown = _has_small_error(curve)
+        has_small_error = _has_small_error(curve)
         style = _curve_style(method, band)
         frequency += _curve_marks(
-            style, x[shown], curve.frequency[shown], curve.frequency_error[shown], False
+            style,
+            x[has_small_error],
+            curve.frequency[has_small_error],
+            curve.frequency_error[has_small_error],
+            False,
         )
         damping += _curve_marks(style, x, curve.damping, curve.damping_error, is_log)
     return [
-        charts.make_chart("Frequency", along, charts.make_axis("frequency", "Hz"), frequency),
         charts.make_chart(
-            "Damping ratio", along, charts.make_axis("damping ratio", "", is_log), damping
+            "Frequency", amplitude_axis, charts.make_axis("frequency", "Hz"), frequency
+        ),
+        charts.make_chart(
+            "Damping ratio", amplitude_axis, charts.make_axis("damping ratio", "", is_log), damping
         ),
     ]
 
@@ -420,13 +424,13 @@ def format_backbone(backbone: Backbone) -> list:
     for method, curve in backbone.curves.items():
         count = curve.amplitude.size
         n_shown = count if count <= MAX_LISTED_AMPLITUDES else N_LISTED_AMPLITUDES
-        shown = np.unique(np.linspace(0, count - 1, n_shown).round().astype(int))
-        for k in shown:
+        rows = np.unique(np.linspace(0, count - 1, n_shown).round().astype(int))
+        for k in rows:
             amplitude, frequency, damping = _format_point(curve, k)
             out.append(f"{method:<13}{amplitude:>12}{frequency:>26}{damping:>26}")
-        if shown.size < count:
+        if rows.size < count:
             out.append(
-                f"{method}: {shown.size} of {count} amplitudes are shown; backbone.csv has all"
+                f"{method}: {rows.size} of {count} amplitudes are shown; backbone.csv has all"
             )
     out += [f"{method}: not known: {text}" for method, text in backbone.missing.items()]
     return out

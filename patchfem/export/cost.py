@@ -46,9 +46,8 @@ HEIGHT = 210.0  # height of the axes [points]
 TALL = 4.2  # height of the picture [inch]
 # fraction of the width beyond which a label does not fit to the right of its point
 LABEL_LEFT_FRACTION = 0.6
-AXIS_MARGIN = (
-    0.15  # margin on both sides of a logarithmic axis / logarithm of the range of its values
-)
+# Margin on both sides of a logarithmic axis / logarithm of the range of its values.
+AXIS_MARGIN = 0.15
 # smallest ratio of the ends of the time axis, for runs that take equally long
 MIN_SECONDS_RATIO = 2.0
 MIN_ERROR_RATIO = 10.0  # smallest ratio of the ends of the error axis, for equal errors
@@ -78,13 +77,15 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
         rows = [(group[0], worst_run_error(group[0]), _format_outcome(group)) for group in groups]
         missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
         last = [
-            f"tolerance {one.tolerance:g}: {remedy}" for one in missed for remedy in one.remedies
+            f"tolerance {entry.tolerance:g}: {remedy}"
+            for entry in missed
+            for remedy in entry.remedies
         ]
-    width = max(len(knob), *(len(one.label) for one, *_ in rows))
+    width = max(len(knob), *(len(entry.label) for entry, *_ in rows))
     out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
-    for one, worst, comment in rows:
+    for entry, worst, comment in rows:
         error = format_number(worst.fraction, 2) if worst.fraction > ROUND_OFF else "exact"
-        text = f"{one.label:<{width}}  {format_number(one.seconds, 2):>6}  {error:>8}  {worst.name}"
+        text = f"{entry.label:<{width}}  {format_number(entry.seconds, 2):>6}  {error:>8}  {worst.name}"
         out.append(f"{text.rstrip()}{comment}")
     return [*out, *last]
 
@@ -110,8 +111,8 @@ def _format_outcome(group: list) -> str:
     missed = f"; not with {first.steps} steps per cycle" if of_steps else "; not reached"
     if last is first:
         return missed
-    tried = last.label.partition(", ")[2]
-    seconds = f"{tried} ({format_number(last.seconds, 2)} CPU s)"
+    settings = last.label.partition(", ")[2]
+    seconds = f"{settings} ({format_number(last.seconds, 2)} CPU s)"
     if last.meets_tolerance():
         return f"{missed}, but with {seconds}"
     worst = worst_run_error(last)

@@ -155,14 +155,14 @@ def write_results(result: Result, path: Path) -> WrittenRun:
     return WrittenRun(summary, result, bodies, _folder_identity(path))
 
 
-def write_run_page(written: WrittenRun, folder: Path) -> Path:
+def write_run_page(stored_run: WrittenRun, folder: Path) -> Path:
     """Write the page of a run into its complete results folder, and return the path of the page.
 
     Missing if another run has replaced the folder in the meantime.
     """
-    text = report.run_page(written.result, written.bodies, player.player_data(folder))
+    text = report.run_page(stored_run.result, stored_run.bodies, player.player_data(folder))
     path = Path(folder) / PAGE
-    if not path.parent.is_dir() or _folder_identity(path.parent) != written.place:
+    if not path.parent.is_dir() or _folder_identity(path.parent) != stored_run.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)
     return path
@@ -187,6 +187,6 @@ def save_run(result: Result, folder: Path, page: bool = True) -> None:
         Whether report.html is written.
     """
     with Folder(folder) as claimed:
-        written = write_results(result, claimed.path)
+        stored_run = write_results(result, claimed.path)
     if page:
-        write_run_page(written, claimed.target)
+        write_run_page(stored_run, claimed.target)

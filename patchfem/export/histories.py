@@ -55,7 +55,7 @@ def result_contents(result: Result) -> netcdf.Contents:
             data, extra["wear"], {name: m.unit for name, m in result.measures.items()}
         )
     if "regime" in extra:
-        data = data.also(
+        data = data.with_entries(
             attributes={"regime": extra["regime"], "largest_multiplier": largest_multiplier(extra)}
         )
     return netcdf.add_provenance(

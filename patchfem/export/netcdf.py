@@ -94,7 +94,7 @@ class Contents:
     coordinates: dict = field(default_factory=dict)
     attributes: dict = field(default_factory=dict)
 
-    def also(
+    def with_entries(
         self,
         variables: dict | None = None,
         coordinates: dict | None = None,
@@ -277,7 +277,7 @@ def add_events(
         "flag_values": np.arange(len(meanings), dtype=np.int8),
     }
     about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
-    return data.also(
+    return data.with_entries(
         {
             "event_time": ("event", time, about),
             "event_interface": (
@@ -367,13 +367,15 @@ def add_curve(data: Contents, curve: dict) -> Contents:
                 {"units": unit, "long_name": f"estimated half-width of the {text}"},
             )
     if len(curve.get("folds", ())):
-        swept, unit = ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
+        varied_quantity, unit = (
+            ("frequency", "Hz") if np.ptp(curve["frequency"]) > 0 else ("level", "m s-2")
+        )
         variables["curve_fold"] = (
             "fold",
             np.asarray(curve["folds"], float),
-            {"units": unit, "long_name": f"{swept} at which the curve turns back"},
+            {"units": unit, "long_name": f"{varied_quantity} at which the curve turns back"},
         )
-    return data.also(variables)
+    return data.with_entries(variables)
 
 
 DECAY = {
@@ -399,7 +401,7 @@ def add_decay(data: Contents, decay) -> Contents:
                 getattr(decay, f"{name}_error"),
                 {"units": unit, "long_name": f"half-width of the interval of the {text}"},
             )
-    return data.also(
+    return data.with_entries(
         variables,
         {
             dimension: (
@@ -437,7 +439,7 @@ def add_spectra(data: Contents, spectra) -> Contents:
         "phase": ("rad", np.angle(spectra.gain), "phase of H1"),
         "coherence": ("1", spectra.coherence, "coherence"),
     }
-    return data.also(
+    return data.with_entries(
         {
             name: ("frequency", values, {"units": unit, "long_name": text})
             for name, (unit, values, text) in columns.items()
@@ -451,7 +453,7 @@ def add_surfaces(data: Contents, gap) -> Contents:
 
     With strips the gap is (s, m).
     """
-    return data.also(
+    return data.with_entries(
         {
             "unloaded_gap": (
                 ("strip", "x")[-np.ndim(gap) :],
@@ -486,7 +488,7 @@ def add_faces(data: Contents, faces) -> Contents:
                     name, f"{name}{suffix}"
                 )
                 target[name] = (tuple(renamed[dimension] for dimension in dimensions), *content)
-    return data.also(variables, coordinates)
+    return data.with_entries(variables, coordinates)
 
 
 EDGE_PEAK = (
@@ -522,7 +524,7 @@ def add_wear(data: Contents, history: dict, units: dict) -> Contents:
             {"units": "Pa", "long_name": EDGE_PEAK},
         )
     count = {"units": "1", "long_name": "cycles of wear so far"}
-    return data.also(variables, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
+    return data.with_entries(variables, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
 
 
 def _variable_attributes(name: str, dimensions: int = 1) -> dict:
@@ -548,7 +550,7 @@ def add_provenance(data: Contents, summary: dict, scene_text: str, versions: dic
     versions : dict
         Package -> version.
     """
-    return data.also(
+    return data.with_entries(
         attributes={
             "Conventions": "CF-1.11",
             "title": summary["title"],

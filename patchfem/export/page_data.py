@@ -294,9 +294,11 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
     history = {"time": response.time, "displacement": response.slide, "force": response.force}
     loop = {"slide": window.slide, "force": window.force, "time": window.time}
     recorded = None
-    read = _read_recorded_loop(result.plan.model.source.path.parent, tables["slide"], response)
-    if read is not None:
-        time, slide, force = read
+    recorded_loop = _read_recorded_loop(
+        result.plan.model.source.path.parent, tables["slide"], response
+    )
+    if recorded_loop is not None:
+        time, slide, force = recorded_loop
         history["measured"] = time, force
         recorded = Path(tables["slide"]["file"]).name, slide, force
     return Motion(history, loop, recorded=recorded)
@@ -307,14 +309,18 @@ def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
     if slide["kind"] != "file":
         return None
     try:
-        read = loops.read_loop(folder / slide["file"])
+        recorded_loop = loops.read_loop(folder / slide["file"])
     except PatchfemError:
         # The file has no loop; mistakes in its path were reported when the path was read.
         return None
-    if read.time is None:
+    if recorded_loop.time is None:
         return None
-    load = 1.0 if read.quantity == "force" else np.interp(read.time, response.time, response.load)
-    return read.time, read.displacement, read.reading * load
+    load = (
+        1.0
+        if recorded_loop.quantity == "force"
+        else np.interp(recorded_loop.time, response.time, response.load)
+    )
+    return recorded_loop.time, recorded_loop.displacement, recorded_loop.reading * load
 
 
 def _rig_motion(result: Result) -> Motion:

@@ -783,7 +783,7 @@ def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = Non
         return None
     if onto is None:
         return pictures.draw_charts.figure(picture.charts(*picture.values)).axes[0]
-    pictures.draw_charts.figure(picture.charts(*picture.values), onto=onto)
+    pictures.draw_charts.figure(picture.charts(*picture.values), axes_to_use=onto)
     return onto
 
 

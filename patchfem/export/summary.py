@@ -16,9 +16,9 @@ from ..runs.patch import values
 from ..runs.results.result import Result, collect_used_settings, measure_engines
 from ..runs.rig import plan as rig_plan
 
-MIN_STIFFNESS_ERRORS = (
-    10.0  # Number of errors of a stiffness, below which nothing is divided by it.
-)
+# Smallest ratio of a stiffness to its error for which other quantities are divided by the
+# stiffness.
+MIN_STIFFNESS_ERRORS = 10.0
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 

@@ -87,7 +87,7 @@ def count_over_tolerance(measures: dict, tolerance) -> dict:
     return counts
 
 
-def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str:
+def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") -> str:
     """State how many cases miss the tolerance in the worst main measure.
 
     It also states the worst case, and how many other measures miss the tolerance.
@@ -97,7 +97,7 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
     measures : dict
         {name: as for `is_over_tolerance`}.
     tolerance : float or (n,) array
-    where : callable
+    format_case : callable
         Number of a case -> its swept values as text.
     first : str
         Measure that the sentence is on; "" for the worst.
@@ -107,10 +107,15 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
     str
         "" if no error is known.
     """
-    known = {name: np.isfinite(np.asarray(one["errors"], float)) for name, one in measures.items()}
-    number = max((is_known.size for is_known in known.values()), default=0)
+    is_known_by_name = {
+        name: np.isfinite(np.asarray(one["errors"], float)) for name, one in measures.items()
+    }
+    number = max((is_known.size for is_known in is_known_by_name.values()), default=0)
     limits = np.broadcast_to(np.asarray(tolerance, float), number)
-    if not any(is_known.any() for is_known in known.values()) or not np.isfinite(limits).any():
+    if (
+        not any(is_known.any() for is_known in is_known_by_name.values())
+        or not np.isfinite(limits).any()
+    ):
         return ""
     tolerance_text = (
         f"the tolerance of {100 * limits[0]:g} %" if np.ptp(limits) == 0 else "their tolerance"
@@ -127,7 +132,7 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
                 axis=0,
             ).sum()
         )
-        some = next(
+        floor_example = next(
             (
                 (name, cases)
                 for name in FIRST_MEASURES
@@ -138,9 +143,9 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
         )
         floor = (
             ""
-            if some is None
-            else f" or the floor of their measure, such as {format_floor(measures[some[0]], some[1])} "
-            f"of {measure_label(some[0])}"
+            if floor_example is None
+            else f" or the floor of their measure, such as {format_floor(measures[floor_example[0]], floor_example[1])} "
+            f"of {measure_label(floor_example[0])}"
         )
         if n_with_value == number:
             return f"All {number} cases meet {tolerance_text}{floor}."
@@ -161,7 +166,7 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
     count = int(lost[name].sum())
     case = int(np.argmax(relative_errors))
     others = len(lost) - 1
-    known = (
+    is_known_by_name = (
         f"{format_number(100 * relative_errors[case], 2)} % of its value"
         if relative_errors[case] <= ZERO_ERROR_RATIO
         else "larger than the value"
@@ -170,7 +175,7 @@ def tolerance_sentence(measures: dict, tolerance, where, first: str = "") -> str
     others_text = f"; {_others_sentence(others)}" if others else ""
     return (
         f"{count} of {number} cases miss{'es' * (count == 1)} {tolerance_text} in {measure_text}; the largest error, at "
-        f"{where(case)}, is {known}{others_text}."
+        f"{format_case(case)}, is {is_known_by_name}{others_text}."
     )
 
 

@@ -27,9 +27,8 @@ DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 MAX_MODES = 12  # largest number of modes in one fit
 # fraction of the residual sum of squares that a further mode must remove
 MIN_RESIDUAL_DECREASE = 0.02
-MIN_RMS_RATIO = (
-    3e-3  # ratio of the rms of a mode to the rms of the response; a weaker mode is not added
-)
+# Ratio of the rms of a mode to the rms of the response; a weaker mode is not added.
+MIN_RMS_RATIO = 3e-3
 MIN_MISFIT = 1e-8  # ratio of residual to response; a smaller residual is round-off
 MAX_START_EVALUATIONS = 12  # evaluations from each start; only the best is refined further
 # number of samples at each end that are not fitted, because the Fourier transform joins the ends by a jump

@@ -18,9 +18,8 @@ MIN_SAMPLES = 5  # smallest number of samples in a half cycle
 SINE_FIT_ERROR = 3e-5
 # standard deviation of the size of a half cycle by noise / size; the decay ends at a half cycle with a larger ratio
 MAX_NOISE_RATIO = 0.25
-N_PASSES = (
-    3  # number of fits of all half cycles; each takes half periods and rates from the fit before
-)
+# Number of fits of all half cycles; each takes half periods and rates from the fit before.
+N_PASSES = 3
 MAX_ITERATIONS = 4  # largest number of iterations that move the middle of a half cycle
 MAX_MIDDLE_SHIFT = 0.35  # largest distance of a middle from the predicted one, in half periods
 # number of half cycles on each side whose residuals give the noise of a half cycle

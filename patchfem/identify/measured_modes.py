@@ -19,7 +19,8 @@ INPUT_QUANTITIES = ("force", "base_acceleration")  # quantities of a record that
 SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
 # fraction by which the damping ratio of the windowed estimate may be larger without a note
 MAX_DAMPING_EXCESS = 0.05
-MAX_ERROR_RATIO = 2.0  # half-width of the interval / damping ratio; an amplitude with a wider interval is left out
+# Half-width of the interval / damping ratio; an amplitude with a wider interval is left out.
+MAX_ERROR_RATIO = 2.0
 # fraction of a driven response that the modes may leave unexplained without a note
 MAX_MISFIT = 0.1
 # fraction of a free decay that the sinusoids may leave unexplained without a note

@@ -8,9 +8,8 @@ import numpy as np
 from ..core import Missing, PatchfemError
 
 DIFFERENCE_STEP = 1e-5  # fraction of the range of a value; step of difference quotients
-MIN_BOUND_RATIO_FOR_LOG = (
-    10  # ratio of upper to lower bound above which a parameter is searched on a log scale
-)
+# Ratio of upper to lower bound above which a parameter is searched on a log scale.
+MIN_BOUND_RATIO_FOR_LOG = 10
 PENALTY_FACTOR = 1e3  # residual that stands for a failed evaluation / largest residual so far
 
 

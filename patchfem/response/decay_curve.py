@@ -36,18 +36,16 @@ SPAN_LENGTHS = (
     256,
 )
 MAX_SLOPE_DIFFERENCE = 2.0  # Largest difference of the slopes of two spans, in standard deviations.
-INTERVAL_DEVIATIONS = (
-    2.5  # standard deviations of a 95 % interval, widened because the data choose the span
-)
+# Standard deviations of a 95 % interval, widened because the data choose the span.
+INTERVAL_DEVIATIONS = 2.5
 # Number of half cycles on both sides whose third differences estimate the noise.
 NOISE_HALF_WIDTH = 8
 # Number of points on both sides over which the largest sampling error is taken.
 SAMPLING_HALF_WIDTH = 4
 N_NEWTON_STEPS = 3  # Number of Newton steps with which the time of a reversal is refined.
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
-REST_SPEED_TOL = (
-    1e-12  # Ratio of the speed to the largest speed below which a sample is itself a reversal.
-)
+# Ratio of the speed to the largest speed below which a sample is itself a reversal.
+REST_SPEED_TOL = 1e-12
 MIN_HALF_CYCLE = 1e-9  # A half cycle smaller than this fraction of the largest one is round-off.
 STEP_END_TOL = 1e-9  # fraction of a step by which round-off may move a reversal outside the step
 # Largest reversal, relative to the range in one period, that is attributed to a faster mode.

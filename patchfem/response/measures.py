@@ -12,17 +12,15 @@ from ..core import Response
 from ..dynamics import integrated
 from ..friction import path_work
 
-SLIP_FRACTION = (
-    0.5  # irreversible fraction of the displacement change above which an interface slips [1]
-)
+# Irreversible fraction of the displacement change above which an interface slips [1]
+SLIP_FRACTION = 0.5
 COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
 MIN_ENERGY_GAP = 1e-18  # Smallest significant difference of energies [J].
 # Friction work below this fraction of the energy that passes through a run is round-off.
 WORK_ROUND_OFF = 1e-10
 MIN_SLIDE_RANGE = 1e-15  # Range of the relative displacement [m] below which nothing moves.
-MAX_SMOOTH_RATIO = (
-    4.0  # largest ratio of second differences at neighbouring samples of a smooth curve
-)
+# Largest ratio of second differences at neighbouring samples of a smooth curve.
+MAX_SMOOTH_RATIO = 4.0
 
 
 def energy_balance(energies: dict):

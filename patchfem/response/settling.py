@@ -13,9 +13,8 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
 GROWS_CLASS = 2  # Index of Outcome.GROWS in CLASSES.
 MIN_WINDOWS = 3  # Smallest number of windows from which free motion is estimated.
-SLIP_SPEED_TOL = (
-    1e-3  # Ratio of the speed to the largest speed in a run above which an interface slips.
-)
+# Ratio of the speed to the largest speed in a run above which an interface slips.
+SLIP_SPEED_TOL = 1e-3
 # Sine of the angle between phasor differences below which they lie along one line.
 COLLINEAR_SINE = 0.02
 # Fraction that the slowest mode must lose over a third of the run before a remaining beat counts as

@@ -19,9 +19,8 @@ from .patch import faces, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
-MAX_EXCESS = (
-    1e9  # cap on the ratio of error to allowed error; a larger ratio indicates a value of zero
-)
+# Cap on the ratio of error to allowed error; a larger ratio indicates a value of zero.
+MAX_EXCESS = 1e9
 # ratio of proposed to present tolerance; a tenth gives at least one more halving of the mesh
 PROPOSED_TOLERANCE_RATIO = 0.1
 # largest number of halvings of the steps to which the order observed over two halvings is extrapolated
@@ -40,9 +39,8 @@ SAMPLED_MEASURES = (
     "stick_fraction",
     "slip_start_phase",
 )
-RINGING_PREFIX = (
-    "ring_"  # prefix of the measures of ringing, which an engine without steps may lack
-)
+# Prefix of the measures of ringing, which an engine without steps may lack.
+RINGING_PREFIX = "ring_"
 STEADY_AMPLITUDE = "relative_displacement_amplitude_steady"
 USE_ERROR_ADVICE = "use the value with its stated error"
 NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR_ADVICE}"

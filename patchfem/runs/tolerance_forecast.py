@@ -32,9 +32,8 @@ BENCH_STEP_FACTOR = 2.0  # the same ratio for a bench: a triangle needs 1.1, a s
 # Smallest ratio of the relative error of a patch to (element size / contact length); patches with equal
 # elements had 0.2 to 7 (crowns, tilts, flat ends).
 MIN_ELEMENT_ERROR_RATIO = 0.2
-MIN_PATCH_ERROR = (
-    1e-6  # relative error on the finest mesh of a static patch, which takes some CPU seconds
-)
+# Relative error on the finest mesh of a static patch, which takes some CPU seconds.
+MIN_PATCH_ERROR = 1e-6
 # relative error on the finest mesh of a patch that slips in part in a rig, coarser because of the time
 # steps
 MIN_SLIP_PATCH_ERROR = 3e-5

@@ -27,7 +27,8 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 # relative difference of yield displacements below which nodes yield together, as mirrored nodes do; the rounding
 # errors of a patch with 801 nodes are 7e-13
 EQUAL_YIELD_TOL = 1e-11
-MAX_SORTING_PASSES = 2  # number of sorts of the nodes before neighbours are exchanged; sorting corrects large errors only
+# Number of sorts of the nodes before neighbours are exchanged; sorting corrects large errors only.
+MAX_SORTING_PASSES = 2
 # exchanges of neighbours per node, after which nodes are eliminated one by one; patches need at most 1
 MAX_EXCHANGES = 20
 # number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
@@ -35,9 +36,8 @@ N_SHEAR_MODES = 4
 N_REFERENCE_MODES = 16  # smallest number of modes of the reference for an error
 # error of a reduction / tolerance at which it is accepted; the modes beyond the reference cause the rest of the error
 MODE_ERROR_FRACTION = 0.8
-MIN_LANCZOS_POINTS = (
-    128  # number of nodes from which it is faster to compute the most compliant modes alone
-)
+# Number of nodes from which it is faster to compute the most compliant modes alone.
+MIN_LANCZOS_POINTS = 128
 # matrix products of Lanczos' method, with two vectors each; it fails to converge only for a soft layer of asperities
 MAX_LANCZOS_PRODUCTS = 24
 # residual of a mode / largest eigenvalue; the relative error of an eigenvalue is the square of this ratio
@@ -49,11 +49,11 @@ N_BACKBONE_DISPLACEMENTS = 24  # number of relative displacements at which backb
 # largest relative displacement of a compared backbone [bond lengths], to which twice the displacement of the pieces is
 # added; the force there is within exp(-6) of its limit
 MAX_BACKBONE_LENGTHS = 6
-N_ERROR_MODES = (
-    64  # smallest number of modes with which the backbone error of a reduction is computed
-)
+# Smallest number of modes with which the backbone error of a reduction is computed.
+N_ERROR_MODES = 64
 MAX_ITERATIONS = 400  # iterations of Newton's method for a backbone
-NEWTON_TOL = 1e-11  # relative step of Newton's method; it converges quadratically, so the next step is round-off
+# Relative step of Newton's method; it converges quadratically, so the next step is round-off.
+NEWTON_TOL = 1e-11
 MAX_DECAY_EXPONENT = 700.0  # exponent that keeps the exponential of the law finite
 
 

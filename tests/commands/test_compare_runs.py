@@ -14,7 +14,7 @@ from test_compare_verb import NAMES
 import patchfem as pf
 from patchfem.export import compare_runs
 from patchfem.export.surfaces import worn
-from patchfem.export.surfaces.worn_runs import hidden_line, hidden_plane
+from patchfem.export.surfaces.worn_runs import find_plane_below, hidden_line
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "patchfem" / "scene" / "guide" / "wear.md"
@@ -278,8 +278,8 @@ def test_exact_the_hidden_plane_lies_below_every_depth_and_is_the_highest():
     y = np.array([-1.0, 0.0, 1.0])
     plane = 5 + 0.5 * x + 2 * y[:, None]
     corners = (1.5, 4.5, 5.5, 8.5)
-    assert hidden_plane(x, y, plane) == pytest.approx(corners, rel=1e-9)
+    assert find_plane_below(x, y, plane) == pytest.approx(corners, rel=1e-9)
     bumps = plane + np.array([[0, 3, 1, 2, 0], [1, 2, 9, 2, 1], [0, 1, 2, 1, 0]])
-    assert hidden_plane(x, y, bumps) == pytest.approx(corners, rel=1e-9)
-    assert hidden_plane(x, y, 0 * plane) == (0, 0, 0, 0)
-    assert hidden_plane(x, y[:1], 0 * x[None] + 2.0) == pytest.approx((2, 2, 2, 2))
+    assert find_plane_below(x, y, bumps) == pytest.approx(corners, rel=1e-9)
+    assert find_plane_below(x, y, 0 * plane) == (0, 0, 0, 0)
+    assert find_plane_below(x, y[:1], 0 * x[None] + 2.0) == pytest.approx((2, 2, 2, 2))

@@ -106,7 +106,7 @@ def test_always_every_measure_has_its_group():
         "level_9": "motion",
     }
     assert {name: measure_group(name) for name in groups} == groups
-    assert measure_group("normal_load", pressed=False) == "friction"
+    assert measure_group("normal_load", has_patch=False) == "friction"
     measures = {"loop_area": entry(1.0, reason="stuck"), "pressure_peak": entry(1.0)}
     assert format_measures(measures) == [
         "energy",
@@ -137,7 +137,7 @@ def test_exact_progress_as_lines(capsys):
     """One line in ten seconds at most, with what is left at the pace since the first share: 15 % in 3 s. The 8 s
     before it, in which something compiles, would make 33 s of the 15 that are left."""
     times = iter([0.0, 8.0, 11.0, 15.0, 40.0])
-    lines = shared.Lines(lambda: next(times))
+    lines = shared.ProgressLines(lambda: next(times))
     for share in (0.1, 0.25, 0.3, 1.0):
         lines(share)
     assert capsys.readouterr().err == "25% done, about 15 s left\n100% done, about 0 s left\n"

@@ -198,7 +198,7 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test():
         for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
     ]
     axes = Figure().subplots()
-    pictures.draw_charts(charts.levels_chart(rows), onto=axes)
+    pictures.draw_charts(charts.levels_chart(rows), axes_to_use=axes)
     arrows = [text for text in axes.texts if isinstance(text, Annotation) and text.arrow_patch]
     upwards = [(arrow.xyann[0] < arrow.xy[0], arrow.xyann[1] < arrow.xy[1]) for arrow in arrows]
     assert upwards == [(True, True), (True, True), (False, False)]
@@ -248,5 +248,5 @@ def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarith
     assert not charts.levels_chart(few)[0]["y"]["log"]
     for some, scale in ((rows, "log"), (few, "linear")):
         axes = Figure().subplots()
-        pictures.draw_charts(charts.levels_chart(some), onto=axes)
+        pictures.draw_charts(charts.levels_chart(some), axes_to_use=axes)
         assert axes.get_yscale() == scale

@@ -12,7 +12,7 @@ from command_line import cli
 from exported import write_small
 from PIL import Image
 
-from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film
+from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film_settings
 from patchfem.export.drawing.flat import STYLE, Picture
 from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
@@ -55,7 +55,7 @@ def pixels(series, film, number) -> np.ndarray:
 def drawn(small):
     """(Film, pictures) of the small series, each frame drawn by itself."""
     with Series(small) as series:
-        film = make_film(series)
+        film = make_film_settings(series)
         return film, [pixels(series, film, number) for number in film.numbers]
 
 
@@ -72,7 +72,7 @@ def test_exact_the_last_cycle_is_without_the_pressed_state():
 
 def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(small):
     with Series(small) as series:
-        film = make_film(series)
+        film = make_film_settings(series)
         frames = [series.frame(number) for number in film.numbers]
     line = frames[0].interface()
     stress = [frame.point_data["normal_stress"][line] for frame in frames]
@@ -92,7 +92,7 @@ def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(sma
 
 def test_exact_the_range_of_colours_is_the_same_in_every_frame(small):
     with Series(small) as series:
-        film = make_film(series)
+        film = make_film_settings(series)
         first = series.frame(film.numbers[0])
         picture = Picture(first, "", film.panels(first), FRAME_SIZE, film.reach)
         assert len(picture.bodies[0].cells) == 2  # triangles and quadrilaterals

@@ -16,7 +16,7 @@ from command_line import cli
 from exported import write_small
 from paraview_stand_in import Simple, blocks_at, times_and_files
 
-from patchfem.export.drawing.film import make_film
+from patchfem.export.drawing.film import make_film_settings
 from patchfem.export.drawing.panels import upper_piece_slide
 from patchfem.export.fields.blocks import NAMES
 from patchfem.export.fields.series import Series
@@ -58,7 +58,7 @@ def test_exact_paraview_warps_to_the_places_that_pictures_draw(bench, written, m
     (pieces, _), (interface, _), (clock, _) = simple.shown
     files = times_and_files(clock.Input)
     with Series(bench) as series:
-        film = make_film(series)
+        film = make_film_settings(series)
         assert [time for time, _ in files] == [series.times[number] for number in film.numbers]
         for number, (_, file) in list(zip(film.numbers, files))[::4]:
             frame = series.frame(number)
@@ -96,7 +96,7 @@ def test_exact_a_script_colours_a_component_in_megapascal(bench, tmp_path, monke
     assert low == -high and high > 0 and "motion and gap x " in clock.Format
     files = times_and_files(clock.Input)
     with Series(bench) as series:
-        frames = [series.frame(number) for number in make_film(series).numbers]
+        frames = [series.frame(number) for number in make_film_settings(series).numbers]
     for (_, _, cells), block in zip(
         blocks_at(pieces, files[0][1]), (frames[0].blocks["lower"], frames[0].blocks["upper"])
     ):
@@ -121,7 +121,7 @@ def test_exact_a_script_shows_where_the_interface_sticks_and_slips(bench, tmp_pa
     files = times_and_files(clock.Input)
     seen = set()
     with Series(bench) as series:
-        for (_, file), number in zip(files, make_film(series).numbers):
+        for (_, file), number in zip(files, make_film_settings(series).numbers):
             known = series.frame(number).blocks["interface"].point_data["status"]
             ((_, points, _),) = blocks_at(line, file)
             assert points["status"].tolist() == known.tolist()
@@ -193,7 +193,7 @@ def test_always_paraview_itself_draws_every_frame_of_the_cycle(bench, tmp_path):
         [*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300
     )
     with Series(bench) as series:
-        count = len(make_film(series).numbers)
+        count = len(make_film_settings(series).numbers)
         every = len(series)
     drawn = [plt.imread(path)[..., :3] for path in sorted(tmp_path.glob("cycle.*.png"))]
     assert len(drawn) == count and all(one.shape == (800, 1280, 3) for one in drawn)

@@ -119,7 +119,7 @@ def made(seed: int, place: Path) -> Made:
             + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(), x.tolist()))
         )
         try:
-            imported.convert_file(record, place, (), False, imported.Estimate(decay=True))
+            imported.convert_file(record, place, (), False, imported.EstimateOptions(decay=True))
             break
         except PatchfemError:
             continue

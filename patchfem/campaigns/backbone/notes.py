@@ -14,9 +14,8 @@ MAX_MICRO_SLIP_RATIO = 0.3
 MIN_LOSS_RATIO = 4.0
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
 REPORT_OTHER_MODES = 1e-3  # Motion of other modes over amplitude above which a sentence states it.
-MIN_STATED_RATIO = (
-    2.0  # Ratio of two values above which a sentence gives the ratio and not a percentage.
-)
+# Ratio of two values above which a sentence gives the ratio and not a percentage.
+MIN_STATED_RATIO = 2.0
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )

@@ -14,9 +14,8 @@ from ...scene.axes import Axis
 from .case_models import SweepScene
 from .cases import Cases
 
-MAX_PLANNED_CASES = (
-    9  # number of cases, spread over the sweep, whose plans estimate the cost of all
-)
+# Number of cases, spread over the sweep, whose plans estimate the cost of all.
+MAX_PLANNED_CASES = 9
 SWEEP_SECONDS = 0.75  # CPU time [s] of a sweep to start and to write its files and its page
 CASE_SECONDS = 8e-3  # CPU time [s] of a case outside a batch, in addition to that of its plan
 RANKING_SECONDS = 0.8  # CPU time [s] to rank the keys by their influence, from random cases.
@@ -25,12 +24,10 @@ MAX_GROUPS = 3
 # CPU time [s] to compute the columns of a case in a batch from its values (0.8 to 1.5 ms, measured on 2000
 # lumped cases).
 BATCHED_CASE_SECONDS = 1.2e-3
-MAX_CASES_WITH_SUMMARY = (
-    1000  # largest number of cases for which a sweep writes individual summaries by default
-)
-MAX_CASES_WITH_TABLES = (
-    200_000  # largest number of cases for which a sweep writes tables by default
-)
+# Largest number of cases for which a sweep writes individual summaries by default.
+MAX_CASES_WITH_SUMMARY = 1000
+# Largest number of cases for which a sweep writes tables by default.
+MAX_CASES_WITH_TABLES = 200_000
 # Bytes on disk per case with a summary; with tables, page and columns (10 000 cases); with columns
 # alone (a million cases).
 SUMMARY_BYTES = 6000

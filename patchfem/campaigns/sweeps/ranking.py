@@ -16,9 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_SURFACE_CASES = (
-    640  # largest number of cases that a surface interpolates, because its equations are dense
-)
+# Largest number of cases that a surface interpolates, because its equations are dense.
+MAX_SURFACE_CASES = 640
 # Number of points of a Sobol sequence per key, which give an index to about 0.01.
 N_SOBOL_POINTS = 1024
 N_HALF_SURFACES = 6  # Number of surfaces that are fitted to half of the cases each.

@@ -101,7 +101,9 @@ def make_dots(x, y, colour: str, name: str = "", **style) -> dict:
     return make_mark("dots", colour, name, x=x, y=y, **style)
 
 
-def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **style) -> dict:
+def make_line(
+    x, y, colour: str, name: str = "", max_points: int = MAX_LINE_POINTS, **style
+) -> dict:
     """Return a chart mark of a line, with fewer points if there are many.
 
     Parameters
@@ -110,14 +112,14 @@ def make_line(x, y, colour: str, name: str = "", most: int = MAX_LINE_POINTS, **
     colour : str
     name : str
         Entry of the legend; "" for none.
-    most : int
+    max_points : int
         Largest number of points.
     **style
         width, dash, alpha.
     """
     x = np.asarray(x, float)
     y = np.asarray(y, float)
-    keep = sample_indices(x, y, most)
+    keep = sample_indices(x, y, max_points)
     return make_mark("line", colour, name, x=x[keep], y=y[keep], **style)
 
 
@@ -234,7 +236,7 @@ def interface_charts(x, fields: dict, name: str = "") -> list:
                 x * length_scale,
                 tau[k] * scale,
                 "soft",
-                most=FAINT_FRAME_POINTS,
+                max_points=FAINT_FRAME_POINTS,
                 width=0.6,
                 alpha=0.6,
             )
@@ -321,7 +323,7 @@ def stress_charts(x, depths, mises, sigma) -> list:
         )
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
-            along, down, means = reduce_grid(x[i], row, part, GRID)
+            x_axis, lower_limit, means = reduce_grid(x[i], row, part, GRID)
             # four digits suffice, because the values are shown as colours
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
                 means.shape
@@ -330,19 +332,21 @@ def stress_charts(x, depths, mises, sigma) -> list:
                 make_mark(
                     "cells",
                     "",
-                    x=along * size,
-                    y=side * down * size,
+                    x=x_axis * size,
+                    y=side * lower_limit * size,
                     value=values,
                     top=colour_limit,
                     unit=unit,
                 )
             )
-        across, up = (
+        across, upper_limit = (
             {"range": [low * size, high * size]} for low, high in ((left, right), (-height, height))
         )
         title = "Von Mises stress" if drawn_charts else "Von Mises stress at the contact"
         drawn_charts.append(
-            make_chart(title, make_axis("x", name) | across, make_axis("y", name) | up, marks)
+            make_chart(
+                title, make_axis("x", name) | across, make_axis("y", name) | upper_limit, marks
+            )
             | {"frame": _frame_size((right - left) / (2 * height))}
         )
     return drawn_charts[::-1]
@@ -435,7 +439,7 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
     measured : tuple, optional
         Measured slide and force.
     """
-    (along, size), (up, scale) = choose_axis_unit(slide, "m"), choose_axis_unit(force, "N")
+    (x_axis, size), (y_axis, scale) = choose_axis_unit(slide, "m"), choose_axis_unit(force, "N")
     read = (
         None
         if measured is None
@@ -446,8 +450,8 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
     return [
         make_chart(
             title,
-            make_axis("slide", along),
-            make_axis("friction force", up),
+            make_axis("slide", x_axis),
+            make_axis("friction force", y_axis),
             [read, make_line(slide * size, force * scale, "accent", "computed" if read else "")],
         )
     ]
@@ -511,7 +515,7 @@ def history_charts(
     window: dict | None,
     period: float | None,
     title: str = "Last cycles",
-    joined: bool = False,
+    draw_lines: bool = False,
 ) -> list:
     """Return charts of the motion over all cycles, and of the last cycles or the friction force.
 
@@ -525,7 +529,7 @@ def history_charts(
         Period of the drive [s]; None if every sample is stored.
     title : str
         Title of the last cycles.
-    joined : bool
+    draw_lines : bool
         Whether earlier reversals are drawn as a line through them instead of a band per cycle.
     """
     time = history["time"]
@@ -537,7 +541,7 @@ def history_charts(
         first_complete = first_complete_time(time, period, window["time"][0] if window else 0.0)
     is_late = time >= first_complete
     marks = []
-    if joined and not is_late.all():
+    if draw_lines and not is_late.all():
         early = slice(0, int(np.argmax(is_late)) + 1)
         marks.append(make_line(time[early] * per, value[early] * scale, "accent", width=1.0))
     elif not is_late.all():
@@ -716,7 +720,7 @@ def curve_charts(curve: dict) -> list:
     They show the amplitude, with the regime as colour and line style and with the folds, and the
     largest acceleration with its first harmonic.
     """
-    along, abscissa_name, unit = curve_axis(curve)
+    x_axis, abscissa_name, unit = curve_axis(curve)
     name, scale = choose_axis_unit(curve["amplitude"], "m")
     value = np.asarray(curve["amplitude"]) * scale
     parts = regime_stretches(curve)
@@ -724,15 +728,15 @@ def curve_charts(curve: dict) -> list:
     is_unbounded = np.concatenate([[False], ~np.isfinite(value), [False]]).astype(int)
     marks = [
         make_mark(
-            "span", "soft", left=along[max(first - 1, 0)], right=along[min(last, along.size - 1)]
+            "span", "soft", left=x_axis[max(first - 1, 0)], right=x_axis[min(last, x_axis.size - 1)]
         )
         for first, last in np.flatnonzero(np.diff(is_unbounded)).reshape(-1, 2)
     ]
     for regime, first, last in parts:
-        end = min(last + 1, along.size)  # up to the next stretch, so the line has no gap
+        end = min(last + 1, x_axis.size)  # up to the next stretch, so the line has no gap
         marks.append(
             make_line(
-                along[first:end],
+                x_axis[first:end],
                 value[first:end],
                 colours[regime],
                 regime,
@@ -754,7 +758,7 @@ def curve_charts(curve: dict) -> list:
     if "acceleration_peak" in curve:
         lines = [
             make_line(
-                along, np.asarray(curve[f"acceleration_{key}"]) / G_N, colour, text, dash=dash
+                x_axis, np.asarray(curve[f"acceleration_{key}"]) / G_N, colour, text, dash=dash
             )
             for key, colour, text, dash in (
                 ("peak", "accent", "largest", "solid"),
@@ -772,43 +776,43 @@ def curve_charts(curve: dict) -> list:
     return drawn_charts
 
 
-def spectra_charts(found, frequency: float | None) -> list:
+def spectra_charts(spectra, frequency: float | None) -> list:
     """Return charts of spectral densities of output and drive, and of the magnitude of H1.
 
     Parameters
     ----------
-    found : response.stationary.Spectra
+    spectra : response.stationary.Spectra
     frequency : float or None
         Frequency [Hz] of the mode that was fitted to the peak of H1.
     """
     # outside the band of the drive the spectrum is only leakage
-    has_drive = np.isfinite(found.coherence)
+    has_drive = np.isfinite(spectra.coherence)
     drawn_charts = []
-    found = type(found)(*(column[has_drive] for column in found))
-    hertz = found.frequency
-    unit, scale = choose_axis_unit([float(np.sqrt(found.place.max(initial=0.0)))], "m")
-    along = make_axis("frequency", "Hz", True)
+    spectra = type(spectra)(*(column[has_drive] for column in spectra))
+    hertz = spectra.frequency
+    unit, scale = choose_axis_unit([float(np.sqrt(spectra.place.max(initial=0.0)))], "m")
+    x_axis = make_axis("frequency", "Hz", True)
     drawn_charts.append(
         make_chart(
             "Displacement of the output",
-            along,
+            x_axis,
             make_axis("spectral density", f"{unit}^2/Hz", True),
-            [_positive_line(hertz, found.place * scale**2, "accent")],
+            [_positive_line(hertz, spectra.place * scale**2, "accent")],
         )
     )
     drawn_charts.append(
         make_chart(
             "Acceleration of output and base",
-            along,
+            x_axis,
             make_axis("spectral density", "g^2/Hz", True),
             [
-                _positive_line(hertz, found.acceleration / G_N**2, "accent", "output"),
-                _positive_line(hertz, found.drive / G_N**2, "soft", "base"),
+                _positive_line(hertz, spectra.acceleration / G_N**2, "accent", "output"),
+                _positive_line(hertz, spectra.drive / G_N**2, "soft", "base"),
             ],
         )
     )
-    gain = np.abs(found.gain) * G_N
-    is_coherent = found.coherence >= MIN_COHERENCE
+    gain = np.abs(spectra.gain) * G_N
+    is_coherent = spectra.coherence >= MIN_COHERENCE
     unit, scale = choose_axis_unit([gain.max(initial=0.0)], "m")
     marks = [
         _positive_line(hertz, gain * scale, "soft"),
@@ -824,7 +828,7 @@ def spectra_charts(found, frequency: float | None) -> list:
     drawn_charts.append(
         make_chart(
             "H1: displacement of the output divided by base acceleration",
-            along,
+            x_axis,
             make_axis("size", f"{unit}/g", True),
             marks,
         )
@@ -902,16 +906,16 @@ def levels_chart(rows: list) -> list:
     marks = []
     style = {"floor": 0.1 * float(y[is_drawn].min())} if log else {}
     for k, (a, b) in enumerate(pairwise(drive)):
-        up = b >= a
+        y_axis = b >= a
         if is_drawn[k] and is_drawn[k + 1]:
             marks.append(
                 make_mark(
                     "arrow",
-                    "accent" if up else "warm",
-                    "raised" if up else "lowered",
+                    "accent" if y_axis else "warm",
+                    "raised" if y_axis else "lowered",
                     x=[a, b],
                     y=[y[k], y[k + 1]],
-                    dash="solid" if up else "dashed",
+                    dash="solid" if y_axis else "dashed",
                     **style,
                 )
             )
@@ -957,7 +961,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
     history : dict
         Name -> (j,), with `cycle`; measures are divided by their first value.
     """
-    (along, size), drawn_charts = choose_axis_unit(x, "m"), []
+    (x_axis, size), drawn_charts = choose_axis_unit(x, "m"), []
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = choose_axis_unit(values, unit)
@@ -971,7 +975,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
             for k, colour in zip(pick, ("soft", *COLOURS))
         ]
         drawn_charts.append(
-            make_chart(title, make_axis("x", along), make_axis(title.lower(), name), lines)
+            make_chart(title, make_axis("x", x_axis), make_axis(title.lower(), name), lines)
         )
     drawn_charts[0]["y"]["range"] = [
         0.0,

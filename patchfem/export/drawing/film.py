@@ -26,9 +26,8 @@ FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
 DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
 BIT_RATE = 4000  # bit rate of a video [kbit/s]
 SLIDE_LABEL = 0.03  # largest slide as drawn / length of the pieces
-CYCLE_SECONDS = (
-    2.4  # duration of a cycle [s], unless MIN_FRAME_SECONDS or MAX_FRAME_SECONDS limits it
-)
+# Duration of a cycle [s], unless MIN_FRAME_SECONDS or MAX_FRAME_SECONDS limits it.
+CYCLE_SECONDS = 2.4
 MIN_FRAME_SECONDS = 0.04  # shortest duration of a frame [s]
 MAX_FRAME_SECONDS = 0.3  # longest duration of a frame [s]
 
@@ -89,7 +88,7 @@ class Film:
         )
 
 
-def make_film(series: Series, magnify: float | None = None) -> Film:
+def make_film_settings(series: Series, magnify: float | None = None) -> Film:
     """Collect what the frames of the last cycle have in common, such as windows and colours.
 
     Parameters
@@ -188,7 +187,7 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
     Missing
         ffmpeg is not installed or cannot write the file.
     """
-    film = make_film(series, magnify)
+    film = make_film_settings(series, magnify)
     picture = None
     with matplotlib.rc_context(STYLE | {"savefig.bbox": None, "savefig.dpi": "figure"}):
         writer = _movie_writer(out, film.seconds)

@@ -54,7 +54,7 @@ class Picture:
     """
 
     def __init__(
-        self, frame: Frame, head: str, shown: tuple, size: tuple, reach: tuple | None = None
+        self, frame: Frame, head: str, panels: tuple, size: tuple, reach: tuple | None = None
     ):
         from matplotlib.figure import Figure
 
@@ -62,7 +62,7 @@ class Picture:
         grid = self.figure.add_gridspec(2, 2)
         self.bodies = [
             _Bodies(self.figure.add_subplot(grid[at]), frame, panel)
-            for at, panel in zip(((slice(None), 0), (0, 1)), shown)
+            for at, panel in zip(((slice(None), 0), (0, 1)), panels)
         ]
         axes = self.figure.add_subplot(grid[1, 1])
         self.reach = reach
@@ -77,13 +77,13 @@ class Picture:
             axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
         axes.legend(loc="best" if reach is None else "upper right")
         cell_collection = self.bodies[0].cells[0][2]
-        unit = choose_axis_unit([shown[0].top], "Pa")[0]
+        unit = choose_axis_unit([panels[0].top], "Pa")[0]
         self.figure.colorbar(
             cell_collection, ax=self.bodies[0].axes, label=f"von Mises stress [{unit}]", shrink=0.7
         )
-        self._head(head, shown)
+        self._head(head, panels)
 
-    def show(self, frame: Frame, head: str, shown: tuple) -> None:
+    def show(self, frame: Frame, head: str, panels: tuple) -> None:
         """Change the pieces and the curves to those of another frame.
 
         Parameters
@@ -91,14 +91,14 @@ class Picture:
         frame : Frame
         head : str
             First line of the title.
-        shown : tuple of Panel
+        panels : tuple of Panel
             The whole pieces and the contact.
         """
-        for bodies, panel in zip(self.bodies, shown):
+        for bodies, panel in zip(self.bodies, panels):
             bodies.show(frame, panel)
         for line, (_, values) in zip(self.lines, interface_curves(frame, self.reach)[1]):
             line.set_ydata(values)
-        self._head(head, shown)
+        self._head(head, panels)
 
     def freeze_layout(self, dpi: float) -> None:
         """Lay out the axes of the figure, and keep this layout for later frames."""
@@ -106,11 +106,11 @@ class Picture:
         self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")
 
-    def _head(self, head: str, shown: tuple) -> None:
+    def _head(self, head: str, panels: tuple) -> None:
         """Write the titles of both panels of the figure."""
         whole_bodies, contact_bodies = self.bodies
-        whole_bodies.axes.set_title(f"{head}\n{shown[0].title()}")
-        contact_bodies.axes.set_title(f"where they touch, {shown[1].title(False)}")
+        whole_bodies.axes.set_title(f"{head}\n{panels[0].title()}")
+        contact_bodies.axes.set_title(f"where they touch, {panels[1].title(False)}")
 
 
 class _Bodies:

@@ -76,7 +76,7 @@ def make_panels(
     frame: Frame,
     magnify: float | tuple | None = None,
     close: tuple | None = None,
-    aside: float = 1.0,
+    slide_factor: float = 1.0,
 ) -> tuple:
     """Return the panels of both pieces, whole and around their contact, with one colour scale.
 
@@ -91,14 +91,14 @@ def make_panels(
         each.
     close : tuple, optional
         Window of the second panel [mm]; by default that of `find_contact_window`.
-    aside : float
+    slide_factor : float
         Factor of the slide of the upper piece as a whole.
 
     Returns
     -------
     tuple of Panel
     """
-    motion = drawn_displacement(frame), upper_piece_slide(frame), aside
+    motion = drawn_displacement(frame), upper_piece_slide(frame), slide_factor
     used_points = np.unique(
         np.concatenate([block.ravel() for part in (0, 1) for block in frame.cells(part)])
     )
@@ -159,7 +159,7 @@ def _make_panel(
     limit : float
         Stress at the upper end of the colours [Pa].
     """
-    move, slide, aside = motion
+    move, slide, slide_factor = motion
     left, right, bottom, top = window
     x, y = frame.points[:, :2].T * 1e3
     is_inside = (x >= left) & (x <= right) & (y >= bottom) & (y <= top)
@@ -175,7 +175,7 @@ def _make_panel(
     rigid_slide[upper_points(frame), 0] = slide
     places = (
         frame.points[:, :2]
-        + min(magnify, 1.0) * aside * rigid_slide
+        + min(magnify, 1.0) * slide_factor * rigid_slide
         + magnify * (move - rigid_slide)
     ) * 1e3
     drawn_points = places[
@@ -194,7 +194,7 @@ def _make_panel(
         (low[0], high[0], low[1], high[1]),
         limit,
         largest > limit * (1 + 1e-6),
-        aside,
+        slide_factor,
     )
 
 
@@ -262,14 +262,14 @@ def drawn_displacement(frame: Frame) -> np.ndarray:
     return move
 
 
-def surface_shape_motion(points, up, x, surface) -> np.ndarray:
+def surface_shape_motion(points, normal_motion, x, surface) -> np.ndarray:
     """Return the motion (f, n) [m] of an upper piece that is due to its surface shape.
 
     Parameters
     ----------
     points : (n, 2) array
         [m]
-    up : (f, n) array
+    normal_motion : (f, n) array
         Motion across the interface [m].
     x : (m,) array
         [m]
@@ -281,7 +281,7 @@ def surface_shape_motion(points, up, x, surface) -> np.ndarray:
     face = face[np.argsort(points[face, 0], kind="stable")]
     added = [
         np.interp(points[:, 0], x, surface_row - np.interp(x, points[face, 0], move[face]))
-        for surface_row, move in zip(surface, up)
+        for surface_row, move in zip(surface, normal_motion)
     ]
     return np.array(added) * (1 - points[:, 1] / height)
 

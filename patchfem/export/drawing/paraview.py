@@ -15,7 +15,7 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_text
 from ..fields.series import Frame, Series
 from ..fields.vtu import frames_folder, write_pvd
-from .film import Film, make_film
+from .film import Film, make_film_settings
 from .panels import drawn_displacement, upper_piece_slide, upper_points
 
 MPA = 1e-6
@@ -56,7 +56,8 @@ MOTION = {motion!r}  # magnification of the motion and the gap
 SLIDE = {slide!r}  # magnification of the rigid slide of the upper piece
 STRESS = {stress!r}  # range of the colours [MPa], the same in all frames
 PRESSURE = {pressure!r}  # range of the colours [MPa], the same in all frames
-STATUS = {status!r}  # whether the interface is coloured by open, stick and slip instead of by its pressure
+# Whether the interface is coloured by open, stick and slip instead of by its pressure.
+STATUS = {status!r}
 TIMES = 3  # how often the cycle is played
 PACE = {pace!r}  # frames per second of a film
 
@@ -140,7 +141,7 @@ if not films:
 '''
 
 
-def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
+def write_script(folder: Path, out: Path, component: str = "von_mises") -> str:
     """Write a ParaView script and the fields of the last cycle; return a line about them.
 
     Parameters
@@ -148,7 +149,7 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     folder : Path
     out : Path
         File of the script; the fields are written next to it.
-    of : str
+    component : str
         Stress that colours the pieces, a key of STRESSES; or STATUS for von Mises stress in the
         pieces and the state of the interface.
 
@@ -159,33 +160,33 @@ def write_script(folder: Path, out: Path, of: str = "von_mises") -> str:
     PatchfemError
         If the fields have only one frame, or the stress is unknown.
     """
-    status = of == STATUS
-    of = "von_mises" if of == STATUS else of
-    if of not in STRESSES:
+    status = component == STATUS
+    component = "von_mises" if component == STATUS else component
+    if component not in STRESSES:
         raise PatchfemError(
-            f"--of {of}: no stress of this name; the stresses are {', '.join(STRESSES)}; {STATUS} "
+            f"--of {component}: no stress of this name; the stresses are {', '.join(STRESSES)}; {STATUS} "
             "shows where the interface sticks and slips"
         )
     out = Path(out)
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
-        film = make_film(series)
-        text = script_text(out, film, of, _colour_range(series, film, of), status)
-        write_pvd(fields, series, film.numbers, lambda frame: add_motion(frame, of))
+        film = make_film_settings(series)
+        text = script_text(out, film, component, _colour_range(series, film, component), status)
+        write_pvd(fields, series, film.numbers, lambda frame: add_motion(frame, component))
         write_text(out, text)
     return f"{out}: {len(film.numbers)} frames, {fields.name} and {frames_folder(fields).name} beside it"
 
 
-def _colour_range(series: Series, film: Film, of: str) -> tuple:
+def _colour_range(series: Series, film: Film, component: str) -> tuple:
     """Return the smallest and largest stress [Pa] of a colour scale.
 
     For the von Mises stress they are those of pictures; for a component they are symmetric about 0.
     """
-    if of == "von_mises":
+    if component == "von_mises":
         return 0.0, float(film.tops[0])
     top = 0.0
     for number in film.numbers:
-        values = get_stress(series.frame(number).cell_data, of)
+        values = get_stress(series.frame(number).cell_data, component)
         top = max(
             top,
             float(np.quantile(np.abs(values[np.isfinite(values)]), MAX_SHARPNESS, method="higher")),
@@ -193,20 +194,20 @@ def _colour_range(series: Series, film: Film, of: str) -> tuple:
     return -top, top
 
 
-def get_stress(cell_data: dict, of: str) -> np.ndarray:
+def get_stress(cell_data: dict, component: str) -> np.ndarray:
     """Return one component of the stress (cells,) [Pa], with tension positive."""
-    place = STRESSES[of][1]
+    place = STRESSES[component][1]
     return cell_data["von_mises"] if place is None else cell_data["stress"][:, place]
 
 
-def script_text(out: Path, film: Film, of: str, ends: tuple, status: bool = False) -> str:
+def script_text(out: Path, film: Film, component: str, ends: tuple, status: bool = False) -> str:
     """Return the ParaView script that plays an animation.
 
     Parameters
     ----------
     out : Path
     film : Film
-    of : str
+    component : str
         A key of STRESSES.
     ends : tuple
         Ends of the colours of the stress [Pa].
@@ -222,12 +223,12 @@ def script_text(out: Path, film: Film, of: str, ends: tuple, status: bool = Fals
         pressure=(0.0, MPA * film.pressure),
         status=status,
         pace=max(1, round(1 / film.seconds)),
-        title=STRESSES[of][0],
-        colours="Viridis (matplotlib)" if of == "von_mises" else "Cool to Warm",
+        title=STRESSES[component][0],
+        colours="Viridis (matplotlib)" if component == "von_mises" else "Cool to Warm",
     )
 
 
-def add_motion(frame: Frame, of: str = "von_mises") -> Frame:
+def add_motion(frame: Frame, component: str = "von_mises") -> Frame:
     """Return a frame with added point arrays for the motion and the slide.
 
     Their sum is the displacement as drawn. The arrays that the script colours [MPa] are added as
@@ -243,7 +244,7 @@ def add_motion(frame: Frame, of: str = "von_mises") -> Frame:
         more = {"motion": motion[mine].astype(np.float32), "slide": slide[mine].astype(np.float32)}
         cells = {}
         if "von_mises" in block.cell_data:
-            cells["shown"] = (MPA * get_stress(block.cell_data, of)).astype(np.float32)
+            cells["shown"] = (MPA * get_stress(block.cell_data, component)).astype(np.float32)
         if "normal_stress" in block.point_data:
             more["contact_pressure"] = (MPA * block.point_data["normal_stress"]).astype(np.float32)
         blocks[name] = replace(

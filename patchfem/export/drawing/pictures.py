@@ -34,7 +34,7 @@ HEIGHT = 3.6  # height of a chart [inch]
 MAX_PLAIN_RATIO = 1e3
 
 
-def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
+def make_figure(columns: int = 1, height: float = 3.2, axes_to_use=None, **layout):
     """Return a figure of the page width with axes side by side.
 
     Parameters
@@ -43,7 +43,7 @@ def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
         Number of axes.
     height : float
         [inch]
-    onto : Axes, optional
+    axes_to_use : Axes, optional
         Axes that replace all of them.
     layout
         Passed to `subplots`.
@@ -53,8 +53,8 @@ def make_figure(columns: int = 1, height: float = 3.2, onto=None, **layout):
     tuple
         Figure and list of Axes.
     """
-    if onto is not None:
-        return onto.figure, [onto]
+    if axes_to_use is not None:
+        return axes_to_use.figure, [axes_to_use]
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -95,9 +95,9 @@ def returns_svg(draw):
 
         with matplotlib.rc_context(STYLE):
             drawn = draw(*args, **kwargs)
-        if kwargs.get("onto") is None:  # otherwise the caller owns the figure
-            for shown in (drawn, *drawn.axes):
-                shown._repr_svg_ = partial(_figure_svg, drawn)
+        if kwargs.get("axes_to_use") is None:  # otherwise the caller owns the figure
+            for element in (drawn, *drawn.axes):
+                element._repr_svg_ = partial(_figure_svg, drawn)
         return drawn
 
     @wraps(draw)
@@ -110,23 +110,23 @@ def returns_svg(draw):
 
 
 @returns_svg
-def draw_charts(made: list, onto=None, height: float = HEIGHT):
+def draw_charts(chart_list: list, axes_to_use=None, height: float = HEIGHT):
     """Draw charts side by side into one figure.
 
     Parameters
     ----------
-    made : list of dict
-    onto : Axes, optional
+    chart_list : list of dict
+    axes_to_use : Axes, optional
         Axes for the first chart alone.
     height : float
         [inch]
     """
-    figure, axes = make_figure(len(made), height, onto)
-    for axis, one in zip(axes, made):
-        for mark in one["marks"]:
+    figure, axes = make_figure(len(chart_list), height, axes_to_use)
+    for axis, chart in zip(axes, chart_list):
+        for mark in chart["marks"]:
             MARKS[mark["kind"]](axis, mark)
         for name in ("x", "y"):
-            how = one[name]
+            how = chart[name]
             axis.set(
                 **{
                     f"{name}label": f"{how['label']} [{how['unit']}]"
@@ -142,9 +142,9 @@ def draw_charts(made: list, onto=None, height: float = HEIGHT):
                 axis.set(**{f"{name}lim": how["range"]})
             if how.get("log"):
                 _write_plain_numbers(getattr(axis, f"{name}axis"))
-        for label in one.get("labels", ()):
+        for label in chart.get("labels", ()):
             _write_label(axis, label)
-        axis.set_title(one["title"])
+        axis.set_title(chart["title"])
         handles = dict(zip(*axis.get_legend_handles_labels()[::-1]))
         if handles:
             axis.legend(

@@ -30,20 +30,20 @@ def sweep_chart(dataset, measure: str) -> dict:
     PatchfemError
         If the sweep does not have this measure.
     """
-    known = sorted(name.removesuffix("_error") for name in dataset if name.endswith("_error"))
-    if measure not in known:
-        names = ", ".join(known)
+    measures = sorted(name.removesuffix("_error") for name in dataset if name.endswith("_error"))
+    if measure not in measures:
+        names = ", ".join(measures)
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {names}", "")
     keys = [name for name in dataset.coords if name != "case"]
     key = max(keys, key=lambda name: np.unique(dataset[name]).size)
-    along = dataset[key]
-    (dim,) = along.dims
-    others = [name for name in dataset[measure].dims if name != dim]
+    axis_key = dataset[key]
+    (dim,) = axis_key.dims
+    other_keys = [name for name in dataset[measure].dims if name != dim]
     names = {"values": measure, "errors": f"{measure}_error", "floors": f"{measure}_floor"}
     table = {
         part: dataset.get(name, 0 * dataset[measure])
-        .transpose(*others, dim)
-        .values.reshape(-1, along.size)
+        .transpose(*other_keys, dim)
+        .values.reshape(-1, axis_key.size)
         for part, name in names.items()
     }
     hollow = is_over_tolerance(table, dataset.attrs.get("tolerance", np.nan))
@@ -51,14 +51,14 @@ def sweep_chart(dataset, measure: str) -> dict:
     errors = np.nan_to_num(table["errors"])
     unit, scale = _choose_axis_unit(values, dataset[measure].attrs.get("units", "1"))
     below = np.fmin(errors, np.fmax(values - minimum_value(measure), 0.0))
-    x, x_axis = _make_key_axis(key, along)
+    x, x_axis = _make_key_axis(key, axis_key)
     lines = []
     rings = []
     filled = []
-    for k, place in enumerate(np.ndindex(*(dataset[name].size for name in others))):
+    for k, place in enumerate(np.ndindex(*(dataset[name].size for name in other_keys))):
         text = ", ".join(
             f"{measure_label(name)} {_format_key(dataset[name], at)}"
-            for name, at in zip(others, place)
+            for name, at in zip(other_keys, place)
         )
         y = scale * values[k]
         bars = scale * np.stack([below[k], errors[k]])
@@ -67,21 +67,21 @@ def sweep_chart(dataset, measure: str) -> dict:
             lines.append(charts.make_line(x, y, colour))
         rings.append(charts.make_dots(x, y, colour, text, errors=bars, hollow=True))
         filled.append(charts.make_dots(x[~hollow[k]], y[~hollow[k]], colour))
-    shown = values[np.isfinite(values)]
-    is_log = _spans_ratio(shown, MIN_MEASURE_RATIO)
+    finite_values = values[np.isfinite(values)]
+    is_log = _spans_ratio(finite_values, MIN_MEASURE_RATIO)
     y_axis = charts.make_axis(measure_label(measure), "" if unit == "1" else unit, is_log)
     return charts.make_chart("", x_axis, y_axis, [*lines, *rings, *filled])
 
 
-def _make_key_axis(key: str, along) -> tuple:
+def _make_key_axis(key: str, axis_key) -> tuple:
     """Return the chart axis of a swept key, and the positions (n,) of its values."""
-    if along.dtype.kind != "f":
-        places = np.arange(float(along.size))
-        ticks = [(place, str(word)) for place, word in zip(places, along.values)]
+    if axis_key.dtype.kind != "f":
+        places = np.arange(float(axis_key.size))
+        ticks = [(place, str(word)) for place, word in zip(places, axis_key.values)]
         return places, charts.make_axis(measure_label(key)) | {"ticks": ticks}
-    unit, scale = _choose_axis_unit(along.values, along.attrs.get("units", "1"))
-    is_log = _spans_ratio(along.values, MIN_KEY_RATIO)
-    return along.values * scale, charts.make_axis(
+    unit, scale = _choose_axis_unit(axis_key.values, axis_key.attrs.get("units", "1"))
+    is_log = _spans_ratio(axis_key.values, MIN_KEY_RATIO)
+    return axis_key.values * scale, charts.make_axis(
         measure_label(key), "" if unit == "1" else unit, is_log
     )
 

@@ -67,16 +67,17 @@ def view(
             " or .html"
         )
     with Series(folder) as series:
-        one = series.frame(-1 if frame is None else frame)
+        frame_fields = series.frame(-1 if frame is None else frame)
         head = series.path.parent.resolve().name
         if len(series) > 1:
             last = len(series) - 1
-            head += f", frame {one.number} ({f'of 0 to {last}' if one.number < last else 'the last'}), {one.time:.6g} s"
+            place = f"of 0 to {last}" if frame_fields.number < last else "the last"
+            head += f", frame {frame_fields.number} ({place}), {frame_fields.time:.6g} s"
     if out is None:
-        _open_window(one, head, magnify)
+        _open_window(frame_fields, head, magnify)
         return
     with write_atomically(Path(out)) as partial:
-        flat.draw_frame(one, head, magnify, partial)
+        flat.draw_frame(frame_fields, head, magnify, partial)
     print(f"{out}: {head}")
 
 
@@ -89,11 +90,11 @@ def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | Non
     film.check_ffmpeg(out)
     with Series(folder) as series:
         with write_atomically(out) as partial:
-            said = film.write_film(series, series.path.parent.resolve().name, magnify, partial)
-    print(f"{out}: {said}")
+            message = film.write_film(series, series.path.parent.resolve().name, magnify, partial)
+    print(f"{out}: {message}")
 
 
-def _open_window(one: Frame, head: str, magnify) -> None:
+def _open_window(frame: Frame, head: str, magnify) -> None:
     """Open a window with the fields; raise Missing without a screen or OpenGL."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
@@ -106,7 +107,7 @@ def _open_window(one: Frame, head: str, magnify) -> None:
         raise Missing(
             f"view: no working OpenGL for a window ({why}); write a picture with -o FILE.png"
         )
-    make_plotter(one, head, magnify).show(title=f"patchfem: {head}")
+    make_plotter(frame, head, magnify).show(title=f"patchfem: {head}")
 
 
 def explain_missing_opengl() -> str | None:
@@ -135,12 +136,12 @@ def explain_missing_opengl() -> str | None:
     )
 
 
-def make_plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):
+def make_plotter(frame: Frame, head: str, magnify: float | None, off_screen: bool = False):
     """Return the pyvista Plotter of the window: both pieces, their contact, and the stresses.
 
     Parameters
     ----------
-    one : Frame
+    frame : Frame
     head : str
         First line of the title.
     magnify : float or None
@@ -160,26 +161,26 @@ def make_plotter(one: Frame, head: str, magnify: float | None, off_screen: bool 
         border=False,
     )
     plotter.set_background("white")
-    whole_panel, close = make_panels(one, magnify)
+    whole_panel, close = make_panels(frame, magnify)
     plotter.subplot(0, 0)
-    _draw_pieces(plotter, one, whole_panel, f"{head}\n{whole_panel.title()}", True)
+    _draw_pieces(plotter, frame, whole_panel, f"{head}\n{whole_panel.title()}", True)
     plotter.subplot(0, 1)
-    _draw_pieces(plotter, one, close, f"where they touch, {close.title(False)}", False)
+    _draw_pieces(plotter, frame, close, f"where they touch, {close.title(False)}", False)
     plotter.subplot(1, 1)
-    _draw_stresses(plotter, one)
+    _draw_stresses(plotter, frame)
     return plotter
 
 
-def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> None:
+def _draw_pieces(plotter, frame: Frame, panel: Panel, text: str, has_colour_bar: bool) -> None:
     """Draw both pieces of a frame in a panel of the window."""
     import pyvista as pv
 
     unit, scale = choose_axis_unit([panel.top], "Pa")
     places = np.column_stack([panel.places, np.zeros(len(panel.places))])
-    sizes = np.diff(one.offsets)
-    faces = np.insert(one.connectivity, one.offsets[:-1], sizes)
+    sizes = np.diff(frame.offsets)
+    faces = np.insert(frame.connectivity, frame.offsets[:-1], sizes)
     mesh = pv.PolyData(places, faces=faces[np.repeat(panel.cells, sizes + 1)])
-    mesh.cell_data["von Mises"] = one.cell_data["von_mises"][panel.cells] * scale
+    mesh.cell_data["von Mises"] = frame.cell_data["von_mises"][panel.cells] * scale
     plotter.add_mesh(
         mesh,
         scalars="von Mises",
@@ -188,7 +189,7 @@ def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> 
         lighting=False,
         show_scalar_bar=False,
     )
-    if scaled:  # the other panel has the same colours
+    if has_colour_bar:  # the other panel has the same colours
         plotter.add_scalar_bar(
             f"von Mises\n[{unit}]\n",
             mapper=plotter.mapper,
@@ -204,7 +205,7 @@ def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> 
             position_y=0.2,
             unconstrained_font_size=True,
         )
-    for edges, colour in zip(outer_edges(one, panel.cells), ("black", "white")):
+    for edges, colour in zip(outer_edges(frame, panel.cells), ("black", "white")):
         if len(edges):
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
@@ -228,11 +229,11 @@ def _draw_pieces(plotter, one: Frame, panel: Panel, text: str, scaled: bool) -> 
     plotter.camera.zoom(0.95)  # leaves space for the colour bar beside the pieces
 
 
-def _draw_stresses(plotter, one: Frame) -> None:
+def _draw_stresses(plotter, frame: Frame) -> None:
     """Draw the stresses along the interface in the window."""
     import pyvista as pv
 
-    x, curves, unit = interface_curves(one)
+    x, curves, unit = interface_curves(frame)
     chart = pv.Chart2D(x_label="x [mm]", y_label=f"stress on the interface [{unit}]")
     for (label, values), colour in zip(curves, ("#1f5f99", "#c8551b")):
         chart.line(x, values, color=colour, width=3, label=label)

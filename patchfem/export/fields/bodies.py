@@ -79,10 +79,10 @@ def write_fields(result, path: Path) -> dict:
     for one, other_body in ((low, high), (high, low)):
         one["stress_error"] = one["error"].relative_error(other_body["error"])[0]
     notes = result.extra.setdefault("notes", [])
-    inside = find_yielding(result.plan.model.patch, {"lower": low, "upper": high})
+    yield_notes = find_yielding(result.plan.model.patch, {"lower": low, "upper": high})
     faces = result.extra.get("yielding_faces", {})
     notes[:] = [text for text in notes if text not in faces.values()]
-    notes += [text for text in (faces | inside).values() if text not in notes]
+    notes += [text for text in (faces | yield_notes).values() if text not in notes]
     steps = {"lower": low["steps"], "upper": high["steps"]}
     write_series(
         path,
@@ -192,7 +192,7 @@ def _mesh_and_stress(piece, grid) -> _PieceFields:
     )
 
 
-def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceFields, u) -> dict:
+def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _PieceFields, u) -> dict:
     """Return the fields of a piece for the file: mesh, displacement and stress in all frames.
 
     y points away from the interface.
@@ -204,18 +204,18 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
     x : (k,) array
         Positions along the interface [m].
     side : {"lower", "upper"}
-    inside : _Inside
+    piece_fields : _Inside
     u : (1 + f, n, 2) array
         From `_piece_displacements`; its first row is the pressed state.
     """
     lower = side == "lower"
-    cells = inside.cells
+    cells = piece_fields.cells
     frames = len(u) - 1
     sign = -1.0 if lower else 1.0
     out = {
         name: np.empty((frames, *shape), np.float32)
         for name, shape in {
-            "displacement": inside.points.shape,
+            "displacement": piece_fields.points.shape,
             "stress": (cells.is_coating.size, 4),
             "mises": cells.is_coating.shape,
         }.items()
@@ -225,15 +225,15 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
     for first in range(0, frames, FRAMES_PER_PASS):
         frame_slice = slice(first, first + FRAMES_PER_PASS)
         motion = u[:1] + u[1:][frame_slice]
-        stress = inside.stress(motion)
-        errors.append(estimate_error(inside.found, motion, stress, inside.rules))
+        stress = piece_fields.stress(motion)
+        errors.append(estimate_error(piece_fields.found, motion, stress, piece_fields.rules))
         out["mises"][frame_slice] = von_mises(stress)
         out["stress"][frame_slice] = stress * [1.0, 1.0, 1.0, sign]
         largest = max(largest, float(np.abs(motion).max()))
         out["displacement"][frame_slice] = (
             motion * [1.0, sign]
             if lower
-            else motion + _holder_motion(patch, fields, inside.points, frame_slice)
+            else motion + _holder_motion(patch, fields, piece_fields.points, frame_slice)
         )
     error = StressError(
         *(
@@ -248,15 +248,15 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
     if bond:
         # positive along +x on the lower piece, like the shear stress of the interface
         bond["shear_bond"] *= -sign
-    blocks = [block if not lower else block[:, ::-1] for block in inside.blocks]
+    blocks = [block if not lower else block[:, ::-1] for block in piece_fields.blocks]
     finest = min(
-        choose_rounding_step(inside.found, error, inside.rules, ROUNDING_FRACTION),
+        choose_rounding_step(piece_fields.found, error, piece_fields.rules, ROUNDING_FRACTION),
         MIN_STEP_FRACTION * float(out["mises"].max(initial=0.0)),
     )
     return out | {
-        "points": inside.points * [1.0, sign],
+        "points": piece_fields.points * [1.0, sign],
         "blocks": blocks,
-        "interface": inside.interface,
+        "interface": piece_fields.interface,
         "material": cells.is_coating,
         "error": error,
         "bond": bond,
@@ -268,11 +268,13 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, inside: _PieceField
     }
 
 
-def _holder_motion(patch, fields: dict, points, some: slice) -> np.ndarray:
+def _holder_motion(patch, fields: dict, points, frame_slice: slice) -> np.ndarray:
     """Return the motion (f, n, 2) [m] of points that move with the upper holder."""
-    same = np.ones((len(fields["time"][some]), 1))
+    same = np.ones((len(fields["time"][frame_slice]), 1))
     rotation, closing, slide = (
-        fields[f"holder_{name}"][some, None] if f"holder_{name}" in fields else constant * same
+        fields[f"holder_{name}"][frame_slice, None]
+        if f"holder_{name}" in fields
+        else constant * same
         for name, constant in (
             ("rotation", patch.pressure.rotation),
             ("closing", patch.pressure.approach),

@@ -13,7 +13,7 @@ from ...runs.patch.strength import YIELDING_NEGLECTED, Strength, yield_strength
 FIXED_REGION_FRACTION = 0.2
 
 
-def find_yielding(asked, bodies: dict) -> dict:
+def find_yielding(patch_model, bodies: dict) -> dict:
     """Find the materials whose von Mises stress exceeds their yield strength anywhere.
 
     The region near the fixed far face is left out, because the stress in its corners is unbounded
@@ -21,7 +21,7 @@ def find_yielding(asked, bodies: dict) -> dict:
 
     Parameters
     ----------
-    asked : PatchModel
+    patch_model : PatchModel
     bodies : dict
         "lower" and "upper" -> {"points" (n, 2) [m], "blocks" of cells, "material" (c,) True for
         coating, "mises" (f, c) [Pa]}.
@@ -31,9 +31,9 @@ def find_yielding(asked, bodies: dict) -> dict:
     dict
         Strength -> note.
     """
-    found = {}
+    places_by_strength = {}
     for side, body in bodies.items():
-        piece = getattr(asked.pieces, side)
+        piece = getattr(patch_model.pieces, side)
         middle = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
         free = (
             np.abs(middle[:, 1]) < (1 - FIXED_REGION_FRACTION) * np.abs(body["points"][:, 1]).max()
@@ -43,26 +43,29 @@ def find_yielding(asked, bodies: dict) -> dict:
             (True, piece.coating.material if piece.coating else None),
         ):
             mine = np.flatnonzero((np.asarray(body["material"]) == coated) & free)
-            known = yield_strength(kind)
-            if known is None or not mine.size:
+            strength = yield_strength(kind)
+            if strength is None or not mine.size:
                 continue
             highest = body["mises"][:, mine].max(axis=0)
             cell = int(mine[np.argmax(highest)])
-            if highest.max() > known.pressure:
-                found.setdefault(known, []).append((float(highest.max()), side, middle[cell]))
+            if highest.max() > strength.pressure:
+                places_by_strength.setdefault(strength, []).append(
+                    (float(highest.max()), side, middle[cell])
+                )
     return {
-        known: _yielding_note(
-            known, max(places, key=lambda one: one[0]), len({side for _, side, _ in places})
+        strength: _yielding_note(
+            strength, max(places, key=lambda one: one[0]), len({side for _, side, _ in places})
         )
-        for known, places in found.items()
+        for strength, places in places_by_strength.items()
     }
 
 
-def _yielding_note(known: Strength, highest: tuple, pieces: int) -> str:
+def _yielding_note(strength: Strength, highest: tuple, pieces: int) -> str:
     """Return the note on a material that yields, with the highest stress and its position."""
     stress, side, (x, y) = highest
     both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (
-        f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {known.material} of the {side} piece, at "
-        f"x = {format_length(x)} and {format_length(abs(y))} from the interface; {known.words}{both}; {YIELDING_NEGLECTED}"
+        f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {strength.material} of the {side} piece, at "
+        f"x = {format_length(x)} and {format_length(abs(y))} from the interface; {strength.words}{both}; "
+        f"{YIELDING_NEGLECTED}"
     )

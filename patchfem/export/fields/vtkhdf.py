@@ -37,7 +37,7 @@ MIN_FRAMEWISE_BYTES = (
 )  # bytes of all arrays above which frames are written one after the other
 # Bits of 23 after the leading one that are kept; the estimated error is accurate to some 10 %.
 BITS = {"stress_error": 5}
-# Bits of every other array without a step: 3e-5 of a value, far below the discretisation error.
+# Mantissa bits of arrays without a rounding step: an error of 3e-5 of a value, far below the discretisation error.
 MOST_BITS = 14
 EMPTY = Block(
     np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {}
@@ -70,7 +70,7 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
         for values in data.values()
     )
     large = size > MIN_FRAMEWISE_BYTES
-    later = []
+    large_arrays = []
     packed = large or size > MIN_COMPRESSED_BYTES
     with (
         write_atomically(path, None if large else size) as partial,
@@ -88,19 +88,22 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
                 _create_group(root, name),
                 one,
                 times,
-                (units, text, later if large else None, rounding),
+                (units, text, large_arrays if large else None, rounding),
             )
             assembly[name] = h5py.SoftLink(f"/VTKHDF/{name}")
         all_steps = _create_steps(root, times)
         _write_mesh(all_steps, EMPTY)
         all_steps["Steps"] = root[next(iter(blocks))]["Steps"]
-        if later:
+        if large_arrays:
             _write_frames(
-                file, [all_steps, *(root[name]["Steps"] for name in blocks)], later, len(times)
+                file,
+                [all_steps, *(root[name]["Steps"] for name in blocks)],
+                large_arrays,
+                len(times),
             )
 
 
-def _write_frames(file, steps: list, later: list, count: int) -> None:
+def _write_frames(file, steps: list, large_arrays: list, count: int) -> None:
     """Write field arrays frame after frame, each safely on disk before it is counted.
 
     VTK reads beyond its memory unless there are as many times as frames.
@@ -110,7 +113,7 @@ def _write_frames(file, steps: list, later: list, count: int) -> None:
     file : h5py.File
     steps : list
         Groups `Steps`.
-    later : list
+    large_arrays : list
         (dataset, values (f, n, ...), rounding of one frame) of each array.
     count : int
         Number of frames.
@@ -118,7 +121,7 @@ def _write_frames(file, steps: list, later: list, count: int) -> None:
     times = [step["Values"][:] for step in steps]
     for number in range(count):
         _set_frame_count(steps, times, number)
-        for frame_array in later:
+        for frame_array in large_arrays:
             _write_frame(*frame_array, number)
         file.flush()
     _set_frame_count(steps, times, count)
@@ -272,7 +275,7 @@ def _write_block(group, block: Block, times, settings: tuple) -> None:
     frame, None if all are written at once; and the steps of rounding by name, None without
     compression.
     """
-    units, text, later, rounding = settings
+    units, text, large_arrays, rounding = settings
     _write_mesh(group, block)
     steps = _create_steps(group, times)
     count = len(times)
@@ -281,14 +284,14 @@ def _write_block(group, block: Block, times, settings: tuple) -> None:
     steps["NumberOfParts"] = np.ones(count, np.int64)
     for name in ("CellOffsets", "ConnectivityIdOffsets"):
         steps[name] = np.zeros((count, 1), np.int64)
-    _write_arrays(group, steps, "PointData", block.point_data, (units, later, rounding))
-    _write_arrays(group, steps, "CellData", block.cell_data, (units, later, rounding))
+    _write_arrays(group, steps, "PointData", block.point_data, (units, large_arrays, rounding))
+    _write_arrays(group, steps, "CellData", block.cell_data, (units, large_arrays, rounding))
     _write_field_data(group, steps, text, count)
 
 
 def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
     """Write the point and cell arrays of a mesh block."""
-    (units, later, rounding), target, offsets = (
+    (units, large_arrays, rounding), target, offsets = (
         settings,
         group[kind],
         _create_group(steps, f"{kind}Offsets"),
@@ -311,11 +314,11 @@ def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
             nearest = _rounding_function(
                 dataset, rounding.get(name, 0.0), BITS.get(name, MOST_BITS)
             )
-            if later is None:
+            if large_arrays is None:
                 for number in range(count):
                     _write_frame(dataset, values, nearest, number)
             else:
-                later.append((dataset, values, nearest))
+                large_arrays.append((dataset, values, nearest))
         else:
             dataset = target.create_dataset(name, data=values.reshape(-1, *values.shape[2:]))
         dataset.attrs["units"] = units.get(name, "1")

@@ -27,12 +27,12 @@ CSV_HEADERS = (
 )
 
 
-def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
+def describe_curve_fit(fit: FittedCurve, folder: Path) -> FitFiles:
     """Collect the files of a fit to measured frequency and damping against amplitude.
 
     The paths in the fitted scene are relative to `folder`.
     """
-    fit_data = _collect_fit_data(fitted)
+    fit_data = _collect_fit_data(fit)
     rms = fit_data["rms"]
     head = (
         f"{fit_data['outcome']}: {fit_data['rows']} amplitudes of {fit_data['measured']} by "
@@ -43,28 +43,28 @@ def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
         f"{100 * rms['damping']:.2g} % of the damping ratio",
         *(f"  note: {text}" for text in fit_data["notes"]),
     ]
-    scene = fitted_scene_text(fitted.keys, fitted.path.name, folder)
+    scene = fitted_scene_text(fit.keys, fit.path.name, folder)
     return FitFiles(
         answer=fit_data,
         lines=[head, *format_values(fit_data), *details],
         summary=[head, *details],
         scenes={FITTED_SCENE: scene},
-        rows=_csv_rows(fitted),
-        charts=_draw_charts(fitted),
+        rows=_csv_rows(fit),
+        charts=_draw_charts(fit),
         caption="Frequency and damping ratio against amplitude: measured values with errors, and "
         "the fit",
     )
 
 
-def _collect_fit_data(fitted: FittedCurve) -> dict:
+def _collect_fit_data(fit: FittedCurve) -> dict:
     """Return the contents of fit.json for a fit to a frequency and damping curve."""
-    keys = fitted.keys
-    measured = fitted.measured
-    deviation = (fitted.model - measured.value) / np.abs(measured.value)
+    keys = fit.keys
+    measured = fit.measured
+    deviation = (fit.model - measured.value) / np.abs(measured.value)
     frequency_rms, damping_rms = np.sqrt(np.mean(deviation**2, axis=1)).tolist()
-    name = fitted.path.name
+    name = fit.path.name
     return describe_measurement(keys.scene.title, name, "decay", keys.outcome) | {
-        "method": fitted.method,
+        "method": fit.method,
         "rows": int(measured.amplitude.size),
         "values": describe_values(keys),
         "rms": {"frequency": frequency_rms, "damping": damping_rms},
@@ -72,17 +72,17 @@ def _collect_fit_data(fitted: FittedCurve) -> dict:
         "failures": keys.fit.counts.failures,
         "descents_agreed": keys.fit.agreed,
         "warnings": keys.warnings,
-        "notes": list(fitted.notes),
+        "notes": list(fit.notes),
         "seconds": round(keys.seconds, 6),
     }
 
 
-def _csv_rows(fitted: FittedCurve) -> list:
+def _csv_rows(fit: FittedCurve) -> list:
     """Return the rows of fit.csv for a fit to a frequency and damping curve.
 
     Errors are half the width of a 95 % interval.
     """
-    measured = fitted.measured
+    measured = fit.measured
     errors = 2 * measured.error
     columns = np.column_stack(
         [
@@ -91,15 +91,15 @@ def _csv_rows(fitted: FittedCurve) -> list:
             errors[0],
             measured.value[1],
             errors[1],
-            *fitted.model,
+            *fit.model,
         ]
     )
     return [CSV_HEADERS, *([*map(repr, row)] for row in columns.tolist())]
 
 
-def _draw_charts(fitted: FittedCurve) -> list:
+def _draw_charts(curve_fit: FittedCurve) -> list:
     """Chart measured and fitted frequency and damping ratio against amplitude."""
-    measured = fitted.measured
+    measured = curve_fit.measured
     unit, scale = choose_axis_unit(measured.amplitude, "m")
     along = charts.make_axis("amplitude", unit, True)
     x = measured.amplitude * scale
@@ -109,6 +109,6 @@ def _draw_charts(fitted: FittedCurve) -> list:
     ):
         errors = 2 * measured.error[k]
         dots = charts.make_dots(x, measured.value[k], "soft", "measured", errors=errors)
-        fit = charts.make_line(x, fitted.model[k], "accent", "fitted")
+        fit = charts.make_line(x, curve_fit.model[k], "accent", "fitted")
         out.append(charts.make_chart(title, along, charts.make_axis(name, of), [dots, fit]))
     return out

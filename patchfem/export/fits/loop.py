@@ -23,12 +23,12 @@ LABELS = {"force": ("force", "N"), "friction_ratio": ("friction ratio", "1")}
 DOT_SIZE = 3.5  # diameter of the dots of measured rows in fit.svg [points]
 
 
-def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
+def describe_loop_fit(fit: FittedLoop, folder: Path) -> FitFiles:
     """Collect the files of a fit to a measured friction loop.
 
     The paths in the fitted scene are relative to `folder`.
     """
-    fit_data = _collect_fit_data(fitted)
+    fit_data = _collect_fit_data(fit)
     rms_fraction = fit_data["rms"] / fit_data["peak"]
     head = (
         f"{fit_data['outcome']}: {fit_data['rows']} rows of {fit_data['measured']}, "
@@ -40,32 +40,32 @@ def describe_loop_fit(fitted: FittedLoop, folder: Path) -> FitFiles:
         held_out_score = fit_data["held"]
         rms = format_quantity(held_out_score["rms"], fit_data["unit"], 4)
         details.append(f"  rms of held-out rows   {rms} ({held_out_score['rows']} rows)")
-    scene = fitted_scene_text(fitted.keys, fitted.loop.path.name, folder)
+    scene = fitted_scene_text(fit.keys, fit.loop.path.name, folder)
     return FitFiles(
         answer=fit_data,
         lines=[head, *format_values(fit_data), *details],
         summary=[head, *details],
         scenes={FITTED_SCENE: scene},
-        rows=_csv_rows(fitted),
-        charts=_draw_charts(fitted),
+        rows=_csv_rows(fit),
+        charts=_draw_charts(fit),
         caption="Measured and fitted values; on the right the residual of each row",
     )
 
 
-def _collect_fit_data(fitted: FittedLoop) -> dict:
+def _collect_fit_data(loop_fit: FittedLoop) -> dict:
     """Return the contents of fit.json of a fit to a friction loop."""
-    keys = fitted.keys
-    loop = fitted.loop
+    keys = loop_fit.keys
+    loop = loop_fit.loop
     fit = keys.fit
     first = len(keys.ranges)
     offsets = {
         offset.name: describe_value(offset.range, fit, first + k)
-        for k, offset in enumerate(fitted.offsets)
+        for k, offset in enumerate(loop_fit.offsets)
     }
-    bounds = [*keys.ranges, *(offset.range for offset in fitted.offsets)]
+    bounds = [*keys.ranges, *(offset.range for offset in loop_fit.offsets)]
     held_out_score = None
-    if fitted.held_rms is not None:
-        held_out_score = {"rows": int(fitted.held_out.sum()), "rms": fitted.held_rms}
+    if loop_fit.held_rms is not None:
+        held_out_score = {"rows": int(loop_fit.held_out.sum()), "rms": loop_fit.held_rms}
     measured = loop.path.name
     return describe_measurement(keys.scene.title, measured, loop.quantity, keys.outcome) | {
         "values": describe_values(keys),
@@ -73,13 +73,13 @@ def _collect_fit_data(fitted: FittedLoop) -> dict:
         "unknown": describe_unknown(bounds, fit),
         "correlation": describe_correlation(fit),
         "unit": LABELS[loop.quantity][1],
-        "rows": int((~fitted.held_out).sum()),
+        "rows": int((~loop_fit.held_out).sum()),
         "effective_rows": None if np.isnan(fit.intervals.rows) else fit.intervals.rows,
-        "rms": fitted.rms,
+        "rms": loop_fit.rms,
         "held": held_out_score,
         "peak": float(np.abs(loop.reading).max()),
-        "step_error": fitted.step_error,
-        "steps_between_rows": fitted.pieces,
+        "step_error": loop_fit.step_error,
+        "steps_between_rows": loop_fit.pieces,
         "evaluations": fit.counts.evaluations,
         "failures": fit.counts.failures,
         "descents_agreed": fit.agreed,
@@ -88,38 +88,38 @@ def _collect_fit_data(fitted: FittedLoop) -> dict:
     }
 
 
-def _csv_rows(fitted: FittedLoop) -> list:
+def _csv_rows(fit: FittedLoop) -> list:
     """Return the rows of fit.csv of a fit to a friction loop, in SI units.
 
     The file can be the measurement of another fit.
     """
-    loop = fitted.loop
+    loop = fit.loop
     unit = LABELS[loop.quantity][1]
     head = ["displacement [m]", f"{loop.quantity} [{unit}]", "fitted", "held"]
-    columns = [loop.displacement, loop.reading, fitted.model]
+    columns = [loop.displacement, loop.reading, fit.model]
     if loop.time is not None:
         head.insert(0, "time [s]")
         columns.insert(0, loop.time)
     rows = zip(*(column.tolist() for column in columns))
-    is_held_out = fitted.held_out.tolist()
+    is_held_out = fit.held_out.tolist()
     return [head, *([*map(repr, row), int(out)] for row, out in zip(rows, is_held_out))]
 
 
-def _draw_charts(fitted: FittedLoop) -> list:
+def _draw_charts(fit: FittedLoop) -> list:
     """Chart a measured and fitted friction loop, and the residual of each row."""
-    loop = fitted.loop
+    loop = fit.loop
     name, unit = LABELS[loop.quantity]
     along, size = choose_axis_unit(loop.displacement, "m")
     up, scale = choose_axis_unit(loop.reading, "N") if unit == "N" else ("1", 1.0)
     number = np.arange(loop.reading.size)
     slide = loop.displacement * size
     reading = loop.reading * scale
-    residual = (fitted.model - loop.reading) * scale
+    residual = (fit.model - loop.reading) * scale
     over_slide = []
     over_rows = [charts.make_line(number[[0, -1]], [0.0, 0.0], "soft", width=0.8)]
     groups = (
-        (~fitted.held_out, "soft", "measured"),
-        (fitted.held_out, "warm", "measured, held out"),
+        (~fit.held_out, "soft", "measured"),
+        (fit.held_out, "warm", "measured, held out"),
     )
     for rows, colour, text in groups:
         if rows.any():
@@ -127,7 +127,7 @@ def _draw_charts(fitted: FittedLoop) -> list:
                 charts.make_dots(slide[rows], reading[rows], colour, text, size=DOT_SIZE)
             )
             over_rows.append(charts.make_dots(number[rows], residual[rows], colour, size=DOT_SIZE))
-    over_slide.append(charts.make_line(slide, fitted.model * scale, "accent", "fitted", width=1.0))
+    over_slide.append(charts.make_line(slide, fit.model * scale, "accent", "fitted", width=1.0))
     return [
         charts.make_chart(
             "Measured and fitted",

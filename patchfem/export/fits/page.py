@@ -72,7 +72,7 @@ def page_html(
 def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
     """Return the head of the page of a fit as HTML: values, summary and warnings."""
     values_text = "; ".join(
-        f"{escape(key)} = {_value_with_ends(described)}" for key, described in values.items()
+        f"{escape(key)} = {_value_with_ends(entry)}" for key, entry in values.items()
     )
     law = f"{fit_data['law']}: " if "law" in fit_data else ""
     sentence = "; ".join(" ".join(line.split()) for line in summary)
@@ -84,9 +84,9 @@ def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
     )
 
 
-def _value_with_ends(described: dict) -> str:
+def _value_with_ends(entry: dict) -> str:
     """Format a fitted value with the ends of its confidence interval."""
-    value, unit, ends = format_fitted(described)
+    value, unit, ends = format_fitted(entry)
     interval = f" ({ends[0]} to {ends[1]})" if ends else ""
     return f"{value} {unit}".strip() + interval
 
@@ -94,25 +94,25 @@ def _value_with_ends(described: dict) -> str:
 def _values_table(values: dict) -> str:
     """Return the HTML table of the value, interval and range of each fitted key."""
     rows = []
-    for key, described in values.items():
-        value, unit, ends = format_fitted(described)
+    for key, entry in values.items():
+        value, unit, ends = format_fitted(entry)
         interval = "&ndash;"
         if ends:
             interval = " .. ".join(ends)
-        elif "interval" in described:
+        elif "interval" in entry:
             interval = "not determined"
         searched = "&ndash;"
-        if "bounds" in described:
-            searched = " .. ".join(_format_bound(described, end) for end in described["bounds"])
-        if described.get("at_bound"):
-            searched += f", at its {described['at_bound']} bound"
+        if "bounds" in entry:
+            searched = " .. ".join(_format_bound(entry, end) for end in entry["bounds"])
+        if entry.get("at_bound"):
+            searched += f", at its {entry['at_bound']} bound"
         rows.append([escape(key), value, interval, escape(unit), searched])
     return table_html(("key", ">value", ">95 %", "unit", "searched"), rows)
 
 
-def _format_bound(described: dict, end: float) -> str:
+def _format_bound(entry: dict, end: float) -> str:
     """Format a bound that limited a fitted value."""
-    value, unit, _ = format_fitted(described | {"value": end, "interval": None})
+    value, unit, _ = format_fitted(entry | {"value": end, "interval": None})
     return f"{value} {unit}"
 
 

@@ -26,40 +26,38 @@ PATCH_COLOUR = "#000000"
 Y_MARGIN = 1.05  # upper end of the axis of stiffness / largest stiffness
 
 
-def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
+def describe_patch_fit(fit: FittedPatch, folder: Path) -> FitFiles:
     """Collect the files of single-point laws that are fitted to a patch.
 
     The paths in the fitted scenes are relative to `folder`.
     """
-    fit_data = _collect_fit_data(fitted)
+    fit_data = _collect_fit_data(fit)
     lines = _format_fit_data(fit_data)
-    names = {FITTED_SCENE: fitted.best} | {f"scene.{law}.toml": law for law in FITTED_LAWS}
-    scenes = {
-        name: _scene_text(fitted, law, fit_data, folder / name) for name, law in names.items()
-    }
+    names = {FITTED_SCENE: fit.best} | {f"scene.{law}.toml": law for law in FITTED_LAWS}
+    scenes = {name: _scene_text(fit, law, fit_data, folder / name) for name, law in names.items()}
     return FitFiles(
         answer=fit_data,
         lines=lines,
         summary=lines[:1],
         scenes=scenes,
-        rows=_csv_rows(fitted),
-        charts=_draw_charts(fitted),
+        rows=_csv_rows(fit),
+        charts=_draw_charts(fit),
         caption="Stiffness and loss per cycle of the patch and of each fitted law, against slide "
         "amplitude",
     )
 
 
-def _collect_fit_data(fitted: FittedPatch) -> dict:
+def _collect_fit_data(fit: FittedPatch) -> dict:
     """Return the contents of fit.json of laws that are fitted to a patch."""
-    patch = fitted.patch
-    laws = {law: _describe_law(law, fitted_law, fitted) for law, fitted_law in fitted.laws.items()}
-    best = laws[fitted.best]
+    patch = fit.patch
+    laws = {law: _describe_law(law, fitted_law, fit) for law, fitted_law in fit.laws.items()}
+    best = laws[fit.best]
     mesh = None
     if patch.mesh_change is not None:
         mesh = _difference_sizes(patch.mesh_change, patch.slides) | {"nodes": patch.nodes}
-    scene = fitted.scene
+    scene = fit.scene
     return describe_measurement(scene.title, scene.path.name, "patch", best["outcome"]) | {
-        "law": fitted.best,
+        "law": fit.best,
         "values": best["values"],
         "laws": laws,
         "load": patch.load,
@@ -69,15 +67,15 @@ def _collect_fit_data(fitted: FittedPatch) -> dict:
         "rows": int(patch.slides.size),
         "amplitudes": [float(patch.slides[0]), float(patch.slides[-1])],
         "mesh": mesh,
-        "warnings": [*scene.remarks, *fitted.warnings],
-        "seconds": round(fitted.seconds, 6),
+        "warnings": [*scene.remarks, *fit.warnings],
+        "seconds": round(fit.seconds, 6),
     }
 
 
-def _describe_law(law: str, fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
+def _describe_law(law: str, fitted_law: FittedLaw, fit: FittedPatch) -> dict:
     """Return the values and errors of a fitted law, as written in fit.json."""
     units = FITTED_LAWS[law].units
-    sizes = _difference_sizes(fitted_law.deviations, fitted.patch.slides)
+    sizes = _difference_sizes(fitted_law.deviations, fit.patch.slides)
     return {
         "values": {
             f"friction.{key}": {"value": value, "unit": units.get(key, "1")}
@@ -85,7 +83,7 @@ def _describe_law(law: str, fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
         },
         "outcome": str(fitted_law.fit.outcome),
         **sizes,
-        "dissipation": sizes["dissipation"] | _relative_loss(fitted_law, fitted),
+        "dissipation": sizes["dissipation"] | _relative_loss(fitted_law, fit),
     }
 
 
@@ -105,13 +103,13 @@ def _difference_sizes(deviations, slides) -> dict:
     return out
 
 
-def _relative_loss(fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
+def _relative_loss(fitted_law: FittedLaw, fit: FittedPatch) -> dict:
     """Return the largest difference of the loss of a law relative to that of the patch.
 
     It is relative to the loss of the patch, also where this loss is tiny. If the patch
     dissipates nothing, the difference is that of `fitted_law.deviations`.
     """
-    patch_loss = fitted.patch.curves.loss
+    patch_loss = fit.patch.curves.loss
     loss = fitted_law.curves.loss
     relative_difference = np.where(
         patch_loss > 0,
@@ -119,16 +117,16 @@ def _relative_loss(fitted_law: FittedLaw, fitted: FittedPatch) -> dict:
         fitted_law.deviations[1],
     )
     k = np.abs(relative_difference).argmax()
-    return {"relative": float(relative_difference[k]), "relative_at": float(fitted.patch.slides[k])}
+    return {"relative": float(relative_difference[k]), "relative_at": float(fit.patch.slides[k])}
 
 
-def _scene_text(fitted: FittedPatch, law: str, fit_data: dict, path: Path) -> str:
+def _scene_text(fit: FittedPatch, law: str, fit_data: dict, path: Path) -> str:
     """Return the text of the scene with a fitted law in place of its patch, in SI units."""
-    scene = fitted.scene
+    scene = fit.scene
     tables = tomllib.loads(scene.resolved())
     tables.pop("contact")
-    tables["normal"] = {"load": fitted.patch.load}
-    values = fitted.laws[law].values
+    tables["normal"] = {"load": fit.patch.load}
+    values = fit.laws[law].values
     tables["friction"] = {"law": law, "static": scene.friction.static, **values}
     tables["accuracy"] = {"tolerance": scene.accuracy.tolerance}
     lumped_scene = loads(format_scene(tables), scene.path)
@@ -140,30 +138,30 @@ def _scene_text(fitted: FittedPatch, law: str, fit_data: dict, path: Path) -> st
     return f"{head}\n\n{write_resolved(move_scene(lumped_scene, path), build(lumped_scene))}"
 
 
-def _csv_rows(fitted: FittedPatch) -> list:
+def _csv_rows(fit: FittedPatch) -> list:
     """Return the rows of fit.csv: force and loss of the patch and of each fitted law."""
-    curves = {"patch": fitted.patch.curves} | {law: one.curves for law, one in fitted.laws.items()}
+    curves = {"patch": fit.patch.curves} | {law: one.curves for law, one in fit.laws.items()}
     parts = ("force [N]", "loss [J]")
     head = ["slide [m]", *(f"{name} {part}" for name in curves for part in parts)]
-    columns = [fitted.patch.slides]
+    columns = [fit.patch.slides]
     for curve in curves.values():
         columns += [curve.force, curve.loss]
     return [head, *([*map(repr, row)] for row in np.column_stack(columns).tolist())]
 
 
-def _draw_charts(fitted: FittedPatch) -> list:
+def _draw_charts(fit: FittedPatch) -> list:
     """Chart the stiffness and the loss per cycle against the slide amplitude."""
-    slides = fitted.patch.slides
+    slides = fit.patch.slides
     unit, scale = choose_axis_unit(slides, "m")
     along = charts.make_axis("amplitude of the slide", unit, True)
     x = slides * scale
-    patch_curves = fitted.patch.curves
+    patch_curves = fit.patch.curves
     stiffness = [charts.make_dots(x, patch_curves.force / slides, PATCH_COLOUR, "patch", size=4)]
     loss = [
         charts.make_dots(x, _mask_nonpositive(patch_curves.loss), PATCH_COLOUR, "patch", size=4)
     ]
     peak = float((patch_curves.force / slides).max())
-    for law, fitted_law in fitted.laws.items():
+    for law, fitted_law in fit.laws.items():
         values = fitted_law.curves.force / slides
         peak = max(peak, float(values.max()))
         stiffness.append(charts.make_line(x, values, COLOURS[law], law))

@@ -121,12 +121,12 @@ def fit_into(
             files = _fit_rows(scene, Path(to), free, options, folder, listener)
         elif kind == "curve":
             starts = options.starts or DEFAULT_STARTS
-            fitted = fit_curve(scene, Path(to), free, listener.say, starts)
-            files = describe_curve_fit(fitted, folder.target)
+            fit = fit_curve(scene, Path(to), free, listener.say, starts)
+            files = describe_curve_fit(fit, folder.target)
         elif kind == "loop":
             loop_options = LoopOptions(options.offset, options.warm_up)
-            fitted = fit_loop(scene, Path(to), free, options.hold, listener.say, loop_options)
-            files = describe_loop_fit(fitted, folder.target)
+            fit = fit_loop(scene, Path(to), free, options.hold, listener.say, loop_options)
+            files = describe_loop_fit(fit, folder.target)
         else:
             coefficient = fit_wear(build(scene), to, free, listener.progress)
             files = describe_wear_fit(coefficient, scene)
@@ -191,5 +191,5 @@ def _fit_rows(
     starts = options.starts or DEFAULT_ROW_STARTS
     search = SearchSettings(starts, options.seed, options.unstable, checkpoint)
     row_options = RowsOptions(options.hold, options.leave_out, options.placebo, search)
-    fitted = fit_rows(FitRequest(scene, ranges, path), row_options, listener.say, listener.progress)
-    return describe_rows_fit(fitted, folder.target)
+    fit = fit_rows(FitRequest(scene, ranges, path), row_options, listener.say, listener.progress)
+    return describe_rows_fit(fit, folder.target)

@@ -67,14 +67,14 @@ class SearchCheckpoint:
         return self.known.get(name)
 
 
-def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
+def describe_rows_fit(fit: FittedRows, folder: Path) -> FitFiles:
     """Collect the files of a fit to a table of measured responses.
 
     The paths in the fitted scene are relative to `folder`.
     """
-    fit_data = rows_fit_data(fitted)
+    fit_data = rows_fit_data(fit)
     lines = _format_fit_data(fit_data)
-    scene = fitted_scene_text(fitted.keys, fitted.cells.path.name, folder)
+    scene = fitted_scene_text(fit.keys, fit.cells.path.name, folder)
     return FitFiles(
         answer=fit_data,
         lines=lines,
@@ -86,54 +86,54 @@ def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
     )
 
 
-def rows_fit_data(fitted: FittedRows) -> dict:
+def rows_fit_data(fit: FittedRows) -> dict:
     """Return the contents of fit.json for a fit to a table of measured responses.
 
     Scores are root mean squares of ln(computed/measured).
     """
-    keys = fitted.keys
-    cells = fitted.cells
+    keys = fit.keys
+    cells = fit.cells
     best_fit = keys.fit
     nulls = {}
     nulls_stable = {}
     for name in NULL_MODELS:
-        null = fitted.nulls[name]
-        nulls[name] = fitted.score(null.logs, null.left_out_logs) | {"numbers": null.numbers}
-        nulls_stable[name] = fitted.score(null.logs, null.left_out_logs, stable=True)
+        null = fit.nulls[name]
+        nulls[name] = fit.score(null.logs, null.left_out_logs) | {"numbers": null.numbers}
+        nulls_stable[name] = fit.score(null.logs, null.left_out_logs, stable=True)
     return describe_measurement(keys.scene.title, cells.path.name, "rows", keys.outcome) | {
         "values": describe_values(keys),
-        "scores": fitted.score(fitted.logs, fitted.left_out_logs),
-        "scores_stable": fitted.score(fitted.logs, fitted.left_out_logs, stable=True),
+        "scores": fit.score(fit.logs, fit.left_out_logs),
+        "scores_stable": fit.score(fit.logs, fit.left_out_logs, stable=True),
         "nulls": nulls,
         "nulls_stable": nulls_stable,
-        "unstable": fitted.settings.unstable,
-        "reading": _instrument_settings(fitted),
+        "unstable": fit.settings.unstable,
+        "reading": _instrument_settings(fit),
         "unknown": describe_unknown(keys.ranges, best_fit),
         "correlation": describe_correlation(best_fit),
-        "readings": int((~fitted.held_out).sum()),
-        "held": int(fitted.held_out.sum()),
+        "readings": int((~fit.held_out).sum()),
+        "held": int(fit.held_out.sum()),
         "rms": best_fit.rms,
-        "seed": fitted.settings.seed,
-        "starts": _search_starts(fitted),
-        "folds": _fold_scores(fitted),
-        "placebos": _placebo_scores(fitted),
-        "rows": _row_entries(fitted),
+        "seed": fit.settings.seed,
+        "starts": _search_starts(fit),
+        "folds": _fold_scores(fit),
+        "placebos": _placebo_scores(fit),
+        "rows": _row_entries(fit),
         "evaluations": best_fit.counts.evaluations,
         "failures": best_fit.counts.failures,
-        "motions": fitted.n_motions,
+        "motions": fit.n_motions,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
 
 
-def _instrument_settings(fitted: FittedRows) -> dict:
+def _instrument_settings(fit: FittedRows) -> dict:
     """Return settings and gains of the instruments of a rig."""
-    read = fitted.models.read
+    read = fit.models.read
     out = {
         "reading": "peak" if read is None else read.reading,
         "reading_cutoff": None if read is None else read.reading_cutoff,
     }
-    keys = fitted.keys
+    keys = fit.keys
     values = {bound.key: float(value) for bound, value in zip(keys.ranges, keys.fit.values)}
     for key in GAIN_KEYS:
         name = key.partition(".")[2]
@@ -141,10 +141,10 @@ def _instrument_settings(fitted: FittedRows) -> dict:
     return out
 
 
-def _search_starts(fitted: FittedRows) -> list:
+def _search_starts(fit: FittedRows) -> list:
     """Return for each search its first and last values and its training score."""
-    names = [bound.key for bound in fitted.keys.ranges]
-    search = fitted.search
+    names = [bound.key for bound in fit.keys.ranges]
+    search = fit.search
     out = []
     for first_values, end, rms in zip(
         search.starts.tolist(), search.ends.tolist(), search.rms.tolist()
@@ -160,37 +160,37 @@ def _search_starts(fitted: FittedRows) -> list:
     return out
 
 
-def _fold_scores(fitted: FittedRows) -> list:
+def _fold_scores(fit: FittedRows) -> list:
     """Return the cross-validation fits with their scores on the left-out readings."""
-    names = [bound.key for bound in fitted.keys.ranges]
+    names = [bound.key for bound in fit.keys.ranges]
     return [
         {
             "left_out": fold.name,
             "training": fold.search.fit.rms,
-            "scores": scores(fitted.cells, fitted.left_out_logs, fold.readings),
+            "scores": scores(fit.cells, fit.left_out_logs, fold.readings),
             "values": dict(zip(names, fold.search.fit.values.tolist())),
             "starts": [rms if math.isfinite(rms) else None for rms in fold.search.rms.tolist()],
         }
-        for fold in fitted.folds
+        for fold in fit.folds
     ]
 
 
-def _placebo_scores(fitted: FittedRows) -> list:
+def _placebo_scores(fit: FittedRows) -> list:
     """Return the scores of fits that are repeated with another value of a fixed key.
 
     Placebos leave out no readings, so they have no score "left_out".
     """
     out = []
-    for placebo in fitted.placebos:
-        score = fitted.score(placebo.logs, np.full(placebo.logs.size, np.nan))
+    for placebo in fit.placebos:
+        score = fit.score(placebo.logs, np.full(placebo.logs.size, np.nan))
         score.pop("left_out")
         out.append({"set": placebo.text, "scores": score})
     return out
 
 
-def _row_entries(fitted: FittedRows) -> list:
+def _row_entries(fit: FittedRows) -> list:
     """Return measured and computed readings of each condition in SI units."""
-    cells = fitted.cells
+    cells = fit.cells
     keys = zip(cells.row.tolist(), map(bool, cells.felt))
     number = {key: n for n, key in enumerate(keys)}
     out = []
@@ -200,11 +200,11 @@ def _row_entries(fitted: FittedRows) -> list:
             n = number.get((k, is_felt))
             value = None
             if n is not None:
-                value = float(fitted.computed[part, cells.condition[n]])
+                value = float(fit.computed[part, cells.condition[n]])
             entry[name] = {
                 "measured": getattr(row, name),
                 "computed": value if value is None or math.isfinite(value) else None,
-                "held": None if n is None else bool(fitted.held_out[n]),
+                "held": None if n is None else bool(fit.held_out[n]),
             }
         out.append(entry)
     return out
@@ -228,9 +228,9 @@ def _csv_rows(fit_data: dict) -> list:
         pairs = ((row["acceleration"], G_N), (row["displacement"], MIL))
         measured = [_format_cell(reading["measured"], unit) for reading, unit in pairs]
         computed = [_format_cell(reading["computed"], unit) for reading, unit in pairs]
-        held = int(any(reading["held"] for reading, _ in pairs))
+        n_held_out = int(any(reading["held"] for reading, _ in pairs))
         drive = [f"{row['frequency']:.9g}", f"{row['input'] / G_N:.9g}"]
-        rows.append([*drive, *measured, row["flag"], *computed, held])
+        rows.append([*drive, *measured, row["flag"], *computed, n_held_out])
     return rows
 
 
@@ -256,14 +256,14 @@ def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
             group = groups.setdefault((bool(reading["held"]), "U" in row["flag"]), [])
             group.append((reading["measured"] / scale, reading["computed"] / scale))
     marks = []
-    for held, unstable in sorted(groups):
-        x, y = zip(*groups[held, unstable])
-        text = "held out" if held else "fitted"
+    for n_held_out, unstable in sorted(groups):
+        x, y = zip(*groups[n_held_out, unstable])
+        text = "held out" if n_held_out else "fitted"
         if unstable:
             text += ", unstable in the test"
         shape = "triangle" if unstable else "circle"
         marks.append(
-            charts.make_dots(x, y, "warm" if held else "accent", text, size=4, shape=shape)
+            charts.make_dots(x, y, "warm" if n_held_out else "accent", text, size=4, shape=shape)
         )
     if groups:
         numbers = np.concatenate([np.ravel(points) for points in groups.values()])

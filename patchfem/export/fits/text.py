@@ -13,14 +13,14 @@ class FormattedValue(NamedTuple):
     ends: list
 
 
-def format_fitted(described: dict) -> FormattedValue:
+def format_fitted(entry: dict) -> FormattedValue:
     """Format a fitted value of fit.json and its interval in a readable unit."""
     unit, scale = choose_display_unit(
-        described["value"], SENTENCE_UNITS.get(described["unit"], described["unit"])
+        entry["value"], SENTENCE_UNITS.get(entry["unit"], entry["unit"])
     )
-    ends = described.get("interval") or []
+    ends = entry.get("interval") or []
     half_width = scale * (ends[1] - ends[0]) / 2 if ends else None
-    numbers = [described["value"], *ends]
+    numbers = [entry["value"], *ends]
     value, *ends = [round_to_error(number * scale, half_width)[0] for number in numbers]
     return FormattedValue(value, unit, ends)
 
@@ -36,12 +36,12 @@ def named_values(fit_data: dict) -> dict:
     return fit_data["values"] | {f"offset of the {name}": one for name, one in offsets.items()}
 
 
-def format_line(name: str, described: dict) -> str:
+def format_line(name: str, entry: dict) -> str:
     """Return a line with a fitted value, its interval and the bound that it reached."""
-    value, unit, ends = format_fitted(described)
+    value, unit, ends = format_fitted(entry)
     interval = "not determined"
     if ends:
-        by = "profile" if described["method"] == "profile" else "linearised problem"
+        by = "profile" if entry["method"] == "profile" else "linearised problem"
         interval = f"95 % in [{', '.join(ends)}] by the {by}"
-    bound = f", at its {described['at_bound']} bound" if described["at_bound"] else ""
+    bound = f", at its {entry['at_bound']} bound" if entry["at_bound"] else ""
     return f"  {name} {f'{value} {unit}'.strip()}   {interval}{bound}"

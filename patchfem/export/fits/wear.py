@@ -8,33 +8,31 @@ from ...scene.scene import Scene, loads
 from .files import FITTED_SCENE, FitFiles, describe_measurement
 
 
-def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
+def describe_wear_fit(fit: FittedCoefficient, scene: Scene) -> FitFiles:
     """Describe the files of a fitted wear coefficient.
 
     `scene` is the scene before the fit.
     """
-    measured = fitted.measured
-    bounds = fitted.bounds
-    fitted_scene = loads(
-        scene.text, scene.path, [*scene.sets, bounds.format_assignment(fitted.value)]
-    )
+    measured = fit.measured
+    bounds = fit.bounds
+    fitted_scene = loads(scene.text, scene.path, [*scene.sets, bounds.format_assignment(fit.value)])
     value = {
-        "value": fitted.value,
+        "value": fit.value,
         "unit": "m2 N-1",
-        "low": fitted.low,
-        "high": fitted.high,
-        "interval": [fitted.low, fitted.high],
+        "low": fit.low,
+        "high": fit.high,
+        "interval": [fit.low, fit.high],
         "bounds": [bounds.low, bounds.high],
     }
     fit_data = describe_measurement(scene.title, measured.source, measured.name, "done") | {
-        "runs": fitted.runs,
-        "model": fitted.model,
+        "runs": fit.runs,
+        "model": fit.model,
         "data": {"value": measured.value, "low": measured.low, "high": measured.high},
         "values": {KEY: value},
         "warnings": [],
     }
     source = "" if measured.source == "--to" else f" of {Path(measured.source).name}"
-    numbers = (fitted.value, fitted.low, fitted.high)
+    numbers = (fit.value, fit.low, fit.high)
     number, low, high = (format_number(one, 4) for one in numbers)
     line = f"{KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
     return FitFiles(

@@ -20,7 +20,7 @@ from . import write
 OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 
 
-class Estimate(NamedTuple):
+class EstimateOptions(NamedTuple):
     """User settings for the estimation of modes or of a frequency response.
 
     Attributes
@@ -45,7 +45,7 @@ class Estimate(NamedTuple):
 
 
 def convert_file(
-    file: Path, out: Path, requests: Iterable[str], zero: bool, settings: Estimate
+    file: Path, out: Path, requests: Iterable[str], zero: bool, settings: EstimateOptions
 ) -> dict:
     """Convert a laboratory file to records (.csv), modes (.toml) or a response (.uff).
 
@@ -57,7 +57,7 @@ def convert_file(
         Channels as in `patchfem import --map`.
     zero : bool
         Whether time and displacement are measured from their first row.
-    settings : Estimate
+    settings : EstimateOptions
 
     Returns
     -------
@@ -74,7 +74,7 @@ def convert_file(
         raise PatchfemError(
             f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
         )
-    if suffix == ".csv" and settings != Estimate(
+    if suffix == ".csv" and settings != EstimateOptions(
         decay=settings.decay, begin=settings.begin if settings.decay else ""
     ):
         raise PatchfemError(
@@ -157,7 +157,7 @@ def _write_decay(file: Path, out: Path, requests, begin_text: str) -> dict:
     }
 
 
-def _write_modes(file: Path, out: Path, requests, settings: Estimate) -> dict:
+def _write_modes(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
     """Write identified modes as tables of a scene."""
     shapes, notes = _read_shapes(file, requests, settings)
     if shapes is not None:
@@ -195,7 +195,7 @@ def _write_modes(file: Path, out: Path, requests, settings: Estimate) -> dict:
     }
 
 
-def _write_response(file: Path, out: Path, requests, settings: Estimate) -> dict:
+def _write_response(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
     """Write an estimated frequency response as a universal file."""
     if settings.decay or settings.begin or settings.band:
         raise PatchfemError(
@@ -230,7 +230,7 @@ def _read_records(file: Path, requests) -> tuple:
     return laboratory_records.values, laboratory_records.notes
 
 
-def _read_shapes(file: Path, requests, settings: Estimate) -> tuple:
+def _read_shapes(file: Path, requests, settings: EstimateOptions) -> tuple:
     """Read mode shapes or frequency responses of a universal file, with notes.
 
     (None, ()) for any other file.
@@ -238,7 +238,7 @@ def _read_shapes(file: Path, requests, settings: Estimate) -> tuple:
     names = {text.partition("=")[0].strip() for text in requests}
     if (
         file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS
-        or settings != Estimate()
+        or settings != EstimateOptions()
         or names & set(CHANNEL_UNITS)
     ):
         return None, ()

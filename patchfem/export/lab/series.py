@@ -13,7 +13,7 @@ from ...inputs.columns import read_columns
 from ...inputs.units import FORCE_UNITS, SLIDE_UNITS
 from ..read_results import is_real, read_variables
 
-# Names of slide and resistance; the first pair that a folder has counts.
+# Names of slide and resistance. The first pair that exists in a folder is used.
 LOOPS = (
     ("slide", "friction_force"),
     ("relative_displacement", "friction_force"),
@@ -65,15 +65,15 @@ class Histories:
     def loops(self) -> list:
         """Return the friction loop of each interface as a pair of columns."""
         columns_by_name = {(column.name, column.number): column for column in self.columns}
-        found = {}
+        loops = {}
         for slide, force in LOOPS:
             for number in sorted(number for name, number in columns_by_name if name == slide):
                 if (force, number) in columns_by_name:
-                    found.setdefault(
+                    loops.setdefault(
                         (force, number),
                         (columns_by_name[slide, number], columns_by_name[force, number]),
                     )
-        return list(found.values())
+        return list(loops.values())
 
 
 def read_histories(folder: Path) -> Histories:

@@ -11,7 +11,8 @@ from ...structure.drive_sizes import MAX_STORED_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
 from .series import read_histories
 
-MIN_ROWS_PER_SWING = 5  # rows between reversals, below which only reversals are stored
+# Below this number of rows between reversals, only the reversals are stored.
+MIN_ROWS_PER_SWING = 5
 # columns of a decay without the prefix "decay_"
 DECAY = {
     "time": "s",

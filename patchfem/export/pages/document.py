@@ -18,7 +18,7 @@ OLD_BROWSER_NOTE = (
     "which browsers have had since 2023. Texts and tables are complete."
 )
 NOT_FINITE = re.compile("nan|-?inf")
-# A word of a scene or of a command inside a sentence stands between two backquotes.
+# Keys of a scene and words of a command are set in backquotes inside a sentence.
 QUOTED_WORD = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
 # Colours of `drawing.pictures`, and the colours of the page that replace them in the light and the
 # dark theme.

@@ -19,8 +19,8 @@ VALUE_DIGITS = 7
 ERROR_DIGITS = 3
 
 
-class DrawnCases(NamedTuple):
-    """Cases of a sweep that its page draws.
+class PlottedCases(NamedTuple):
+    """Cases of a sweep that are plotted on its page.
 
     cases: their numbers; said: a sentence that says which they are, "" for all.
     """
@@ -29,7 +29,7 @@ class DrawnCases(NamedTuple):
     said: str = ""
 
 
-def select_cases(table: dict, data) -> DrawnCases:
+def select_cases(table: dict, data) -> PlottedCases:
     """Choose the cases of a sweep that its page draws.
 
     Parameters
@@ -42,14 +42,14 @@ def select_cases(table: dict, data) -> DrawnCases:
     number = len(table["outcome"])
     sample = _evenly_spaced(number, N_SAMPLED_CASES)
     if number * len(to_json(data(sample, True))) <= MAX_BYTES * sample.size:
-        return DrawnCases(np.arange(number))
+        return PlottedCases(np.arange(number))
     max_cases = max(MIN_CASES, int(MAX_BYTES * sample.size / len(to_json(data(sample, False)))))
     if max_cases >= number:
-        return DrawnCases(np.arange(number))
+        return PlottedCases(np.arange(number))
     return _select_rows(table, max_cases)
 
 
-def _select_rows(table: dict, max_cases: int) -> DrawnCases:
+def _select_rows(table: dict, max_cases: int) -> PlottedCases:
     """Select evenly spaced cases, the extremes of measures and keys, and one of each outcome."""
     number = len(table["outcome"])
     always_drawn = {
@@ -62,7 +62,7 @@ def _select_rows(table: dict, max_cases: int) -> DrawnCases:
     cases = np.union1d(
         _evenly_spaced(number, max(max_cases - always_drawn.size, MIN_CASES)), always_drawn
     )
-    return DrawnCases(
+    return PlottedCases(
         cases,
         f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
         "largest or "

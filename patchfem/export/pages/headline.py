@@ -36,7 +36,7 @@ MAIN_MEASURES = (
 
 
 class Sentences(NamedTuple):
-    """Sentences of which the summary of a sweep consists.
+    """Sentences that make up the summary of a sweep.
 
     Attributes
     ----------
@@ -102,20 +102,28 @@ class SweepHeadline(NamedTuple):
 
         They are the answer, whether all cases meet the tolerance, and all others.
         """
-        said = self.said
+        sentences = self.said
         # The limits of a grid give more information than the ranking.
-        rank = said.rank if said.scatter or not (said.limit or said.peak) else ""
-        others = [said.limit, said.peak, rank, said.scatter, said.span]
+        rank = (
+            sentences.rank if sentences.scatter or not (sentences.limit or sentences.peak) else ""
+        )
+        other_sentences = [sentences.limit, sentences.peak, rank, sentences.scatter, sentences.span]
         if self.asked:
-            others = [said.rank, said.scatter, said.span, said.limit, said.peak]
+            other_sentences = [
+                sentences.rank,
+                sentences.scatter,
+                sentences.span,
+                sentences.limit,
+                sentences.peak,
+            ]
         used = self._answer_parts()
-        misses = "" if self.missed or not used else said.misses
+        misses = "" if self.missed or not used else sentences.misses
         return [
             sentence
             for sentence in (
                 self.answer(),
                 misses,
-                *(sentence for sentence in others if sentence not in used),
+                *(sentence for sentence in other_sentences if sentence not in used),
             )
             if sentence
         ]
@@ -366,32 +374,32 @@ def span_sentence(
         has_value = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
         if not has_value.any():
             continue
-        counted = has_value & trusted[name]
-        if not counted.any():
+        is_included = has_value & trusted[name]
+        if not is_included.any():
             return ""
         values, errors, unit = (
-            column if isinstance(column, str) else np.asarray(column, float)[counted]
+            column if isinstance(column, str) else np.asarray(column, float)[is_included]
             for column in measures[name]
         )
         low, high = format_pair(name, values.min(), values.max(), unit, 4)
         range_text = f"is {high}"
         if low != high:
             range_text = f"ranges from {low} to {high}"
-        elif counted.sum() > 1:  # a single case has no range
+        elif is_included.sum() > 1:  # a single case has no range
             range_text = f"is {high} throughout"
         # A value of 0 is known absolutely.
         has_error = np.isfinite(errors) & (errors > 0) & (np.abs(values) > format_zero(name))
-        has_error &= ~within_floor[name][0][counted] if name in within_floor else True
+        has_error &= ~within_floor[name][0][is_included] if name in within_floor else True
         largest_error = (
             float(np.max(errors[has_error] / np.abs(values[has_error]))) if has_error.any() else 0.0
         )
         error_texts = [f"{format_number(100 * largest_error, 1)} %"] * (
             largest_error > MIN_STATED_ERROR
         )
-        if name in within_floor and within_floor[name][0][counted].any():
+        if name in within_floor and within_floor[name][0][is_included].any():
             error_texts.append(f"{within_floor[name][1]}, the floor of this measure")
         error_clause = f", with errors of at most {' or '.join(error_texts)}" if error_texts else ""
-        n_counted = counted.sum()
+        n_counted = is_included.sum()
         n_settled = (has_value & settled).sum()
         qualifier = ""
         if n_counted != has_value.sum() and n_counted == n_settled:

@@ -30,9 +30,9 @@ def key_formatter(key: dict) -> Callable[[int], str]:
     return format_case
 
 
-def group_cases_along_key(key: dict, others: list) -> list:
+def group_cases_along_key(key: dict, other_keys: list) -> list:
     """Group the cases by the values of all other keys, ordered along one key."""
     lines = {}
     for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():
-        lines.setdefault(tuple(other["texts"][case] for other in others), []).append(case)
+        lines.setdefault(tuple(other["texts"][case] for other in other_keys), []).append(case)
     return [np.array(line) for line in lines.values()]

@@ -47,7 +47,7 @@ KEYS_WITHOUT_LIMIT = (
 )
 GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}
 ANGLE_UNITS = [name for name, _ in UNIT_LADDERS["rad"]]
-# A smaller number of a key is written in a smaller unit: 0.011 mrad, but 10 urad.
+# A value below this number is written in the next smaller unit: 0.011 mrad, but 10 urad.
 MIN_NUMBER = 0.0101
 MAX_NUMBER = 1e4  # the next larger unit is used for larger numbers of a key
 # Relative change of a measure below which it is round-off.
@@ -203,7 +203,7 @@ def _limit_along_line(
     largest = CHANGE_AT_LIMIT[name]
     change = (values[valid] - values[0]) / abs(values[0])
     error = (errors[valid] + errors[0]) / abs(values[0])
-    # Only an increase can double a pressure.
+    # A pressure can be twice its first value only if it increases along the key.
     size = np.abs(change) if largest < DOUBLING else change
     open_or_beyond = np.flatnonzero(size[1:] + error[1:] > largest)
     inside = int(open_or_beyond[0]) if open_or_beyond.size else valid.size - 1
@@ -364,12 +364,14 @@ def _first_to_change(limits: Limits, ends: list) -> str:
     sizes = limits.sizes()
     reached = [limit for limit in ends if limit.beyond is not None]
     soonest = min(sizes[limit.beyond] for limit in reached)
-    early = [measure_label(limit.name) for limit in reached if sizes[limit.inside] < soonest]
+    first_measures = [
+        measure_label(limit.name) for limit in reached if sizes[limit.inside] < soonest
+    ]
     last = ends[-1]
     later = ""
-    if last.beyond is not None and measure_label(last.name) not in early:
+    if last.beyond is not None and measure_label(last.name) not in first_measures:
         later = f"; {measure_label(last.name)} {_format_position(limits, last)}"
-    return f"first to change: {' or '.join(early)}{later}"
+    return f"first to change: {' or '.join(first_measures)}{later}"
 
 
 def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:

@@ -19,11 +19,10 @@ KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 MIN_FREQUENCIES = 5  # smallest number of frequencies that show a peak
 ERROR_FACTOR = 3.0  # error / difference between the polynomials, a safety factor
-N_NEWTON_STEPS = (
-    30  # Newton steps from the vertex of a parabola, or from the crossing of a straight line
-)
+# Newton steps from the vertex of a parabola, or from the crossing of a straight line.
+N_NEWTON_STEPS = 30
 OPEN = "not resolved by these cases"
-# Error / value of a steady estimate, up to which the estimate is used as the height in a case.
+# Largest relative error with which a steady-state estimate is used as the height of the curve in a case.
 MAX_STEADY_ERROR = 0.01
 
 
@@ -98,18 +97,20 @@ def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
     name = next((candidate for candidate in HEIGHTS if candidate in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
         return []
-    others = [candidate for candidate in keys if candidate is not key and is_varied(candidate)]
-    formatters = [_case_formatter(other) for other in others]
+    other_keys = [candidate for candidate in keys if candidate is not key and is_varied(candidate)]
+    formatters = [_case_formatter(other) for other in other_keys]
     height, error = _peak_heights(name, measures, trusted)
     peaks = []
-    for line in group_cases_along_key(key, others):
-        swept = _find_swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
-        if swept is not None:
+    for line in group_cases_along_key(key, other_keys):
+        swept_peak = _find_swept_peak(
+            np.asarray(key["values"], float)[line], height[line], error[line]
+        )
+        if swept_peak is not None:
             other_values = ", ".join(
                 f"{other['name']} {format_case(line[0])}"
-                for other, format_case in zip(others, formatters)
+                for other, format_case in zip(other_keys, formatters)
             )
-            peaks.append(Peak(name, other_values, measures[name][2], swept))
+            peaks.append(Peak(name, other_values, measures[name][2], swept_peak))
     return peaks
 
 
@@ -172,16 +173,16 @@ def _find_swept_peak(
         (peak_index - 1, peak_index + 3),
         (peak_index - 2, peak_index + 3),
     )
-    others = [
+    other_estimates = [
         _find_minimum(square, g, peak_index, low, high)
         for low, high in windows
         if low >= 0 and high <= y.size
     ]
-    agreeing = [result for result in others if result]
+    agreeing = [result for result in other_estimates if result]
     peak_squares = np.sqrt(x[peak_index] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
     heights = y[peak_index] * np.array([minimum, *(value for _, value in agreeing)]) ** -0.5
-    # A polynomial through more cases has no peak here.
-    unchecked = len(agreeing) < len(others) or not others
+    # The polynomial through more cases has no maximum in this interval.
+    unchecked = len(agreeing) < len(other_estimates) or not other_estimates
     peak = float(heights[0])
     height_error = ERROR_FACTOR * float(np.ptp(heights))
     frequency_error = ERROR_FACTOR * float(np.ptp(peak_squares))
@@ -323,10 +324,10 @@ def peaks_sentence(peaks: list) -> str:
     )
 
 
-def _unknown_peaks(peaks: list, others: bool) -> str:
+def _unknown_peaks(peaks: list, some_are_known: bool) -> str:
     """State for which lines of cases the peak is unknown.
 
-    others: whether it is known for some.
+    some_are_known: whether it is known for some.
     """
     if not peaks:
         return ""
@@ -334,7 +335,7 @@ def _unknown_peaks(peaks: list, others: bool) -> str:
         f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     )
     line_text = f" with {peaks[0].held}{number_of_others}" if peaks[0].held else ""
-    where = "where it" if others else f"Where {measure_label(peaks[0].name)}"
+    where = "where it" if some_are_known else f"Where {measure_label(peaks[0].name)}"
     return (
         f"{where} peaks{line_text} is not known: cases next to the largest value have not settled or miss the "
         "tolerance; raise drive.cycles so that these cases settle."

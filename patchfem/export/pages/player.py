@@ -36,7 +36,9 @@ CURVES = (
     ("gap", "gap"),
     ("slip", "slide"),
 )
-MAX_CONTACT_FRACTION = 0.25  # contact / interface length, below which twice the contact is shown
+# If the contact is shorter than this fraction of the interface, the view has twice the length of the
+# contact.
+MAX_CONTACT_FRACTION = 0.25
 MM_PER_M = 1e3
 
 

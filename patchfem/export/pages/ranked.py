@@ -40,9 +40,8 @@ FINAL_OUTCOMES = "steady", "stuck", "done", "no_contact"  # outcomes of cases wh
 MAX_NAMED_KEYS = 3  # number of keys in the sentence
 # Text for a measure whose label does not say that it is a ratio.
 MEASURE_LABELS = {"equivalent_damping": "equivalent damping ratio"}
-N_TREND_GROUPS = (
-    5  # groups of the random cases by the value of a key, between which a trend is determined
-)
+# Groups of the random cases by the value of a key, between which a trend is determined.
+N_TREND_GROUPS = 5
 # Number of standard errors of a median (1.25 times that of a mean) by which two groups must differ.
 TREND_ERROR_FACTOR = 2.5
 
@@ -340,16 +339,16 @@ def ranking_sentence(
     clauses = ", ".join(clauses)
     has, is_, its = ("has", "is", "its") if n_unsettled == 1 else ("have", "are", "their")
     last = f"last value{'s' * (n_unsettled != 1)}"
-    ended = f"{has} not settled" if moves else f"miss{'es' * (n_unsettled == 1)} the tolerance"
+    how_ended = f"{has} not settled" if moves else f"miss{'es' * (n_unsettled == 1)} the tolerance"
     if 2 * n_unsettled > n_cases > 0:
         included = last if moves else "values"
-        return f"{n_unsettled} of {n_cases} cases {ended}; with {its} {included} included, {measure_text} {clauses}."
-    counted = (
-        f"; {n_unsettled} case{'s' * (n_unsettled != 1)} that {ended} {is_} included"
+        return f"{n_unsettled} of {n_cases} cases {how_ended}; with {its} {included} included, {measure_text} {clauses}."
+    included_clause = (
+        f"; {n_unsettled} case{'s' * (n_unsettled != 1)} that {how_ended} {is_} included"
         if n_unsettled
         else ""
     )
-    return f"{measure_text.capitalize()} {clauses}{counted}{f' with {its} {last}' if n_unsettled and moves else ''}."
+    return f"{measure_text.capitalize()} {clauses}{included_clause}{f' with {its} {last}' if n_unsettled and moves else ''}."
 
 
 def _group_overlapping(shares: list) -> list:
@@ -452,11 +451,11 @@ def measure_quantiles(table: dict, trusted: dict) -> dict:
         if measure is None:
             continue
         values = np.asarray(measure["values"], float)
-        counted = np.isfinite(values) & (
+        is_included = np.isfinite(values) & (
             settled | trusted[name] | ~np.isfinite(values)[settled].any()
         )
-        misses = int(np.sum(counted & ~trusted[name]))
-        values = values[counted]
+        misses = int(np.sum(is_included & ~trusted[name]))
+        values = values[is_included]
         if values.size >= MIN_RANDOM_CASES and np.ptp(values) > 1e-9 * np.abs(values).max():
             quantiles[name] = (
                 measure["unit"],
@@ -492,9 +491,9 @@ def describe_scatter(
     largest_count = max((quantiles[name][2] for name in names if name in quantiles), default=0)
     if largest_count and largest_count < MIN_SETTLED_FRACTION * n_cases:
         reason = "not settled within the tolerance" if settled else "no value"
-        missed = f"{'has' if n_cases - largest_count == 1 else 'have'} {reason}"
+        how_missed = f"{'has' if n_cases - largest_count == 1 else 'have'} {reason}"
         return (
-            f"{n_cases - largest_count} of {n_cases} random cases {missed}, perhaps those with the largest motion, "
+            f"{n_cases - largest_count} of {n_cases} random cases {how_missed}, perhaps those with the largest motion, "
             "so the scatter of the results is not known."
         )
     for name in [name for name in names if name in quantiles]:

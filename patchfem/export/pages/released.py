@@ -8,12 +8,10 @@ from ...runs.results.result import Result
 # Fraction of the final position, which is printed with three digits; an output that moves by less
 # is at rest.
 REST_FRACTION = 5e-3
-MIN_AMPLITUDES = (
-    5  # smallest number of amplitudes of a decay for which frequency and damping are printed
-)
-ROUND_OFF_FRACTION = (
-    1e-13  # fraction of the largest output; a smaller change between samples is round-off
-)
+# Smallest number of amplitudes of a decay for which frequency and damping are printed.
+MIN_AMPLITUDES = 5
+# Fraction of the largest output; a smaller change between samples is round-off.
+ROUND_OFF_FRACTION = 1e-13
 # Fraction of the largest output; a final position closer to 0 is the remainder of a decay to 0.
 ZERO_FRACTION = 1e-9
 

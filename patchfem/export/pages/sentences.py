@@ -75,9 +75,8 @@ LEVEL_MEASURES = (
     "jump_level",
 )  # lies between two drive levels of the scene, whatever the tolerance
 RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
-ROUND_OFF_FRACTION = (
-    1e-12  # Fraction of the friction force times the motion; a smaller work is round-off.
-)
+# Fraction of the friction force times the motion; a smaller work is round-off.
+ROUND_OFF_FRACTION = 1e-12
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
 EXACT_NOTE = "values without ± are exact to the last digit shown"
@@ -213,12 +212,12 @@ def format_with_error(name: str, measure: dict) -> str:
     if value == "-":
         return value
     unit, scale = display_units(name, measure["value"], measure["unit"], measure["error"])[0]
-    if format_below_minimum(name, measure):
+    if is_below_minimum(name, measure):
         return f"0 to {formatting.format_number((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
     return formatting.format_with_error(value, error, unit)
 
 
-def format_below_minimum(name: str, measure: dict) -> bool:
+def is_below_minimum(name: str, measure: dict) -> bool:
     """Return whether a value minus its error is below the smallest possible value."""
     value = measure["value"]
     error = measure["error"]
@@ -280,13 +279,13 @@ def verdict_sentence(summary: dict) -> str:
         advice = "use the other measures with their stated errors"
         return f"The numerical error of {unknown} is as large as the value, so it is not known; {advice}."
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
-        found = (
+        slip_sentence = (
             _bench_loop_sentence(summary["loop"], measures["equivalent_stiffness"])
             if "loop" in summary
             else outcome.sentence
         )
         return _bench_slip_sentence(
-            measures.get("slip_amplitude"), found, "contact_fraction" in measures
+            measures.get("slip_amplitude"), slip_sentence, "contact_fraction" in measures
         )
     if run_away := summary.get("run_away"):
         drive, knee = (format_measure("", run_away[name], "m s-2", 4) for name in ("drive", "knee"))
@@ -312,14 +311,18 @@ def verdict_sentence(summary: dict) -> str:
         ("loop_area", ROUND_OFF_FRACTION * abs(force * motion), "{} per cycle"),
         ("slip_amplitude", 0.0, "by {}"),
     ):
-        found = {
+        slip_sentence = {
             name: one
             for name, one in measures.items()
             if re.sub(r"_\d+$", "", name) == kind and one["value"]
         }
-        name = max(found, key=lambda candidate: found[candidate]["value"], default="")
-        if name and found[name]["value"] > max(_error_or_floor(found[name]), threshold):
-            size = form.format(format_with_error(name, found[name]))
+        name = max(
+            slip_sentence, key=lambda candidate: slip_sentence[candidate]["value"], default=""
+        )
+        if name and slip_sentence[name]["value"] > max(
+            _error_or_floor(slip_sentence[name]), threshold
+        ):
+            size = form.format(format_with_error(name, slip_sentence[name]))
             return f"The interface as a whole sticks, but {part} ({size}).{rings}"
     return _no_slip_sentence("contact_fraction" in measures, "cycles") + rings
 
@@ -673,7 +676,7 @@ def _plain_value(name: str, value: float, unit: str) -> str:
     return f"{formatting.format_number(value * scale, 3)} {display_unit}".rstrip()
 
 
-def measure_link(text: str, name: str, more: str = "") -> str:
+def measure_link(text: str, name: str, attributes: str = "") -> str:
     """Return a text as a link to the definition of a measure on the same page.
 
     Parameters
@@ -681,18 +684,18 @@ def measure_link(text: str, name: str, more: str = "") -> str:
     text : str
     name : str
         The measure.
-    more : str
+    attributes : str
         Further attributes of the link, with a leading space.
     """
-    return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
+    return f"<a{attributes} href='#measure-{escape(name)}'>{escape(text)}</a>"
 
 
-def find_definition(name: str, pressed: bool = False):
+def find_definition(name: str, has_patch: bool = False):
     """Return the definition of a measure, whose name may end in an interface number.
 
-    None if there is none. pressed: whether a patch was pressed, which has a load of its own.
+    None if there is none. has_patch: whether a patch was pressed, which has a load of its own.
     """
-    for table in (STATIC, MOTION) if pressed else (MOTION, STATIC):
+    for table in (STATIC, MOTION) if has_patch else (MOTION, STATIC):
         for candidate in (name, re.sub(r"_\d+$", "", name)):
             if candidate in table:
                 return table[candidate]
@@ -705,9 +708,9 @@ def measure_meaning(name: str) -> str:
     return "" if row is None else row.text
 
 
-def measure_group(name: str, pressed: bool = True) -> str:
+def measure_group(name: str, has_patch: bool = True) -> str:
     """Return the group of measures under which a measure is shown."""
-    row = find_definition(name, pressed)
+    row = find_definition(name, has_patch)
     return GROUPS[0] if row is None else row.group
 
 
@@ -765,7 +768,7 @@ def format_measures(measures: dict, engine: str = "") -> list[str]:
     measures = order_measures(measures)
     width = max(map(len, measures), default=0)
     all_lines = []
-    pressed = "contact_fraction" in measures
+    has_patch = "contact_fraction" in measures
     range_text = (
         OVER_MOTION_CYCLES if "worn_volume" in measures else PERIOD_BY_ENGINE.get(engine, WHOLE_RUN)
     )
@@ -774,7 +777,7 @@ def format_measures(measures: dict, engine: str = "") -> list[str]:
             f"  {name:<{width}}  {_format_measure_line(name, measure, range_text, POWER in all_measures)}"
             f"{_format_record_interval(name, all_measures)}"
             for name, measure in measures.items()
-            if measure_group(name, pressed) == group
+            if measure_group(name, has_patch) == group
         ]
         all_lines += [group, *lines] if lines else []
     return all_lines

@@ -23,7 +23,7 @@ from .headline import (
 )
 from .sentences import format_zero, is_share, measure_link
 
-# More columns of the table of cases do not fit a wide screen.
+# Largest number of columns of the table of cases that fits a wide screen.
 MAX_MEASURES = 6
 MAX_COLUMNS = 8  # largest number of keys and measures together
 # Files of a case.
@@ -179,7 +179,7 @@ def _measure_data(name: str, measure: dict, cases, tolerance=np.nan) -> dict:
         for part in ("values", "errors", "floors")
         if part in measure
     }
-    missed = is_over_tolerance(columns, tolerance[cases] if np.ndim(tolerance) else tolerance)
+    is_over = is_over_tolerance(columns, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {
         "name": name,
         "label": measure_label(name),
@@ -189,7 +189,7 @@ def _measure_data(name: str, measure: dict, cases, tolerance=np.nan) -> dict:
         "errors": columns["errors"] * scale,
         "least": format_zero(name) * scale,
         "minimum": minimum_value(name) * scale,
-        "over": missed.astype(int),
+        "over": is_over.astype(int),
     }
 
 
@@ -213,8 +213,8 @@ def _explorer_html(drawn_note: str, folders: list | None) -> str:
     if stored_files == {PAGE}:
         opens = " Click on a case to open its page."
     elif stored_files:
-        stored = f"page or its {SUMMARY}" if PAGE in stored_files else SUMMARY
-        opens = f" Click on a case to open its {stored}; <code>--keep pages</code> keeps a page of every case."
+        link_target = f"page or its {SUMMARY}" if PAGE in stored_files else SUMMARY
+        opens = f" Click on a case to open its {link_target}; <code>--keep pages</code> keeps a page of every case."
     thinned = drawn_note and f"<p class=soft>{sentence_html(drawn_note)}</p>"
     return (
         "<div class=choices><label>Measure<select id=measure></select></label>"
@@ -291,9 +291,9 @@ def _cases_table(table: dict) -> str:
         and np.nanmax(np.abs(one["values"])) > format_zero(name)
     ]
     shown_measures = shown_measures[: min(MAX_MEASURES, max(2, MAX_COLUMNS - len(table["keys"])))]
-    listed = slice(MAX_LISTED_CASES)
+    listed_cases = slice(MAX_LISTED_CASES)
     columns = [
-        _measure_data(name, table["measures"][name], listed, table.get("tolerance", np.nan))
+        _measure_data(name, table["measures"][name], listed_cases, table.get("tolerance", np.nan))
         for name in shown_measures
     ]
     heads = [

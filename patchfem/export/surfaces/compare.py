@@ -81,9 +81,8 @@ QUANTITY_LABELS = {
 ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
 TABLE_HEADS = ("quantity", "value", "95 %", "unit")
 SIDES = ("before", "after")
-MAX_DRAWN_HEIGHTS = (
-    1_000_000  # largest number of heights of a histogram or Abbott curve; larger scans are thinned
-)
+# Largest number of heights of a histogram or Abbott curve; larger scans are thinned.
+MAX_DRAWN_HEIGHTS = 1_000_000
 PAGE_NOTE = (
     "All intervals are 95 % intervals. The intervals of shift, depth and area hold for the "
     "measured place and come from the noise of the unworn heights. A track or worn part begins "
@@ -161,7 +160,7 @@ def format_comparison(
     list of str
     """
     headline, sentences = verdict
-    pressed = computed.pressed
+    surface_runs = computed.pressed
     out = [headline, *(f"  {text}" for text in sentences), ""]
     for part in parts:
         direction = f", along {part.direction}" if part.direction else ""
@@ -174,13 +173,13 @@ def format_comparison(
     if computed.predicted is not None:
         table = predicted_table(computed.predicted)
         out += ["", table.heads[0], *table.lines()]
-    if pressed is not None:
-        out += ["", f"{pressed.title}, pressed with each surface"]
+    if surface_runs is not None:
+        out += ["", f"{surface_runs.title}, pressed with each surface"]
         rows = []
-        for name, words, first, second in pressed.rows():
+        for name, words, first, second in surface_runs.rows():
             rows.append((words, _format_measure(name, first), _format_measure(name, second)))
         out += sides_lines(rows)
-        out += [f"  {text}" for text in (*pressed.failed, *pressed.lacking)]
+        out += [f"  {text}" for text in (*surface_runs.failed, *surface_runs.lacking)]
     return out
 
 
@@ -255,12 +254,12 @@ def comparison_data(
     if len(parts) > 1:
         out["directions"] = {part.direction: _part_data(part) for part in parts}
         out["anisotropy"] = {}
-        for when, amplitude, slope in directions:
+        for state, amplitude, slope in directions:
             ratios = {
                 "amplitude_ratio": quantity_data(amplitude),
                 "slope_ratio": quantity_data(slope),
             }
-            out["anisotropy"][when] = ratios
+            out["anisotropy"][state] = ratios
     if computed.pressed is not None:
         out["pressed"] = pressed_data(computed.pressed)
     if computed.predicted is not None:
@@ -281,10 +280,12 @@ def _part_data(part: Comparison) -> dict:
             "shift": quantity_data(part.motion.shift),
             "mirrored": part.is_mirrored,
         }
-        sizes, *others = (_values_data(found) for found in (part.tracks.sizes, *part.tracks.others))
+        sizes, *other_sizes = (
+            _values_data(track_sizes) for track_sizes in (part.tracks.sizes, *part.tracks.others)
+        )
         out |= {
             "track": sizes or None,
-            "other_tracks": others,
+            "other_tracks": other_sizes,
             "removed": dict(zip(SIDES, part.removed)),
             "roughness": _roughness_data(measure_track_roughness(part)),
         }
@@ -422,14 +423,14 @@ def page_html(
     str
     """
     names = [Path(surface.source).name for surface in (parts[0].before, parts[0].after)]
-    pressed = computed.pressed
+    surface_runs = computed.pressed
     sections = []
     if computed.predicted is not None:
         sections.append(_predicted_section(computed.predicted))
     if directions:
         ratios = []
-        for when, amplitude, _ in directions:
-            ratios.append(f"{when} {' '.join(format_quantity(amplitude)[:2])}")
+        for state, amplitude, _ in directions:
+            ratios.append(f"{state} {' '.join(format_quantity(amplitude)[:2])}")
         crossed = figure_html(
             "xy",
             pictures.draw_directions(parts, directions),
@@ -456,10 +457,12 @@ def page_html(
         if roughness.regions:
             body.append(_roughness_table(roughness).html())
         sections.append(Section(f"changes{number}", heading, "\n".join(body)))
-    if pressed is not None:
+    if surface_runs is not None:
         sections.append(
             Section(
-                "pressed", f"{pressed.title}, pressed with each surface", _pressed_html(pressed)
+                "pressed",
+                f"{surface_runs.title}, pressed with each surface",
+                _pressed_html(surface_runs),
             )
         )
     notes = [f"{text}." for part in parts for text in part.notes]
@@ -561,9 +564,9 @@ def _scan_pictures(change: Change) -> list:
             f"{format_quantity(change.volumes.values['worn_volume']).short}",
         )
     ]
-    known = np.flatnonzero(np.isfinite(depth) & np.isfinite(first))
-    known = known[:: -(-known.size // MAX_DRAWN_HEIGHTS)]
-    heights = (first.ravel()[known], second.ravel()[known])
+    finite_points = np.flatnonzero(np.isfinite(depth) & np.isfinite(first))
+    finite_points = finite_points[:: -(-finite_points.size // MAX_DRAWN_HEIGHTS)]
+    heights = (first.ravel()[finite_points], second.ravel()[finite_points])
     out.append(
         Picture(
             pictures.draw_both_heights(heights),
@@ -591,20 +594,20 @@ def _levelled_heights(surface) -> np.ndarray:
     """Return the heights (k,) [m] of a surface about its least-squares line or plane."""
     if isinstance(surface, Profile):
         return level(resample_evenly(surface)).z
-    every = max(int(np.sqrt(surface.z.size / MAX_DRAWN_HEIGHTS)), 1)
+    step = max(int(np.sqrt(surface.z.size / MAX_DRAWN_HEIGHTS)), 1)
     thinned = replace(
-        surface, x=surface.x[::every], y=surface.y[::every], z=surface.z[::every, ::every]
+        surface, x=surface.x[::step], y=surface.y[::step], z=surface.z[::step, ::step]
     )
     z = level_plane(thinned).z
     return z[~np.isnan(z)]
 
 
-def _pressed_html(pressed: SurfaceRuns) -> str:
+def _pressed_html(surface_runs: SurfaceRuns) -> str:
     """Return the measures and pressures of a scene, pressed with each surface, as HTML."""
-    runs = zip(SIDES, (pressed.before, pressed.after))
+    runs = zip(SIDES, (surface_runs.before, surface_runs.after))
     runs = [(name, run) for name, run in runs if run is not None]
     warnings = [f"{name}: {text}" for name, run in runs for text in run.warnings]
-    parts = [warning_box([*pressed.failed, *warnings])]
+    parts = [warning_box([*surface_runs.failed, *warnings])]
     if runs:
         peaks = []
         for name, run in runs:
@@ -623,7 +626,7 @@ def _pressed_html(pressed: SurfaceRuns) -> str:
             )
         )
         rows = []
-        for name, words, first, second in pressed.rows():
+        for name, words, first, second in surface_runs.rows():
             texts = (
                 words,
                 _format_measure(name, first),
@@ -632,7 +635,7 @@ def _pressed_html(pressed: SurfaceRuns) -> str:
             )
             rows.append([escape(text) for text in texts])
         parts.append(table_html(("measure", ">before", ">after", ">after / before"), rows))
-    parts += [f"<p class=soft>{sentence_html(text)}.</p>" for text in pressed.lacking]
+    parts += [f"<p class=soft>{sentence_html(text)}.</p>" for text in surface_runs.lacking]
     return "\n".join(parts)
 
 

@@ -60,8 +60,8 @@ def compare_pairs(
                 *verdict.judge_files(paths, pair_direction or direction, **settings)
             )
         if pair_direction or settings.get("shift") is not None:
-            what = "a direction" if pair_direction else "a shift"
-            raise PatchfemError(f"{what} can be given only for traces, not for results folders")
+            option = "a direction" if pair_direction else "a shift"
+            raise PatchfemError(f"{option} can be given only for traces, not for results folders")
         wear = compare_runs(*paths)
         return worn.wear_data(wear, worn.wear_verdict(wear))
 
@@ -214,14 +214,14 @@ def page_html(rows: list, name: str) -> str:
     sections = []
     for number, (group, count, averages) in enumerate(pairs.average_pairs(rows)):
         if averages:
-            own = [
+            rows_of_group = [
                 row for row in rows if row["outcome"] == "done" and pairs.find_group(row) == group
             ]
             sections.append(
                 Section(
                     f"means{number}",
                     _group_heading(group, count),
-                    _means_html(number, own, averages),
+                    _means_html(number, rows_of_group, averages),
                 )
             )
     lines = []

@@ -37,14 +37,26 @@ def draw_trace(primary, waviness) -> str:
     along, mm = choose_axis_unit(primary.x, "m")
     up, um = choose_axis_unit(primary.z, "m")
     if waviness is None:
-        marks = [make_line(primary.x * mm, primary.z * um, "accent", most=MAX_POINTS, width=0.7)]
+        marks = [
+            make_line(primary.x * mm, primary.z * um, "accent", max_points=MAX_POINTS, width=0.7)
+        ]
     else:
         marks = [
             make_line(
-                primary.x * mm, primary.z * um, "soft", "levelled trace", most=MAX_POINTS, width=0.7
+                primary.x * mm,
+                primary.z * um,
+                "soft",
+                "levelled trace",
+                max_points=MAX_POINTS,
+                width=0.7,
             ),
             make_line(
-                waviness.x * mm, waviness.z * um, "warm", "waviness", most=MAX_POINTS, width=1.6
+                waviness.x * mm,
+                waviness.z * um,
+                "warm",
+                "waviness",
+                max_points=MAX_POINTS,
+                width=1.6,
             ),
         ]
     return draw_charts(
@@ -71,7 +83,9 @@ def draw_roughness(roughness, ends: tuple, cutoff: float) -> str:
     """
     along, mm = choose_axis_unit(ends, "m")
     up, um = choose_axis_unit(roughness.z, "m")
-    marks = [make_line(roughness.x * mm, roughness.z * um, "accent", most=MAX_POINTS, width=0.7)]
+    marks = [
+        make_line(roughness.x * mm, roughness.z * um, "accent", max_points=MAX_POINTS, width=0.7)
+    ]
     count = roughness.length / cutoff
     if count < MAX_SECTION_RULES:
         places = roughness.x[0] + cutoff * np.arange(int(count + 1e-6) + 1)
@@ -188,9 +202,9 @@ def depth_axis(unit: str, depth, scale: float) -> dict:
     scale : float
         From metres to the unit.
     """
-    room = 0.05 * float(np.ptp(depth))
+    margin = 0.05 * float(np.ptp(depth))
     return make_axis("worn depth", unit) | {
-        "range": [(np.max(depth) + room) * scale, (np.min(depth) - room) * scale]
+        "range": [(np.max(depth) + margin) * scale, (np.min(depth) - margin) * scale]
     }
 
 
@@ -230,11 +244,16 @@ def draw_scan(x, y, z):
     matplotlib.figure.Figure
     """
     figure, (left, right) = make_figure(2, 3.8, width_ratios=(1.2, 1))
-    known = z[~np.isnan(z)]
-    _draw_map(figure, left, (x, y, z), np.quantile(known, COLOUR_QUANTILES), "viridis")
+    finite_heights = z[~np.isnan(z)]
+    _draw_map(figure, left, (x, y, z), np.quantile(finite_heights, COLOUR_QUANTILES), "viridis")
     left.set(title="Heights")
     up, um = choose_axis_unit(z, "m")
-    right.hist(known * um, bins=N_BINS, color=BLUE, weights=np.full(known.size, 100 / known.size))
+    right.hist(
+        finite_heights * um,
+        bins=N_BINS,
+        color=BLUE,
+        weights=np.full(finite_heights.size, 100 / finite_heights.size),
+    )
     right.set(
         xlabel=f"height [{up}]",
         ylabel="share of the points [%]",
@@ -294,9 +313,9 @@ def _draw_map(figure, panel, scan: tuple, ends: tuple, colours: str, name: str =
 
 def draw_both_heights(heights: tuple) -> str:
     """Draw the distributions and the Abbott curves of the heights (k,) [m] before and after."""
-    both = np.concatenate(heights)
-    up, um = choose_axis_unit(both, "m")
-    edges = np.linspace(*np.quantile(both, (0.001, 0.999)), N_BINS + 1)
+    all_heights = np.concatenate(heights)
+    up, um = choose_axis_unit(all_heights, "m")
+    edges = np.linspace(*np.quantile(all_heights, (0.001, 0.999)), N_BINS + 1)
     middles = (edges[:-1] + edges[1:]) / 2 * um
     bars = []
     for z, (colour, name) in zip(heights, SIDES):
@@ -339,10 +358,10 @@ def draw_mean_section(track, start: float, end: float) -> str:
     str
         The picture as SVG.
     """
-    known = np.isfinite(track.section)
-    x = track.across[known]
-    depth = track.section[known]
-    spread = track.spread[known]
+    is_finite = np.isfinite(track.section)
+    x = track.across[is_finite]
+    depth = track.section[is_finite]
+    spread = track.spread[is_finite]
     along, mm = choose_axis_unit(x, "m")
     up, um = choose_axis_unit(depth, "m")
     low = depth - spread
@@ -351,7 +370,7 @@ def draw_mean_section(track, start: float, end: float) -> str:
         make_mark(
             "band", "soft", "scatter of the sections", x=x * mm, low=low * um, high=high * um
         ),
-        make_line(x * mm, depth * um, "warm", "mean", most=MAX_POINTS, width=1.2),
+        make_line(x * mm, depth * um, "warm", "mean", max_points=MAX_POINTS, width=1.2),
         make_line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
     ]
     marks += [make_mark("rule", GREY, x=place * mm, dash="dotted") for place in (start, end)]
@@ -361,7 +380,7 @@ def draw_mean_section(track, start: float, end: float) -> str:
     )
 
 
-def draw_aligned(x, first, second, worn) -> str:
+def draw_aligned(x, first, second, worn_depth) -> str:
     """Draw two aligned traces, and enlarged the part around the largest wear.
 
     Parameters
@@ -369,7 +388,7 @@ def draw_aligned(x, first, second, worn) -> str:
     x : (n,) array [m]
     first, second : (n,) arrays [m]
         Heights before and after.
-    worn : (n,) array [m]
+    worn_depth : (n,) array [m]
         Worn depth, 0 where nothing wore off.
 
     Returns
@@ -381,16 +400,18 @@ def draw_aligned(x, first, second, worn) -> str:
     up, um = choose_axis_unit(np.concatenate([first, second]), "m")
     marks = []
     for z, (colour, name) in zip((first, second), SIDES):
-        marks.append(make_line(x * mm, z * um, colour, name, most=MAX_POINTS, width=1.0))
-    bottom = np.where(worn > 0, second, np.nan)
+        marks.append(make_line(x * mm, z * um, colour, name, max_points=MAX_POINTS, width=1.0))
+    bottom = np.where(worn_depth > 0, second, np.nan)
     marks.append(make_mark("band", "warm", "worn off", x=x * mm, low=bottom * um, high=first * um))
-    ends = _detail_ends(x, worn)
+    ends = _detail_ends(x, worn_depth)
     inside = (x >= ends[0]) & (x <= ends[1])
     detail = np.concatenate([first[inside], second[inside]]) * um
-    room = np.ptp(detail)
+    height_range = np.ptp(detail)
     label = "x of the second trace"
     height = make_axis("height", up)
-    detail_height = height | {"range": [detail.min() - 0.1 * room, detail.max() + 0.15 * room]}
+    detail_height = height | {
+        "range": [detail.min() - 0.1 * height_range, detail.max() + 0.15 * height_range]
+    }
     traces_chart = make_chart("Both traces", _full_axis(label, along, x * mm), height, marks)
     detail_chart = make_chart(
         "A part of them", _full_axis(label, along, ends * mm), detail_height, marks
@@ -398,11 +419,11 @@ def draw_aligned(x, first, second, worn) -> str:
     return draw_charts([traces_chart, detail_chart], height=3.4)
 
 
-def _detail_ends(x, worn) -> np.ndarray:
+def _detail_ends(x, worn_depth) -> np.ndarray:
     """Choose the ends [m] of the enlarged part: a sixth of the traces around the largest wear."""
     half = max((x[-1] - x[0]) / 12, MIN_DETAIL_SAMPLES / 4 * (x[1] - x[0]))
     half = min(half, (x[-1] - x[0]) / 2)
-    centre = float(np.clip(x[int(np.argmax(worn))], x[0] + half, x[-1] - half))
+    centre = float(np.clip(x[int(np.argmax(worn_depth))], x[0] + half, x[-1] - half))
     return np.array([centre - half, centre + half])
 
 
@@ -418,7 +439,7 @@ def draw_separate(before, after) -> str:
     for profile, shift, (colour, name) in zip(flat, (lift, 0.0), SIDES):
         x = (profile.x - profile.x[0]) * mm
         marks.append(
-            make_line(x, (profile.z + shift) * um, colour, name, most=MAX_POINTS, width=0.8)
+            make_line(x, (profile.z + shift) * um, colour, name, max_points=MAX_POINTS, width=0.8)
         )
     return draw_charts(
         [
@@ -450,7 +471,12 @@ def draw_depth(x, depth, used=None, ends: tuple | None = None) -> str:
     up, um = choose_axis_unit(depth, "m")
     marks = [
         make_line(
-            x * mm, depth * um, "warm", "depth of the second trace", most=MAX_POINTS, width=1.0
+            x * mm,
+            depth * um,
+            "warm",
+            "depth of the second trace",
+            max_points=MAX_POINTS,
+            width=1.0,
         ),
         make_line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
     ]
@@ -540,9 +566,11 @@ def draw_pairs(panels: list) -> str:
     charts = []
     for panel in panels:
         mean = panel.mean
-        known = {number: value for number, value in panel.values.items() if value.value is not None}
+        known_values = {
+            number: value for number, value in panel.values.items() if value.value is not None
+        }
         bounds = []
-        for value in known.values():
+        for value in known_values.values():
             bounds += [bound for bound in (value.low, value.high) if bound is not None]
         unit, scale = ("", 1.0) if mean.unit == "1" else choose_axis_unit(bounds, mean.unit)
         ends = np.array([min(panel.values) - 0.5, max(panel.values) + 0.5])
@@ -553,14 +581,19 @@ def draw_pairs(panels: list) -> str:
             make_mark("band", "soft", "mean", x=ends, low=low, high=high),
             make_line(ends, middle, "soft"),
         ]
-        for number, value in known.items():
+        for number, value in known_values.items():
             if value.high is not None:
                 bar = [value.low * scale, value.high * scale]
                 marks.append(make_line([number, number], bar, "accent", width=1.0))
-        heights = np.array([value.value * scale for value in known.values()])
+        heights = np.array([value.value * scale for value in known_values.values()])
         marks.append(
             make_mark(
-                "dots", "accent", "each pair", x=np.array([*known], float), y=heights, size=4.0
+                "dots",
+                "accent",
+                "each pair",
+                x=np.array([*known_values], float),
+                y=heights,
+                size=4.0,
             )
         )
         place = make_axis("line number in the table") | {"range": ends}

@@ -196,11 +196,13 @@ def predicted_picture(predicted: PredictedWear) -> Picture:
     depths = np.concatenate([measured, computed])
     marks = [
         make_mark("band", "soft", "measured, 95 % noise", x=x, low=low, high=high),
-        make_line(x, measured * um, "soft", "measured", most=MAX_POINTS, width=1.0),
-        make_line(x, computed * um, "accent", "computed", most=MAX_POINTS, width=1.6),
+        make_line(x, measured * um, "soft", "measured", max_points=MAX_POINTS, width=1.0),
+        make_line(x, computed * um, "accent", "computed", max_points=MAX_POINTS, width=1.6),
     ]
     below = [
-        make_line(x, difference, "warm", "measured less computed", most=MAX_POINTS, width=1.0),
+        make_line(
+            x, difference, "warm", "measured less computed", max_points=MAX_POINTS, width=1.0
+        ),
         make_line(x[[0, -1]], [0.0, 0.0], "soft", width=0.8),
     ]
     part = predicted.difference

@@ -100,14 +100,14 @@ def describe_surface(report: RoughnessReport) -> str:
         return text + _areal_filters(
             treatment.short, treatment.cutoff, has_holes=bool(np.isnan(report.surface.z).any())
         )
-    short = (
+    s_filter = (
         f"S-filter at {format_length(treatment.short)}, half this length trimmed at each end"
         if treatment.short
         else ""
     )
     if treatment.cutoff is not None:
         cutoff = f"Gaussian filter at {format_length(treatment.cutoff)}, half this length trimmed at each end"
-        return f"{text}; {cutoff}, {short or 'no filter for short waves'}"
+        return f"{text}; {cutoff}, {s_filter or 'no filter for short waves'}"
     # A trace has one step per sample.
     fitting = fitting_cutoff(size.length + size.step, size.step)
     advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
@@ -116,20 +116,22 @@ def describe_surface(report: RoughnessReport) -> str:
             f' (--cutoff "{format_length(fitting)}" is the longest standard cut-off of which five fit '
             "into the trace once half a cut-off is trimmed at each end)"
         )
-    return f"{text}; no cut-off, so no roughness profile{advice}" + (f"; {short}" if short else "")
+    return f"{text}; no cut-off, so no roughness profile{advice}" + (
+        f"; {s_filter}" if s_filter else ""
+    )
 
 
-def _areal_filters(short: float | None, cutoff: float | None, *, has_holes: bool) -> str:
+def _areal_filters(cutoff_length: float | None, cutoff: float | None, *, has_holes: bool) -> str:
     """Name the filters of a scan and the surface that they leave."""
     parts = [
         f"{name}-filter at {format_length(length)}"
-        for name, length in (("S", short), ("L", cutoff))
+        for name, length in (("S", cutoff_length), ("L", cutoff))
         if length
     ]
     if not parts:
         return "; no filter"
     surface = ""
-    if short:
+    if cutoff_length:
         surface = " (the S-L surface)" if cutoff else " (the S-F surface)"
     lengths = "each length" if len(parts) > 1 else "this length"
     holes = (

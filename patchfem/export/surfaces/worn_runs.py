@@ -30,10 +30,11 @@ OPTIONAL_VARIABLES = (
     "friction_force",
     "wear_cycle",
 )
-FLOOR_PARTS = (
-    5  # width of the worn part / width of its floor, the deepest fifth, as for measured tracks
-)
-FLOOR_POINTS = 100  # points of the floor; more change it by less than the error of the run
+# Width of the worn part / width of its floor, the deepest fifth, as for measured tracks.
+FLOOR_PARTS = 5
+# Number of points that estimate the noise floor; more points change it by less than the error of
+# the run.
+FLOOR_POINTS = 100
 MIN_WORN_FRACTION = 1e-3  # depth / largest depth below which a node counts as unworn
 MIN_ROUGHNESS = 1e-12  # [m] standard deviation below which an unworn surface counts as flat
 TEXTS = {
@@ -341,12 +342,12 @@ def _mesh_error(surface: PatchSurface, x) -> float:
 
 def _measure_change(first: PatchRun, second: PatchRun, name: str) -> tuple[float, float | None]:
     """Return the change of a measure and the sum of its errors, None if one is unknown."""
-    later = second.measure(name)
+    later_value = second.measure(name)
     earlier = first.measure(name)
     if earlier is None:
-        return later["value"], later["error"]
-    errors = (earlier["error"], later["error"])
-    return later["value"] - earlier["value"], None if None in errors else float(sum(errors))
+        return later_value["value"], later_value["error"]
+    errors = (earlier["error"], later_value["error"])
+    return later_value["value"] - earlier["value"], None if None in errors else float(sum(errors))
 
 
 def _make_quantity(name: str, value: float, error: float | None) -> Quantity:
@@ -366,7 +367,7 @@ def hidden_depths(surface: PatchSurface, depth) -> tuple:
     """Return the hidden wear [m] at the ends or corners of the patch."""
     if surface.y is None:
         return hidden_line(surface.x, depth)
-    return hidden_plane(surface.x, surface.y, depth)
+    return find_plane_below(surface.x, surface.y, depth)
 
 
 def hidden_line(x, depth) -> tuple:
@@ -375,10 +376,10 @@ def hidden_line(x, depth) -> tuple:
     Returns its depths [m] at both ends, none below zero. An unworn stretch leaves none: from there
     a trace shows all wear.
     """
-    return hidden_plane(np.asarray(x, float), np.zeros(1), np.asarray(depth, float)[None])[:2]
+    return find_plane_below(np.asarray(x, float), np.zeros(1), np.asarray(depth, float)[None])[:2]
 
 
-def hidden_plane(x, y, depth) -> tuple:
+def find_plane_below(x, y, depth) -> tuple:
     """Find the plane of the highest mean below depths (s, m) [m] by linear programming.
 
     Parameters

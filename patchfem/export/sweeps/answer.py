@@ -17,7 +17,7 @@ NONE = MappingProxyType({})
 
 
 def sweep_summary(
-    lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mapping = NONE
+    lead: SweepHeadline, outcome: Sequence, sign: str = "", identity: Mapping = NONE
 ) -> dict:
     """Return the summary of a sweep as a dict that can be written as JSON.
 
@@ -35,7 +35,7 @@ def sweep_summary(
         Outcome of each case.
     sign : str
         Hash of what the tables were written for (`run.hash_tables`).
-    of : mapping
+    identity : mapping
         Scene and keys of the sweep (`run.sweep_identity`).
 
     Returns
@@ -57,7 +57,7 @@ def sweep_summary(
             name: [index._asdict() for index in indices] for name, indices in lead.ranks.items()
         },
         "limits": limits_json(lead.limits),
-        "of": dict(of),
+        "of": dict(identity),
         "sign": sign,
     }
 

@@ -38,7 +38,7 @@ from . import chunks
 from .answer import read_answer
 from .chunks import CHUNKS
 
-KEEP = ("none", "summaries", "results", "pages")  # what is stored of each case besides its columns
+KEEP = ("none", "summaries", "results", "pages")  # what is stored for each case besides its columns
 CASES = "cases"
 SUMMARY = "summary.json"
 TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "report.html")

@@ -260,9 +260,9 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
     """Return the table for `pages.sweep.page_html` from rows of sweep.csv and from sweep.nc."""
     columns = []
     for key in keys:
-        held = file[re.sub(r"\W", "_", key)]
+        facts = file[re.sub(r"\W", "_", key)]
         texts = [row[key] for row in rows]
-        axis_values = np.asarray(held[...])
+        axis_values = np.asarray(facts[...])
         places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
         values = (
             axis_values
@@ -273,7 +273,7 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
         columns.append(
             {
                 "name": key,
-                "unit": str(held.attrs.get("units", "1")),
+                "unit": str(facts.attrs.get("units", "1")),
                 "texts": texts,
                 "values": values,
                 "log": suits_log_axis(values.tolist()),
@@ -304,7 +304,7 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
             for word in ("--over", f"{column['name']}={','.join(dict.fromkeys(column['texts']))}")
         ]
     )
-    held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
+    facts = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
     require_valid(
         isinstance(title, str) and all(isinstance(entry, list | tuple) for entry in (sets, words)),
@@ -312,7 +312,7 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
     )
     return {
         **page_titles(columns, title),
-        **_shared_facts(held, columns),
+        **_shared_facts(facts, columns),
         "version": str(file.attrs["source"]).removeprefix("patchfem "),
         "scene": text,
         "command": shlex.join(
@@ -358,32 +358,34 @@ def join_tables(tables: list, names: list) -> dict:
         }
     ]
     for key in keys[0]:
-        own = [next(one for one in table["keys"] if one["name"] == key) for table in tables]
-        texts = [text for one in own for text in one["texts"]]
+        keys_of_tables = [
+            next(one for one in table["keys"] if one["name"] == key) for table in tables
+        ]
+        texts = [text for one in keys_of_tables for text in one["texts"]]
         words = not any(
             map(NUMBER_PATTERN.match, texts)
         )  # each table numbers the words in another order
         columns.append(
             {
                 "name": key,
-                "unit": own[0]["unit"],
-                "log": own[0]["log"],
+                "unit": keys_of_tables[0]["unit"],
+                "log": keys_of_tables[0]["log"],
                 "texts": texts,
                 "values": axis_numbers(texts)
                 if words
-                else np.concatenate([one["values"] for one in own]),
+                else np.concatenate([one["values"] for one in keys_of_tables]),
             }
         )
     measures = {}
     shift = np.cumsum([0, *counts])
     for name in dict.fromkeys(name for table in tables for name in table["measures"]):
-        own = [table["measures"].get(name) for table in tables]
-        first = next(one for one in own if one is not None)
+        keys_of_tables = [table["measures"].get(name) for table in tables]
+        first = next(one for one in keys_of_tables if one is not None)
         measures[name] = {"unit": first["unit"], "means": first["means"]} | {
             part: np.concatenate(
                 [
                     np.full(count, np.nan) if one is None else one.get(part, np.zeros(count))
-                    for one, count in zip(own, counts)
+                    for one, count in zip(keys_of_tables, counts)
                 ]
             )
             for part in ("values", "errors", "floors")

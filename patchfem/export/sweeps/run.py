@@ -88,16 +88,16 @@ def sweep_into(
     -------
     CaseResults
     """
-    shared = place.shard is not None
+    is_shard = place.shard is not None
     keep = place.kept_files(len(cases))
-    with Folder(place.target, cases.names(sweep_scene), shared) as folder:
+    with Folder(place.target, cases.names(sweep_scene), is_shard) as folder:
         if place.resume:
             folder.refuse_another(sweep_identity(sweep_scene, cases))
             if folder.chunks.others and folder.is_complete() and say is not None:
                 say(_left_out(folder.chunks.others))
         requested = _shard_cases(len(cases), place.shard)
         complete = folder.find_complete_cases(requested, keep)
-        if not (place.resume or shared):
+        if not (place.resume or is_shard):
             if complete.size and not folder.is_complete() and say is not None:
                 say(
                     f"note: {complete.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
@@ -124,17 +124,17 @@ def sweep_into(
                 ),
             )
         except (KeyboardInterrupt, PatchfemError):
-            if not shared:
+            if not is_shard:
                 with suppress(PatchfemError):
                     _write_partial_tables(
                         sweep_scene, cases, folder, folder.answers(total), place.page
                     )
             raise
-        if shared:
+        if is_shard:
             return total
         folder.answers(total)
-        for numbers, found in dead_cases:
-            total.insert(numbers, found)
+        for numbers, fault in dead_cases:
+            total.insert(numbers, fault)
         sign = hash_tables(sweep_scene, cases, folder, place.page)
         if remaining.size or not _tables_are_current(sign, folder, place.page):
             write_tables(
@@ -171,7 +171,7 @@ def _write_partial_tables(
 
 
 class Jobs(NamedTuple):
-    """The cases of a sweep, the folder for them, and what is stored of each case."""
+    """Cases of a sweep, their folder, and what is stored for each case."""
 
     asked: SweepScene
     cases: Cases

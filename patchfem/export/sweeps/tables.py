@@ -27,9 +27,8 @@ from .. import netcdf
 from ..summary import package_versions
 
 CASES_PER_BLOCK = 4000  # cases whose strings are in memory at the same time
-MAX_CASES_TRIED = (
-    3  # maximum number of cases to read until one is valid, for the facts that all cases share
-)
+# Maximum number of cases to read until one is valid, for the facts that all cases share.
+MAX_CASES_TRIED = 3
 MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 FACTS = {
     "tolerance": ("accuracy", "tolerance"),

@@ -26,12 +26,10 @@ from ..results.result import file_name_shortener, shorten_file_names
 from . import one_by_one
 from .case_results import CaseResults
 
-MAX_CASES_PER_CALL = (
-    2048  # largest number of cases whose nodal forces are in memory at the same time
-)
-MIN_ALLOWED_ERROR = (
-    1e-300  # absolute error that is always allowed, so that a value of 0 meets the tolerance
-)
+# Largest number of cases whose nodal forces are in memory at the same time.
+MAX_CASES_PER_CALL = 2048
+# Absolute error that is always allowed, so that a value of 0 meets the tolerance.
+MIN_ALLOWED_ERROR = 1e-300
 
 
 class _NodePositions(NamedTuple):

@@ -44,12 +44,10 @@ MAX_CONTACT_ENDS = 12
 LOAD_RANGE_FACTORS = (0.5, 1.5)
 # Longest cell over the length of the interface if wear may move the contact edges anywhere.
 MAX_WEAR_CELL_RATIO = 1 / 48
-N_CELLS_PER_SMALL_CONTACT = (
-    64  # Number of cells along a contact of one or two nodes in the next search.
-)
-N_CELLS_PER_WAVE = (
-    16  # Number of cells per wavelength of the gap, in the search and in the third grid.
-)
+# Number of cells along a contact of one or two nodes in the next search.
+N_CELLS_PER_SMALL_CONTACT = 64
+# Number of cells per wavelength of the gap, in the search and in the third grid.
+N_CELLS_PER_WAVE = 16
 # Smallest local pressure maximum, relative to the largest pressure, around which the mesh is refined.
 MIN_PEAK_RATIO = 0.3
 N_CELLS_PER_PEAK = 4  # Number of cells of the coarsest grid per half-width of a pressure maximum.
@@ -65,9 +63,8 @@ BAND_CHANGE_TOL = 0.1
 MIN_LEVELS = 3  # Smallest number of nested meshes from which an order of convergence is seen.
 # Largest predicted CPU time [s] of condensing a mesh that is still tried, by whether the patch is static.
 MAX_CONDENSING_SECONDS = {True: 3.0, False: 0.4}
-UNSTRUCTURED_COST_FACTOR = (
-    4.0  # Ratio of the CPU times of condensing an unstructured mesh and a tensor grid.
-)
+# Ratio of the CPU times of condensing an unstructured mesh and a tensor grid.
+UNSTRUCTURED_COST_FACTOR = 4.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -38,9 +38,8 @@ __all__ = [
     "static_measures_without_errors",
     "warn_of_strains",
 ]
-MIN_COUPLING_RATIO = (
-    0.02  # smallest ratio of normal to tangential displacement under shear that a note states
-)
+# Smallest ratio of normal to tangential displacement under shear that a note states.
+MIN_COUPLING_RATIO = 0.02
 # Smallest ratio of load to buckling load of a tall piece that a note states; its sideways motion lacks
 # about this fraction.
 MIN_BUCKLING_RATIO = 0.02

@@ -14,18 +14,15 @@ from ...scene.keys.materials import MATERIALS
 
 # relative difference [1] of the friction work from samples and from energies, above which a run warns
 MAX_WORK_CHECK = 1e-3
-MAX_FORMING_RATIO = (
-    0.3  # ratio of slip while a bond forms to the bond length, above which a run warns
-)
-MIN_EXCESS_RATIO = (
-    1e-3  # excess of the friction force over mu_s N, relative to it, above which a run notes it
-)
+# Ratio of slip while a bond forms to the bond length, above which a run warns.
+MAX_FORMING_RATIO = 0.3
+# Excess of the friction force over mu_s N, relative to it, above which a run notes it.
+MIN_EXCESS_RATIO = 1e-3
 MAX_PROPOSED_HALVINGS = 8  # largest number of halvings of the steps that a warning proposes
 HARMONICS_FACTOR = 4  # ratio of proposed to present harmonics of a balance
 MIN_PROPOSED_HARMONICS = 31  # smallest number of harmonics that is proposed
-MAX_PROPOSED_HARMONICS = (
-    500  # largest number of harmonics that is proposed for a sharp friction law
-)
+# Largest number of harmonics that is proposed for a sharp friction law.
+MAX_PROPOSED_HARMONICS = 500
 
 
 def note_on_groove_slope(model, patch) -> list:

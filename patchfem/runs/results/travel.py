@@ -9,9 +9,8 @@ import numpy as np
 from ...formatting import format_length
 from ...response.outcome import check_piece_length
 
-MAX_SLIDE_FRACTION = (
-    0.1  # fraction of the contact length above which an unchanged pressure is inaccurate
-)
+# Fraction of the contact length above which an unchanged pressure is inaccurate.
+MAX_SLIDE_FRACTION = 0.1
 
 
 def find_largest_slide(slide) -> float:

@@ -37,12 +37,10 @@ from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 if TYPE_CHECKING:
     from ...friction.protocol import Element
 
-MAX_EXACT_SECONDS_OVER_MARCH = (
-    5.0  # CPU seconds that an exact solution may take if a march, which has errors, takes less
-)
-MAX_EXACT_SECONDS_UNRESOLVED = (
-    60.0  # CPU seconds of an exact solution if no march resolves the modes
-)
+# CPU seconds that an exact solution may take if a march, which has errors, takes less.
+MAX_EXACT_SECONDS_OVER_MARCH = 5.0
+# CPU seconds of an exact solution if no march resolves the modes.
+MAX_EXACT_SECONDS_UNRESOLVED = 60.0
 MAX_EXACT_SECONDS = 600.0  # CPU seconds of an exact solution above which it is refused
 MAX_MARCH_STEPS = 6400  # largest number of steps per cycle that a march chooses by itself
 # Exponent of (friction limit / drive force), which gives the expected fraction of the time in stick: a
@@ -52,7 +50,8 @@ STICKING_EXPONENT = 6
 # the motion of a slipping joint.
 MAX_MERGES = 4
 MERGE_TOLERANCE = 1e-3  # cells are merged MAX_MERGES times at this or a larger tolerance
-MAX_INTERVAL_PHASE = 2.0  # phase [rad] of the fastest vibration in a time interval, as in `dynamics.events.series_kernels`
+# Phase [rad] of the fastest vibration in a time interval, as in `dynamics.events.series_kernels`.
+MAX_INTERVAL_PHASE = 2.0
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
@@ -67,9 +66,8 @@ MAX_STEP_RATIO = 3.5
 # A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time, where r is the drive
 # force over the friction limit: measured 0.5 at r = 1.07 and 0.1 at r = 1.26.
 STIFF_TIME_EXPONENT = 9.0
-MAX_STEP_RELAXATION_LENGTHS = (
-    3.0  # largest stable step, in relaxation lengths of a state of the friction law
-)
+# Largest stable step, in relaxation lengths of a state of the friction law.
+MAX_STEP_RELAXATION_LENGTHS = 3.0
 # engines that keep a fixed number of samples of each of the last cycles, independent of their steps
 RESAMPLING_ENGINES = (
     "exact",
@@ -77,9 +75,8 @@ RESAMPLING_ENGINES = (
     "smooth",
 )
 SAMPLES_PER_CYCLE = 400  # number of samples of a kept cycle, as in `dynamics.cycles`
-REVERSALS_PER_CYCLE = (
-    4.0  # expected reversals per cycle, which are kept from before the last cycles
-)
+# Expected reversals per cycle, which are kept from before the last cycles.
+REVERSALS_PER_CYCLE = 4.0
 
 
 class HistoryBytes(NamedTuple):

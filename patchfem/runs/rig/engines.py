@@ -36,9 +36,8 @@ from .costs import (
     reason_to_march_smooth_law,
 )
 
-MERGE_WIDTH_FACTOR = (
-    0.5  # factor on the merge width of bonds in the run that shows the error of merging
-)
+# Factor on the merge width of bonds in the run that shows the error of merging.
+MERGE_WIDTH_FACTOR = 0.5
 # Ratio of the neglected tail of a sum over bonds to the tolerance, above which a run with a smaller tail
 # checks its error; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
@@ -199,9 +198,8 @@ LOOP_MEASURES = (
     "friction_force_peak",
 )
 LOOP_SAMPLING_ERROR = 1e-4  # relative error of loop measures from 400 samples per cycle
-INSTANT_SAMPLING_ERROR = (
-    0.005  # error of the stick fraction [1] and of the phase at slip start [rad] at 400 samples
-)
+# Error of the stick fraction [1] and of the phase at slip start [rad] at 400 samples.
+INSTANT_SAMPLING_ERROR = 0.005
 MOTION_SAMPLING_ERROR = 1e-9  # relative error of all other measures, which are interpolated
 
 

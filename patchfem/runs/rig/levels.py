@@ -23,9 +23,8 @@ from ...response.levels import (
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
-EXACT_RELATIVE_ERROR = (
-    1e-9  # relative error of the measures of an event-driven run, whose motion has round-off only
-)
+# Relative error of the measures of an event-driven run, whose motion has round-off only.
+EXACT_RELATIVE_ERROR = 1e-9
 MAX_BISECTIONS = 40  # largest number of bisections of an onset, to 1e-12 of its bracket
 
 

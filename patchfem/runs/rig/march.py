@@ -31,9 +31,8 @@ from .lists import ListGuard, choose_bond_summation, has_list
 from .reading import Reader
 from .solution import CycleLoop, Solution, compute_sampled_loop, normal_load
 
-END_ERROR_FACTOR = (
-    1.5  # safety factor on the first-order error of a run that ends beside its requested end
-)
+# Safety factor on the first-order error of a run that ends beside its requested end.
+END_ERROR_FACTOR = 1.5
 
 
 class March(NamedTuple):

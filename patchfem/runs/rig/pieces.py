@@ -44,9 +44,8 @@ MOTION_MEASURES = (
 )
 MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a settled motion to the tolerance
 N_CHANGE_WINDOWS = 3  # number of last windows whose extremes show the change of the motion
-MIN_DECAY = (
-    1e-6  # lower bound [1] of the decay of a free motion in the last windows, for lack of damping
-)
+# Lower bound [1] of the decay of a free motion in the last windows, for lack of damping.
+MIN_DECAY = 1e-6
 
 
 def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:

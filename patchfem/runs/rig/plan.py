@@ -56,15 +56,13 @@ STEADY_CODES = {
 }
 # expected points of a curve over frequency, including those at its bends and peak
 N_MAPPED_POINTS = 160  # points of a curve by maps of events or yields, or by marches
-N_BALANCE_POINTS = (
-    250  # points of a curve by harmonic balance, which follows the folds of the curve
-)
+# Points of a curve by harmonic balance, which follows the folds of the curve.
+N_BALANCE_POINTS = 250
 N_MARCHED_CYCLES = 400.0  # expected cycles of all marches until a motion repeats
 # relative distance from the frequency of a mode within which a sine excites a resonance
 RESONANCE_TOL = 0.02
-MIN_STIFF_LINK_RATIO = (
-    10.0  # ratio of link to modal stiffness, from which a link holds the block nearly at rest
-)
+# Ratio of link to modal stiffness, from which a link holds the block nearly at rest.
+MIN_STIFF_LINK_RATIO = 10.0
 
 
 def chain(rig) -> dict:

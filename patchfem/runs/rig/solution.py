@@ -15,9 +15,8 @@ from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
 NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
-PEAK_SHIFT_FACTOR = (
-    3.0  # safety factor on the frequency shift of a peak by a coarser mesh or fewer modes
-)
+# Safety factor on the frequency shift of a peak by a coarser mesh or fewer modes.
+PEAK_SHIFT_FACTOR = 3.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -16,13 +16,16 @@ from .section import find_flank_ends, noise_threshold
 MAX_SCALE_RATIO = 1.5  # scale of a floor / that of the quietest floor; rougher floors are dropped
 BEND_GAIN = 0.8  # scale with / without a bend of the datum; below it, the bend is subtracted
 MIN_UNWORN_FRACTION = 0.7  # fraction of the heights of an unworn end that must lie on the floor
-LONG_FLANK = 0.05  # length of a flank / length of the trace; from this ratio on, a scar is distinguished from a bent datum
+# Length of a flank / length of the trace; from this ratio on, a scar is distinguished from a bent
+# datum.
+LONG_FLANK = 0.05
 SHORT_FLANK = 0.02  # length of a flank / length of the trace; below this ratio, a scar is excluded
 MAX_CHI2 = 30.0  # chi-squared of a flank's bow, with two or three degrees of freedom
 FLANK_PARTS = 6  # parts of the trace (of N_PARTS) that remain on either side of a shallow track
 MIN_PARTS = 3  # smallest number of parts in a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
-MIN_STEP = 8.0  # depth / standard deviation from which a box is a shallow track; 2 % of random walks have more
+# Depth / standard deviation from which a box is a shallow track; 2 % of random walks have more.
+MIN_STEP = 8.0
 # number of samples in the subset with which the starting points of a fit are refined
 N_THINNED = 2000
 # samples in the running means that detect wear below the noise of a single height
@@ -31,7 +34,9 @@ MIN_WIDE_RUN = 64  # samples of a worn run from which its flanks may leave the f
 # width beside a worn run / width of the run; slight wear there would be taken for a drift
 MARGIN_FRACTION = 0.2
 MARGIN_SAMPLES = 8  # smallest width of the margin beside a worn run, in samples
-MAX_ROUNDS = 4  # largest number of alternating fits and detections of wear; fewer if the worn heights stay the same
+# Largest number of alternating fits and detections of wear; fewer if the worn heights stay the
+# same.
+MAX_ROUNDS = 4
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-N_PARTS = 60  # number of parts of a trace, whose means show wear and drift below the noise of a single height
+# Number of parts of a trace, whose means show wear and drift below the noise of a single height.
+N_PARTS = 60
 
 
 class Boxes(NamedTuple):

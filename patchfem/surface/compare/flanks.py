@@ -18,7 +18,8 @@ PARTS = 40  # number of parts of the trace; the ends of a track are known to wit
 FLANK_PARTS = 4  # number of parts in the shortest flank
 PART_SAMPLES = 8  # samples in a part of the second trace; the mean of fewer is too uncertain
 N_DRAWS = 100  # number of random traces into which the track is cut for the intervals
-INTERVAL_FACTOR = 1.4  # factor for the estimated spectrum; without it only 85 of 100 intervals contain the true value
+# Factor for the estimated spectrum; without it only 85 of 100 intervals contain the true value.
+INTERVAL_FACTOR = 1.4
 MIN_CLEARANCE = 1.2  # depth or roughness / the largest one of random traces without a track
 
 

@@ -14,7 +14,9 @@ from .section import Section
 MIN_WINDOW = 5  # number of samples in the shortest window
 MAX_WINDOW = 1025  # number of samples in the longest window
 N_PARTS = 8  # number of parts of a window, whose means the parabola must also fit
-MAX_MISFIT = 2.5  # standard deviations of a misfit; with this limit the parabola fits 97 % of the windows of pure noise
+# Standard deviations of a misfit; with this limit the parabola fits 97 % of the windows of pure
+# noise.
+MAX_MISFIT = 2.5
 # standard deviations that are subtracted from a depth when the largest depth is chosen
 PENALTY = 3.0
 # samples; for longer windows, a quarter of the window on either side shows the slopes

@@ -14,9 +14,11 @@ from ..roughness.parameters import Heights
 from ..roughness.spectrum import BAND, Spectrum, band_amplitude, estimate_spectrum, refuse_band
 from .boxes import average_parts, part_edges
 
-RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum, in addition to the noise
+# Standard deviation of a ratio due to tip, interpolation and datum, in addition to the noise.
+RATIO_ERROR = 0.004
 MAX_MISSING = 1 / 3  # fraction of the heights of a line of a scan that may be missing
-MAX_LINES = 256  # largest number of lines of a scan that are read; further ones nearly equal their neighbours
+# Largest number of lines of a scan that are read; further ones nearly equal their neighbours.
+MAX_LINES = 256
 N_PARTS = 6  # number of parts of a trace whose mean squares show the scatter along the trace
 
 

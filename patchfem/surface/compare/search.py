@@ -24,7 +24,8 @@ MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves and the tilt are 
 N_RANDOM = 100  # number of random traces, whose correlations are due to chance
 # standard deviations above the correlations of random traces; 1 of 1000 unrelated pairs has more
 MIN_CLEARANCE = 5.0
-MIN_LEAD = 0.3  # difference of Fisher's z of the best and second-best shift; 150 related pairs had 0.64 or more
+# Difference of Fisher's z of the best and second-best shift; 150 related pairs had 0.64 or more.
+MIN_LEAD = 0.3
 MAX_SECOND = 0.97  # correlation of the second-best shift; only periodic surfaces have a larger one
 N_PARTS = 12  # number of parts of the first trace that are correlated one by one
 N_BEST_PARTS = 4  # number of parts whose correlations, the largest ones, give the score of a shift

@@ -13,9 +13,8 @@ from ..profile import Profile, level
 
 MAX_DEGREE = 9  # higher polynomials follow the waves of the surface
 CYLINDER = "cylinder"
-MAX_FITTED_HEIGHTS = (
-    65_536  # heights of the fit of a cylinder; more take seconds and do not change it
-)
+# Heights of the fit of a cylinder; more take seconds and do not change it.
+MAX_FITTED_HEIGHTS = 65_536
 MAX_JACKKNIFE_HEIGHTS = 8_192  # heights of each fit of the jackknife
 N_PARTS = 10  # parts of the surface, each of which the jackknife leaves out once
 STUDENT_T = 1.833  # Student's t of 90 % with N_PARTS - 1 degrees of freedom

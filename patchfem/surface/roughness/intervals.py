@@ -32,9 +32,8 @@ P_LOWER = 0.05  # probability of the lower bound
 P_UPPER = 0.95  # probability of the upper bound
 N_SIMULATED_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
 MAX_SAMPLES = 2048  # samples of a simulated trace, which keeps all of them below 10 MB
-SPECTRUM_FREEDOM = (
-    2.5  # number of degrees of freedom that estimating the spectrum uses up, from coverage tests
-)
+# Number of degrees of freedom that estimating the spectrum uses up, from coverage tests.
+SPECTRUM_FREEDOM = 2.5
 MAX_DEVIATIONS = 1.96  # standard deviations of skewness and kurtosis of Gaussian heights
 PEAK_FACTOR = 1.3  # scatter of the dominant wavelength / that of simulated traces
 MIN_WAVES = 4  # dominant waves in a trace; self-affine traces have 2.7 to 3.5

@@ -9,7 +9,8 @@ from .spectrum import chi_square_factor
 
 SPENT_FRACTION = 0.85  # degrees of freedom left after estimating the spectrum, from 240 scans
 NORMAL_QUANTILE_95 = 1.6449  # standard deviations at the 95 % quantile of a normal distribution
-MIN_PAIRS = 0.1  # pairs of heights / those at lag zero; lags with fewer pairs are not used for the correlation
+# Pairs of heights / those at lag zero; lags with fewer pairs are not used for the correlation.
+MIN_PAIRS = 0.1
 
 
 class ScanIntervals(NamedTuple):

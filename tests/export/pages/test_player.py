@@ -116,7 +116,7 @@ def test_exact_numbers_and_places_are_those_of_the_fields(coarse):
         aside = 50.0
         for at, time in list(enumerate(film["times"]))[::5]:
             frame = series.frame(int(np.searchsorted(series.times, time)))
-            drawn = make_panels(frame, (gap, gap), aside=aside)[0]
+            drawn = make_panels(frame, (gap, gap), slide_factor=aside)[0]
             assert film["slide"][at] == pytest.approx(drawn.slide, rel=1e-9)
             shift = np.array([aside * film["slide"][at], 0.0])
             parts = np.split(

@@ -47,9 +47,8 @@ from ...rig.engines import describe_unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
-N_FINAL_WINDOWS = (
-    5  # number of last windows from which the steady motion is extrapolated (response.settling)
-)
+# Number of last windows from which the steady motion is extrapolated (response.settling).
+N_FINAL_WINDOWS = 5
 MAIN_MEASURE = "relative_displacement_amplitude"
 PHASE_MEASURE = "slip_start_phase"
 

@@ -24,9 +24,8 @@ from .lane_steps import STRETCH_STEPS
 CHECK_INTERVAL = 200  # number of cases per case that is checked with the exact engine
 MIN_CHECKED = 2  # smallest number of checked cases of a batch
 N_MORE_CHECKED = 70  # number of further cases that are checked if a checked case differs
-MAX_WRONG_FRACTION = (
-    0.03  # fraction of differing checked cases, above which all are computed exactly
-)
+# Fraction of differing checked cases, above which all are computed exactly.
+MAX_WRONG_FRACTION = 0.03
 # Factor on the errors of a single run of the Iwan law in a check: 1 of 590 random cases differed by more
 # than its error, by 1.9 times as much.
 IWAN_ERROR_FACTOR = 2.0

@@ -26,9 +26,8 @@ LANE_LAWS = {
     "lugre": "friction.laws.lugre_kernels",
     "nonlocal": "friction.laws.stretch_kernels",
 }
-MAX_STICK_SLIP_FRACTION = (
-    1e-3  # ratio of slip to the stretch at the friction limit, below which an interface sticks
-)
+# Ratio of slip to the stretch at the friction limit, below which an interface sticks.
+MAX_STICK_SLIP_FRACTION = 1e-3
 
 
 class Scales(NamedTuple):

@@ -16,9 +16,8 @@ from ..case_results import CaseResults, has_unreadable_table
 from . import pieces
 from .columns import assemble_results
 
-MAX_CASES_PER_CALL = (
-    1024  # largest number of cases in one compiled call, to limit the memory of histories
-)
+# Largest number of cases in one compiled call, to limit the memory of histories.
+MAX_CASES_PER_CALL = 1024
 
 
 def refuses(model: Model) -> str:

@@ -32,9 +32,8 @@ from ...rig.pieces import (
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
 from .threads import run_in_threads
 
-N_STICK_CYCLES = (
-    3  # number of cycles that contain every stick interval of a periodic motion completely
-)
+# Number of cycles that contain every stick interval of a periodic motion completely.
+N_STICK_CYCLES = 3
 MIN_CYCLES = 20  # smallest number of cycles of a run
 MAX_CYCLES = 4000  # largest number of cycles of a run, whose extremes are all kept
 # relative error of the drift of rigid elements, which is the round-off of two means

@@ -19,9 +19,8 @@ from .. import one_by_one, pressed
 from ..case_results import CaseResults
 from . import lane_check, lane_numbers, lane_steps, lanes, sheared
 
-MAX_CASES_PER_CALL = (
-    512  # largest number of cases in one compiled call, whose tables are in memory together
-)
+# Largest number of cases in one compiled call, whose tables are in memory together.
+MAX_CASES_PER_CALL = 512
 
 
 def refuses(model: Model) -> str:

@@ -11,9 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
 
-MIN_CASES_PER_THREAD = (
-    32  # smallest number of cases of a thread: fewer end before the thread has started
-)
+# Smallest number of cases of a thread: fewer end before the thread has started.
+MIN_CASES_PER_THREAD = 32
 
 
 def run_in_threads(work: Callable[[slice], None], count: int, least: int = 0) -> None:

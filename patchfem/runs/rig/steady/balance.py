@@ -30,9 +30,8 @@ from ..reading import Reader, compute_friction_works
 from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
-SAMPLES_PER_CYCLE = (
-    4096  # number of samples of a cycle from which the measures of a steady motion are computed
-)
+# Number of samples of a cycle from which the measures of a steady motion are computed.
+SAMPLES_PER_CYCLE = 4096
 
 
 class BalanceReader(Reader):

@@ -23,18 +23,17 @@ COLUMN_MEASURES = {
 }
 # relative error of the measures of an event-driven motion from a given state, which has round-off only
 EXACT_RELATIVE_ERROR = 1e-9
-HARMONIC_ROUND_OFF = (
-    1e-12  # round-off of the third harmonic of the acceleration relative to the first
-)
+# Round-off of the third harmonic of the acceleration relative to the first.
+HARMONIC_ROUND_OFF = 1e-12
 N_SWEEP_POINTS = 121  # number of points of a curve over frequency before its refinement
 # The neighbourhood of a peak ends where the curve falls below this fraction of the peak; no other peak may
 # exceed this fraction.
 PEAK_END_RATIO = 0.8
-MAX_PEAK_FRACTION = 0.75  # largest ratio of the width of a neighbourhood to that of the sweep; a wider one is not used
+# Largest ratio of the width of a neighbourhood to that of the sweep; a wider one is not used.
+MAX_PEAK_FRACTION = 0.75
 N_START_POINTS = 7  # number of points of the curve in a neighbourhood before its refinement
-INTERPOLATION_TOL = (
-    0.01  # largest relative error of the linear interpolation between the points of a curve
-)
+# Largest relative error of the linear interpolation between the points of a curve.
+INTERPOLATION_TOL = 0.01
 
 
 class CurvePoint(NamedTuple):

@@ -23,16 +23,13 @@ from .curves import CurvePoint, TracedCurve, describe_instability, make_curve_po
 
 START_STEPS = 256  # steps per cycle of the first march of a law that is not set-valued
 MAX_STEPS = 4096  # largest number of steps per cycle to which a march is refined
-SET_VALUED_SAMPLES = (
-    1024  # samples per cycle for a set-valued law, whose steps are chosen by their error
-)
-N_CYCLES_IN_GROOVES = (
-    30  # number of cycles from rest after which a lifted mass is assumed to stay in its grooves
-)
+# Samples per cycle for a set-valued law, whose steps are chosen by their error.
+SET_VALUED_SAMPLES = 1024
+# Number of cycles from rest after which a lifted mass is assumed to stay in its grooves.
+N_CYCLES_IN_GROOVES = 30
 STEP_END_ERROR = 1e-9  # relative error of the measures due to round-off at the ends of steps
-PERIODIC_TOL = (
-    1e-6  # largest change from cycle to cycle, relative to the amplitude, of a periodic motion
-)
+# Largest change from cycle to cycle, relative to the amplitude, of a periodic motion.
+PERIODIC_TOL = 1e-6
 # Error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a
 # multiplier exceeds 1 by more.
 MULTIPLIER_TOL = 1e-2

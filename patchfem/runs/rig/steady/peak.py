@@ -23,12 +23,10 @@ MAX_ADDED_POINTS = 40  # largest number of points that refine a peak
 # Fraction of the largest amplitude above which a resonance curve is assumed concave; that of a single mode is
 # concave from 0.816 on.
 MIN_CONCAVE_FRACTION = 0.8
-POSITION_TOL = (
-    3e-4  # error of the position of a peak due to round-off, relative to the width of the peak
-)
-IDENTICAL_POINT_TOL = (
-    1e-9  # distance relative to the length of the curve, below which two points are identical
-)
+# Error of the position of a peak due to round-off, relative to the width of the peak.
+POSITION_TOL = 3e-4
+# Distance relative to the length of the curve, below which two points are identical.
+IDENTICAL_POINT_TOL = 1e-9
 WIDTH_HEIGHT_FRACTION = 0.9  # fraction of the height of a peak at which its width is measured
 # Ratio of the shift of a peak to (its width times the relative error of its height): the width is measured a tenth of
 # the height below the peak, so that an error of a tenth shifts the peak by its width.
