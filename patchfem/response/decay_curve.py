@@ -201,12 +201,9 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     farthest = float(position[-1])
     for reversal in locate_reversals(time, position, speed)[1][::-1].tolist():
         if direction == 0:
-            direction = (
-                int(np.sign(reversal - farthest))
-                if abs(reversal - farthest) > MAX_RIPPLE * last_range
-                else 0
-            )
-            farthest = reversal if direction else farthest
+            if abs(reversal - farthest) > MAX_RIPPLE * last_range:
+                direction = int(np.sign(reversal - farthest))
+                farthest = reversal
         elif direction * (reversal - farthest) > 0:
             farthest = reversal
         elif direction * (farthest - reversal) > MAX_RIPPLE * last_range:
@@ -489,7 +486,9 @@ def _evaluate_cubic(position, speed, fraction):
     position, speed: values at both ends of the steps; the speeds are multiplied by the durations of
     the steps.
     """
-    (a, b), (c, d), s = position, speed, fraction
+    a, b = position
+    c, d = speed
+    s = fraction
     return a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d)))
 
 
@@ -498,7 +497,8 @@ def _find_reversal_fraction(position, speed) -> np.ndarray:
 
     The speeds at both ends have opposite signs.
     """
-    (a, b), (c, d) = position, speed
+    a, b = position
+    c, d = speed
     two = 2 * (3 * (b - a) - 2 * c - d)
     three = 3 * (2 * (a - b) + c + d)
     both = -(two + np.copysign(np.sqrt(np.maximum(two**2 - 4 * three * c, 0.0)), two)) / 2

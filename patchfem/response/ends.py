@@ -29,7 +29,8 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
         return {}
     offset = abs(offset)
     span = window.time[-1] - window.time[0]
-    cycles, (slips, slides) = span / period, slips_and_displacements(window)
+    cycles = span / period
+    slips, slides = slips_and_displacements(window)
     forces = window.extra.get("forces", window.force[:, None])
     parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
     if "lateral_slides" in window.extra:

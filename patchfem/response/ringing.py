@@ -272,7 +272,8 @@ def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
         own = np.array([one.errors[k] for one in found])
         middle = float(np.median(each))
         spread = 1.4826 * float(np.median(np.abs(each - middle))) / np.sqrt(each.size)
-        values[f"ring_{name}"], errors[f"ring_{name}"] = middle, 2 * spread + float(np.median(own))
+        values[f"ring_{name}"] = middle
+        errors[f"ring_{name}"] = 2 * spread + float(np.median(own))
     return values, errors
 
 
@@ -348,7 +349,8 @@ def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
 
 def _subtract_sinusoids(time, value, forced, poles) -> tuple:
     """Return the residual and the fitted sinusoids (k,) for given poles."""
-    n, (columns, few, *_) = forced.shape[1], _fit_poles(time, value, forced, poles)[2]
+    n = forced.shape[1]
+    columns, few, *_ = _fit_poles(time, value, forced, poles)[2]
     return columns[2, 0].copy(), [
         few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
     ]
@@ -413,11 +415,9 @@ def _refine_poles(time, value, forced, poles, max_slow_rms: float = 0.0) -> _Fit
     less than its round-off, or when the rms of the residual is below `whole` with sinusoids that
     are too slow to be ringing.
     """
-    poles, scale, short = (
-        poles.copy(),
-        np.abs(poles) + 1 / time[-1],
-        MIN_REFINED_FRACTION * 2 * np.pi * MIN_PERIODS / time[-1],
-    )
+    scale = np.abs(poles) + 1 / time[-1]
+    poles = poles.copy()
+    short = MIN_REFINED_FRACTION * 2 * np.pi * MIN_PERIODS / time[-1]
     _, size, (*_, normal, _) = _fit_poles(
         time,
         value,

@@ -43,10 +43,8 @@ def fill_sinusoids(time, poles, columns, first):
         for j in range(time.size):
             fall = exp(min(max(-rate * time[j], -50.0), 50.0))
             turn = own * time[j]
-            columns[first + 2 * r, j], columns[first + 2 * r + 1, j] = (
-                fall * cos(turn),
-                fall * sin(turn),
-            )
+            columns[first + 2 * r, j] = fall * cos(turn)
+            columns[first + 2 * r + 1, j] = fall * sin(turn)
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

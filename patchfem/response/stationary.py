@@ -85,7 +85,8 @@ def random_response_measures(window, drive) -> dict:
         ("relative_displacement_rms", window.output, record.place),
         ("absolute_acceleration_rms", window.acceleration, record.acceleration),
     ):
-        out[name], out[f"{name}_scatter"] = compute_rms(window.time, values), rms_scatter(even)
+        out[name] = compute_rms(window.time, values)
+        out[f"{name}_scatter"] = rms_scatter(even)
     found = fit_peak(record, drive.band)
     if found is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *found):

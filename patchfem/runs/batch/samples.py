@@ -153,7 +153,8 @@ class Samples:
         number : int
             Multiple of the drive frequency.
         """
-        omega, (moved, faster) = number * self.omega, self.ends()
+        omega = number * self.omega
+        moved, faster = self.ends()
         return row @ (2 / self.span * (faster + 1j * omega * moved) - omega**2 * first)
 
     def loops(self, first, stiffness) -> dict:
@@ -166,8 +167,8 @@ class Samples:
         stiffness : (n,)
             See `values`.
         """
-        modes, omega, (moved, _) = self.modes, self.omega, self.ends()
-        rates = 2 / self.span * moved + 1j * omega * first
+        modes = self.modes
+        rates = 2 / self.span * self.ends()[0] + 1j * self.omega * first
         rest = np.array(
             [
                 -base * (-1j * self.amplitude) - self.gain(unit, first, 1)
@@ -355,10 +356,8 @@ def find_peaks(magnitude) -> tuple:
     near = np.clip(peak_index + np.arange(-2, 3)[:, None], 0, len(magnitude) - 1)
     neighbourhood = magnitude[near, rows]
     bends = -(neighbourhood[2:] - 2 * neighbourhood[1:-1] + neighbourhood[:-2])
-    bends[0], bends[2] = (
-        np.where(peak_index >= 2, bends[0], bends[1]),
-        np.where(peak_index <= len(magnitude) - 3, bends[2], bends[1]),
-    )
+    bends[0] = np.where(peak_index >= 2, bends[0], bends[1])
+    bends[2] = np.where(peak_index <= len(magnitude) - 3, bends[2], bends[1])
     smooth = bends.min(axis=0) * MAX_SMOOTH_RATIO >= bends.max(axis=0)
     left, mid, right = neighbourhood[1:4]
     bend = -bends[1]

@@ -86,7 +86,8 @@ def press_to_approach_with_rotation(
             open_gap = frozen_array(np.atleast_2d(gap).min(axis=0) - min(distance, gap.min()))
             pressure = replace(unloaded.pressure, gap=open_gap, approach=distance)
             return unloaded._replace(pressure=pressure)
-        low, top = max(low - 2, bottom), low
+        top = low
+        low = max(low - 2, bottom)
     brentq(excess, low, top, xtol=1e-13, rtol=1e-14)
     approaches = [solution.pressure.approach for solution in solutions]
     nearest = int(np.argmin(np.abs(np.array(approaches) - distance)))

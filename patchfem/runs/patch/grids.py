@@ -408,10 +408,17 @@ def make_columns(patch_model, layout: Layout) -> np.ndarray:
 
 
 def make_grid(patch_model, x, piece) -> TensorGrid:
-    """Return the tensor grid of a piece on node positions x (k,) [m] along the interface.
+    """Return the tensor grid of a piece.
 
     Its rows are as fine as the columns at the interface, at the inner face of the coating and at
     the holder.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    x : (k,)
+        Positions of the nodes along the interface [m].
+    piece : PatchPiece
     """
     thick = piece.thickness
     height = piece.height

@@ -153,11 +153,11 @@ def pressing_cost(patch_model, tolerance: float) -> Cost:
         "condensing": condensing_factor * grids.seconds,
         "fields": cost_model.FIELDS_SECONDS,
     }
-    n_bytes = PACKAGE_BYTES + (
-        BYTES_PER_OVERHANG_NODE * grids.nodes
-        if grids.outlined
-        else CONDENSING_BYTES_RATIO * grids.bytes
-    )
+    n_bytes = PACKAGE_BYTES
+    if grids.outlined:
+        n_bytes += BYTES_PER_OVERHANG_NODE * grids.nodes
+    else:
+        n_bytes += CONDENSING_BYTES_RATIO * grids.bytes
     if not patch_model.mesh.is_static:
         times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * grids.nodes
         n_bytes += FRAME_BYTES_PER_NODE * grids.nodes
@@ -172,11 +172,11 @@ def stiffness_chain(patch_model) -> dict:
     """
     stiffnesses = {
         "holder": patch_model.loading.tangential_stiffness or "rigid",
-        "pieces_shear": patch_model.pieces.shear_stiffness
-        if patch_model.interface.has_shear
-        else "rigid",
+        "pieces_shear": "rigid",
         "asperities": "rigid",
     }
+    if patch_model.interface.has_shear:
+        stiffnesses["pieces_shear"] = patch_model.pieces.shear_stiffness
     if (
         patch_model.interface.skin is not None
         and patch_model.interface.skin.tangential_ratio is not None

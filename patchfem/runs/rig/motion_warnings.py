@@ -154,11 +154,9 @@ def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
         stuck = mode["stuck_frequency"]
         low = free
         high = free if stuck is None else max(free, stuck)
-        is_beyond = (
-            high > at * (1 + EQUAL_FREQUENCY_TOL)
-            if upper
-            else 0 < low < at * (1 - EQUAL_FREQUENCY_TOL)
-        )
+        is_beyond = 0 < low < at * (1 - EQUAL_FREQUENCY_TOL)
+        if upper:
+            is_beyond = high > at * (1 + EQUAL_FREQUENCY_TOL)
         if is_beyond:
             phrase = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz"
             if high > low:

@@ -203,7 +203,8 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
         values = evaluate_reading(
             reading, energies, sine=True, whole=True, stiffness=stiffness, size=acceleration
         )
-    work, loss = energies["friction"], energies["friction"]
+    work = energies["friction"]
+    loss = work
     if not is_rigid:
         work = np.array([run.end[1].work.sum() for run in finished])
         loss = np.array([run.end[1].loss.sum() for run in finished])
