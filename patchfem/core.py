@@ -506,28 +506,20 @@ class IntegratedMeasures:
     """Quantities of the last cycles that an engine computed without samples of the motion.
 
     An engine that has its motion in closed form, or as polynomials, knows peaks, times without slip and work better
-    than samples of the motion show them. A quantity that is None, or an empty tuple, is read from samples instead
+    than samples of the motion show them. A quantity that is missing here is read from samples instead
     (`response.rows`).
 
-    - output_amplitude: half the range of the output [m], or None.
-    - acceleration_peak: largest acceleration at the output [m s-2], or None.
-    - drift: time mean of the relative displacement in the last cycle less that in the first, per cycle between them
-      [m], or None.
+    - values: measures by name; None for a measure of which the run has no value.
     - acceleration_harmonics: sizes of the first and third harmonic of the absolute acceleration [m s-2], or None.
     - loops: friction loop of each interface.
     - slip_start_phases (s,): phases of the drive [rad], modulo pi, at which the first interface begins to slip, or
-      None.
-    - friction_works: friction work [J] from samples, from the energy balance, and the sum of its absolute values, or
       None.
     - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
       largest relative displacement, a pair for every cycle.
     """
 
-    output_amplitude: float | None = None
-    acceleration_peak: float | None = None
-    drift: float | None = None
+    values: dict = field(default_factory=dict)
     acceleration_harmonics: tuple | None = None
     loops: tuple = ()
     slip_start_phases: np.ndarray | None = None
-    friction_works: tuple | None = None
     reversals: tuple = ()

@@ -30,7 +30,6 @@ from .measures import (
     compute_slip_measures,
     energy_balance,
     lateral_history,
-    relative_gap,
     slip_start_measure,
 )
 from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
@@ -52,7 +51,6 @@ class LastCycles:
     - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they do not come
       from `integrated`; None if the window contains no whole cycle.
     - ledger (4, k): friction work and energies [J], or None.
-    - known: values by name that the engine has itself; None if it has no value of a measure.
     - by: how the force at a reversal of the slide is evaluated (see `loops.find_reversals`).
     - still: half range of the slide [m] up to which it is round-off.
     - even: equally spaced samples of the window; None if its own samples are.
@@ -74,7 +72,6 @@ class LastCycles:
     integrated: IntegratedMeasures = field(default_factory=IntegratedMeasures)
     loop: tuple | None = None
     ledger: np.ndarray | None = None
-    known: dict = field(default_factory=dict)
     by: str = "rate"
     still: float = 0.0
     even: Response | None = None
@@ -195,15 +192,6 @@ class LastCycles:
                 del found[name]
         return found
 
-    @property
-    def work_check(self) -> float | None:
-        """Relative difference [1] of the friction work from two computations, if both exist."""
-        if self.load is None or self.integrated.friction_works is None:
-            return None
-        return relative_gap(
-            *self.integrated.friction_works, self.book["power"] + self.book["peak_stored"]
-        )
-
     def further_interfaces(self) -> list:
         """Return the LastCycles of each interface after the first one.
 
@@ -233,7 +221,6 @@ class LastCycles:
                     window=window,
                     integrated=IntegratedMeasures(loops=loops),
                     sine=False,
-                    known={},
                     number=k,
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
                 )
@@ -342,22 +329,14 @@ ROWS = (
         "half the peak-to-peak displacement at the output, relative to "
         "the base; of a release, that of the last whole cycle of the "
         "motion, from a reversal to the second reversal after it",
-        lambda s: (
-            float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2
-            if s.integrated.output_amplitude is None
-            else s.integrated.output_amplitude
-        ),
+        lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2,
     ),
     MeasureDefinition(
         "absolute_acceleration_peak",
         "m s-2",
         1e-4,
         "largest acceleration at the output, base motion included",
-        lambda s: (
-            compute_acceleration_peak(s.window)
-            if s.integrated.acceleration_peak is None
-            else s.integrated.acceleration_peak
-        ),
+        lambda s: compute_acceleration_peak(s.window),
     ),
     MeasureDefinition(
         "friction_force_peak",
@@ -406,7 +385,7 @@ ROWS = (
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
         "the length of this vector; null if the drive is not periodic at the end of the run",
-        lambda s: compute_drift(s) if s.integrated.drift is None else s.integrated.drift,
+        compute_drift,
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
     ),
@@ -598,7 +577,6 @@ ROWS = (
         1e-2,
         "relative difference between two values of the friction work of the run: the value from the trapezoidal rule "
         "on the samples, and the value in the energy balance",
-        lambda s: s.work_check,
         group="energy",
     ),
     *_random_rows(
@@ -691,16 +669,17 @@ def compute_measures(last_cycles: LastCycles) -> dict:
     interface, with its number after the name. A value of the engine replaces the one computed from
     samples.
     """
+    known = last_cycles.integrated.values
     out = {}
     for row in ROWS:
-        if row.name in last_cycles.known:
-            out[row.name] = last_cycles.known[row.name]
+        if row.name in known:
+            out[row.name] = known[row.name]
         elif row.function is not None and (last_cycles.run is not None or not row.needs_run):
             out[row.name] = row.function(last_cycles)
     for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:
             out[add_interface_number(name, number)] = TABLE[name].function(interface)
-    return {name: value for name, value in (out | last_cycles.known).items() if value is not None}
+    return {name: value for name, value in (out | known).items() if value is not None}
 
 
 def stick_fraction(stuck, span):

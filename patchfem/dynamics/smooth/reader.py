@@ -294,14 +294,16 @@ def measure_parts(response, drive, ends) -> tuple:
         min(stuck_time, parts.time[-1, -1] - parts.time[0, 0]),
         max_force,
     )
-    phases = 2 * np.pi * starts / period % np.pi
+    values = {
+        "relative_displacement_amplitude": parts.find_half_range("output"),
+        "absolute_acceleration_peak": acceleration,
+        "drift_per_cycle": parts.drift(),
+    }
     measures = IntegratedMeasures(
-        parts.find_half_range("output"),
-        acceleration,
-        parts.drift(),
+        values,
         _acceleration_harmonics(parts, drive, ends),
         (loop,),
-        phases,
+        2 * np.pi * starts / period % np.pi,
     )
     return measures, {
         "absolute_acceleration_peak": acceleration_error,

@@ -28,7 +28,7 @@ from . import levels as rig_levels
 from . import strips
 from .interface import make_contact
 from .lists import ListGuard, choose_bond_summation, has_list
-from .reading import Reader
+from .reading import Reader, compute_work_check
 from .solution import CycleLoop, Solution, compute_sampled_loop, normal_load
 
 # Safety factor on the first-order error of a run that ends beside its requested end.
@@ -159,14 +159,33 @@ class MarchReader(Reader):
             return None
         return choose_bond_summation(self.model, self.numerics)
 
-    def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the friction work of a run from its samples and from its energy balance."""
-        return IntegratedMeasures(
-            friction_works=tuple(run.ledger[name] for name in ("sampled", "booked", "passed"))
-        )
+    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the check of the friction work, and the measures of a stuck interface.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.integrated_measures`.
+        """
+        if not self.has_friction:
+            return IntegratedMeasures()
+        book = self._energies(run, drive, stuck=stuck)
+        values = {"work_check": compute_work_check(book)}
+        if stuck and self.contact.set_valued:
+            # the remaining motion of the interface is round-off, not slip
+            values |= {"slip_start_phase": None, "stick_fraction": 1.0}
+        return IntegratedMeasures(values)
+
+    def _energies(self, run, drive, *, stuck: bool) -> dict:
+        """Return the energies of a run; those of a stuck interface are round-off of the kinetic energy."""
+        if not (stuck and self.contact.set_valued):
+            return run.ledger
+        rig = self.model.rig
+        moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
+        return run.ledger | {"power": run.ledger["power"] + moving}
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the friction loop and the measures of a stuck interface for the evaluation.
+        """Return the friction loop and the energies for the evaluation.
 
         Parameters
         ----------
@@ -175,22 +194,12 @@ class MarchReader(Reader):
         """
         if not self.has_friction:
             return {}
-        rig = self.model.rig
-        jumps = self.contact.set_valued
-        fields = {
+        return {
+            "book": self._energies(run, drive, stuck=stuck),
             "loop": self._loop(run, drive),
-            "still": self.held if jumps else 0.0,
-            "together": rig.friction.strips_slide_apart,
+            "still": self.held if self.contact.set_valued else 0.0,
+            "together": self.model.rig.friction.strips_slide_apart,
             "inside": self.inside_steps,
-        }
-        if not (stuck and jumps):
-            return fields
-        # the energies of a stuck interface are round-off of the kinetic energy
-        moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
-        # the remaining motion of the interface is round-off, not slip
-        return fields | {
-            "book": run.ledger | {"power": run.ledger["power"] + moving},
-            "known": {"slip_start_phase": None, "stick_fraction": 1.0},
         }
 
     def inside_steps(self, window, number: int):

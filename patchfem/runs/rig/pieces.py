@@ -147,25 +147,15 @@ class PieceReader(Reader):
             return run_events.is_all_stuck(run.window, self.held)
         return super().sticks(run)
 
-    def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the friction loops of the interfaces.
-
-        Strips that slide independently have a single loop, that of their mean, from samples. `more`
-        returns all other measures.
-        """
-        return IntegratedMeasures(
-            loops=(_compute_strips_loop(run, drive),) if self.apart else run.loops
-        )
-
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
+    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the measures that the event-driven engine computes between its events.
 
-        Rigid elements dissipate all work of friction, so that their ledger is known.
+        Strips that slide independently have a single loop, that of their mean, from samples.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.further_fields`.
+            See `Reader.integrated_measures`.
         """
         values = evaluate_reading(
             run.reading,
@@ -176,18 +166,28 @@ class PieceReader(Reader):
             size=find_max_acceleration(drive),
         )
         known = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
+        names = list(known)
         if not self.has_friction:
-            return {"known": {name: known[name] for name in (*MOTION_MEASURES, "drift_per_cycle")}}
-        if not self.rigid:
-            return {"known": known}
-        if self.apart:
-            known = {name: known[name] for name in (*MOTION_MEASURES, "slip_start_phase")}
+            names = [*MOTION_MEASURES, "drift_per_cycle"]
+        elif self.apart:
+            names = [*MOTION_MEASURES, "slip_start_phase"]
+        return IntegratedMeasures(
+            {name: known[name] for name in names},
+            loops=(_compute_strips_loop(run, drive),) if self.apart else run.loops,
+        )
+
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
+        """Return the ledger of rigid elements, which dissipate all work of friction.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.further_fields`.
+        """
+        if not (self.has_friction and self.rigid):
+            return {}
         lost = run.ledger["friction"]
-        return {
-            "known": known,
-            "ledger": np.array([[lost], [0.0], [lost], [0.0]]),
-            "together": self.apart,
-        }
+        return {"ledger": np.array([[lost], [0.0], [lost], [0.0]]), "together": self.apart}
 
     def rings(self, run, drive) -> tuple:
         """Compute frequency and damping of the ringing during stick, with errors.

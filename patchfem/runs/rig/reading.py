@@ -5,7 +5,6 @@ that they know better than their samples.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +15,12 @@ from ...response import run_events
 from ...response.errors import ERROR_MEASURES, absolute_change, error_of_change
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_evaluation
-from ...response.measures import slip_round_off, window_amplitudes, window_end_values
+from ...response.measures import (
+    relative_gap,
+    slip_round_off,
+    window_amplitudes,
+    window_end_values,
+)
 from ...response.outcome import estimate_steady
 from ...response.rows import ROWS_NEEDING_RUN, LastCycles, compute_measures, find_definition
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
@@ -26,7 +30,7 @@ from .solution import Solution, find_release_amplitude, mode_stiffness, normal_l
 class Reader:
     """Evaluation of the runs of a model by one engine.
 
-    The methods `integrated` and `more` return the measures that an engine computes itself.
+    The methods `integrated_measures` and `further_fields` return what an engine computes itself.
 
     Parameters
     ----------
@@ -54,12 +58,8 @@ class Reader:
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.held = 0.0 if self.creeps else held
 
-    def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the measures that the engine itself integrates over the last cycles."""
-        return IntegratedMeasures()
-
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return data that the engine knows more accurately than samples, as fields of `LastCycles`.
+    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the measures that the engine itself integrates over the last cycles.
 
         Parameters
         ----------
@@ -69,6 +69,16 @@ class Reader:
             Drive of the run.
         stuck : bool
             Whether the interface sticks.
+        """
+        return IntegratedMeasures()
+
+    def further_fields(self, run, drive, *, stuck: bool) -> dict:
+        """Return data that the engine knows more accurately than samples, as fields of `LastCycles`.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `integrated_measures`.
         """
         return {}
 
@@ -91,7 +101,7 @@ class Reader:
         fields = {
             "window": run.window,
             "book": run.ledger,
-            "integrated": self.integrated_measures(run, drive),
+            "integrated": self.integrated_measures(run, drive, stuck=stuck),
             "run": self.whole_run(run, drive),
         }
         if self.has_friction:
@@ -115,10 +125,9 @@ class Reader:
 
     def sticks(self, run) -> bool:
         """Return whether all interfaces stick during the last cycles of a run."""
-        loops = self.integrated_measures(run, self.model.rig.drive.signal).loops
         if not self.has_friction or self.creeps:
             return False
-        if loops:
+        if loops := self.integrated_measures(run, self.model.rig.drive.signal).loops:
             limit = max(self.held, slip_round_off(run.window))
             return all(loop.slip_range / 2 <= limit for loop in loops)
         return run_events.is_all_stuck(run.window, self.held)
@@ -310,31 +319,26 @@ def thin_samples(window):
     return window.select(kept)
 
 
-class FrictionWorks(NamedTuple):
-    """Friction work of a run, computed from samples and from the energy balance.
+def sample_friction_works(response) -> dict:
+    """Return the friction work of a response and the sum of its absolute values [J] as a dict.
 
-    - sampled: from samples by the trapezoidal rule [J].
-    - booked: from the energy balance [J].
-    - exchanged: sum of |work| [J].
-    """
-
-    sampled: float
-    booked: float
-    exchanged: float
-
-
-def compute_friction_works(response, work: float) -> FrictionWorks:
-    """Compute the friction work of a run from samples and from the energy balance.
-
-    Parameters
-    ----------
-    response : Response
-    work : float
-        Friction work of the ledger [J].
+    They follow from the samples of all interfaces by the trapezoidal rule.
     """
     slides = response.extra.get("slides", response.slide[:, None])
     forces = response.extra.get("forces", response.force[:, None])
     parts = [path_work.sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
     sampled = sum(float(part.sum()) for part in parts)
-    exchanged = sum(float(abs(part).sum()) for part in parts)
-    return FrictionWorks(sampled, work, exchanged)
+    return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
+
+
+def compute_work_check(book: dict) -> float:
+    """Return the relative difference [1] of the friction work from samples and from energies.
+
+    Parameters
+    ----------
+    book : dict
+        Energies of a run, with its friction work from samples, from energies and the sum of |work|
+        as "sampled", "booked" and "passed" [J].
+    """
+    energy = book["power"] + book["peak_stored"]
+    return relative_gap(book["sampled"], book["booked"], book["passed"], energy)

@@ -13,7 +13,7 @@ from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import ROWS_NEEDING_RUN, find_definition
 from .interface import make_contact
-from .reading import FrictionWorks, Reader, thin_samples
+from .reading import Reader, compute_work_check, thin_samples
 from .solution import Solution
 
 # Smallest ratio of the slip to its round-off, with which the onset of slip is located within a step.
@@ -71,15 +71,20 @@ class SmoothReader(Reader):
     def __init__(self, model, numerics, patch, contact):
         super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, SAMPLES_PER_CYCLE)
 
-    def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the measures integrated over the polynomials of the time steps."""
-        book = run.ledger
+    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the measures integrated over the polynomials of the time steps.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.integrated_measures`.
+        """
         integrated = run.integrated
         if not _has_clear_slip(run):
             loop = integrated.loops[0]._replace(stuck_time=None)
             integrated = replace(integrated, loops=(loop,), slip_start_phases=None)
-        works = FrictionWorks(book["sampled"], book["booked"], book["passed"])
-        return replace(integrated, friction_works=works)
+        check = {"work_check": compute_work_check(run.ledger)}
+        return replace(integrated, values=integrated.values | check)
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the last cycles with samples added at the reversals, for the evaluation.

@@ -26,7 +26,7 @@ from ....response.errors import finer_errors
 from ....response.measures import compute_acceleration_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..interface import make_single_contact
-from ..reading import Reader, compute_friction_works
+from ..reading import Reader, compute_work_check, sample_friction_works
 from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
@@ -42,36 +42,39 @@ class BalanceReader(Reader):
 
     turns: tuple = ()
 
-    def integrated_measures(self, run, drive) -> IntegratedMeasures:
-        """Return the friction work from samples and from the harmonics, and the reversals.
+    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the check of the friction work, and peaks and reversals.
 
         A periodic motion has no drift.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `Reader.integrated_measures`.
         """
-        return IntegratedMeasures(
-            drift=0.0,
-            friction_works=compute_friction_works(run.response, run.ledger["friction"]),
-            reversals=(tuple(turn[:2] for turn in self.turns),) if self.turns else (),
-        )
+        values = {"drift_per_cycle": 0.0}
+        if not self.has_friction:
+            return IntegratedMeasures(values)
+        book = run.ledger | {"booked": run.ledger["friction"]}
+        values["work_check"] = compute_work_check(book | sample_friction_works(run.response))
+        if not self.turns:
+            return IntegratedMeasures(values)
+        _, turn_forces, turn_slips = zip(*self.turns)
+        forces = np.append(turn_forces, run.window.force)
+        slips = np.append(turn_slips, run.window.slip)
+        values["friction_force_peak"] = float(np.abs(forces).max())
+        values["slip_amplitude"] = float(np.ptp(slips)) / 2
+        return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the friction loop and the peaks of force and slip, for the evaluation.
+        """Return the friction loop for the evaluation.
 
         Parameters
         ----------
         run, drive, stuck
             See `Reader.further_fields`.
         """
-        loop = compute_sampled_loop(run.window, drive, run.ledger["friction"])
-        if not self.has_friction or not self.turns:
-            return {"loop": loop}
-        _, turn_forces, turn_slips = zip(*self.turns)
-        forces = np.append(turn_forces, run.window.force)
-        slips = np.append(turn_slips, run.window.slip)
-        known = {
-            "friction_force_peak": float(np.abs(forces).max()),
-            "slip_amplitude": float(np.ptp(slips)) / 2,
-        }
-        return {"loop": loop, "known": known}
+        return {"loop": compute_sampled_loop(run.window, drive, run.ledger["friction"])}
 
 
 class CycleMeasures(NamedTuple):
