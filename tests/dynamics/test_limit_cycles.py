@@ -176,8 +176,8 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
 
 def test_exact_backbone_of_rigid_friction_agrees_with_closed_form():
     """Frequency and damping of a block on rigid friction agree with their closed form within 1e-7.
-    At an amplitude A, with h = F/k lost per half period, the gain (A/h + 1)/(A/h - 1) follows from
-    a net damping ratio -z by pi z/sqrt(1 - z^2) = ln G."""
+    At an amplitude A, with h = F/k lost per half period, the gain G = (A/h + 1)/(A/h - 1) gives the
+    net damping ratio -z by pi z/sqrt(1 - z^2) = ln G."""
     modes = make_modes([750.0], [0.003], [1.0], [2.0])
     force = 9.0
     zeta = 0.003

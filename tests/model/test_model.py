@@ -211,8 +211,9 @@ def test_exact_replaced_part_equals_changed_scene_key(text, sets, change):
 
 
 def test_exact_replaced_friction_equals_changed_scene_keys():
-    """A model with a replaced friction law gives the results of the scene with these keys. The law
-    is replaced in the model and in the first interface of the rig, which both refer to it."""
+    """A model with a replaced friction law gives the results of the scene with the changed keys.
+    The law is replaced in the model and in the first interface of the rig, which both refer to
+    it."""
     text = SMALL_PATCH + SHEAR + COULOMB + SHORT
     sets = ["accuracy.steps_per_cycle=100"]
     original = build(loads(text, sets=sets))

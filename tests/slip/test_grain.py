@@ -49,8 +49,8 @@ def test_exact_work_at_large_slides_falls_with_range_width():
 
 def test_exact_mirrored_nodes_are_spread_like_single_nodes():
     """Pairs of mirrored nodes with nearly equal yield slides are spread like single nodes of twice
-    the stiffness. The work agrees within 1e-6 for a relative difference of 1e-10, and within 40 %
-    for the 1e-4 of a small tilt."""
+    the stiffness. The work agrees within 1e-6 if the yield slides differ by 1e-10, and within 40 %
+    if they differ by 1e-4, as with a small tilt."""
     k = np.array([1e6, 2e6, 3e6, 4e6, 5e6])
     y = np.array([2e-8, 5e-8, 9e-8, 14e-8, 16e-8])
     slides = 1e-8, 6e-8, 2e-7

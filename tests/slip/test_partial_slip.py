@@ -320,8 +320,8 @@ def test_always_backbone_error_falls_with_number_of_modes(angle, length):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
 def test_always_short_bonds_use_enough_modes(angle):
-    """For bonds of 1e-2 and 1e-3 of the slide at gross slip the backbone error falls with the
-    number of modes. For bonds that are too short to resolve, all permitted modes are used."""
+    """For bond lengths of 1e-2 and 1e-3 of the slide at gross slip, the backbone error falls with
+    the number of modes. For bonds that are too short to resolve, all permitted modes are used."""
     pair = coated_pair(60)
     limit = friction_limit(60, angle)
     gross_slip_slide = limit.sum() / tangential_stiffness(pair.tangential, limit > 0)

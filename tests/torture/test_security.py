@@ -49,7 +49,7 @@ FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); js
 
 
 def find_unsafe_code(name: str, text: str) -> set:
-    """Return the unsafe imports and calls in the text of a module that HARMLESS does not list. A
+    """Return the unsafe imports and calls in the text of a module, except those in HARMLESS. A
     module is parsed only if its text contains a suspicious word."""
     findings = set()
     for node in syntax_nodes(text) if WORDS.search(text) else ():

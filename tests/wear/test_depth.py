@@ -126,8 +126,8 @@ def test_order_two_for_transient_of_punch():
 
 
 def test_order_step_size_follows_true_error():
-    """The controller changes a step by 0.9 (tolerance / error)**(1/3), where the error agrees with
-    the true one within 1 %."""
+    """The controller changes a step by the factor 0.9 (tolerance / error)**(1/3), and this error
+    agrees with the true one within 1 %."""
     press, c, area, rate, critical = flat_contact()
     tolerance = 1e-7
     path = np.full(area.size, PATH)

@@ -1,4 +1,4 @@
-"""The event loop as plain Python: the same motion as the compiled loop, for short runs."""
+"""The event loop in plain Python, which computes short motions, against the compiled loop."""
 
 import os
 import pickle

@@ -60,8 +60,8 @@ def test_order_two_in_number_of_iwan_cells():
 
 
 def test_exact_merging_in_fours_keeps_last_slider():
-    """48 cells of a power law are merged into groups of four, or into two, eleven groups of four
-    and two; the last slider stays single."""
+    """48 cells of a power law are merged into groups of four, or into a group of two, eleven of
+    four and one of two. The last slider is not merged."""
     elements = make_elements(*slider_cells(1.0, 1.0, -0.3, 0.5))
     for _ in range(4):
         elements = merge_elements(elements)

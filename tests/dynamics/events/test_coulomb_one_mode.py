@@ -183,7 +183,7 @@ def test_exact_stroke_of_rigid_block_agrees_with_closed_form(friction):
 
 @pytest.mark.parametrize("cycles", [30_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
 def test_exact_million_cycles_do_not_drift(cycles, monkeypatch):
-    """Without extrapolation of cycles amplitude, number of stops and energy balance are the same
+    """If no cycles are extrapolated, amplitude, number of stops and energy balance are the same
     after a million cycles as in the first ones."""
     monkeypatch.setattr(
         histories._EventRun, "_skip_repeating_cycles", lambda self, *arguments: None
@@ -355,8 +355,8 @@ def test_exact_long_periods_with_kinetic_below_static_friction(friction, kinetic
 
 @pytest.mark.parametrize("zeta, ratio", [(0.003, 1.0), (0.2, 0.31), (0.0, 1.7)])
 def test_exact_phasors_without_friction_agree_with_transfer_function(zeta, ratio):
-    """Started in the steady motion without friction, every cycle has the phasor of the transfer
-    function within 1e-11."""
+    """A frictionless motion that starts in its steady state has the phasor of the transfer function
+    in every cycle, within 1e-11."""
     modes = make_mode(1.0, zeta)
     drive = SineDrive(1.0, ratio)
     phasor = -1 / complex(1 - ratio**2, 2 * zeta * ratio)  # phasor of the response to a sine

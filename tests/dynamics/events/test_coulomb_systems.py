@@ -385,8 +385,7 @@ def test_exact_phases_after_a_million_cycles():
 
 
 def test_exact_force_drive_has_no_base_acceleration():
-    """A force and a base acceleration give the same slide, but the force gives no base
-    acceleration."""
+    """A force gives the same slide as a base acceleration, but no acceleration of the base."""
     modes = basis_of(1.0, 0.05)
     base, force = (
         simulate(modes, SineDrive(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False)
@@ -423,8 +422,8 @@ def test_table_check_9_waveform_agrees_with_report():
 
 
 def test_refuses_start_beyond_travel():
-    """An initial displacement beyond the travel is refused; a start inside ends where the closed
-    form reaches the travel."""
+    """An initial displacement beyond the travel is refused. A run from a permitted start ends where
+    the closed form reaches the travel."""
     with pytest.raises(PatchfemError, match=r"structure\.travel"):
         simulate(
             basis_of(1.0),

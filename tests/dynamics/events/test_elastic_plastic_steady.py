@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 from test_elastic_plastic import ONE, make_basis, random_rig
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
-from patchfem.dynamics import continue_to_steady_state as settled
+from patchfem.dynamics import continue_to_steady_state as continue_to_steady
 from patchfem.dynamics import make_elements
 from patchfem.dynamics.events.histories import simulate
 from patchfem.dynamics.events.period import PeriodMap
@@ -41,10 +41,10 @@ def jenkins_amplitude(stiffness, limit, zeta, ratio, guess):
         return (expm(matrix * time) @ [*x, np.sin(phase), np.cos(phase), 1.0])[:2]
 
     def residuals(unknown):
-        top, phase, stick = unknown
-        held = propagate((top, 0.0), stiffness, limit - stiffness * top, phase, stick)
-        end = propagate(held, 0.0, -limit, phase + ratio * stick, np.pi / ratio - stick)
-        return held[0] - top + 2 * limit / stiffness, end[0] + top, end[1]
+        peak, phase, stick = unknown
+        stick_end = propagate((peak, 0.0), stiffness, limit - stiffness * peak, phase, stick)
+        end = propagate(stick_end, 0.0, -limit, phase + ratio * stick, np.pi / ratio - stick)
+        return stick_end[0] - peak + 2 * limit / stiffness, end[0] + peak, end[1]
 
     solution = fsolve(residuals, guess, xtol=1e-13)
     assert np.abs(residuals(solution)).max() < 1e-13
@@ -100,7 +100,7 @@ def test_exact_random_rigs_agree_with_long_runs(seed, cycles):
     group = [make_elements(k, y)]
     motion = steady(modes, drive, group)
     run = simulate(modes, drive, group, 60, window=1)
-    continued = settled(modes, drive, group, *run.end)
+    continued = continue_to_steady(modes, drive, group, *run.end)
     long = simulate(modes, drive, group, cycles, window=1)
     previous = simulate(modes, drive, group, cycles - 1, window=1).end[0]
     end = np.concatenate([long.end[0].z, long.end[0].v])
@@ -207,8 +207,8 @@ def test_refuses_motion_that_is_not_periodic():
 
 
 def test_exact_search_ends_if_last_step_loses_a_reversal():
-    """The last step of Newton's method may lose a reversal that the next period slips past; the
-    search then returns the point before it, which is periodic within 1e-9."""
+    """If the last step of Newton's method loses a reversal, the search returns the point before
+    this step, which is periodic within 1e-9."""
     rng = np.random.default_rng(1068)
     count = int(np.exp(rng.uniform(0, np.log(40))))
     omega = rng.choice([0.0, 1.0, np.exp(rng.uniform(-1, 2))])
@@ -222,7 +222,7 @@ def test_exact_search_ends_if_last_step_loses_a_reversal():
     drive = SineDrive(1.0, float(np.exp(rng.uniform(-1, 1))))
     groups = [make_elements(k, y)]
     result = simulate(modes, drive, groups, 40, window=4)
-    motion = settled(modes, drive, groups, *result.end)
+    motion = continue_to_steady(modes, drive, groups, *result.end)
     repeated = simulate(modes, drive, groups, 2, window=1, start=motion.start, memory=motion.memory)
     assert motion.amplitude == pytest.approx(repeated.output_amplitude, rel=1e-9)
     np.testing.assert_allclose(

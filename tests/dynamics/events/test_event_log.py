@@ -62,8 +62,8 @@ def test_exact_events_of_scene_levels_agree_with_single_run():
 
 
 def test_exact_last_events_are_stored_and_all_are_counted():
-    """Of a long motion with four events per cycle the last MAX_EVENTS events are stored, and all
-    are counted."""
+    """The last MAX_EVENTS events of a long motion are stored, and all of its events, four per
+    cycle, are counted."""
     modes = make_mode()
     drive = SineDrive(1.0, 1.0)
     cycles = event_list.MAX_EVENTS // 4 + 20_000

@@ -66,7 +66,7 @@ def test_exact_memory_agrees_with_single_elements(seed):
     k = rng.uniform(0.1, 2.0, count) * (rng.random(count) > 0.1)
     tracker = SlideTracker(k, y)
     for slide in np.cumsum(rng.normal(0.0, 0.6, 300) * rng.random(300) ** 2):
-        force = tracker.to(slide)
+        force = tracker.move_to(slide)
         assert force == pytest.approx(k @ tracker.stretch, abs=1e-12 * (k @ y))
         energy = kernels.find_force_and_energy.py_func(0, tracker.table, tracker.memory)[1]
         assert energy == pytest.approx(0.5 * k @ tracker.stretch**2, rel=1e-10, abs=1e-12)

@@ -101,7 +101,7 @@ def test_refuses_unbounded_motion():
 
 
 def test_exact_singular_system_has_minimum_norm_solution():
-    """The solution of a singular system is that of minimum norm; a regular system has its only
+    """A singular system gives the solution of minimum norm, and a regular system its unique
     solution."""
     assert solve_linear(np.ones((2, 2)))(np.array([2.0, 2.0])) == pytest.approx([1.0, 1.0])
     left = np.array([[4.0, 1.0], [2.0, 3.0]])

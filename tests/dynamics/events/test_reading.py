@@ -82,11 +82,11 @@ def test_exact_measures_agree_with_gauss_quadrature(drive, several_interfaces):
     window = result.window
     acceleration = run._response_from_columns(values, time).acceleration
     span = weight.sum()
-    x = result.reading
-    assert x.span == pytest.approx(span, rel=1e-13) and x.period == drive.period
+    measures = result.reading
+    assert measures.span == pytest.approx(span, rel=1e-13) and measures.period == drive.period
     rotation = np.exp(-1j * drive.omega * time) * weight
     scale = np.abs(acceleration).max()
-    for harmonic, wave in zip((1, 3), x.acceleration_harmonics):
+    for harmonic, wave in zip((1, 3), measures.acceleration_harmonics):
         expected = (
             2
             / span
@@ -94,11 +94,11 @@ def test_exact_measures_agree_with_gauss_quadrature(drive, several_interfaces):
         )
         assert wave == pytest.approx(expected, rel=1e-11, abs=1e-13 * scale)
     # the samples slightly underestimate the peak
-    assert x.acceleration == pytest.approx(np.abs(window.acceleration).max(), rel=1e-4)
-    assert x.acceleration >= np.abs(window.acceleration).max() * (1 - 1e-13)
-    assert x.output_amplitude == pytest.approx(np.ptp(window.output) / 2, rel=1e-12)
-    for f, loop in enumerate(result.loops):
-        slide, rate, force = (values[:, 2 * n + 1 + 6 * f + k] for k in range(3))
+    assert measures.acceleration == pytest.approx(np.abs(window.acceleration).max(), rel=1e-4)
+    assert measures.acceleration >= np.abs(window.acceleration).max() * (1 - 1e-13)
+    assert measures.output_amplitude == pytest.approx(np.ptp(window.output) / 2, rel=1e-12)
+    for interface, loop in enumerate(result.loops):
+        slide, rate, force = (values[:, 2 * n + 1 + 6 * interface + k] for k in range(3))
         slide_harmonic, force_harmonic = (
             2 / span * np.sum(rotation * part) for part in (slide, force)
         )
@@ -107,27 +107,29 @@ def test_exact_measures_agree_with_gauss_quadrature(drive, several_interfaces):
         ) <= 1e-11 * abs(force_harmonic / slide_harmonic)
         assert abs(loop.displacement_harmonic) == pytest.approx(abs(slide_harmonic), rel=1e-11)
         assert loop.work == pytest.approx(np.sum(weight * force * rate), rel=1e-10)
-        assert x.interface_value(InterfaceMeasure.END_WORK, f) == pytest.approx(
+        assert measures.interface_value(InterfaceMeasure.END_WORK, interface) == pytest.approx(
             loop.work, rel=1e-10
         )
-        assert x.interface_value(InterfaceMeasure.PATH_WORK, f) == pytest.approx(
+        assert measures.interface_value(InterfaceMeasure.PATH_WORK, interface) == pytest.approx(
             np.sum(weight * np.abs(force * rate)), rel=0.05
         )
         slides, forces = (
-            window.extra[name][:, f] if several_interfaces else getattr(window, one_name)
+            window.extra[name][:, interface] if several_interfaces else getattr(window, one_name)
             for name, one_name in (("slides", "slide"), ("forces", "force"))
         )
-        rates = window.extra["slide_rates"][:, f] if several_interfaces else window.slide_rate
+        rates = (
+            window.extra["slide_rates"][:, interface] if several_interfaces else window.slide_rate
+        )
         assert (
-            x.interface_value(InterfaceMeasure.MIN_SLIDE, f),
-            x.interface_value(InterfaceMeasure.MAX_SLIDE, f),
+            measures.interface_value(InterfaceMeasure.MIN_SLIDE, interface),
+            measures.interface_value(InterfaceMeasure.MAX_SLIDE, interface),
         ) == pytest.approx((slides.min(), slides.max()), rel=1e-12)
         assert loop.max_force == pytest.approx(np.abs(forces).max(), rel=1e-12)
         reversals = find_reversals(window.time, slides, rates, forces, drive.period, "slide")
-        assert x.interface_value(InterfaceMeasure.MEAN_RANGE, f) / 2 == pytest.approx(
-            mean_half_range(reversals), rel=1e-9
-        )
-        assert x.interface_value(InterfaceMeasure.SECANT, f) == pytest.approx(
+        assert measures.interface_value(
+            InterfaceMeasure.MEAN_RANGE, interface
+        ) / 2 == pytest.approx(mean_half_range(reversals), rel=1e-9)
+        assert measures.interface_value(InterfaceMeasure.SECANT, interface) == pytest.approx(
             secant_stiffness(reversals), rel=1e-9
         )
     slide = values[:, 2 * n + 1]
@@ -136,7 +138,9 @@ def test_exact_measures_agree_with_gauss_quadrature(drive, several_interfaces):
         np.sum((weight * slide)[part])
         for part in (time < rows[0, 0] + drive.period, time > end - drive.period)
     ]
-    assert x.drift == pytest.approx((means[1] - means[0]) / drive.period / 4, rel=1e-9, abs=1e-14)
+    assert measures.drift == pytest.approx(
+        (means[1] - means[0]) / drive.period / 4, rel=1e-9, abs=1e-14
+    )
 
 
 def test_exact_release_phase_agrees_with_event_log():

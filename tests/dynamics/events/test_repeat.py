@@ -124,8 +124,8 @@ def test_exact_tiny_level_change_ends_extrapolation():
 
 
 def test_exact_full_event_arrays_do_not_change_run(monkeypatch):
-    """Extremes and phasors are bit-identical wherever the arrays of events are full and the
-    compiled loop returns."""
+    """Extremes and phasors do not depend on where the arrays of events are full and the compiled
+    loop returns."""
     for shape in ((1, 1, 24), (3, 2, 4)):
         modes, drive, groups = make_case(*shape)
         whole = histories.simulate(modes, drive, groups, 13, window=4)

@@ -154,8 +154,8 @@ def test_always_lifted_mass_that_leaves_grooves_is_reported():
 
 
 def test_order_two_for_lifted_mass_with_initial_speed():
-    """With nearly no friction and no drive, the motion of a lifted mass with an initial speed
-    converges with order two to the motion without friction."""
+    """With nearly no friction and without a drive, a lifted mass with an initial speed converges
+    with order two to the motion without friction."""
     grooves = Grooves(80e-6, 7.5e-6, 0.4, 0.5)
     start = InitialState(np.array([10e-6]), np.array([0.02]))
     no_drive = SineDrive(0.0, DRIVE.omega)

@@ -18,7 +18,7 @@ BASIS = basis_of(OMEGA, ZETA, mass=1.194)
 
 
 def test_exact_orbit_of_linear_oscillator_agrees_with_closed_form():
-    """With an element that never slips amplitude, multipliers and energy balance are those of a
+    """For an element that never slips, amplitude, multipliers and energy balance are those of a
     linear oscillator."""
     spring = 2e5
     drive = SineDrive(10.0, 2 * np.pi * 120)

@@ -81,7 +81,8 @@ def test_refuses_list_longer_than_limit(monkeypatch):
 
 
 def test_exact_enlarged_list_of_bench_equals_large_list(monkeypatch):
-    """A bench whose list is enlarged has the same forces and energies, bit by bit."""
+    """A bench whose list is enlarged has bit-identical forces and energies to one with a large
+    list."""
     from patchfem.friction.bonds import list_numbers
 
     text = (

@@ -309,8 +309,8 @@ STEEP_LAWS = [
 
 @pytest.mark.parametrize("seed", STICK_OR_SLIP + STEEP_LAWS)
 def test_always_difficult_random_chains_converge(seed):
-    """Random chains converge in which the states of stick and slip of one step were once not
-    found."""
+    """Random chains converge although the states of stick and slip in one of their steps are
+    difficult to find."""
     assert march_random_chain(seed)[0].outcome is None
 
 

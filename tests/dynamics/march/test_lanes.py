@@ -1,5 +1,5 @@
-"""Bonds behind shear modes in lanes, side by side, against the march of each case and the measures
-of single runs."""
+"""March of bonds behind shear modes in lanes, against single marches and the measures of single
+runs."""
 
 import numpy as np
 import pytest

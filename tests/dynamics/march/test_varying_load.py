@@ -227,8 +227,8 @@ def test_always_no_energy_is_created(laws, data, seed, steps):
     ],
 )
 def test_always_stops_under_varying_load_are_solved(law, seed, steps):
-    """Every step is solved if a stop inside it depends on the load. In these cases no friction
-    force with such a stop agrees with the load that it causes."""
+    """Steps in which a stop depends on the varying load are solved, although no friction force with
+    such a stop is consistent with the load that it causes."""
     check_energy_of_random_march(law, seed, steps)
 
 

@@ -67,8 +67,8 @@ def test_exact_integrals_and_peaks_agree_with_closed_form():
 
 
 def test_exact_slip_starts_where_half_the_slide_is_irreversible():
-    """Stick time and starts of slip are found within 1e-6 where half of the slide rate is
-    irreversible."""
+    """Slip begins where half of the slide rate is irreversible; its starts and the stick time are
+    exact within 1e-6."""
     omega = 2 * np.pi / PERIOD
 
     def slip_fraction(t):
@@ -119,8 +119,8 @@ CASES = {  # law, load [N], damping ratio, frequency ratio, amplitude of the dri
 @pytest.mark.parametrize("name", CASES)
 def test_exact_peaks_agree_with_finely_sampled_motion(name):
     """Peaks of acceleration and force lie within the bounds from 100 001 samples of a more accurate
-    motion. Case "tanh" has its largest acceleration inside steps whose ends and middle are smaller;
-    omitting them gave a peak 3.8e-6 too low."""
+    motion. In case "tanh" the largest acceleration lies inside a step with smaller values at its
+    ends and middle; a search without such steps was 3.8e-6 too low."""
     law, load, zeta, ratio, acceleration, moving = CASES[name]
     drive = SineDrive(acceleration, ratio * OMEGA, moving)
     start = None if name == "tanh" else InitialState(np.full(1, 2e-5), np.zeros(1))
@@ -145,7 +145,7 @@ def test_exact_peaks_agree_with_finely_sampled_motion(name):
 
 
 def test_exact_step_of_zero_length_does_not_change_mean(recwarn):
-    """A step of zero length, as an event at the end of a step creates it, changes no mean and
+    """A step of zero length, which results from an event at the end of a step, changes no mean and
     causes no warning. The mean of x = t over [0.5, 1.5] is 1."""
     edges = [(0.0, 1.0), (1.0, 1.0), (1.0, 2.0)]
     time = np.concatenate([begin + (end - begin) * NODE_FRACTIONS for begin, end in edges])

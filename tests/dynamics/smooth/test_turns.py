@@ -83,7 +83,7 @@ def test_always_strongly_damped_release_reaches_its_end():
 def test_always_round_off_of_stiff_bonds_does_not_reduce_steps(
     tolerance,
 ):
-    """A released block that is caught by stiff bonds far from its rest position vibrates on them
+    """A released block that is stopped by stiff bonds far from its rest position vibrates on them
     and needs fewer than 40 000 steps (measured: 13 000). When the round-off of the bond force
     counted as an error of the step, 40 of the 108 cycles needed 839 000 steps."""
     omega = 2 * np.pi * 62.86
