@@ -33,7 +33,7 @@ acceleration = "5 g"
 cycles = 60
 """
 MARCH = {"accuracy.method": "march"}
-MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
+MAIN_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +45,7 @@ def marched_result():
 def worst_true_error(steps: int, exact) -> float:
     """Return the largest true relative error of the main measures with some steps per cycle."""
     measures = pf.run(BLOCK, **MARCH, **{"accuracy.steps_per_cycle": steps}).measures
-    return max(abs(measures[name].value / exact[name].value - 1) for name in MAIN)
+    return max(abs(measures[name].value / exact[name].value - 1) for name in MAIN_MEASURES)
 
 
 def test_always_errors_of_curve_cover_true_errors(marched_result):
@@ -70,9 +70,9 @@ def test_exact_present_point_has_stated_error_and_step_time(marched_result):
     tolerance = marched_result.plan.model.accuracy.tolerance
     worst = max(
         measures[name].error / (abs(measures[name].value) + measures[name].floor / tolerance)
-        for name in MAIN
+        for name in MAIN_MEASURES
     )
-    assert present.error == pytest.approx(worst, rel=1e-12) and present.measure in MAIN
+    assert present.error == pytest.approx(worst, rel=1e-12) and present.measure in MAIN_MEASURES
     assert 0 < present.seconds < marched_result.seconds["total"]
     step_runs = marched_result.extra["step_runs"]
     assert present.steps == step_runs[0].steps
@@ -119,6 +119,7 @@ def test_exact_caption_names_error_that_remains_with_more_steps():
     "scene", [BLOCK, pf.new("bench"), pf.new("patch")], ids=["exact", "bench", "patch"]
 )
 def test_refuses_curve_if_steps_do_not_limit_accuracy(scene):
+    """Runs whose error does not depend on time steps have no accuracy curve."""
     result = pf.run(scene)
     assert compute_accuracy_curve(result) is None
     with pytest.raises(pf.PatchfemError, match=r"plot\.accuracy: nothing to draw"):

@@ -29,23 +29,23 @@ SLIDES = {
     "small": 'kind = "sine"\namplitude = "0.1 um"\nfrequency = "50 Hz"\ncycles = 2\n',
     "dwell": 'kind = "dwell"\nspeed = "1 mm/s"\ndistance = "20 um"\nhold = "0.3 s"\ndistance_after = "10 um"\n',
 }  # fmt: skip
-EXACT = {
+ROUND_OFF_LAWS = {
     "coulomb": 'law = "coulomb"\n', "coulomb that holds more": 'law = "coulomb"\nkinetic = 0.2\n',
     "tanh": 'law = "tanh"\nreference_speed = "1 mm/s"\n',
     "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "2 um"\n',
     "averaged": 'law = "convolution"\nbond_length = "0.8 mm"\n',
     "bonds": BONDS + "initial_bonds = 0.4\n", "growing": BONDS + GROWTH, "loose": BONDS + GROWTH + "breakaway = 0.3\n",
 }  # fmt: skip
-SUMS = (
+SUM_LAWS = (
     [("stretch", order, growth) for order in (0, 0.5, 2.5) for growth in ("", GROWTH)]
     + [("report", order, growth) for order in (0, 0.5, 1, 2) for growth in ("", GROWTH)]
     + [("report", -0.5, "")]
 )
 
 
-def build_bench(law, slide, *sets, where=POINT):
+def build_bench(law, slide, *sets, contact=POINT):
     """Return the model of a bench with a friction law and a slide."""
-    return build(loads(where + FRICTION + law + "[slide]\n" + SLIDES[slide], sets=sets))
+    return build(loads(contact + FRICTION + law + "[slide]\n" + SLIDES[slide], sets=sets))
 
 
 def format_sum_law(reading, order, growth):
@@ -71,9 +71,10 @@ def run_both_ways(model, steps, patch=None, frames=0):
 
 @pytest.mark.share(0, 2, 4, 6, 8, 10, 13, 15, 17, 19, 21, 23)
 @pytest.mark.parametrize("slide", SLIDES)
-@pytest.mark.parametrize("law", EXACT)
+@pytest.mark.parametrize("law", ROUND_OFF_LAWS)
 def test_exact_compiled_bench_agrees_with_numpy_law(law, slide):
-    compiled, stepped = run_both_ways(build_bench(EXACT[law], slide), 80)
+    """The compiled engine agrees with the law stepped in NumPy to round-off, in force, slip and energies."""
+    compiled, stepped = run_both_ways(build_bench(ROUND_OFF_LAWS[law], slide), 80)
     limit = np.abs(stepped.force).max()
     assert compiled.force == pytest.approx(stepped.force, abs=1e-13 * limit)
     assert compiled.slip == pytest.approx(stepped.slip, abs=1e-18)
@@ -87,7 +88,7 @@ def test_exact_compiled_bench_agrees_with_numpy_law(law, slide):
     "reading, order, growth, slide",
     [
         pytest.param(*law, slide, marks=() if (k + n) % len(SLIDES) == 0 else pytest.mark.slow)
-        for k, law in enumerate(SUMS)
+        for k, law in enumerate(SUM_LAWS)
         for n, slide in enumerate(SLIDES)
     ],
 )
@@ -112,7 +113,7 @@ def test_exact_bond_list_agrees_with_numpy_sum_within_error(reading, order, grow
 def test_exact_frames_of_patch_agree_with_numpy_law(law):
     """The tractions and displacements of the stored frames of a compiled patch agree with those of
     the law stepped in NumPy."""
-    model = build_bench(EXACT[law], "sine", where=PATCH)
+    model = build_bench(ROUND_OFF_LAWS[law], "sine", contact=PATCH)
     patch = solve_with_coarser(model.patch, 1e-3, False)[0]
     compiled, stepped = run_both_ways(model, 40, patch, 5)
     peak_traction = np.abs(stepped.tau).max()
@@ -126,16 +127,17 @@ def test_exact_frames_of_patch_agree_with_numpy_law(law):
 
 
 @pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8)
-@pytest.mark.parametrize("law, where, name", [
-    (EXACT["coulomb"], POINT, "closed form"), (EXACT["elastic-plastic"], POINT, "parallel elements"),
+@pytest.mark.parametrize("law, contact, name", [
+    (ROUND_OFF_LAWS["coulomb"], POINT, "closed form"), (ROUND_OFF_LAWS["elastic-plastic"], POINT, "parallel elements"),
     (BONDS, POINT, "recursion"), (BONDS + "order = 2\n", POINT, "merged bond list"),
     (BONDS + 'reading = "report"\n', POINT, "truncated bond list"),
     (BONDS + "order = 2\nbreakaway = 0.2\n", POINT, "law step by step"),
     (BONDS, PATCH + 'on = "lower"\n', "law step by step"), (BONDS, PATCH + "[contact.shear]\n", "bond points"),
-    (EXACT["coulomb"], PATCH + "[contact.shear]\n", "parallel elements"),
+    (ROUND_OFF_LAWS["coulomb"], PATCH + "[contact.shear]\n", "parallel elements"),
 ])  # fmt: skip
-def test_exact_plan_names_engine_of_run(law, where, name):
-    run_plan = plan(build_bench(law, "sine", "accuracy.steps_per_cycle=200", where=where))
+def test_exact_plan_names_engine_of_run(law, contact, name):
+    """The plan names the engine that the run uses, and the length of its bond list, if it has one."""
+    run_plan = plan(build_bench(law, "sine", "accuracy.steps_per_cycle=200", contact=contact))
     result = run(run_plan, estimate=False)
     assert (
         run_plan.engine == result.extra["engine"] == result.response.engine.name == f"bench, {name}"
@@ -164,7 +166,7 @@ def test_refuses_long_bond_list_and_unsupported_merging():
                 BONDS + "order = 2\n",
                 "sine",
                 "accuracy.quadrature=merged",
-                where=PATCH + 'on = "lower"\n',
+                contact=PATCH + 'on = "lower"\n',
             )
         )
 
@@ -196,32 +198,34 @@ def test_exact_errors_cover_merging_of_bonds(keys, slide):
 
 
 @pytest.mark.parametrize(
-    "law, where",
+    "law, contact",
     [
-        (EXACT["coulomb"], POINT),
+        (ROUND_OFF_LAWS["coulomb"], POINT),
         (BONDS, POINT),
         (BONDS + "order = 2\n", POINT),
-        (EXACT["elastic-plastic"], PATCH + "[contact.shear]\n"),
-        (EXACT["tanh"], PATCH + 'on = "lower"\n'),
+        (ROUND_OFF_LAWS["elastic-plastic"], PATCH + "[contact.shear]\n"),
+        (ROUND_OFF_LAWS["tanh"], PATCH + 'on = "lower"\n'),
     ],
 )
-def test_always_progress_grows_to_one(law, where):
+def test_always_progress_grows_to_one(law, contact):
+    """The reported progress never falls and ends at 1."""
     fractions = []
     run(
-        build_bench(law, "sine", "accuracy.steps_per_cycle=6000", where=where),
+        build_bench(law, "sine", "accuracy.steps_per_cycle=6000", contact=contact),
         progress=fractions.append,
         estimate=False,
     )
     assert fractions[-1] == 1.0 and (np.diff([0.0, *fractions]) >= 0).all()
-    assert len(fractions) >= (1 if law == EXACT["coulomb"] else 12000 // N_BLOCK_SAMPLES)
+    assert len(fractions) >= (1 if law == ROUND_OFF_LAWS["coulomb"] else 12000 // N_BLOCK_SAMPLES)
 
 
 def test_always_interrupt_ends_bench_between_blocks():
+    """An interrupt ends a bench after the present block of samples."""
     fractions = []
 
-    def interrupt_after_half(share):
-        fractions.append(share)
-        if share > 0.5:
+    def interrupt_after_half(fraction):
+        fractions.append(fraction)
+        if fraction > 0.5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -239,7 +243,10 @@ def test_exact_work_check_allows_force_jump_at_reversal():
     """The friction force of the Coulomb law jumps at a reversal; the work check still closes within
     1e-13."""
     for law in ("coulomb", "coulomb that holds more"):
-        assert bench.run(build_bench(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
+        assert (
+            bench.run(build_bench(ROUND_OFF_LAWS[law], "sine"), None, 40).values["work_check"]
+            < 1e-13
+        )
 
 
 @pytest.mark.parametrize(

@@ -113,9 +113,9 @@ def test_exact_breakaway_agrees_with_growth_at_rest(hold):
     response = run_bench(
         POINT + NONLOCAL + DWELL, f"slide.hold={hold} s", "accuracy.steps_per_cycle=6000"
     )
-    after = response.force[response.slide >= 39.999e-6] / (0.3 * response.load[0])
-    assert after[0] == pytest.approx(bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-5)
-    assert after.max() == pytest.approx(breakaway_ratios(hold)[0], rel=2e-5)
+    friction_ratio = response.force[response.slide >= 39.999e-6] / (0.3 * response.load[0])
+    assert friction_ratio[0] == pytest.approx(bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-5)
+    assert friction_ratio.max() == pytest.approx(breakaway_ratios(hold)[0], rel=2e-5)
     assert response.values["friction_ratio_end"] == pytest.approx(
         0.3 * bond_lengths_at_rest(hold)[0] / LENGTH, rel=1e-4
     )
@@ -127,9 +127,11 @@ def test_order_of_friction_after_rest_is_two():
     errors = []
     for steps in (600, 1200, 2400):
         response = run_bench(POINT + NONLOCAL + DWELL, steps=steps)
-        after = response.slide >= 39.9999e-6
-        reference = friction_after_rest(0.3, response.slide[after] - 40e-6)
-        errors.append(np.abs(response.force[after] / (0.3 * response.load[0]) - reference).max())
+        after_rest = response.slide >= 39.9999e-6
+        reference = friction_after_rest(0.3, response.slide[after_rest] - 40e-6)
+        errors.append(
+            np.abs(response.force[after_rest] / (0.3 * response.load[0]) - reference).max()
+        )
     assert (
         errors[1:] == pytest.approx([errors[0] / 4, errors[0] / 16], rel=0.02) and errors[2] < 2e-6
     )
@@ -147,12 +149,12 @@ def test_exact_report_law_grows_at_rest(order):
     for k in (*rest, rest[-1] + 1):
         decay = np.exp(-A_S * (response.time[k] - 0.04) / FLOOR)
 
-        def force(y, left=decay):
-            own = (
+        def force(y, remaining=decay):
+            bond_length = (
                 LENGTH
-                - (LENGTH + sliding_length * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * left
+                - (LENGTH + sliding_length * np.expm1(-(A_S / SPEED**2 + 1 / L_K) * y)) * remaining
             )
-            return (y / own) ** order * np.exp(-y / own)
+            return (y / bond_length) ** order * np.exp(-y / bond_length)
 
         reference = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
         assert response.force[k] / (0.3 * response.load[0]) == pytest.approx(reference, rel=2e-5)
@@ -178,6 +180,7 @@ HEAD = "time [s],displacement [um]\n"
     (HEAD + "0,0\n1,0\n", "displacement is 0 in every row"), (b"\xff\xfe\x00", "cannot be read"),
 ])  # fmt: skip
 def test_refuses_faulty_path_table_with_line(write_path_scene, text, message):
+    """A faulty table of the sliding path is refused with its file, line and cause."""
     scene = write_path_scene(text)
     with pytest.raises(PatchfemError) as error:
         plan(scene)
@@ -238,6 +241,7 @@ def test_exact_extremely_slow_slide_has_full_bond_length(speed, keys, recwarn):
 
 
 def test_refuses_slide_with_more_steps_than_memory(tmp_path):
+    """A slide with more steps than fit in memory is refused with the key to change."""
     scene = tmp_path / "a.toml"
     scene.write_text(
         POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n'

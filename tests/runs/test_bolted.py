@@ -51,9 +51,9 @@ STUCK = 'measured = "stuck"'
 def test_exact_stuck_frequency_of_plan_returns_free_frequency(law):
     """The stuck frequency that `plan` prints, given as a measured frequency, returns the free
     frequency of the mode."""
-    before = POINT + friction_of(law)
-    free = pf.plan(before + MODES % ("", 143.0, 0.8, 0.9) + DRIVE).as_json()["modes"][0]
-    stuck = pf.plan(before + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()[
+    contact = POINT + friction_of(law)
+    free = pf.plan(contact + MODES % ("", 143.0, 0.8, 0.9) + DRIVE).as_json()["modes"][0]
+    stuck = pf.plan(contact + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()[
         "modes"
     ][0]
     assert stuck["free_frequency"] == pytest.approx(143.0, rel=1e-10) and stuck["name"] == "axial"
@@ -83,8 +83,8 @@ def test_exact_two_stuck_modes_return_free_modes():
     assert modes.omega == pytest.approx(free.omega, rel=1e-10)
     for name in ("slide", "output", "base"):
         assert np.abs(getattr(modes, name)) == pytest.approx(np.abs(getattr(free, name)), rel=1e-9)
-    listed = pf.plan(tail + stuck).as_json()["modes"]
-    assert [mode["stuck_frequency"] for mode in listed] == pytest.approx(f, rel=1e-10)
+    modes_of_plan = pf.plan(tail + stuck).as_json()["modes"]
+    assert [mode["stuck_frequency"] for mode in modes_of_plan] == pytest.approx(f, rel=1e-10)
 
 
 def test_exact_matrices_with_stuck_joints_return_free_modes(tmp_path):
@@ -103,9 +103,12 @@ def test_exact_matrices_with_stuck_joints_return_free_modes(tmp_path):
     interfaces = law % ([1, 0], 1e5) + law % ([1, 2], 3e5) + DRIVE
     models = [
         pf.build(
-            pf.load(f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{more}\n' + interfaces)
+            pf.load(
+                f'[structure]\nfile = "{(tmp_path / name).as_posix()}"\n{measured_key}\n'
+                + interfaces
+            )
         )
-        for name, more in (("free.npz", ""), ("stuck.npz", STUCK))
+        for name, measured_key in (("free.npz", ""), ("stuck.npz", STUCK))
     ]
     assert models[1].rig.modes.omega == pytest.approx(models[0].rig.modes.omega, rel=1e-10)
     assert models[1].rig.modes.zeta == pytest.approx(models[0].rig.modes.zeta, rel=1e-10)
@@ -122,11 +125,11 @@ def test_exact_stuck_patch_has_measured_frequency():
     assert pf.run(measured).plan.model.rig.modes.omega[0] == pytest.approx(
         model.rig.modes.omega[0], rel=1e-12
     )
-    listed = pf.plan(measured).as_json()["modes"][0]
+    mode_of_plan = pf.plan(measured).as_json()["modes"][0]
     assert (
-        listed["free_frequency"]
+        mode_of_plan["free_frequency"]
         < model.rig.modes.omega[0] / (2 * np.pi)
-        < listed["stuck_frequency"]
+        < mode_of_plan["stuck_frequency"]
     )
     outcomes = pf.run_many([measured]).outcome
     assert "failed" not in [str(outcome) for outcome in outcomes]
@@ -154,11 +157,13 @@ def test_exact_stuck_patch_has_measured_frequency():
     ],
 )
 def test_refuses_stuck_modes_with_unsuitable_joint(text, message):
+    """A joint that is too stiff, rigid in stick or without stiffness cannot be removed from measured modes."""
     with pytest.raises(PatchfemError, match=f"(?s)structure.m.*{message}"):
         pf.run(text)
 
 
 def test_refuses_stuck_modes_without_constant_joint_stiffness():
+    """Measured stuck modes are refused without friction, with masses instead of modes, and with a varying normal load."""
     assert "add [friction]" in mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
     messages = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
     assert any(

@@ -40,12 +40,14 @@ def test_exact_friction_above_static_limit_is_noted():
 
 @pytest.mark.parametrize("text", [BENCH, RIG])
 def test_exact_initial_bonds_without_growth_are_noted(text):
+    """With the law of the report, a note says that the initial bonds keep their length although the other bonds grow."""
     growth = GROWTH.replace("50 um", "0.5 um").replace("0.06", "0.2") + 'reading = "report"\n'
     assert "the initial bonds keep the bond length eps_0" in run_with_notes(text, growth)[1]
     assert "initial bonds" not in run_with_notes(text, growth + "initial_bonds = 0\n")[1]
 
 
 def test_exact_initial_bonds_of_negative_order_give_warning():
+    """Initial bonds of negative order have an infinite force at first; a rig with them gives a warning."""
     result, _ = run_with_notes(
         RIG.replace("cycles = 10", "cycles = 1"), 'reading = "report"\norder = -0.5\n'
     )

@@ -17,6 +17,7 @@ RIG = (
     "law, method, engine", [("coulomb", "auto", "exact"), ("tanh", "march", "march")]
 )
 def test_exact_summary_names_engine_and_steps(law, method, engine):
+    """The summary names the engine and the window, and the steps per cycle of a march."""
     speed = 'reference_speed = "1 mm/s"\n' if law == "tanh" else ""
     text = RIG.format(law).replace("static = 0.3\n", f"static = 0.3\n{speed}")
     numerics = summarise_run(pf.run(text + f'[accuracy]\nmethod = "{method}"\n'))["numerics"]
@@ -25,6 +26,7 @@ def test_exact_summary_names_engine_and_steps(law, method, engine):
 
 
 def test_exact_summary_names_prescribed_steps():
+    """The summary names a prescribed number of steps per cycle."""
     text = (
         HEAD.format("elastic-plastic")
         + 'bond_length = "1 um"\n[slide]\nkind = "sine"\namplitude = "5 um"\n'

@@ -39,13 +39,13 @@ VARIANTS = {
     ],
     "coulomb": [["kinetic=0.2"]],
 }
-FEW = "[accuracy]\nsteps_per_cycle = 32\n"
-RUBS = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+FEW_STEPS = "[accuracy]\nsteps_per_cycle = 32\n"
+COULOMB_LAW = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 POINT = '[normal]\nload = "26 lbf"\n'
 # The pressure of this patch is nearly uniform.
 PATCH = COATED.replace('"0.5 mm"', '"1.5 mm"') + '[contact.crown]\nradius = "100 m"\n'
-SHAKEN = MODE + DRIVE.replace("cycles = 30", "cycles = 2") + FEW
-SLID = SLIDE + "cycles = 1\n" + FEW
+SHAKEN_MODE = MODE + DRIVE.replace("cycles = 30", "cycles = 2") + FEW_STEPS
+SINE_SLIDE = SLIDE + "cycles = 1\n" + FEW_STEPS
 FACE = '[[structure.interface]]\nbetween = [{}, 0]\nload = "100 N"\nlaw = "coulomb"\nstatic = 0.3\n'
 MASSES = (
     '[structure]\nmasses = ["1 kg", "1 kg"]\n'
@@ -56,48 +56,63 @@ MASSES = (
     + FACE.format(1)
     + "{}"
     + DRIVE.replace("cycles = 30", "cycles = 2")
-    + FEW
+    + FEW_STEPS
 )
 
 BONDS = ["friction.law=nonlocal", "friction.bond_length=1 um"]
-SWING = ["normal.amplitude=20 N", "normal.frequency=50 Hz"]
-STIFFENS = ["structure.stiffening.cubic=1e10 N/m^3"]
-INTERLOCKS = ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"]
+VARYING_LOAD = ["normal.amplitude=20 N", "normal.frequency=50 Hz"]
+STIFFENING = ["structure.stiffening.cubic=1e10 N/m^3"]
+INTERLOCK = ["structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"]
 SHEAR, LOWER, STRIPS = ["contact.shear={}"], ["contact.crown.on=lower"], ["contact.strips.count=3"]
 SKIN = ["contact.asperities.law=exponential", "contact.asperities.decay_length=1 um"]
 YAW, PITCH = [*STRIPS, "structure.mode.axial.yaw=2 rad/m"], ["structure.mode.axial.pitch=1 rad/m"]
-WAVES = [
+WAVEFORMS = [
     ["drive.waveform=step"],
     ["drive.kind=free", "drive.displacement=0.1 mm"],
     ["drive.waveform=levels", 'drive.levels=["3 g", "4 g"]'],
     ["drive.waveform=sweep", "drive.from=143 Hz", "drive.to=143.2 Hz", "drive.rate=10 Hz/s"],
 ]
 METHODS = [[], *([f"accuracy.method={name}"] for name in ("exact", "march", "harmonic"))]
-SUMS = [[], *([f"accuracy.quadrature={name}"] for name in ("recursion", "direct", "merged"))]
+QUADRATURES = [[], *([f"accuracy.quadrature={name}"] for name in ("recursion", "direct", "merged"))]
 # Kind of run: (text, table of the law, effects, engines).
 RUNS = {
-    "bench of a point": (POINT + RUBS + SLID, "friction", [[], SWING], SUMS),
+    "bench of a point": (
+        POINT + COULOMB_LAW + SINE_SLIDE,
+        "friction",
+        [[], VARYING_LOAD],
+        QUADRATURES,
+    ),
     "bench of a patch": (
-        PATCH + RUBS + SLID,
+        PATCH + COULOMB_LAW + SINE_SLIDE,
         "friction",
         [[], SHEAR, LOWER, STRIPS, SKIN, SHEAR + LOWER],
-        SUMS,
+        QUADRATURES,
     ),
     "rig of a point": (
-        POINT + RUBS + SHAKEN,
+        POINT + COULOMB_LAW + SHAKEN_MODE,
         "friction",
-        [[], SWING, STIFFENS, INTERLOCKS, *WAVES[:3]],
+        [[], VARYING_LOAD, STIFFENING, INTERLOCK, *WAVEFORMS[:3]],
         METHODS,
     ),
     "rig of a patch": (
-        PATCH + RUBS + SHAKEN,
+        PATCH + COULOMB_LAW + SHAKEN_MODE,
         "friction",
-        [[], SHEAR, LOWER, STRIPS, YAW, PITCH, PITCH + SHEAR, STIFFENS + SHEAR],
+        [[], SHEAR, LOWER, STRIPS, YAW, PITCH, PITCH + SHEAR, STIFFENING + SHEAR],
         METHODS,
     ),
-    "sums in a rig": (PATCH + RUBS + SHAKEN, "friction", [[], LOWER, SHEAR], SUMS[1:]),
-    "one interface": (MASSES.format(""), "structure.interface.0", [[], STIFFENS], METHODS),
-    "interfaces": (MASSES.format(FACE.format(2)), "structure.interface.0", [[], STIFFENS], METHODS),
+    "sums in a rig": (
+        PATCH + COULOMB_LAW + SHAKEN_MODE,
+        "friction",
+        [[], LOWER, SHEAR],
+        QUADRATURES[1:],
+    ),
+    "one interface": (MASSES.format(""), "structure.interface.0", [[], STIFFENING], METHODS),
+    "interfaces": (
+        MASSES.format(FACE.format(2)),
+        "structure.interface.0",
+        [[], STIFFENING],
+        METHODS,
+    ),
 }
 
 
@@ -106,6 +121,7 @@ class TimeLoopReached(Exception):
 
 
 def raise_time_loop_reached(*_):
+    """Raise TimeLoopReached in place of the preparation of a time loop."""
     raise TimeLoopReached
 
 
@@ -151,7 +167,12 @@ def assert_combinations_run(name: str, law: str, every: int) -> None:
     ) % every  # Each law and kind of run tests other combinations.
     outcomes = [
         check_and_run(
-            text, [*(f"{law_table}.{one}" for one in (*law_keys, *variant)), *effect, *engine]
+            text,
+            [
+                *(f"{law_table}.{assignment}" for assignment in (*law_keys, *variant)),
+                *effect,
+                *engine,
+            ],
         )
         for variant, effect, engine in cases[:1] + cases[1 + offset :: every]
     ]
@@ -170,16 +191,18 @@ def stop_at_time_loop(monkeypatch):
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("name", RUNS)
 def test_always_accepted_combinations_run(name, law):
+    """A part of the combinations of each law with effects and engines runs if `check` accepts it."""
     assert_combinations_run(name, law, 9)
 
 
 @pytest.mark.usefixtures("stop_at_time_loop")
 @pytest.mark.share(0, 1)
-@pytest.mark.parametrize("effect", [[], STIFFENS, INTERLOCKS])
+@pytest.mark.parametrize("effect", [[], STIFFENING, INTERLOCK])
 def test_always_accepted_combinations_without_friction_run(effect):
+    """Rigs without friction run with every effect, waveform and method that `check` accepts."""
     outcomes = [
-        check_and_run(SHAKEN, [*effect, *wave, *method])
-        for wave in ([], *WAVES)
+        check_and_run(SHAKEN_MODE, [*effect, *wave, *method])
+        for wave in ([], *WAVEFORMS)
         for method in METHODS
     ]
     assert {"ran", "refused"} == set(outcomes)
@@ -189,19 +212,19 @@ def test_always_accepted_combinations_without_friction_run(effect):
     "text, sets, key, reason",
     [
         (
-            SHAKEN,
-            [*STIFFENS, "accuracy.method=exact"],
+            SHAKEN_MODE,
+            [*STIFFENING, "accuracy.method=exact"],
             "accuracy.method",
             "exists with [structure.stiffening]; use 'mar",
         ),
         (
-            POINT + RUBS + SHAKEN,
+            POINT + COULOMB_LAW + SHAKEN_MODE,
             [*BONDS, "friction.breakaway=0.2", "accuracy.quadrature=direct"],
             "accuracy.quadrature",
             "'direct' with friction.breakaway in a rig is not supported yet; use 'recursion' or 'auto'",
         ),
         (
-            PATCH + RUBS + SHAKEN,
+            PATCH + COULOMB_LAW + SHAKEN_MODE,
             [*BONDS, *LOWER, "accuracy.quadrature=merged"],
             "accuracy.quadrature",
             "'merged' with a shape on the lower piece in a rig is not supported yet",

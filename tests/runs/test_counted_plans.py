@@ -9,7 +9,7 @@ from patchfem.runs import choose_numerics
 from patchfem.runs.rig.lists import estimate_list_cost
 from patchfem.runs.run import run
 
-TURNED = """[contact]
+APPROACH_WITH_MOMENT = """[contact]
 length = "11.85 mm"
 width = "18.38 mm"
 height = "6.926 mm"
@@ -45,7 +45,7 @@ def test_always_plan_load_includes_moment_with_approach():
     """The plan of a patch with a prescribed approach and a moment estimates the load within 10 %
     and the steps within a factor of 1.5. Without the moment it estimated 155 N instead of 2.6e6 N.
     """
-    scene = load(TURNED)
+    scene = load(APPROACH_WITH_MOMENT)
     run_plan = plan(scene)
     result = run(scene, estimate=False)
     assert run_plan.model.nominal_load == pytest.approx(
@@ -54,7 +54,7 @@ def test_always_plan_load_includes_moment_with_approach():
     assert result.extra["book"]["iterations"] <= 1.5 * run_plan.steps
 
 
-PUSHED = """[normal]
+STEP_LOAD = """[normal]
 load = "310.4 N"
 [friction]
 law = "nonlocal"
@@ -90,13 +90,13 @@ tolerance = 0.01
 def test_always_plan_estimates_bond_list_under_step_load():
     """The plan estimates the strips of bonds of a block under a step load. The block hardly moves,
     and each step adds a strip: 3800 strips were kept where 66 were estimated."""
-    scene = load(PUSHED.format(cycles=12))
+    scene = load(STEP_LOAD.format(cycles=12))
     estimate = plan(scene).unknowns["bond_list_about"]
     counts = run(scene, estimate=False).extra["book"]
     assert counts["strips"] <= 1.2 * estimate
 
 
-HELD = """[structure]
+STUCK_CHAIN = """[structure]
 masses = ["0.3454 kg", "1.339 kg"]
 [[structure.spring]]
 between = [1, 0]
@@ -138,7 +138,7 @@ def test_always_plan_estimates_time_of_stuck_block():
     reference is 2.5e-7 s (measured) per increment and strip, with half of the final strips on
     average."""
     sine = (
-        HELD.format(order=1.085, cycles=4)
+        STUCK_CHAIN.format(order=1.085, cycles=4)
         .replace('levels = ["24.7 m/s^2", "29.5 m/s^2"]', 'acceleration = "29.5 m/s^2"')
         .replace('"levels"', '"sine"')
     )
@@ -153,7 +153,7 @@ def test_always_plan_estimates_time_of_stuck_block():
     )
 
 
-JUST_HELD = """[normal]
+BARELY_STUCK = """[normal]
 load = "12.9 N"
 [friction]
 law = "nonlocal"
@@ -182,7 +182,7 @@ def test_always_plan_estimates_bond_list_near_friction_limit(order):
     """The plan estimates the strips of a block whose friction limit is 1.13 times the load within a
     factor of 3. Bonds of order 0 have a constant force, so that the velocity reverses in every step
     and each reversal adds a strip."""
-    scene = load(JUST_HELD.format(order=order))
+    scene = load(BARELY_STUCK.format(order=order))
     run_plan = plan(scene)
     counts = run(scene, estimate=False).extra["book"]
     assert counts["strips"] / 3 <= run_plan.unknowns["bond_list_about"] <= 3 * counts["strips"]
@@ -191,7 +191,7 @@ def test_always_plan_estimates_bond_list_near_friction_limit(order):
     ) == (order == "0.0")
 
 
-SLIDES = """[normal]
+FORCED_BLOCK = """[normal]
 load = "100 N"
 [friction]
 law = "coulomb"
@@ -216,10 +216,10 @@ cycles = 200
 def test_exact_kinetic_coefficient_decides_about_sticking(kinetic, sticks):
     """Whether a sliding block sticks again depends on the kinetic coefficient, in the run and in
     the verdict of the plan."""
-    text = SLIDES.format(kinetic=kinetic)
+    text = FORCED_BLOCK.format(kinetic=kinetic)
     run_plan = plan(text)
     result = run(load(text))
-    sentence = next(one for one in run_plan.verdict if one.startswith("D = 0.9 is below 1"))
+    sentence = next(line for line in run_plan.verdict if line.startswith("D = 0.9 is below 1"))
     assert (
         (result.measures["stick_fraction"].value > 0)
         == sticks

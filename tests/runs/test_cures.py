@@ -12,20 +12,21 @@ from patchfem import build, run
 from patchfem.core import ErrorCauses, Measure
 from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
 
-SHAKEN = POINT + NONLOCAL + MODE + DRIVE
-FEW = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
+SHAKEN_RIG = POINT + NONLOCAL + MODE + DRIVE
+SIXTEEN_STEPS = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
 # Seeds of the fastest scenes of every kind, which run in a normal test run.
-EVERY_TIME = (10, 18, 31, 34, 45, 78, 89, 116, 117, 144, 150, 163, 175)
+FAST_SEEDS = (10, 18, 31, 34, 45, 78, 89, 116, 117, 144, 150, 163, 175)
 # Seeds whose remedies failed in an earlier version, out of 500 more scenes.
-FAILED = 460, 482, 484, 725, 746
+FAILED_SEEDS = 460, 482, 484, 725, 746
 
 
 def run_text(text: str):
+    """Return the result of a scene."""
     return run(text)
 
 
-@pytest.mark.share(*EVERY_TIME)
-@pytest.mark.parametrize("seed", [*range(200), *FAILED])
+@pytest.mark.share(*FAST_SEEDS)
+@pytest.mark.parametrize("seed", [*range(200), *FAILED_SEEDS])
 def test_always_printed_remedy_has_promised_effect(seed):
     """A remedy that is applied exactly as printed removes its warning, or halves the error it
     names, or reduces the error to three quarters if it promises only a refinement."""
@@ -43,11 +44,11 @@ def test_always_printed_remedy_has_promised_effect(seed):
 def test_always_automatic_steps_meet_tolerance():
     """If the changes of the measures do not fall from 2 to 8 steps per cycle, the warning advises
     automatic steps, which meet the tolerance."""
-    eight = FEW.replace("steps_per_cycle = 16", "steps_per_cycle = 8")
-    few = run(SHAKEN + eight)
+    eight_steps = SIXTEEN_STEPS.replace("steps_per_cycle = 16", "steps_per_cycle = 8")
+    coarse = run(SHAKEN_RIG + eight_steps)
     main = "relative_displacement_amplitude"
     warnings = [
-        text for text in few.warnings if text.startswith(f"{main} has an estimated error of ")
+        text for text in coarse.warnings if text.startswith(f"{main} has an estimated error of ")
     ]
     assert len(warnings) == 1
     assert "absolute_acceleration_peak of " in warnings[0]
@@ -56,8 +57,8 @@ def test_always_automatic_steps_meet_tolerance():
         "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps"
         in warnings[0]
     )
-    automatic = run(SHAKEN + FEW.replace("steps_per_cycle = 16\n", "")).measures[main]
-    assert automatic.error <= 1e-2 * automatic.value < few.measures[main].error
+    automatic = run(SHAKEN_RIG + SIXTEEN_STEPS.replace("steps_per_cycle = 16\n", "")).measures[main]
+    assert automatic.error <= 1e-2 * automatic.value < coarse.measures[main].error
 
 
 @pytest.mark.parametrize(
@@ -83,7 +84,7 @@ def test_exact_warning_names_main_measures_first(errors, warning):
         name: Measure(1.0, "1", error, causes=ErrorCauses({"steps": error}, 2.0))
         for name, error in errors.items()
     }
-    finding = Finding(build(SHAKEN + FEW), measures, None, {"steps_per_cycle": 16})
+    finding = Finding(build(SHAKEN_RIG + SIXTEEN_STEPS), measures, None, {"steps_per_cycle": 16})
     assert tolerance_warnings(finding) == [warning]
 
 

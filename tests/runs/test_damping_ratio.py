@@ -111,20 +111,20 @@ def test_exact_second_sliding_mode_gives_no_damping_ratio():
     """A second mode of 300 Hz that contributes more than 5 % of the relative displacement leaves
     the measure without a value, with a reason; with a contribution of 0.001 the measure has its
     value."""
-    second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
-    shared, alone = (
-        pf.run(load(format_rig("coulomb", slide=SLIDE, more=second.format(slide))))
+    second_mode = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
+    with_second_mode, with_first_mode = (
+        pf.run(load(format_rig("coulomb", slide=SLIDE, more=second_mode.format(slide))))
         for slide in (2.5, 0.001)
     )
-    contributions = shared.window.modal * shared.plan.model.rig.modes.slide
+    contributions = with_second_mode.window.modal * with_second_mode.plan.model.rig.modes.slide
     fraction = np.ptp(contributions[:, 1]) / np.ptp(contributions.sum(axis=1))
     assert fraction > 0.05
-    damping = shared.measures["equivalent_damping"]
+    damping = with_second_mode.measures["equivalent_damping"]
     assert damping.value is None
     assert (
         damping.reason
         == f"this measure is that of mode 1, but another mode contributes {100 * fraction:.2g} % of the slide"
     )
-    assert alone.measures["equivalent_damping"].value == pytest.approx(
-        damping_from_loop_area(alone), rel=2e-3
+    assert with_first_mode.measures["equivalent_damping"].value == pytest.approx(
+        damping_from_loop_area(with_first_mode), rel=2e-3
     )

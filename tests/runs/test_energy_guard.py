@@ -62,6 +62,7 @@ def test_exact_overdamped_mode_moves_with_base(tmp_path):
     ],
 )
 def test_always_energy_balance_above_limit_is_reported(engine, value, error, closes):
+    """An energy balance above the limit of its engine, or above its stated error, is reported."""
     message = describe_balance_error(
         ENGINES[engine], {"energy_balance": Measure(value, "1", error, 1e-8)}
     )

@@ -11,6 +11,7 @@ LEVELS = WAVEFORMS["levels"]
 
 
 def test_always_every_engine_lists_supported_features():
+    """Every engine has a row of supported features, and every feature of a row is known."""
     assert set(ENGINES) == set(ENGINE_SUPPORT)
     for support in ENGINE_SUPPORT.values():
         assert set(support.features.split()) <= set(FEATURE_FINDERS)

@@ -20,9 +20,9 @@ from patchfem.runs.patch.values import values
 from patchfem.scene import loads
 
 BLOCKS = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\n'
-ALWAYS = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}
+SEEDS_OF_KIND = {"uniform": (4, 13, 15, 28, 50), "graded": (3001, 3036)}
 # CPU seconds for a mesh; low, so that two finer levels remain affordable.
-LEAST = {True: 0.02, False: 0.02}
+MAX_SECONDS = {True: 0.02, False: 0.02}
 
 
 def draw_settings(seed: int, kind: str) -> list:
@@ -102,14 +102,14 @@ def compare_with_refined_meshes(seed: int, kind: str) -> dict:
     }
 
 
-def extrapolate_or_last(first, second, third) -> float:
+def extrapolate_or_last(coarse, middle, fine) -> float:
     """Return the limit of three values on refined meshes if their changes shrink with one sign,
     otherwise the last value."""
-    before = second - first
-    last = third - second
-    if before * last <= 0 or abs(before) < 1.15 * abs(last):
-        return third
-    return third + last / (min(max(before / last, 1.2), 4.0) - 1)
+    first_change = middle - coarse
+    last_change = fine - middle
+    if first_change * last_change <= 0 or abs(first_change) < 1.15 * abs(last_change):
+        return fine
+    return fine + last_change / (min(max(first_change / last_change, 1.2), 4.0) - 1)
 
 
 def exceeds_error(value, error, reference) -> bool:
@@ -130,12 +130,12 @@ def error_ratios(rows) -> list:
 @pytest.fixture
 def limit_mesh_cost(monkeypatch):
     """Limit the cost of the meshes so that two refinements remain affordable."""
-    monkeypatch.setattr(ladder, "MAX_CONDENSING_SECONDS", LEAST)
+    monkeypatch.setattr(ladder, "MAX_CONDENSING_SECONDS", MAX_SECONDS)
 
 
 @pytest.mark.share(0, 3, 6)
 @pytest.mark.parametrize(
-    ("kind", "seed"), [(kind, seed) for kind, seeds in ALWAYS.items() for seed in seeds]
+    ("kind", "seed"), [(kind, seed) for kind, seeds in SEEDS_OF_KIND.items() for seed in seeds]
 )
 def test_always_errors_cover_refined_meshes(kind, seed, limit_mesh_cost):
     """The errors cover refined meshes for scenes where three meshes alone would not suffice:
@@ -144,10 +144,10 @@ def test_always_errors_cover_refined_meshes(kind, seed, limit_mesh_cost):
         assert not exceeds_error(*row), (name, row)
 
 
-def collect_campaign_rows(kind: str, first: int, count: int) -> dict:
-    """Return name -> [(value, error, reference)] of the scenes with `count` seeds from `first`."""
+def collect_campaign_rows(kind: str, first_seed: int, count: int) -> dict:
+    """Return name -> [(value, error, reference)] of the scenes with `count` seeds from `first_seed`."""
     rows = {}
-    for seed in range(first, first + count):
+    for seed in range(first_seed, first_seed + count):
         for name, row in compare_with_refined_meshes(seed, kind).items():
             rows.setdefault(name, []).append(row)
     return rows
@@ -168,7 +168,7 @@ def test_exact_limit_of_geometric_series(ratio):
 
 
 if __name__ == "__main__":
-    ladder.MAX_CONDENSING_SECONDS = LEAST
+    ladder.MAX_CONDENSING_SECONDS = MAX_SECONDS
     for name, found in collect_campaign_rows(
         sys.argv[1], int(sys.argv[2]), int(sys.argv[3])
     ).items():

@@ -46,7 +46,7 @@ frequency = "129 Hz"
 damping = 0.003
 slide = 0.095
 """
-RUBS = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+COULOMB_POINT = '[normal]\nload = "26 lbf"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
 FREQUENCY = "0.0003404368455286208 Hz"
 SLOW = f'[drive]\nkind = "base"\nfrequency = "{FREQUENCY}"\nacceleration = "5 g"\ncycles = 12\n'
 SWEEP = (
@@ -77,10 +77,11 @@ def count_pieces(model) -> int:
         CHAIN.format(0.0004),
         CHAIN.format(40),
         MODES + YAW + SLOW,
-        MODES + RUBS + SWEEP,
+        MODES + COULOMB_POINT + SWEEP,
     ],
 )
 def test_always_piece_count_is_estimated_within_factor_four(text):
+    """The estimated number of linear pieces is within a factor of four of the actual number."""
     model = pf.plan(text).model
     expected = costs.intervals_per_cycle(model) * model.rig.drive.cycles
     actual = count_pieces(model)
@@ -107,7 +108,7 @@ def test_exact_linear_rig_under_slow_drive():
 def test_exact_spring_block_under_slow_drive(kinetic):
     """The amplitude and the loop area of a spring and block under a slow drive agree with the
     closed form, and the energy balance closes."""
-    text = MODES + RUBS + SLOW.replace(FREQUENCY, "0.01 Hz").replace("5 g", "18 g")
+    text = MODES + COULOMB_POINT + SLOW.replace(FREQUENCY, "0.01 Hz").replace("5 g", "18 g")
     result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
     assert costs.max_exact_seconds(result.plan.model) < 20
     limit = 0.3 * 26 * 4.4482216152605
@@ -124,7 +125,7 @@ def test_exact_spring_block_under_slow_drive(kinetic):
 def test_always_undamped_rig_under_slow_drive_is_marched():
     """The free vibration of an undamped rig never decays; under a slow drive the exact engine is
     too expensive and the march is chosen."""
-    text = MODES.replace("0.003", "0") + RUBS + SLOW.replace("5 g", "18 g")
+    text = MODES.replace("0.003", "0") + COULOMB_POINT + SLOW.replace("5 g", "18 g")
     plan = pf.plan(text)
     assert plan.engine == "march"
     assert costs.max_exact_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
@@ -136,7 +137,7 @@ def test_exact_averaged_law_with_extreme_damping_is_marched():
     law = 'law = "convolution"\nbond_length = "1 nm"'
     text = (
         MODES.replace("0.003", "2e9")
-        + RUBS.replace('law = "coulomb"', law)
+        + COULOMB_POINT.replace('law = "coulomb"', law)
         + SLOW.replace("5 g", "18 g")
     )
     text = text.replace(FREQUENCY, "56.75 Hz")
@@ -146,7 +147,8 @@ def test_exact_averaged_law_with_extreme_damping_is_marched():
 
 
 def test_refuses_exact_run_with_unlimited_cost():
+    """An exact run that would practically never end is refused with the keys to change."""
     slow = SLOW.replace(FREQUENCY, "0.00003 Hz").replace("5 g", "18 g")
-    text = MODES.replace("0.003", "0") + RUBS + slow + '[accuracy]\nmethod = "exact"\n'
+    text = MODES.replace("0.003", "0") + COULOMB_POINT + slow + '[accuracy]\nmethod = "exact"\n'
     with pytest.raises(Missing, match=r'drive\.cycles .* accuracy\.method = "march"'):
         pf.run(text)

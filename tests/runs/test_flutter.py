@@ -28,12 +28,20 @@ kind = "free"
 cycles = {cycles}
 """
 # Flutter amplitude [mm]: a half cycle loses 2 F/k and grows by exp(pi zeta/sqrt(1 - zeta^2)).
-EDGE = 1e3 * 9 / (0.5 * (240 * np.pi) ** 2) / np.tanh(np.pi * 0.02 / np.sqrt(1 - 0.02**2) / 2)
+FLUTTER_AMPLITUDE = (
+    1e3 * 9 / (0.5 * (240 * np.pi) ** 2) / np.tanh(np.pi * 0.02 / np.sqrt(1 - 0.02**2) / 2)
+)
 
 
 def format_scene(**keys):
     """Return the scene with some values replaced."""
-    values = {"law": "coulomb", "more": "", "damping": -0.02, "start": EDGE, "cycles": 60}
+    values = {
+        "law": "coulomb",
+        "more": "",
+        "damping": -0.02,
+        "start": FLUTTER_AMPLITUDE,
+        "cycles": 60,
+    }
     return SCENE.format(**values | keys)
 
 
@@ -43,11 +51,11 @@ def format_scene(**keys):
 def test_exact_flutter_amplitude_separates_decay_and_growth(ratio, outcome):
     """A release below the flutter amplitude decays, one above it grows; the amplitude agrees with
     the closed form within 1e-9."""
-    result = pf.run(pf.load(format_scene(start=ratio * EDGE)))
+    result = pf.run(pf.load(format_scene(start=ratio * FLUTTER_AMPLITUDE)))
     assert result.outcome == outcome
     flutter = result.measures["flutter_amplitude"]
     assert (
-        flutter.value == pytest.approx(1e-3 * EDGE, rel=1e-9)
+        flutter.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=1e-9)
         and flutter.error <= 1e-8 * flutter.value
     )
     if outcome != "stuck":
@@ -56,7 +64,7 @@ def test_exact_flutter_amplitude_separates_decay_and_growth(ratio, outcome):
     assert "10.08" not in "".join(result.notes) and "decays to rest" in result.notes[-1]
 
 
-WEAKENS = {
+WEAKENING_SCENE = {
     "normal": {"load": 100.0},
     "friction": {
         "law": "lugre",
@@ -79,7 +87,7 @@ def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
     """Under a velocity-weakening law, releases 0.5 % below the flutter amplitude decay, and those
     0.5 % above it grow. Motions in micro-slip cannot be continued there. Den Hartog's balance gives
     12.90 mm with the kinetic coefficient alone."""
-    result = pf.run(WEAKENS, **{"drive.displacement": ratio * 12.88e-3})
+    result = pf.run(WEAKENING_SCENE, **{"drive.displacement": ratio * 12.88e-3})
     final_amplitude = result.measures["relative_displacement_amplitude"].value
     flutter = result.measures["flutter_amplitude"]
     assert (
@@ -99,7 +107,7 @@ def test_exact_flutter_amplitude_with_two_modes():
     """With a second mode, the free vibration of a stuck interface may gain energy, so the note
     promises no rest. A rigid mode leaves no flutter amplitude and gives a reason."""
     two, rigid = (
-        format_scene(start=0.9 * EDGE)
+        format_scene(start=0.9 * FLUTTER_AMPLITUDE)
         .replace("[structure.start]\n", SECOND.format(frequency))
         .replace(' mm"]', ' mm", "0 mm"]')
         for frequency in (400, 0)
@@ -107,7 +115,7 @@ def test_exact_flutter_amplitude_with_two_modes():
     result = pf.run(pf.load(two))
     flutter = result.measures["flutter_amplitude"]
     assert (
-        flutter.value == pytest.approx(1e-3 * EDGE, rel=0.1)
+        flutter.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=0.1)
         and 0 < flutter.error < 1e-6 * flutter.value
     )
     assert "a free oscillation of smaller amplitude decays, and" in result.notes[-1]
@@ -122,8 +130,11 @@ def test_exact_flutter_amplitude_with_two_modes():
 def test_always_unbounded_growth_ends_run_early(law):
     """A motion that would grow beyond the largest floating-point number ends when it exceeds 1000
     m."""
-    result = pf.run(pf.load(format_scene(law=law, start=1.1 * EDGE, cycles=10000)))
-    assert result.outcome == "grows" and result.measures["flutter_amplitude"].value < 1.1e-3 * EDGE
+    result = pf.run(pf.load(format_scene(law=law, start=1.1 * FLUTTER_AMPLITUDE, cycles=10000)))
+    assert (
+        result.outcome == "grows"
+        and result.measures["flutter_amplitude"].value < 1.1e-3 * FLUTTER_AMPLITUDE
+    )
     assert result.response.time[-1] < 2 and "when the motion exceeded 1000 m" in result.notes[-1]
     assert all(
         measure.error is None
@@ -133,6 +144,7 @@ def test_always_unbounded_growth_ends_run_early(law):
 
 
 def test_refuses_negative_damping_without_friction():
+    """Negative damping is refused without friction, and below -1 in any case."""
     frictionless = (
         format_scene()
         .replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "")
@@ -147,6 +159,7 @@ def test_refuses_negative_damping_without_friction():
 
 
 def test_always_missing_flutter_amplitude_has_reason():
+    """If the flutter amplitude cannot be computed, the measure states a reason."""
     small_release = format_scene(
         law="nonlocal", more='bond_length = "20 um"\nreading = "report"', start=0.01, cycles=3
     )

@@ -57,6 +57,7 @@ def plan_text(text, *sets):
     ],
 )
 def test_refuses_large_run_before_allocation_with_key(text, sets, key):
+    """A run that needs more memory than is free is refused with the key to change, before large arrays are allocated."""
     tracemalloc.start()
     run_plan = plan_text(text, *sets)
     reason = memory.reason_of_refusal(run_plan.cost.parts, GIGABYTE)
@@ -109,6 +110,7 @@ def test_exact_memory_estimate_scales_with_nodes_and_steps():
 
 
 def test_refuses_extremely_long_run_with_key():
+    """A run of centuries of computing time is refused with the key to change."""
     with pytest.raises(Missing, match=r"computing time of about .* s .*; lower drive\.cycles$"):
         long_plan = plan_text(RIG, MARCH, "drive.cycles=1e15")
         # Without these parts, the memory would be refused first.
@@ -143,6 +145,7 @@ def test_exact_free_memory_of_control_group(tmp_path):
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law, limit_mib", [(COULOMB, 150), (TANH, 200), (TANH, 300)])
 def test_refuses_run_beyond_memory_limit_in_one_line(tmp_path, law, limit_mib):
+    """A run beyond the memory limit of its process ends with exit code 4 and a message of one line."""
     path = tmp_path / "a.toml"
     path.write_text(POINT + law + MODE + STRUCTURE[len(MODE) :])
     process = subprocess.run(
@@ -179,7 +182,7 @@ def test_always_plans_agree_in_nine_of_ten_scenes(tmp_path):
     assert time >= 0.9 and memory_ >= 0.9
 
 
-RUBBED = """[structure]
+TWO_INTERFACES = """[structure]
 masses = ["1 kg", "2 kg"]
 [[structure.spring]]
 between = [1, 0]
@@ -207,7 +210,7 @@ cycles = 2
 
 def test_always_short_run_of_two_interfaces_is_planned(tmp_path):
     """The command `plan` of a short run states no compile time, because such a run is not compiled."""
-    (tmp_path / "scene.toml").write_text(RUBBED, "utf-8")
+    (tmp_path / "scene.toml").write_text(TWO_INTERFACES, "utf-8")
     command = [sys.executable, "-m", "patchfem", "plan", tmp_path / "scene.toml", "--json"]
     # An empty cache: nothing is compiled yet.
     environment = os.environ | {"PATCHFEM_CACHE": str(tmp_path)}
@@ -217,7 +220,7 @@ def test_always_short_run_of_two_interfaces_is_planned(tmp_path):
     assert 7e7 < output["bytes"] < 2e8
 
 
-SHAKEN = """[structure]
+RANDOM_VIBRATION = """[structure]
 moving_mass = "1 kg"
 [[structure.mode]]
 name = "axial"
@@ -237,7 +240,7 @@ duration = "{} s"
 def test_always_random_run_stores_planned_number_of_samples():
     """A random vibration stores as many samples per cycle as the engine needs, whatever the band
     demands of a march: 60 s take 1.5 GB, not 11 GB."""
-    run_plan = plan_text(SHAKEN.format(2))
+    run_plan = plan_text(RANDOM_VIBRATION.format(2))
     expected = costs.count_kept_samples(choose_numerics(run_plan.model))
     assert run.run(run_plan).window.time.size == pytest.approx(expected, rel=0.01)
-    assert 1e9 < plan_text(SHAKEN.format(60)).bytes < 2e9
+    assert 1e9 < plan_text(RANDOM_VIBRATION.format(60)).bytes < 2e9

@@ -15,7 +15,7 @@ from patchfem.response import judge_outcome, settling
 
 FOUND = Path(__file__).parent / "found"
 # Scene, measure, reference (DOP853 between reversals at 3e-14, or a march with 4000 steps per cycle), its digits.
-TRUE = (
+REFERENCES = (
     ("peak_bouc_wen_53", "friction_force_peak", 20.594500409, 3e-8),
     ("peak_bouc_wen_53", "absolute_acceleration_peak", 217.5187442529, 1e-8),
     ("tanh_levels_114", "absolute_acceleration_peak", 664.244, 9e-3),
@@ -50,15 +50,17 @@ def run_scene(name: str):
 
 
 # The Bouc-Wen scenes would compile a loop that no other test needs.
-@pytest.mark.share(*range(2, len(TRUE)))
-@pytest.mark.parametrize(("name", "measure", "reference", "round_off"), TRUE)
+@pytest.mark.share(*range(2, len(REFERENCES)))
+@pytest.mark.parametrize(("name", "measure", "reference", "round_off"), REFERENCES)
 def test_exact_measure_agrees_with_independent_program(name, measure, reference, round_off):
+    """A measure agrees with an independent program within its error, which meets the tolerance."""
     result = run_scene(name).measures[measure]
     assert abs(result.value - reference) <= result.error + round_off
     assert result.error <= (2 / 128 if measure == "stick_fraction" else 1e-2 * reference)
 
 
 def test_always_unbounded_motion_has_no_steady_amplitude():
+    """A rig whose motion is unbounded grows: it has no measures except for the normal load, and each gives a reason."""
     result = pf.run(load(FOUND / "harmonic_unbounded.toml"))
     assert result.outcome is Outcome.GROWS
     assert all(measure.error is None for measure in result.measures.values())
@@ -70,6 +72,7 @@ def test_always_unbounded_motion_has_no_steady_amplitude():
 
 
 def test_always_endless_sliding_under_step_has_no_errors():
+    """A free block that slides endlessly under a step load grows, and its measures have no errors."""
     drive = 'kind = "force"\nwaveform = "step"\nforce = "5 N"\ncycles = 40'
     result = pf.run(
         load(

@@ -13,7 +13,7 @@ from motion_scenes import spec, written
 from patchfem import run
 
 FOUND = Path(__file__).parent / "found"
-KNOWN = [  # Scene, measure, reference, half a unit of its last digit.
+FILE_REFERENCES = [  # Scene, measure, reference, half a unit of its last digit.
     ("s77_21", "relative_displacement_amplitude", 3.5862e-5, 5e-10),
     ("s77_21", "absolute_acceleration_peak", 3.562, 5e-4),
     ("s77_21", "friction_force_peak", 2.820, 5e-4),
@@ -24,39 +24,34 @@ KNOWN = [  # Scene, measure, reference, half a unit of its last digit.
 ]
 
 
-@pytest.mark.parametrize(("name", "measure", "reference", "round_off"), KNOWN)
+@pytest.mark.parametrize(("name", "measure", "reference", "round_off"), FILE_REFERENCES)
 def test_exact_measure_agrees_with_external_reference(name, measure, reference, round_off):
+    """A measure of a stored scene agrees with an external reference within its error."""
     result = run(FOUND / f"{name}.toml").measures[measure]
     assert abs(result.value - reference) <= result.error + round_off
     assert result.error <= 0.1 * abs(result.value)
 
 
-DRAWN = [  # Seed, measure, reference of the independent program, half a unit of its last digit.
+# Seed, measure, reference of the independent program, half a unit of its last digit.
+RANDOM_REFERENCES = [
     # With 400 samples per cycle the result was 0.0403.
     (7062, "stick_fraction", 0.048004613, 5e-10),
     (7062, "slip_start_phase", 2.089609, 5e-7),
-    (
-        5046,
-        "relative_displacement_amplitude",
-        8.20190559e-6,
-        5e-15,
-    ),  # The density of the Iwan law has 768 cells here.
+    # The density of the Iwan law has 768 cells here.
+    (5046, "relative_displacement_amplitude", 8.20190559e-6, 5e-15),
     (5046, "equivalent_stiffness", -74645.1102, 5e-5),
-    (
-        9256,
-        "relative_displacement_amplitude",
-        6.689247147339e-5,
-        5e-18,
-    ),  # The rise of friction at v_s was between two stages of the integrator.
+    # The rise of friction at v_s was between two stages of the integrator.
+    (9256, "relative_displacement_amplitude", 6.689247147339e-5, 5e-18),
     (9256, "equivalent_stiffness", 4188.7310127, 5e-8),
 ]
 
 
 @pytest.mark.share(2, 3)
-@pytest.mark.parametrize(("seed", "measure", "reference", "round_off"), DRAWN)
+@pytest.mark.parametrize(("seed", "measure", "reference", "round_off"), RANDOM_REFERENCES)
 def test_exact_random_scene_agrees_with_independent_program(
     seed, measure, reference, round_off, tmp_path
 ):
+    """A measure of a random scene agrees with the independent integrator within its error."""
     settings = spec(seed)
     if seed == 5046:  # This tolerance uses all cells; a larger one uses fewer.
         settings["tolerance"] = 1e-6

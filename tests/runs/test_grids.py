@@ -51,6 +51,7 @@ def count_nodes_of_run(patch, tolerance) -> tuple:
     ],
 )
 def test_exact_plan_predicts_grids_of_run(text, tolerance, sets):
+    """A plan predicts the finest grid, the number of levels and the number of interface nodes of the run."""
     patch = build_patch(text, *sets)
     expected, (finest, levels) = (
         expected_grids(patch, tolerance),
@@ -90,6 +91,7 @@ SMALL_CROWN = 'radius = "0.3 m"'
     "ending", [ENDING.format("load_line", ECCENTRIC_LOAD), ENDING.format("crown", SMALL_CROWN)]
 )
 def test_always_further_contact_searches_keep_columns(ending, monkeypatch):
+    """Further searches for the contact region move the columns of the grid by less than a tenth of an element."""
     columns = []
     for fraction in (grids.BAND_CHANGE_TOL, -1.0):  # With -1, the search never stops early.
         store.clear_cache()

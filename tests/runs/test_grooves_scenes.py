@@ -11,7 +11,7 @@ from patchfem.core import Outcome
 from patchfem.scene import loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
-PRESSED = f"""
+GROOVED_POINT = f"""
 [normal]
 load = "115 N"
 {GROOVES}
@@ -20,7 +20,7 @@ law = "coulomb"
 static = 0.4
 """
 BENCH = (
-    PRESSED
+    GROOVED_POINT
     + """
 [slide]
 kind = "triangle"
@@ -29,7 +29,7 @@ speed = "1 mm/s"
 """
 )
 RIG = (
-    PRESSED
+    GROOVED_POINT
     + """
 [structure]
 moving_mass = "1.2 kg"
@@ -72,6 +72,7 @@ def groove_loop_area(load, mu, amplitude, reach):
 
 @pytest.mark.parametrize("reach", [30e-6, 200e-6])
 def test_exact_slow_sliding_loop_agrees_with_closed_form(reach):
+    """Area and peak force of a slow friction loop over grooves agree with the closed form, and its energies balance."""
     result = run_with_keys(BENCH, **{"slide.amplitude": f"{reach} m"})
     assert measure_value(result, "loop_area") == pytest.approx(
         groove_loop_area(115, 0.4, 7.5e-6, reach), rel=1e-9
@@ -139,10 +140,10 @@ def test_always_hysteretic_laws_on_grooves_close_energy_balance(law):
     """The energy balance closes for laws with memory along the slope; with bonds far shorter than a
     groove, the loop is that of Coulomb's law."""
 
-    def text(of, length):
-        return of.replace('law = "coulomb"', f'law = "{law}"\nbond_length = "{length}"')
+    def format_law(base_text, length):
+        return base_text.replace('law = "coulomb"', f'law = "{law}"\nbond_length = "{length}"')
 
-    result = run_with_keys(text(BENCH, "0.1 um"), **{"accuracy.steps_per_cycle": "4000"})
+    result = run_with_keys(format_law(BENCH, "0.1 um"), **{"accuracy.steps_per_cycle": "4000"})
     assert (
         measure_value(result, "energy_balance") < 1e-10
         and measure_value(result, "work_check") < 1e-3
@@ -154,7 +155,7 @@ def test_always_hysteretic_laws_on_grooves_close_energy_balance(law):
         result, "energy_stored"
     ) == pytest.approx(measure_value(result, "energy_dissipated"), rel=1e-9)
     result = run_with_keys(
-        text(RIG, "1 um"),
+        format_law(RIG, "1 um"),
         **{"normal.grooves.lifted_mass": "0.3 kg", "accuracy.steps_per_cycle": "400"},
     )
     assert (
@@ -164,6 +165,7 @@ def test_always_hysteretic_laws_on_grooves_close_energy_balance(law):
 
 
 def test_exact_rigid_patch_on_grooves_agrees_with_point():
+    """A rigid patch on grooves agrees with a point contact, on a bench and in a rig."""
     pieces = PIECES + GROOVES
     point = f'[normal]\nload = "115 N"\n{GROOVES}'
     for text, names in (
@@ -191,6 +193,7 @@ def test_exact_grooves_of_zero_amplitude_change_nothing(text):
 
 
 def test_refuses_normal_motion_with_grooves():
+    """A mode with normal motion is not supported with grooves."""
     text = (
         RIG.replace("[normal]", PIECES)
         .replace('load = "115 N"\ngrooves', "grooves")
@@ -252,6 +255,7 @@ def test_refuses_normal_motion_with_grooves():
     ],
 )
 def test_refuses_keys_incompatible_with_grooves(text, sets, key, words):
+    """Keys that are not supported with grooves are refused with a message that names them."""
     with pytest.raises(SceneError) as error:
         loads(text, sets=sets)
     assert any(f" {key}: " in line and words in line for line in error.value.mistakes), (
@@ -260,6 +264,7 @@ def test_refuses_keys_incompatible_with_grooves(text, sets, key, words):
 
 
 def test_refuses_grooves_in_static_patch_or_unsuitable_shear():
+    """Grooves need a sliding motion; with [contact.shear], the law tanh and a holder spring are refused."""
     patch = BLOCK + GROOVES
     with pytest.raises(SceneError, match=r"contact\.grooves: .*needs a sliding motion"):
         loads(patch)
@@ -275,7 +280,7 @@ def test_refuses_grooves_in_static_patch_or_unsuitable_shear():
         loads(sheared + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
 
 
-LEAVES = {
+LEAVING_KEYS = {
     "normal.grooves.lifted_mass": "1.5 kg",
     "drive.acceleration": "60 g",
     "normal.load": "60 N",
@@ -311,7 +316,7 @@ def test_exact_energy_balance_ends_with_exceeded_travel(law):
 def test_always_lifted_mass_leaving_grooves_is_outcome(text):
     """In every engine the outcome is `leaves_grooves`; a note states the instant, and no warning
     calls it a failed solution."""
-    result = run_with_keys(text, **LEAVES)
+    result = run_with_keys(text, **LEAVING_KEYS)
     assert result.outcome is Outcome.LEAVES_GROOVES
     assert "left their grooves" in result.outcome.sentence
     assert any("leaves the grooves at" in item for item in result.notes)

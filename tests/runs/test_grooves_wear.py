@@ -57,19 +57,19 @@ def measure_value(result, name):
 def slip_path_per_cycle(amplitude, reach=15e-6):
     """Return int R ds/N over a cycle between +-reach, where R ds = (1 + t^2)/(1 -+ mu t) N dq."""
 
-    def slip_rate(q, way):
+    def slip_rate(q, direction):
         t = amplitude * WAVE * np.sin(WAVE * q)
-        return (1 + t * t) / (1 - way * MU * t)
+        return (1 + t * t) / (1 - direction * MU * t)
 
-    return sum(quad(slip_rate, -reach, reach, args=(way,))[0] for way in (-1, 1))
+    return sum(quad(slip_rate, -reach, reach, args=(direction,))[0] for direction in (-1, 1))
 
 
-@pytest.mark.parametrize("share", [0.5, 0.3])
-def test_exact_worn_amplitude_agrees_with_differential_equation(share):
+@pytest.mark.parametrize("upper_share", [0.5, 0.3])
+def test_exact_worn_amplitude_agrees_with_differential_equation(upper_share):
     """The worn amplitude agrees with dA/dn = -share kappa N int R ds/N divided by the area, for the
     piece that wears more; the worn volume is that of both pieces."""
-    result = run_with_keys(PIECES + SLIDE, **{"wear.upper_share": share})
-    larger_share = max(share, 1 - share)
+    result = run_with_keys(PIECES + SLIDE, **{"wear.upper_share": upper_share})
+    larger_share = max(upper_share, 1 - upper_share)
     solution = solve_ivp(
         lambda n, a: -larger_share * KAPPA * LOAD * slip_path_per_cycle(a[0]) / AREA,
         (0, 4e6),
@@ -113,7 +113,7 @@ def test_exact_wear_of_rig_agrees_with_friction_work(lifted):
         )
 
 
-SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
+SHEARED_PIECES = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
 
 
 @pytest.mark.share(0)
@@ -146,7 +146,7 @@ def test_exact_wear_of_sheared_patch_agrees_with_friction_work(text, keys):
     over mu, and the grooves lose their share of it."""
     for form, divisor in (("archard", MU), ("energy", 1.0)):
         result = run_with_keys(
-            SOFT + text,
+            SHEARED_PIECES + text,
             False,
             **{"wear.form": f'"{form}"', "wear.cycles": 10, "wear.jumps": 1, **keys},
         )
@@ -165,9 +165,11 @@ def test_exact_wear_on_flat_grooves_agrees_with_contact_elements():
     contact elements, for an amplitude about three times that of the first complete slip."""
     keys = {"slide.amplitude": "0.3 um", "wear.cycles": 1000, "wear.jumps": 1}
     grooved = run_with_keys(
-        SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"}
+        SHEARED_PIECES + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"}
     )
-    plain = run_with_keys(SOFT + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"})
+    plain = run_with_keys(
+        SHEARED_PIECES + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"}
+    )
     np.testing.assert_allclose(grooved.patch.unloaded_gap, plain.patch.unloaded_gap, rtol=2e-3)
     slip_paths = grooved.patch.unloaded_gap / grooved.patch.pressure.sigma_n
     assert np.ptp(slip_paths) > 0.05 * slip_paths.mean()

@@ -13,7 +13,7 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-W = 2 * pi * 100  # Angular frequency [rad/s] of the mode of 1 kg.
+OMEGA = 2 * pi * 100  # Angular frequency [rad/s] of the mode of 1 kg.
 LOAD = 100.0
 
 
@@ -59,7 +59,7 @@ def measure_value(result, name="relative_displacement_amplitude"):
 
 
 def assert_within_error(result, name, reference, round_off=0.0):
-    """Assert that a measure agrees with a reference within its error plus `least`."""
+    """Assert that a measure agrees with a reference within its error plus `round_off`."""
     measure = result.measures[name]
     assert abs(measure.value - reference) <= measure.error + round_off, (
         name,
@@ -87,7 +87,7 @@ def test_exact_first_slip_near_friction_limit(power, more):
         format_rig("static = 0.3", format_base_drive(30.0 / (1 - excess), 0.5), 0.0, more=more),
         estimate=False,
     )
-    expected = 4.5 * excess**2 * 30.0 / W**2
+    expected = 4.5 * excess**2 * 30.0 / OMEGA**2
     assert abs(result.response.slide[-1]) == pytest.approx(
         expected, rel=3 * excess + 1e-14 / excess
     )
@@ -139,7 +139,7 @@ def test_exact_amplitude_above_resonance_threshold():
     text = format_rig("static = 0.3", format_base_drive(30.0 / d, 1500), 0.0)
     result = run_text(text)
     assert result.outcome == "steady"
-    assert measure_value(result) * W**2 / (30.0 / d) == pytest.approx(
+    assert measure_value(result) * OMEGA**2 / (30.0 / d) == pytest.approx(
         expected, rel=1e-12 * abs(condition)
     )
     assert_energy_balance(result, 1e-10)
@@ -147,8 +147,8 @@ def test_exact_amplitude_above_resonance_threshold():
     assert_within_error(
         harmonic,
         "relative_displacement_amplitude",
-        expected * 30.0 / d / W**2,
-        1e-9 * expected * 30.0 / d / W**2,
+        expected * 30.0 / d / OMEGA**2,
+        1e-9 * expected * 30.0 / d / OMEGA**2,
     )
 
 
@@ -161,7 +161,7 @@ def test_exact_growth_below_resonance_threshold():
     )
     assert short_run.outcome == long_run.outcome == "grows"
     assert long_run.measures["relative_displacement_amplitude"].error is None
-    rise = (measure_value(long_run) - measure_value(short_run)) / 600 * W**2 / (30.0 / d)
+    rise = (measure_value(long_run) - measure_value(short_run)) / 600 * OMEGA**2 / (30.0 / d)
     assert rise == pytest.approx(pi - 4 * d, rel=1e-2)
     assert_energy_balance(long_run, 1e-10)
 
@@ -193,16 +193,18 @@ def test_exact_free_block_on_table_agrees_with_closed_form():
 
 # Damping, frequency ratio, level, static, cycles, slip amplitude [m] and loop area [J] of an
 # independent program (DOP853 at 1e-11 with event search).
-PEERS = {
+PROGRAM_RESULTS = {
     "overdamped": (2.0, 1.0, 10.0, 0.05, 20, 2.177447050215183e-06, 4.354894097337636e-05),
     "eight stops": (0.01, 1 / 16, 10.0, 0.05, 12, 1.3238644852087504e-05, 2.6477289704175477e-4),
 }
 
 
-@pytest.mark.parametrize("name", PEERS)
+@pytest.mark.parametrize("name", PROGRAM_RESULTS)
 @pytest.mark.parametrize("method", ["auto", "march", "harmonic"])
 def test_exact_slip_and_loop_agree_with_independent_program(name, method):
-    damping, ratio, level, static, cycles, slip, area = PEERS[name]
+    """Slip amplitude and loop area agree with an independent program, for an overdamped mode and
+    for a motion with eight stops per cycle."""
+    damping, ratio, level, static, cycles, slip, area = PROGRAM_RESULTS[name]
     result = run_text(
         format_rig(f"static = {static}", format_base_drive(level, cycles, ratio), damping),
         f"accuracy.method={method}",
@@ -225,13 +227,13 @@ def test_exact_slip_and_loop_agree_with_independent_program(name, method):
 def test_exact_amplitude_at_resonance_agrees_with_printed_value(damping, expected):
     """The amplitude for D = 0.8 agrees with the printed value in every engine."""
     text = format_rig("static = 0.3", format_base_drive(37.5, 200), damping)
-    assert measure_value(run_text(text)) == pytest.approx(expected * 37.5 / W**2, rel=1e-11)
+    assert measure_value(run_text(text)) == pytest.approx(expected * 37.5 / OMEGA**2, rel=1e-11)
     for method in ("march", "harmonic"):
         assert_within_error(
             run_text(text, f"accuracy.method={method}"),
             "relative_displacement_amplitude",
-            expected * 37.5 / W**2,
-            1e-10 * expected * 37.5 / W**2,
+            expected * 37.5 / OMEGA**2,
+            1e-10 * expected * 37.5 / OMEGA**2,
         )
 
 
@@ -243,7 +245,7 @@ def test_exact_phase_after_many_cycles(cycles):
         run_text(format_rig("static = 0.3", format_base_drive(37.5, n)), estimate=False)
         for n in (200, cycles)
     )
-    expected = 0.28704671337871602595 * 37.5 / W**2
+    expected = 0.28704671337871602595 * 37.5 / OMEGA**2
     assert measure_value(long_run) == pytest.approx(expected, rel=1e-12)
     assert measure_value(long_run, "slip_start_phase") == pytest.approx(0.538622, abs=1e-6)
     assert measure_value(long_run, "slip_start_phase") == pytest.approx(
@@ -265,7 +267,7 @@ def test_exact_static_above_kinetic_has_two_steady_states():
     assert rest.outcome == "stuck" and measure_value(rest) == 0.0
     assert moving.outcome == "steady"
     # The printed value is relative to omega_n^2.
-    assert measure_value(moving) == pytest.approx(4.83011 * 60.0 / W**2, rel=1e-5)
+    assert measure_value(moving) == pytest.approx(4.83011 * 60.0 / OMEGA**2, rel=1e-5)
     for result in (rest, moving):
         assert_energy_balance(result, 1e-10)
     marched = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
@@ -313,6 +315,7 @@ cycles = 4
     "law", ["coulomb", 'elastic-plastic"\nbond_length = "1 um', 'nonlocal"\nbond_length = "1 um']
 )
 def test_always_energy_balance_closes_with_lift_off(law):
+    """The energy balance of a bouncing mode closes although the contact opens, and friction stays below mu N."""
     result = run_text(HEAVE % law, estimate=False)
     load = result.response.extra["normal_load"]
     assert load.min() == 0.0 and (np.abs(result.response.force) <= 0.3 * load + 1e-9).all()
@@ -320,6 +323,7 @@ def test_always_energy_balance_closes_with_lift_off(law):
 
 
 def test_refuses_start_beyond_travel():
+    """A motion that starts beyond the travel is refused by every engine."""
     text = format_rig(
         "static = 0.05",
         'kind = "free"\ndisplacement = "0.5 mm"\ncycles = 10',

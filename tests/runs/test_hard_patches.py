@@ -200,25 +200,26 @@ def test_exact_patch_test_with_elongated_elements():
     )
 
 
-@pytest.mark.parametrize("share", [0.499, -0.499])
-def test_exact_load_near_edge_is_carried_at_edge(share):
-    result = run_and_check(f"contact.load_line.offset={share * SIZE} m", COARSE)
-    assert measure_value(result, "pressure_centre") == pytest.approx(share * SIZE, rel=1e-9)
-    assert np.sign(measure_value(result, "rotation")) == -np.sign(share)
+@pytest.mark.parametrize("fraction", [0.499, -0.499])
+def test_exact_load_near_edge_is_carried_at_edge(fraction):
+    """A load line close to an edge is carried by at most two nodes at this edge, and the piece rotates towards it."""
+    result = run_and_check(f"contact.load_line.offset={fraction * SIZE} m", COARSE)
+    assert measure_value(result, "pressure_centre") == pytest.approx(fraction * SIZE, rel=1e-9)
+    assert np.sign(measure_value(result, "rotation")) == -np.sign(fraction)
     assert result.patch.active.sum() <= 2
 
 
 def write_wavy_profile(path, with_faults=False) -> list:
-    """Write a smooth profile of two waves and return the settings that use it; `spoil` adds spikes
-    and missing heights."""
+    """Write a smooth profile of two waves and return the settings that use it; `with_faults` adds
+    spikes and missing heights."""
     x = np.linspace(0, 12.7, 1271)
     z = 2.0 * np.cos(2 * np.pi * x / 6.35) + 0.5 * np.cos(2 * np.pi * x / 3.175)
     cells = [f"{v:.9g}" for v in z]
     if with_faults:
-        for at, height in ((200, 50), (640, -40), (641, -45), (1100, 30)):
-            cells[at] = str(height)
-        for first in (100, 500, 900):
-            cells[first : first + 12] = ["nan"] * 12
+        for index, height in ((200, 50), (640, -40), (641, -45), (1100, 30)):
+            cells[index] = str(height)
+        for start in (100, 500, 900):
+            cells[start : start + 12] = ["nan"] * 12
     path.write_text(
         "x [mm],z [um]\n" + "\n".join(f"{a:.9g},{b}" for a, b in zip(x, cells, strict=True)),
         "utf-8",
@@ -285,7 +286,7 @@ def test_exact_strips_on_step_agree_with_single_patch():
         assert measure_value(strips, name) == pytest.approx(measure_value(single, name), rel=1e-9)
 
 
-GRADED = {
+SCENE_SETTINGS = {
     "corner": ("contact.tilt.angle=10 mrad",), "step": ("contact.step.height=1 um", "contact.step.at=2 mm"),
     "full": (), "no load": ("contact.load=0 N",), "billionth": ("contact.load=1e-7 N", TILT),
     "strips": (TILT, "contact.strips.count=5", "contact.strips.roll=0.1 mrad"),
@@ -296,14 +297,19 @@ GRADED = {
     "held": ("contact.crown.radius=1 m", "contact.holder.rotational_stiffness=1e3 N m/rad",
              "contact.load_line.offset=3 mm"),
 }  # fmt: skip
-COATED = {"thin coating": 1e-6, "thick coating": 6.2865e-3}
+COATING_THICKNESS = {"thin coating": 1e-6, "thick coating": 6.2865e-3}
 
 
 @pytest.mark.share(0, 1, 2, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14)
-@pytest.mark.parametrize("name", [*GRADED, *COATED])
+@pytest.mark.parametrize("name", [*SCENE_SETTINGS, *COATING_THICKNESS])
 def test_always_automatic_mesh_stays_within_cost(name, coarse_meshes):
-    text = BLOCKS + COATING.format(250e9, 0.24, COATED[name]) if name in COATED else BLOCKS
-    result = run_and_check(*GRADED.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
+    """Automatic meshes of extreme patches stay within the limit of the cost."""
+    text = (
+        BLOCKS + COATING.format(250e9, 0.24, COATING_THICKNESS[name])
+        if name in COATING_THICKNESS
+        else BLOCKS
+    )
+    result = run_and_check(*SCENE_SETTINGS.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
     grids = {id(g): g for g in (result.patch.pair.grid, result.patch.pair.upper_grid)}.values()
     assert predict_condensing_seconds(grids) <= 0.15 and np.diff(result.patch.x).min() > 0
     if name in ("corner", "billionth"):  # The contact lies at the corner where the wedge closes.
@@ -331,6 +337,7 @@ def test_always_command_line_reports_faults_without_traceback(tmp_path):
 
 
 def test_refuses_profile_without_heights(tmp_path):
+    """A profile whose heights are all missing is refused with its file name."""
     path = tmp_path / "lost.csv"
     path.write_text(
         "x [mm],z [um]\n" + "\n".join(f"{a},nan" for a in np.linspace(0, 12.7, 50)), "utf-8"

@@ -12,7 +12,7 @@ from patchfem.core import Missing
 from patchfem.runs.rig import lists
 from patchfem.runs.run import run
 
-GROWS = "each reversal makes the list of bonds longer"
+GROWTH_SENTENCE = "each reversal makes the list of bonds longer"
 RIG = """[normal]
 load = "54.08 N"
 [friction]
@@ -72,7 +72,7 @@ cycles = 5
 [accuracy]
 tolerance = 0.01
 """
-RELEASED = """[normal]
+RELEASED_BLOCK = """[normal]
 load = "133.2 N"
 [friction]
 law = "nonlocal"
@@ -103,18 +103,18 @@ tolerance = 0.003
 
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize(
-    ("text", "more"),
-    [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0), (RELEASED, 1.5)],
+    ("text", "strip_factor"),
+    [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0), (RELEASED_BLOCK, 1.5)],
     ids=["mode", "masses", "released"],
 )
-def test_always_plan_estimates_strips_of_stuck_block(text, more):
+def test_always_plan_estimates_strips_of_stuck_block(text, strip_factor):
     """The plan estimates the strips of bonds of a stuck block, one per step, within a factor of
-    1.5. `more` allows for the steps that are subdivided after a release."""
+    1.5. `strip_factor` allows for the steps that are subdivided after a release."""
     scene = load(text)
     run_plan = plan(scene)
     result = run(scene)
     assert (
-        result.extra["book"]["strips"] / more
+        result.extra["book"]["strips"] / strip_factor
         <= run_plan.unknowns["bond_list_about"]
         <= 1.5 * result.extra["book"]["strips"]
     )
@@ -122,7 +122,8 @@ def test_always_plan_estimates_strips_of_stuck_block(text, more):
     assert any("accuracy.steps_per_cycle" in text for text in result.warnings)
 
 
-SPRING = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000  # Stiffness [N/m] of the springs of RELEASED.
+# Stiffness [N/m] of the springs of RELEASED_BLOCK.
+SPRING = 0.3877 * (2 * np.pi * 47.05) ** 2 + 176000
 # Start [um] at which the spring force is half of the friction limit.
 MAX_START = 1e6 * 0.53 * 133.2 / 2 / SPRING
 # Acceleration [m/s^2] of RIG, whose base factor is 0.8, at half of the friction limit.
@@ -132,16 +133,18 @@ MAX_PUSH = 0.662 * 54.08 / 0.5617 / 0.8 / 2
 @pytest.mark.parametrize(
     "text, is_stuck",
     [
-        (RELEASED.replace("11.82", repr(0.999 * MAX_START)), True),
-        (RELEASED.replace("11.82", repr(1.001 * MAX_START)), False),
-        (RELEASED.replace("report", "stretch"), False),
+        (RELEASED_BLOCK.replace("11.82", repr(0.999 * MAX_START)), True),
+        (RELEASED_BLOCK.replace("11.82", repr(1.001 * MAX_START)), False),
+        (RELEASED_BLOCK.replace("report", "stretch"), False),
         (RIG.format(reading="report", push=0.999 * MAX_PUSH), True),
         (RIG.format(reading="report", push=1.001 * MAX_PUSH), False),
         (RIG.format(reading="stretch", push=5.739), False),
     ],
 )
 def test_exact_report_law_sticks_up_to_half_friction_limit(text, is_stuck):
-    assert any(GROWS in sentence for sentence in plan(text).verdict) is is_stuck
+    """The plan predicts a block that sticks on growing bonds up to half of the friction limit, only
+    with the law of the report."""
+    assert any(GROWTH_SENTENCE in sentence for sentence in plan(text).verdict) is is_stuck
 
 
 LEVELS = (
@@ -165,7 +168,7 @@ def test_always_plan_estimates_growing_bonds_under_levels():
     run_plan = plan(LEVELS)
     result = run(load(LEVELS), estimate=False)
     counts = result.extra["book"]
-    assert any(GROWS in sentence for sentence in run_plan.verdict)
+    assert any(GROWTH_SENTENCE in sentence for sentence in run_plan.verdict)
     assert run_plan.unknowns["bond_list_about"] == pytest.approx(
         counts["strips"] - counts["substeps"], rel=0.05
     )
@@ -176,7 +179,7 @@ def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     with an estimate of its time."""
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
     begin = process_time()
-    assert GROWS in str(plan(scene))
+    assert GROWTH_SENTENCE in str(plan(scene))
     monkeypatch.setattr(lists, "MAX_LIST_SECONDS", 3.0)
     with pytest.raises(
         Missing,

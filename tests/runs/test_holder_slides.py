@@ -9,23 +9,26 @@ from scipy.integrate import solve_ivp
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-STIFF, LIMIT = 5e6, 0.3 * 26 * 4.4482216152605
+HOLDER_STIFFNESS, LIMIT = 5e6, 0.3 * 26 * 4.4482216152605
 PIECE = PATCH + BENCH[BENCH.index("[friction]") :]
-SPRING = ["contact.holder.tangential_stiffness=5e6 N/m", "contact.element_size=400 um"]
+HOLDER_SPRING = ["contact.holder.tangential_stiffness=5e6 N/m", "contact.element_size=400 um"]
 
 
 def run_bench(law, *sets):
     """Return the response of a bench with a friction law behind the holder spring."""
     text = PIECE.replace('"coulomb"', law)
-    return run(loads(text, "a.toml", [*SPRING, "slide.cycles=2", *sets]), estimate=False).response
+    return run(
+        loads(text, "a.toml", [*HOLDER_SPRING, "slide.cycles=2", *sets]), estimate=False
+    ).response
 
 
 def test_exact_coulomb_with_holder_spring_is_jenkins_element():
+    """A Coulomb contact behind the holder spring has the force of a Jenkins element at every sample."""
     response = run_bench('"coulomb"')
     force = []
     spring_force = 0.0
     for step in np.diff(response.slide, prepend=0.0):
-        spring_force = min(max(spring_force + STIFF * step, -LIMIT), LIMIT)
+        spring_force = min(max(spring_force + HOLDER_STIFFNESS * step, -LIMIT), LIMIT)
         force.append(spring_force)
     assert response.force == pytest.approx(force, abs=1e-9 * LIMIT)
     assert response.force.max() == pytest.approx(LIMIT, rel=1e-12)
@@ -35,7 +38,7 @@ def test_exact_coulomb_with_holder_spring_is_jenkins_element():
 def test_exact_initial_stiffness_is_series_stiffness(law):
     """The initial stiffness is 1/(1/k_h + eps/(mu N)), and the friction limit stays mu N."""
     response = run_bench(f'"{law}"\nbond_length = "1 um"', "accuracy.steps_per_cycle=20000")
-    series = 1 / (1 / STIFF + 1e-6 / LIMIT)
+    series = 1 / (1 / HOLDER_STIFFNESS + 1e-6 / LIMIT)
     assert response.force[1] / response.slide[1] == pytest.approx(
         series, rel=1e-12 if law != "nonlocal" else 5e-3
     )
@@ -50,7 +53,7 @@ def test_exact_bonds_with_holder_spring_agree_with_differential_equation():
     response = run_bench('"nonlocal"\nbond_length = "1 um"', "accuracy.steps_per_cycle=4000")
     first_loading = slice(0, 900)
     solution = solve_ivp(
-        lambda q, f: (LIMIT - f) / 1e-6 / (1 + (LIMIT - f) / 1e-6 / STIFF),
+        lambda q, f: (LIMIT - f) / 1e-6 / (1 + (LIMIT - f) / 1e-6 / HOLDER_STIFFNESS),
         (0, response.slide[first_loading][-1]),
         [0.0],
         t_eval=response.slide[first_loading],
@@ -66,17 +69,17 @@ def test_exact_holder_and_shear_compliances_add():
     text = PIECE.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 nm"')
     responses = [
         run(loads(text, "a.toml", [*sets, *sheared]), estimate=False).response
-        for sets in (SPRING, SPRING[1:])
+        for sets in (HOLDER_SPRING, HOLDER_SPRING[1:])
     ]
     stiffness = [response.force[1] / response.slide[1] for response in responses]
-    assert 1 / stiffness[0] == pytest.approx(1 / STIFF + 1 / stiffness[1], rel=1e-9)
+    assert 1 / stiffness[0] == pytest.approx(1 / HOLDER_STIFFNESS + 1 / stiffness[1], rel=1e-9)
 
 
 def test_exact_stuck_rig_vibrates_with_holder_spring():
     """A stuck rig with a Coulomb contact vibrates at the frequency of flexure and holder spring in
     parallel, and its energy balance closes."""
     sets = [
-        *SPRING,
+        *HOLDER_SPRING,
         "friction.static=30",
         "drive.cycles=20",
         "drive.frequency=20 Hz",
@@ -88,7 +91,7 @@ def test_exact_stuck_rig_vibrates_with_holder_spring():
     result = run(loads(text, "a.toml", sets), estimate=False)
     mass = 0.884
     omega = 2 * np.pi * 143
-    omega_stuck = np.sqrt(omega**2 + STIFF / mass)
+    omega_stuck = np.sqrt(omega**2 + HOLDER_STIFFNESS / mass)
     drive = 40 * np.pi
     t = result.response.time
     z = result.response.slide
@@ -106,5 +109,6 @@ def test_exact_stuck_rig_vibrates_with_holder_spring():
 
 
 def test_refuses_holder_spring_with_negative_order_bonds():
-    message = only(RIG, SPRING[0], "friction.reading=report", "friction.order=-0.5")
+    """A holder spring is refused with initial bonds of negative order."""
+    message = only(RIG, HOLDER_SPRING[0], "friction.reading=report", "friction.order=-0.5")
     assert "contact.holder.tangential_stiffness" in message and "initial_bonds" in message

@@ -88,6 +88,7 @@ def test_exact_compliances_of_unlike_pieces_add():
 
 
 def test_exact_step_opens_gap_on_one_side():
+    """A step opens the gap on one side by its height; the pressure is zero there."""
     patch, patch_values = solve_patch(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
     x = patch.pair.grid.x
     assert patch.unloaded_gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
@@ -118,7 +119,7 @@ def test_exact_soft_linear_skin_agrees_with_wedge_on_foundation(angle):
     )
 
 
-TURNING = {
+ROTATION_TABLES = {
     "spring": '[contact.holder]\nrotational_stiffness = "1e4 N m/rad"\n[contact.tilt]\nangle = "0.01 mrad"\n',
     "offset": '[contact.load_line]\noffset = "2 mm"\n',
     "moment": '[contact.load_line]\nmoment = "0.05 N m"\n',
@@ -131,7 +132,7 @@ TURNING = {
 
 
 @pytest.mark.share(0, 2, 5)
-@pytest.mark.parametrize("tables", TURNING.values(), ids=TURNING.keys())
+@pytest.mark.parametrize("tables", ROTATION_TABLES.values(), ids=ROTATION_TABLES.keys())
 def test_exact_approach_with_rotation_returns_load(tables):
     """The approach that results from a load, prescribed instead of the load, returns this load, its
     rotation and its pressure."""
@@ -145,7 +146,8 @@ def test_exact_approach_with_rotation_returns_load(tables):
 
 
 def test_exact_rotating_piece_before_contact_has_no_load():
-    tables = TURNING["spring"]
+    """An approach of 0 on a piece that can rotate has the outcome no_contact and no load."""
+    tables = ROTATION_TABLES["spring"]
     patch, patch_values = solve_patch(
         "", tables.replace("0.01 mrad", "0 mrad") + '[contact.approach]\ndistance = "0 m"\n'
     )

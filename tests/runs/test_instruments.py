@@ -37,7 +37,7 @@ LAWS = {
     "tanh": 'law = "tanh"\nreference_speed = "5 mm/s"\n',
     "nonlocal": 'law = "nonlocal"\nbond_length = "5 um"\n',
 }
-FELT, SEEN = {"axial": 1.0, "yaw": -0.4}, {"axial": 0.9, "yaw": 0.2}
+ACCELEROMETER_ROW, GAUGE_ROW = {"axial": 1.0, "yaw": -0.4}, {"axial": 0.9, "yaw": 0.2}
 NAMES = "absolute_acceleration_peak", "relative_displacement_amplitude"
 
 
@@ -76,19 +76,25 @@ def test_exact_accelerometer_and_gauge_agree_with_separate_outputs(law, method):
     )
     text += "" if method != "march" else "steps_per_cycle = 400\n"
     text = text if method == "harmonic" else text.replace("cycles = 100", "cycles = 10")
-    both, (acceleration, displacement) = run_instruments(
-        text, *assign_mode_keys("accelerometer", FELT), *assign_mode_keys("gauge", SEEN)
+    result, (acceleration, displacement) = run_instruments(
+        text,
+        *assign_mode_keys("accelerometer", ACCELEROMETER_ROW),
+        *assign_mode_keys("gauge", GAUGE_ROW),
     )
-    _, (reference_acceleration, _) = run_instruments(text, *assign_mode_keys("output", FELT))
+    _, (reference_acceleration, _) = run_instruments(
+        text, *assign_mode_keys("output", ACCELEROMETER_ROW)
+    )
     gauge_result, (_, reference_displacement) = run_instruments(
-        text, *assign_mode_keys("output", SEEN)
+        text, *assign_mode_keys("output", GAUGE_ROW)
     )
     assert acceleration.value == reference_acceleration.value
     assert displacement.value == pytest.approx(reference_displacement.value, rel=1e-6)
-    assert both.outcome == gauge_result.outcome
+    assert result.outcome == gauge_result.outcome
     assert displacement.error is not None
     assert abs(displacement.value - reference_displacement.value) <= displacement.error + 1e-10
-    assert np.array_equal(both.window.output, both.window.modal @ both.plan.model.rig.modes.gauge)
+    assert np.array_equal(
+        result.window.output, result.window.modal @ result.plan.model.rig.modes.gauge
+    )
 
 
 def test_exact_linear_instruments_agree_with_closed_form():
@@ -100,8 +106,8 @@ def test_exact_linear_instruments_agree_with_closed_form():
     )
     result, (acceleration, displacement) = run_instruments(
         text,
-        *assign_mode_keys("accelerometer", FELT),
-        *assign_mode_keys("gauge", SEEN),
+        *assign_mode_keys("accelerometer", ACCELEROMETER_ROW),
+        *assign_mode_keys("gauge", GAUGE_ROW),
         "accuracy.method=harmonic",
     )
     w = 2 * np.pi * 140
@@ -120,19 +126,21 @@ def test_exact_linear_instruments_agree_with_closed_form():
 
 
 @pytest.mark.parametrize(
-    "more, message",
+    "settings, message",
     [
         (("structure.travel=5 mm",), "with structure.travel"),
         (("structure.stiffening.cubic=1e12 N/m^3",), "with structure.stiffening"),
         (("drive.waveform=levels",), "waveform = 'levels'"),
     ],
 )
-def test_refuses_instruments_if_output_limits_the_run(more, message):
+def test_refuses_instruments_if_output_limits_the_run(settings, message):
+    """Separate instruments are refused with travel, a stiffening spring or levels, which depend on the output."""
     with pytest.raises(SceneError, match=message):
-        loads(POINT + LAWS["coulomb"] + MODES, sets=["structure.mode.yaw.gauge=0.2", *more])
+        loads(POINT + LAWS["coulomb"] + MODES, sets=["structure.mode.yaw.gauge=0.2", *settings])
 
 
 def test_exact_half_range_of_cubic_motion():
+    """Half of the range of a motion of cubic pieces is computed from their extrema, not from the samples."""
     t = np.array([0.0, 1.0, 3.0])
     y = t**3 - 4 * t**2 + 2 * t
     v = 3 * t**2 - 8 * t + 2

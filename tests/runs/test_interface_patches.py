@@ -16,7 +16,7 @@ from patchfem.runs.patch import faces
 
 SPRING, DAMPER, MASS = 1e6, 10.0, 0.5
 LAW = 'law = "coulomb"\nstatic = 0.3\n'
-STIFF = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
+STIFF_LAW = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 40\n'
 
 
@@ -37,9 +37,9 @@ def format_interface(
     )
 
 
-def format_spring_and_damper(mass: int, to: int, stiffness: float = SPRING) -> str:
+def format_spring_and_damper(mass: int, other_mass: int, stiffness: float = SPRING) -> str:
     """Return a spring and a damper between two masses."""
-    pair = f"between = [{mass}, {to}]\n"
+    pair = f"between = [{mass}, {other_mass}]\n"
     return (
         f'[[structure.spring]]\n{pair}stiffness = "{stiffness} N/m"\n[[structure.damper]]\n{pair}'
         f'coefficient = "{DAMPER} N s/m"\n'
@@ -51,7 +51,7 @@ def format_masses(count: int) -> str:
     return f"[structure]\nmasses = {json.dumps([f'{MASS} kg'] * count)}\n"
 
 
-ALONE = (
+SINGLE_INTERFACE = (
     format_masses(1) + format_spring_and_damper(1, 0) + format_interface("[1, 0]", 100, 0.5) + DRIVE
 )
 CHAIN = (
@@ -65,7 +65,7 @@ CHAIN = (
 
 
 def format_equivalent_rig(law: str = LAW) -> str:
-    """Return the rig with [contact] whose mode is the mass of ALONE on its spring."""
+    """Return the rig with [contact] whose mode is the mass of SINGLE_INTERFACE on its spring."""
     return (
         format_contact("contact", 100, 0.5)
         + f'[friction]\n{law}[structure]\nmoving_mass = "{MASS} kg"\n'
@@ -76,14 +76,14 @@ def format_equivalent_rig(law: str = LAW) -> str:
 
 
 @pytest.mark.parametrize(
-    "law, method", [(LAW, "auto"), (STIFF, "auto"), (LAW, "march"), (LAW, "harmonic")]
+    "law, method", [(LAW, "auto"), (STIFF_LAW, "auto"), (LAW, "march"), (LAW, "harmonic")]
 )
 def test_exact_single_interface_agrees_with_contact_rig(law, method):
     """Every measure and error of a scene agrees between both ways to write it: as an interface and
     as [contact]."""
-    more = f'[accuracy]\nmethod = "{method}"\n'
-    interface = pf.run(ALONE.replace(LAW, law) + more)
-    rig = pf.run(format_equivalent_rig(law) + more)
+    accuracy = f'[accuracy]\nmethod = "{method}"\n'
+    interface = pf.run(SINGLE_INTERFACE.replace(LAW, law) + accuracy)
+    rig = pf.run(format_equivalent_rig(law) + accuracy)
     assert interface.outcome == rig.outcome and interface.measures.keys() == rig.measures.keys()
     for name, expected in rig.measures.items():
         actual = interface.measures[name]
@@ -118,6 +118,7 @@ def swap_interface_suffix(name: str) -> str:
 
 
 def test_exact_results_do_not_depend_on_interface_order(chain_result):
+    """Exchanging the interfaces exchanges the suffixes of the measures and changes no value."""
     reversed_result = pf.run(
         format_masses(2)
         + format_spring_and_damper(1, 0)
@@ -136,14 +137,16 @@ def test_exact_results_do_not_depend_on_interface_order(chain_result):
         )
         for name in chain_result.measures
     ]
-    assert sum(one != two for one, two in pairs) > 20
-    for one, two in pairs:
+    assert sum(first_name != second_name for first_name, second_name in pairs) > 20
+    for first_name, second_name in pairs:
         # These measures exist only for the first interface.
-        if one.startswith(("slip_start", "equivalent", "secant", "drift")):
+        if first_name.startswith(("slip_start", "equivalent", "secant", "drift")):
             continue
-        actual = reversed_result.measures[two]
-        expected = chain_result.measures[one]
-        assert actual.value == pytest.approx(expected.value, rel=1e-8, abs=expected.floor), one
+        actual = reversed_result.measures[second_name]
+        expected = chain_result.measures[first_name]
+        assert actual.value == pytest.approx(expected.value, rel=1e-8, abs=expected.floor), (
+            first_name
+        )
         # The error of the secant stiffness of the first interface enters the others.
         assert actual.error <= 3 * expected.error + expected.floor
         assert expected.error <= 3 * actual.error + expected.floor
@@ -254,6 +257,7 @@ def test_exact_chain_agrees_with_independent_integration():
 
 
 def test_exact_engines_of_chain_agree_within_errors(chain_result):
+    """The march and the harmonic balance agree with the exact engine within the errors."""
     for method in ("march", "harmonic"):
         result = pf.run(CHAIN, **{"accuracy.method": method})
         for name in (
@@ -271,6 +275,7 @@ def test_exact_engines_of_chain_agree_within_errors(chain_result):
 
 
 def test_always_errors_cover_finer_meshes(chain_result):
+    """The errors of a chain of two patches cover the result at a tolerance of 1e-4."""
     fine = pf.run(CHAIN, **{"accuracy.tolerance": "1e-4"}).measures
     for name, measure in chain_result.measures.items():
         if measure.value is not None and measure.error is not None and name in fine:
@@ -298,7 +303,7 @@ def test_exact_patch_with_point_interface_and_without_load():
     )
     with_patch, with_point = (
         pf.run(head + interface + DRIVE)
-        for interface in (format_interface("[2, 1]", 0, 2.0), point.replace(LAW, STIFF))
+        for interface in (format_interface("[2, 1]", 0, 2.0), point.replace(LAW, STIFF_LAW))
     )
     for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
         assert with_patch.measures[name].value == pytest.approx(
@@ -307,7 +312,7 @@ def test_exact_patch_with_point_interface_and_without_load():
     assert with_patch.measures["normal_load_2"].value == 0
     rigid_point, stiff_point = (
         pf.run(head + point.replace('"0 N"', '"20 N"').replace(LAW, law) + DRIVE)
-        for law in (LAW, STIFF.replace("50 nm", "1 nm"))
+        for law in (LAW, STIFF_LAW.replace("50 nm", "1 nm"))
     )
     assert (rigid_point.extra["engine"], stiff_point.extra["engine"]) == ("march", "piecewise")
     for name in ("relative_displacement_amplitude", "loop_area", "loop_area_2"):
@@ -320,7 +325,9 @@ def test_exact_contact_elements_of_strips_agree_with_patch():
     """The contact elements of three strips of equal pressure carry the force of the whole patch."""
     strips = "[structure.interface.contact.strips]\ncount = 3\n"
     strip_interface, whole = (
-        pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.friction.interfaces[0]
+        pf.build(
+            pf.load(SINGLE_INTERFACE.replace("[drive]", more + "[drive]"))
+        ).rig.friction.interfaces[0]
         for more in (strips, "")
     )
     for slide in (2e-8, 1e-7, 1e-6):
@@ -334,7 +341,8 @@ def test_exact_contact_elements_of_strips_agree_with_patch():
 
 
 def test_always_rigid_patch_moves_as_point_with_warning():
-    rigid = ALONE.replace("[structure.interface.contact.shear]\n", "")
+    """Without [contact.shear], a patch moves as a point contact; a warning says so."""
+    rigid = SINGLE_INTERFACE.replace("[structure.interface.contact.shear]\n", "")
     point = (
         format_masses(1)
         + format_spring_and_damper(1, 0)
@@ -360,6 +368,7 @@ def test_always_rigid_patch_moves_as_point_with_warning():
 
 
 def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, chain_result):
+    """The dataset, the plan, the report, the exports and the summary contain every interface."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "chain.toml").write_text(CHAIN)
     answer = cli("run", "chain.toml", "-o", "out")
@@ -406,6 +415,7 @@ def test_always_lost_contact_of_interface_ends_run():
 
 
 def test_always_coarse_interface_mesh_gives_no_motion_errors():
+    """An interface of a few elements has no errors of the motion, and a warning names the key to leave out."""
     coarse = pf.run(CHAIN, **{"structure.interface.0.contact.element_size": "5 mm"})
     assert (
         coarse.measures["loop_area_2"].error is None

@@ -65,7 +65,7 @@ frequency = "143 Hz"
 acceleration = "6 g"
 cycles = 60
 """
-ONE = f"""\
+SINGLE_MASS = f"""\
 [normal]
 load = "115 N"
 [friction]
@@ -160,11 +160,12 @@ def test_exact_figure_16_of_the_report(run_scene):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["exact", "march"])
 def test_exact_two_equal_masses_agree_with_single_mass(run_scene, method):
+    """Two equal masses with equal interfaces move as a single mass: measures, histories and events agree."""
     words = ("--set", f"accuracy.method={method}")
     if method == "march":
         words += ("--set", "accuracy.steps_per_cycle=400")
     pair, data = run_scene(SIDE_BY_SIDE + DRIVE, *words)
-    single, single_data = run_scene(ONE + DRIVE, *words)
+    single, single_data = run_scene(SINGLE_MASS + DRIVE, *words)
     for name in ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area"):
         expected = single["measures"][name]
         first = pair["measures"][name]

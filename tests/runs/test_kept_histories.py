@@ -22,36 +22,36 @@ slide = 0.4
 base = 0.0
 output = 0.3
 """
-SLIPPING = POINT + COULOMB
-SOFT = POINT + PLASTIC.replace("1 um", "3 um")
-BONDS = POINT + NONLOCAL.replace("1 um", "3 um")
-TANH = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'
+COULOMB_POINT = POINT + COULOMB
+SOFT_POINT = POINT + PLASTIC.replace("1 um", "3 um")
+BOND_POINT = POINT + NONLOCAL.replace("1 um", "3 um")
+TANH_POINT = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'
 SINE = DRIVE.replace("5 g", "6 g")
 LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\nlevels = ["3 g", "6 g"]\ncycles = 15\n'
 RELEASE = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "0.1 s"\n'
-SHORT = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "1 ms"\n'
+SHORT_RELEASE = '[drive]\nkind = "free"\ndisplacement = "0.3 mm"\nduration = "1 ms"\n'
 STEP = '[drive]\nkind = "force"\nwaveform = "step"\nforce = "100 N"\nduration = "0.1 s"\n'
 SWEEP = (
     '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "135 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n'
     'acceleration = "6 g"\n'
 )
-FILE = '[drive]\nkind = "base"\nwaveform = "file"\nfile = "signal.csv"\n'
+FILE_DRIVE = '[drive]\nkind = "base"\nwaveform = "file"\nfile = "signal.csv"\n'
 ENGINES = {
-    "exact": SLIPPING + MODE,
-    "exact two modes": SLIPPING + MODE + SECOND,
-    "march coulomb": SLIPPING + MODE,
-    "march plastic": SOFT + MODE,
-    "march bonds": BONDS + MODE + SECOND,
-    "march tanh": TANH + MODE,
+    "exact": COULOMB_POINT + MODE,
+    "exact two modes": COULOMB_POINT + MODE + SECOND,
+    "march coulomb": COULOMB_POINT + MODE,
+    "march plastic": SOFT_POINT + MODE,
+    "march bonds": BOND_POINT + MODE + SECOND,
+    "march tanh": TANH_POINT + MODE,
 }
 DRIVES = {
     "sine": SINE,
     "levels": LEVELS,
     "release": RELEASE,
-    "short release": SHORT,
+    "short release": SHORT_RELEASE,
     "step": STEP,
     "sweep": SWEEP,
-    "file": FILE,
+    "file": FILE_DRIVE,
 }
 
 
@@ -65,7 +65,7 @@ def run_case(tmp_path_factory):
     rows = "\n".join(f"{t:.9g},{a:.9g}" for t, a in zip(time, value))
     (folder / "signal.csv").write_text("time [s],acceleration [m/s^2]\n" + rows + "\n", "utf-8")
 
-    def of(engine, drive):
+    def run_once(engine, drive):
         if (engine, drive) not in results:
             words = []
             if engine.startswith("march"):
@@ -78,7 +78,7 @@ def run_case(tmp_path_factory):
             results[engine, drive] = scene, run(scene, estimate=False)
         return results[engine, drive]
 
-    return of
+    return run_once
 
 
 CASES = [(engine, drive) for engine in ENGINES for drive in DRIVES]
@@ -108,7 +108,7 @@ def test_always_release_history_has_uniform_samples(run_case, engine):
     """The history of a release has at least 20 samples per cycle from its start; an earlier version
     stored only reversals before the last cycles."""
     if engine == "smooth":
-        result = run(loads(TANH + MODE + RELEASE), estimate=False)
+        result = run(loads(TANH_POINT + MODE + RELEASE), estimate=False)
         assert result.extra["engine"] == "smooth"
     else:
         _, result = run_case(engine, "release")
@@ -128,20 +128,22 @@ def test_exact_outcomes_of_drives():
     """The outcome depends on the drive: for example, a release with friction sticks, a sweep is
     never steady and never grows, and a drive below the friction limit leaves the block stuck."""
     outcomes = {
-        (SLIPPING + MODE + RELEASE): "stuck",
+        (COULOMB_POINT + MODE + RELEASE): "stuck",
         (MODE + RELEASE): "transient",
         (MODE.replace("0.003", "0.3") + RELEASE): "steady",
-        (SLIPPING + MODE + STEP.replace("0.1 s", "0.5 s")): "stuck",
+        (COULOMB_POINT + MODE + STEP.replace("0.1 s", "0.5 s")): "stuck",
         (MODE.replace("0.003", "0.3") + STEP): "steady",
-        (SLIPPING + MODE + SWEEP): "transient",
+        (COULOMB_POINT + MODE + SWEEP): "transient",
         (MODE + SWEEP.replace("135 Hz", "100 Hz").replace('"150 Hz"', '"143 Hz"')): "transient",
-        (SLIPPING + MODE + SWEEP.replace("6 g", "3 g")): "stuck",
-        (SLIPPING + MODE + LEVELS): "transient",
+        (COULOMB_POINT + MODE + SWEEP.replace("6 g", "3 g")): "stuck",
+        (COULOMB_POINT + MODE + LEVELS): "transient",
         (
-            SLIPPING + MODE + LEVELS.replace('"3 g", "6 g"', '"6 g", "3 g"').replace("15", "80")
+            COULOMB_POINT
+            + MODE
+            + LEVELS.replace('"3 g", "6 g"', '"6 g", "3 g"').replace("15", "80")
         ): "stuck",
-        (SOFT + MODE + RELEASE): "stuck",
-        (TANH + MODE + RELEASE.replace("0.1 s", "1 s")): "steady",
+        (SOFT_POINT + MODE + RELEASE): "stuck",
+        (TANH_POINT + MODE + RELEASE.replace("0.1 s", "1 s")): "steady",
     }
     for text, outcome in outcomes.items():
         result = run(loads(text), estimate=False)
@@ -154,9 +156,9 @@ def test_exact_outcomes_of_drives():
 @pytest.mark.parametrize(
     "text",
     [
-        TANH + MODE + SINE.replace("cycles = 30", "cycles = 25.5"),
-        TANH + MODE + SECOND + SWEEP,
-        SOFT
+        TANH_POINT + MODE + SINE.replace("cycles = 30", "cycles = 25.5"),
+        TANH_POINT + MODE + SECOND + SWEEP,
+        SOFT_POINT
         + MODE.replace("[structure]", '[structure]\ntravel = "0.9 mm"')
         + SINE.replace("6 g", "9 g")
         + '[accuracy]\nmethod = "march"\n',
@@ -171,7 +173,7 @@ def test_exact_short_history_has_measures_of_full_history(text):
     model = build(loads(text))
     numerics = replace(choose_numerics(model), engine="march", steps=100)
     full, short = (
-        run_march(model, replace(numerics, whole=whole), None) for whole in (True, False)
+        run_march(model, replace(numerics, whole=is_whole), None) for is_whole in (True, False)
     )
     sums = {
         name: full.values[name]

@@ -33,6 +33,7 @@ def empty_patch_cache():
 
 
 def test_exact_runs_with_shared_patch_agree_with_separate_runs():
+    """Runs that share a solved patch agree with runs from an empty cache, to the last bit."""
     cases = build_models()
     shared = one_by_one.solve(cases)
     for case, model in enumerate(cases):
@@ -67,6 +68,7 @@ def test_exact_runs_with_shared_patch_agree_with_separate_runs():
     ],
 )
 def test_always_different_patches_have_different_keys(changes):
+    """Two models share a patch only if all keys of the patch agree; the drive does not matter."""
     first, second, third = (
         pf.build(TEXT, **keys).patch for keys in ({}, {"drive.acceleration": 1.0}, changes)
     )
@@ -77,6 +79,7 @@ def test_always_different_patches_have_different_keys(changes):
 
 
 def test_always_patch_with_file_is_not_shared(tmp_path):
+    """A patch with a profile is not shared, because its file may change."""
     model = pf.build(TEXT)
     assert not store.may_be_shared(model.patch) and store.may_be_shared(
         with_shared_meshes([model, model])[0].patch

@@ -21,25 +21,27 @@ from patchfem.runs.run import run
 from patchfem.scene import loads
 
 SINE = '[slide]\nkind = "sine"\nfrequency = "1 Hz"\ncycles = 1\namplitude = "{}"\n'
-HELD = (
+FIXED_FACE = (
     '[contact]\nlength = "12.8 mm"\nwidth = "12.7 mm"\nheight = "6.4 mm"\nload = "26 lbf"\n'
     'substrate = "Ti-8Al-1Mo-1V"\nmesh = "{}"\n'
 )
-TURNING = (
+PRESCRIBED_APPROACH = (
     PIECE
     + 'substrate = "Ti-8Al-1Mo-1V"\nelement_size = "0.2 mm"\n[contact.approach]\ndistance = "0.2 um"\n'
 )
-LINE = '[contact.load_line]\noffset = "{} mm"\n'
+LOAD_LINE = '[contact.load_line]\noffset = "{} mm"\n'
 
 
 def run_text(text, estimate=True):
+    """Return the result of a scene."""
     return run(loads(text), estimate=estimate)
 
 
-# ---------------------------------------------------------------------------------------------------- plane state
+# ---- plane state
 
 
 def test_exact_notes_appear_in_output_summary_and_report(tmp_path):
+    """A note is printed and written to the summary and the report."""
     (tmp_path / "a.toml").write_text(COATED)
     answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
     [note] = json.loads((tmp_path / "out" / "summary.json").read_text())["notes"]
@@ -47,8 +49,7 @@ def test_exact_notes_appear_in_output_summary_and_report(tmp_path):
     assert f"Note: {note}" in (tmp_path / "out" / "report.html").read_text()
 
 
-# ----------------------------------------------------------------------------------------------
-# mesh files, tall pieces
+# ---- mesh files, tall pieces
 @pytest.mark.parametrize("n_fixed", [2, 16])
 def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_path):
     """A mesh whose face `lower_far` is fixed on 2 of its 16 edges (1.6 of 12.8 mm) gives a note, in
@@ -61,7 +62,7 @@ def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_pat
     for form in ("gmsh 2.2 binary", "vtu", "inp lines"):
         path = tmp_path / f"pair{FORMATS[form][0]}"
         FORMATS[form][1](m, path)
-        result = run_text(HELD.format(path))
+        result = run_text(FIXED_FACE.format(path))
         approaches.append(result.measures["approach"].value)
         notes = [text for text in result.extra["notes"] if "lower_far" in text]
         assert notes == (
@@ -79,7 +80,7 @@ def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_pat
     assert (approaches[0] > 3 * flat) == (n_fixed == 2)
 
 
-def test_exact_a_note_states_the_area_of_a_hole_in_the_mesh(tmp_path):
+def test_exact_note_states_area_of_mesh_hole(tmp_path):
     """A note states the area of a hole of two elements of 0.8 mm in the lower piece."""
     m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
     centres = m.points[m.quads].mean(axis=1)
@@ -92,14 +93,14 @@ def test_exact_a_note_states_the_area_of_a_hole_in_the_mesh(tmp_path):
     m.quads, m.quad_tags = np.delete(m.quads, removed, axis=0), np.delete(m.quad_tags, removed)
     FORMATS["vtu"][1](m, paths[1])
     notes = [
-        [text for text in run_text(HELD.format(path), False).extra["notes"] if "hole" in text]
+        [text for text in run_text(FIXED_FACE.format(path), False).extra["notes"] if "hole" in text]
         for path in paths
     ]
     expected = f"contact.mesh: the lower piece has 1 hole inside, {1e6 * area:.3g} mm^2 in all; if a hole is not"
     assert removed.size == 2 and notes == [[], [f"{expected} intended, close it in the mesh"]]
 
 
-def test_exact_a_note_states_the_fraction_of_the_buckling_load():
+def test_exact_note_states_fraction_of_buckling_load():
     """The note refers to Euler's load of a clamped-free column, pi^2 E' I/(4 H^2) with I = width
     length^3/12."""
     text = (
@@ -118,7 +119,7 @@ def test_exact_a_note_states_the_fraction_of_the_buckling_load():
         )
 
 
-# ---------------------------------------------------------------------------------------------------- sliding away
+# ---- sliding away
 @pytest.mark.parametrize(
     "fraction, has_warning, outcome",
     [
@@ -129,6 +130,7 @@ def test_exact_a_note_states_the_fraction_of_the_buckling_load():
     ],
 )
 def test_exact_warning_states_slide_amplitude_over_contact_length(fraction, has_warning, outcome):
+    """A slide of more than a tenth of the contact length gives a warning; a longer one than the contact ends the run."""
     result = run_text(COATED + COULOMB + SINE.format(f"{12.7 * fraction} mm"), False)
     line = f"the slide amplitude, {12.7 * fraction:.3g} mm, is {fraction:.2g} of the contact length 12.7 mm"
     assert any(text.startswith(line) for text in result.warnings) == has_warning
@@ -137,6 +139,7 @@ def test_exact_warning_states_slide_amplitude_over_contact_length(fraction, has_
 
 
 def test_exact_lateral_slide_beyond_width_leaves_contact(tmp_path):
+    """A lateral slide beyond the width has the outcome leaves_contact."""
     for across, outcome in ((12.6, "done"), (12.8, "leaves_contact")):
         path = tmp_path / "path.csv"
         path.write_text(f"time [s],displacement [um],lateral [mm]\n0,0,0\n1,5,{across}\n", "utf-8")
@@ -170,8 +173,7 @@ def test_exact_motion_beyond_piece_leaves_contact_in_every_engine(law, more, eng
         assert run_text(COATED + law + MODE + steps + more, False).outcome == "leaves_contact"
 
 
-# ------------------------------------------------------------------------------------- approaches
-# that no load reaches
+# ---- approaches that no load reaches
 @pytest.mark.parametrize("offset", ["5", "-5"])
 def test_refuses_approach_if_load_opens_middle_of_patch(offset):
     """With the load line 5 mm off the middle, twice the load opens the middle of flat pieces twice
@@ -179,14 +181,16 @@ def test_refuses_approach_if_load_opens_middle_of_patch(offset):
     with pytest.raises(
         PatchfemError, match=r"contact\.approach\.distance: the line of the load lies -?5 mm off"
     ):
-        run_text(TURNING + LINE.format(offset), False)
+        run_text(PRESCRIBED_APPROACH + LOAD_LINE.format(offset), False)
     approaches = []
     for load in (100.0, 200.0):
         for line in (float(offset), np.sign(float(offset)) * 3):
             model = build(
                 loads(
-                    TURNING.replace('[contact.approach]\ndistance = "0.2 um"', f'load = "{load} N"')
-                    + LINE.format(line)
+                    PRESCRIBED_APPROACH.replace(
+                        '[contact.approach]\ndistance = "0.2 um"', f'load = "{load} N"'
+                    )
+                    + LOAD_LINE.format(line)
                 )
             ).patch
             approaches.append(
@@ -194,9 +198,9 @@ def test_refuses_approach_if_load_opens_middle_of_patch(offset):
             )
     assert approaches[2:] == pytest.approx(2 * np.array(approaches[:2]), rel=1e-9)
     assert approaches[0] < 0 < approaches[1]
-    assert run_text(TURNING + LINE.format(3), False).measures["approach"].value == pytest.approx(
-        2e-7, rel=1e-9
-    )
+    assert run_text(PRESCRIBED_APPROACH + LOAD_LINE.format(3), False).measures[
+        "approach"
+    ].value == pytest.approx(2e-7, rel=1e-9)
 
 
 def test_refuses_approach_within_jump_between_contact_nodes():
@@ -204,7 +208,7 @@ def test_refuses_approach_within_jump_between_contact_nodes():
     under a moment, so that the approach jumps by about h^2/2R = 28 um. On finer elements the
     prescribed approach is reached."""
     text = (
-        TURNING.replace("0.2 um", "2.509 um") + '[contact.crown]\nradius = "18.18 mm"\n'
+        PRESCRIBED_APPROACH.replace("0.2 um", "2.509 um") + '[contact.crown]\nradius = "18.18 mm"\n'
         '[contact.load_line]\nmoment = "0.0001782 N m"\n'
     )
     with pytest.raises(

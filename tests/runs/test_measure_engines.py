@@ -51,12 +51,14 @@ def test_always_summary_names_method_of_each_measure():
 
 
 def test_always_motion_measures_name_engine_of_run():
+    """Measures of the motion name the engine of the run, those of the patch the finite elements."""
     numerics = summarise_run(run(PATCH.format(1e-2) + SLIDE))["numerics"]
     assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
     assert numerics["measures"]["normal_stiffness"].startswith("finite elements")
 
 
 def test_exact_arrays_of_static_patch_balance_load():
+    """The arrays of a static patch are those of its fields: the pressure balances the load and excludes a gap."""
     result = run(PATCH.format(1e-2))
     patch = result.patch
     force = patch.pieces.interface.weight @ patch.normal_stress
@@ -69,6 +71,7 @@ def test_exact_arrays_of_static_patch_balance_load():
 
 
 def test_exact_arrays_of_sliding_patch_are_last_frame():
+    """Shear stress and slip of a sliding patch are those of the last frame."""
     bench = PATCH.replace("[accuracy]", "[contact.shear]\n[accuracy]").format(1e-2) + SLIDE
     result = run(bench)
     for name in ("shear_stress", "slip"):

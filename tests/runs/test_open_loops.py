@@ -17,20 +17,21 @@ cycles = {cycles}
 [accuracy]
 tolerance = 1e-3
 """
-BOUC = 'law = "bouc-wen"\nstiffness = "1e8 N/m"\nexponent = 2.0'
-CLOSED = "friction loop of the last cycle does not close"
+BOUC_WEN = 'law = "bouc-wen"\nstiffness = "1e8 N/m"\nexponent = 2.0'
+OPEN_LOOP_WARNING = "friction loop of the last cycle does not close"
 
 
 def run_with_loop_warnings(law: str, cycles) -> tuple:
     """Return the result of a bench and its warnings about an open loop."""
     result = pf.run(BENCH.format(law=law, cycles=cycles))
-    return result, [warning for warning in result.warnings if CLOSED in warning]
+    return result, [warning for warning in result.warnings if OPEN_LOOP_WARNING in warning]
 
 
 def test_exact_warning_names_cycles_until_loop_is_steady():
-    first, warnings = run_with_loop_warnings(BOUC, 1)
-    second, no_warnings = run_with_loop_warnings(BOUC, 2)
-    third, _ = run_with_loop_warnings(BOUC, 3)
+    """The warning about an open loop states the steady loop area and the number of cycles that reach it."""
+    first, warnings = run_with_loop_warnings(BOUC_WEN, 1)
+    second, no_warnings = run_with_loop_warnings(BOUC_WEN, 2)
+    third, _ = run_with_loop_warnings(BOUC_WEN, 3)
     assert len(warnings) == 1 and warnings[0].endswith("set slide.cycles = 2") and not no_warnings
     steady = third.measures["loop_area"].value
     assert second.measures["loop_area"].value == pytest.approx(steady, rel=1e-3)
@@ -40,6 +41,7 @@ def test_exact_warning_names_cycles_until_loop_is_steady():
 
 @pytest.mark.parametrize("cycles", [1, 2, 1.5])
 def test_exact_rigid_loop_is_steady_from_first_cycle(cycles):
+    """The loop of Coulomb's law has the area 4 mu N A from the first cycle and gives no warning."""
     result, warnings = run_with_loop_warnings('law = "coulomb"', cycles)
     assert not warnings and result.measures["loop_area"].value == pytest.approx(
         4 * 0.3 * 115 * 2e-6, rel=1e-6

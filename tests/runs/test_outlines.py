@@ -49,12 +49,11 @@ def solve_on_uniform_mesh(text: str):
     return solve(model, *make_piece_meshes(model))
 
 
-def graded_columns(place: float, half: float, fine: float, growth: float = 1.2) -> np.ndarray:
-    """Return symmetric columns over |x| <= half with cells of `fine` on either side of |x| = place,
-    growing from there."""
-    right = [place - np.append(0.0, np.cumsum(graded_rows(fine, place, growth)))[::-1]]
+def graded_columns(place: float, half: float, smallest: float, growth: float = 1.2) -> np.ndarray:
+    """Return symmetric columns over |x| <= half that grow from cells of `smallest` at |x| = place."""
+    right = [place - np.append(0.0, np.cumsum(graded_rows(smallest, place, growth)))[::-1]]
     if half > place:
-        right.append(place + np.cumsum(graded_rows(fine, half - place, growth)))
+        right.append(place + np.cumsum(graded_rows(smallest, half - place, growth)))
     x = np.concatenate(right)
     x[0] = 0.0
     x[-1] = half
@@ -91,6 +90,7 @@ def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
     ],
 )
 def test_order_of_corner_pressure_agrees_with_wedge_exponent(tables, angles, printed):
+    """The pressure grows towards the corner of a narrow piece with the exponent of the two wedges that meet there."""
     model = build_patch_model(BLOCK + tables)
     assert model.has_singular_ends
     expected = falling(*angles)
@@ -136,6 +136,7 @@ def test_order_of_rounded_punch_error_is_one():
 
 
 def test_exact_stiff_sharp_block_agrees_with_flat_punch():
+    """The pressure of a stiff block with sharp ends on a long block agrees with that of a flat punch within 0.5 %."""
     text = BLOCK.replace("24 mm", "160 mm").replace("8 mm", "80 mm")
     model = build_patch_model(
         text + '[contact.upper]\nlength = "4 mm"\nheight = "4 mm"\n'
@@ -149,6 +150,7 @@ def test_exact_stiff_sharp_block_agrees_with_flat_punch():
 
 @pytest.mark.parametrize("text, outline", [(COATED, OUTLINE), (BLOCK, NARROW)])
 def test_exact_narrow_piece_above_or_below_gives_same_pressure(text, outline):
+    """Exchanging the upper and the lower piece does not change the pressure and the values of the patch."""
     a, b = (
         solve_on_uniform_mesh(text + outline.format(*sides) + TILT.format(""))
         for sides in (("lower", "upper"), ("upper", "lower"))
@@ -176,6 +178,7 @@ def test_exact_load_is_transferred_at_interface_and_bond_lines():
 
 
 def test_exact_written_mesh_of_shaped_pieces_gives_same_patch(tmp_path):
+    """The mesh of two shaped pieces, written to a file and read back, gives the same patch."""
     text = COATED + TILT.format("")
     model = build_patch_model(
         text.replace("[contact.tilt]", OUTLINE.format("upper", "lower") + "[contact.tilt]")
@@ -200,6 +203,8 @@ def test_exact_written_mesh_of_shaped_pieces_gives_same_patch(tmp_path):
     "tables", [NARROW.format("upper"), UPPER + 'length = "8 mm"\nend_radius = "2 mm"\n']
 )
 def test_always_errors_of_bounded_measures_cover_finer_mesh(tables):
+    """On automatic meshes with sharp or rounded ends, the errors of bounded measures cover a
+    smaller tolerance and stay below 5 %."""
     model = build_patch_model(BLOCK + tables)
     coarse, fine = (
         estimate_measures(*solve_with_coarser(model, tolerance)) for tolerance in (2e-2, 4e-3)
@@ -238,6 +243,7 @@ def test_always_errors_of_unresolved_rounding_cover_fine_mesh(radius, tilt):
 
 
 def test_always_bench_with_shaped_pieces_writes_fields(tmp_path):
+    """A bench with chamfered and rounded pieces reaches the friction limit and writes its fields."""
     text = (
         COATED
         + OUTLINE.format("upper", "lower")
@@ -288,6 +294,7 @@ def test_refuses_profile_shorter_than_interface(tmp_path):
     ],
 )
 def test_always_plan_and_result_name_assembly_of_stiffness(more, planned, notes):
+    """The plan and the notes of the result name the same assembly of the stiffness."""
     scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")
     assert [text for text in pf.plan(scene).verdict if "assemble" in text] == [planned]
     assert [text for text in pf.run(scene).notes if "assemble" in text] == notes

@@ -64,9 +64,11 @@ def solve_patch(*args, **kwargs) -> tuple:
     return patch, values(patch)
 
 
-# ---------------------------------------------------------------------------------------------------------------- skins
+# ---- skins
 @pytest.mark.parametrize("angle", [1e-5, 1e-4, 1e-3])
 def test_exact_rigid_wedges_on_skins_agree_with_closed_forms(angle):
+    """Contact fraction, pressure centre, peak and stiffnesses of rigid wedges on exponential and
+    linear skins agree with the closed forms."""
     _, patch_values = solve_patch(TILT.format(angle) + SKINS["exponential"], material=RIGID)
     fraction, centre = exact.wedge_on_asperities(angle, LENGTH, 2.5e-6)
     assert patch_values["loaded_fraction"] == pytest.approx(
@@ -127,7 +129,7 @@ def test_exact_sticking_loop_has_stiffness_of_skin(law):
         assert result.measures["loop_area"].value <= 1e-9 * stiffness * 1e-18
 
 
-# --------------------------------------------------------------------------------------------------------------- strips
+# ---- strips
 @pytest.mark.parametrize("count", [2, 8])
 def test_exact_rolled_rigid_strips_agree_with_closed_form(count):
     """Below the roll angle that opens the contact, the pressure is linear over the width; the
@@ -163,6 +165,7 @@ def test_exact_eccentric_load_on_strips_agrees_with_closed_form():
 
 @pytest.mark.parametrize("count, arm", [(2, 1e-3), (6, 3e-3)])
 def test_always_errors_of_free_roll_cover_strip_count(count, arm):
+    """The errors of a patch that can roll cover the result with 48 strips."""
     tables = (
         f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
     )
@@ -176,6 +179,7 @@ def test_always_errors_of_free_roll_cover_strip_count(count, arm):
 
 
 def test_exact_strips_without_roll_agree_with_single_patch():
+    """Four strips without roll have the values of the single patch."""
     tables = TILT.format(1e-4)
     single = solve_patch(tables)[1]
     strips = solve_patch(tables + "[contact.strips]\ncount = 4\n")[1]
@@ -184,7 +188,7 @@ def test_exact_strips_without_roll_agree_with_single_patch():
     assert strips["pressure_centre_lateral"] == pytest.approx(0.0, abs=1e-12)
 
 
-# ------------------------------------------------------------------------------------------------------------- profiles
+# ---- profiles
 def write_profile(folder, x, z, name="before.csv"):
     """Write a profile and return the table that uses it."""
     rows = "\n".join(f"{a * 1e6:.6f},{b * 1e9:.6f}" for a, b in zip(x, z))
@@ -193,6 +197,7 @@ def write_profile(folder, x, z, name="before.csv"):
 
 
 def test_exact_crown_as_profile_agrees_with_crown(tmp_path):
+    """A crown that is read as a profile agrees with [contact.crown]."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = write_profile(tmp_path, x, x**2 / 2 / 5.0)
     from_profile, from_crown = (
@@ -252,7 +257,7 @@ def test_exact_surface_trace_agrees_with_inverted_gap(tmp_path, side_name):
     assert upright["pressure_peak"] > 1.1 * surface_values["pressure_peak"]
 
 
-# --------------------------------------------------------------------------------------------------- pieces that differ
+# ---- pieces that differ
 def write_pair_mesh(folder, lower, upper) -> str:
     """Write the meshes of both pieces and return the keys that use the file."""
     write_mesh(lower, folder / "pair.msh", upper)
@@ -260,6 +265,7 @@ def write_pair_mesh(folder, lower, upper) -> str:
 
 
 def test_exact_unlike_meshes_transfer_load_to_both_pieces(tmp_path):
+    """Two pieces with unlike nodes both receive the load and its moment; the values agree with like meshes within 2 %."""
     coarse, fine = (graded_grid(LENGTH, HEIGHT, LENGTH / cells) for cells in (60, 96))
     model = build(
         load_scene(
@@ -288,6 +294,7 @@ UNLIKE = '[contact.upper]\nsubstrate = "Ti-8Al-1Mo-1V"\nheight = "{}"\n'
 
 
 def test_refuses_mesh_with_other_dimensions_than_scene(tmp_path):
+    """A mesh file whose piece has another height than the scene is refused with the line of the key, by every command."""
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / 20)
     faulty_scene = load_scene(
         UNLIKE.format("9 mm"), write_pair_mesh(tmp_path, grid, grid), path=tmp_path / "scene.toml"
@@ -333,7 +340,6 @@ def test_exact_rounded_mesh_agrees_with_crown(tmp_path):
         assert mesh_values[name] == pytest.approx(crown[name], rel=1e-3), name
 
 
-# --------------------------------------------------------------------------------------------------
 # ---- the automatic mesh
 def test_exact_automatic_mesh_agrees_with_hertz():
     """The automatic mesh resolves a contact of 1 % of the length, which no uniform mesh of the same
@@ -403,6 +409,7 @@ def test_always_errors_of_uniform_mesh_cover_reference():
 
 
 def test_refuses_run_larger_than_memory():
+    """The plan predicts that a run needs more memory than is free, and the run is refused."""
     from patchfem.core import Missing
 
     run_plan = plan(load_scene(keys='load = "26 lbf"\nelement_size = "0.2 um"'))
@@ -428,6 +435,7 @@ def test_refuses_run_larger_than_memory():
     ],
 )
 def test_always_scene_outside_model_gives_warning(tables, keys, message):
+    """Very soft or nearly incompressible pieces, and meshes of few elements, give a warning."""
     result = run(load_scene(tables, 'load = "26 lbf"\n' + (keys or 'element_size = "0.5 mm"')))
     assert any(message in text for text in result.warnings)
 
@@ -481,6 +489,7 @@ def test_exact_summary_states_contact_intervals(tmp_path, shape, ends, pattern):
 
 
 def test_refuses_profile_with_waves_finer_than_mesh(tmp_path):
+    """A profile with waves shorter than the elements is refused with the line of its key."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
     tables = write_profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
     with pytest.raises(
@@ -490,6 +499,7 @@ def test_refuses_profile_with_waves_finer_than_mesh(tmp_path):
 
 
 def test_exact_patch_without_load_has_no_contact(tmp_path):
+    """A patch with a load of 0 has the outcome no_contact."""
     path = tmp_path / "apart.toml"
     path.write_text(
         TEXT.format(keys='load = "0 N"\nelement_size = "0.5 mm"', material=STEEL, tables=""),

@@ -27,7 +27,7 @@ import patchfem as pf
 IWAN = friction_of("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
 # Measures that consist of round-off.
-ROUND = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")
+ROUND_OFF_MEASURES = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")
 
 
 def run_exact_and_march(text, *sets):
@@ -46,7 +46,11 @@ def list_differences(exact, march, *ignored):
     out = []
     for name, march_measure in march.measures.items():
         exact_measure = exact.measures.get(name, march_measure)
-        if name in (*ROUND, *ignored) or exact_measure.value is None or march_measure.value is None:
+        if (
+            name in (*ROUND_OFF_MEASURES, *ignored)
+            or exact_measure.value is None
+            or march_measure.value is None
+        ):
             continue
         if (
             abs(exact_measure.value - march_measure.value)
@@ -62,6 +66,7 @@ def list_differences(exact, march, *ignored):
     [(), ("drive.cycles=20.3",), ("drive.acceleration=2 g",), ("structure.mode.axial.damping=3",)],
 )
 def test_exact_single_spring_rig_agrees_with_march(sets):
+    """The exact engine agrees with the march within the errors of the march, and its own errors are at most 1e-8."""
     exact, march = run_exact_and_march(RIG, "accuracy.tolerance=1e-4", *sets)
     assert list_differences(exact, march) == []
     assert exact.measures["energy_balance"].value < 1e-12
@@ -78,6 +83,7 @@ def test_exact_single_spring_rig_agrees_with_march(sets):
 
 
 def test_exact_two_modes_and_release_agree_with_march():
+    """The exact engine agrees with the march for two modes under a sine, and for a release."""
     exact, march = run_exact_and_march(
         POINT + PLASTIC + MODE + SECOND + DRIVE, "drive.cycles=12", "accuracy.tolerance=1e-4"
     )
@@ -92,6 +98,7 @@ def test_exact_two_modes_and_release_agree_with_march():
 
 
 def test_exact_two_interfaces_agree_with_march(monkeypatch):
+    """The exact engine agrees with the march for two interfaces between masses."""
     share_one_loop(monkeypatch)
     exact, march = run_exact_and_march(PAIR + FORCED, "accuracy.tolerance=1e-4")
     assert list_differences(exact, march) == []
@@ -134,6 +141,8 @@ def test_exact_errors_of_levels_include_mesh_error():
 
 
 def test_always_automatic_method_chooses_cheaper_engine():
+    """The automatic method chooses the exact engine unless the march is cheaper or steps are prescribed."""
+
     def planned_engine(text, **keys):
         return pf.plan(
             pf.load(text + "".join(f"[accuracy]\n{k} = {v}\n" for k, v in keys.items()))
@@ -144,16 +153,15 @@ def test_always_automatic_method_chooses_cheaper_engine():
     assert planned_engine(RIG.replace("1 um", "1e-7 um")) == "piecewise"
     # A stiff spring whose free vibration has too many events.
     assert planned_engine(RIG.replace("1 um", "1e-9 um")) == "march"
-    assert (
-        planned_engine(POINT + IWAN + MODE + DRIVE) == "piecewise"
-    )  # The tolerance needs 49 cells.
-    many = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
+    # The tolerance needs 49 cells.
+    assert planned_engine(POINT + IWAN + MODE + DRIVE) == "piecewise"
+    many_elements = COATED.replace("0.5 mm", "10 um") + SHEAR + PLASTIC + KILOGRAM + DRIVE
     # 1271 elements slip one after the other; a fine mesh does not make the motion more expensive.
-    assert planned_engine(many) == "piecewise"
-    longer = many.replace("cycles = ", "cycles = 100")
+    assert planned_engine(many_elements) == "piecewise"
+    long_run = many_elements.replace("cycles = ", "cycles = 100")
     assert (
-        planned_engine(longer) == "march"
-        and planned_engine(longer, tolerance="1e-5") == "piecewise"
+        planned_engine(long_run) == "march"
+        and planned_engine(long_run, tolerance="1e-5") == "piecewise"
     )
     # A prescribed number of steps selects the march.
     assert planned_engine(RIG, steps_per_cycle="400") == "march"
@@ -167,6 +175,7 @@ def test_always_automatic_method_chooses_cheaper_engine():
 
 
 def test_refuses_exact_run_with_unlimited_cost():
+    """An exact run with too many events is refused; the message advises the march only if this is cheaper."""
     stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
     pattern = r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"
     with pytest.raises(pf.Missing, match=pattern) as error:
@@ -177,6 +186,7 @@ def test_refuses_exact_run_with_unlimited_cost():
 
 
 def test_refuses_exact_method_with_nonlinear_spring_or_varying_load():
+    """The exact method is refused with a stiffening spring, a varying load, or the law tanh."""
     exact = '[accuracy]\nmethod = "exact"\n'
     stiffening = (
         POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact

@@ -15,8 +15,8 @@ from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.run import run
 from patchfem.scene import load, loads
 
-LONGER = NONLOCAL.replace("1 um", "2 um")
-FILE = '[slide]\nkind = "file"\nfile = "path.csv"\n'
+LONGER_BONDS = NONLOCAL.replace("1 um", "2 um")
+FILE_SLIDE = '[slide]\nkind = "file"\nfile = "path.csv"\n'
 STRIPS = '[contact.strips]\ncount = 4\nroll = "0.02 mrad"\n'
 L_SHAPE = "time [ms],displacement [um],lateral [um]\n0,0,0\n2,10,0\n6,10,20\n8,4,24\n"
 
@@ -25,9 +25,9 @@ L_SHAPE = "time [ms],displacement [um],lateral [um]\n0,0,0\n2,10,0\n6,10,20\n8,4
 def write_path_scene(tmp_path):
     """Return a function that writes the table of a path and loads a scene with it."""
 
-    def write_table(text, scene=POINT + LONGER, *sets):
+    def write_table(text, scene=POINT + LONGER_BONDS, *sets):
         (tmp_path / "path.csv").write_text(text, "utf-8")
-        (tmp_path / "scene.toml").write_text(scene + FILE, "utf-8")
+        (tmp_path / "scene.toml").write_text(scene + FILE_SLIDE, "utf-8")
         return load(tmp_path / "scene.toml", sets)
 
     return write_table
@@ -63,7 +63,7 @@ def test_exact_friction_on_circular_path_agrees_with_closed_form(
     model = build(
         write_path_scene(
             format_circle_path(radius, revolutions, {1: 400, 4: 600, 20: 1500}[radius]),
-            POINT + LONGER,
+            POINT + LONGER_BONDS,
         )
     )
     response = law_bench.run(model, None, 4)
@@ -79,7 +79,7 @@ def test_exact_friction_on_circular_path_agrees_with_closed_form(
 def test_exact_patch_on_plane_path_agrees_with_pointwise_law(write_path_scene, strips):
     """Friction forces and yaw moment agree with the law stepped at every node of every strip, with
     the pressure of this strip."""
-    model = build(write_path_scene(L_SHAPE, SMALL_PATCH + strips + LONGER))
+    model = build(write_path_scene(L_SHAPE, SMALL_PATCH + strips + LONGER_BONDS))
     patch = solve_with_coarser(model.patch, 1e-3, False)[0]
     response = law_bench.run(model, patch, 60, 6)
     pressure = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
@@ -113,8 +113,9 @@ def test_exact_patch_on_plane_path_agrees_with_pointwise_law(write_path_scene, s
 
 
 def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_path):
+    """The dataset contains lateral displacement, lateral force and yaw moment; a long lateral slide gives a warning."""
     scene = write_path_scene(
-        L_SHAPE, SMALL_PATCH + STRIPS + LONGER + "[accuracy]\nsteps_per_cycle = 100\n"
+        L_SHAPE, SMALL_PATCH + STRIPS + LONGER_BONDS + "[accuracy]\nsteps_per_cycle = 100\n"
     )
     answer = cli("run", scene.path, "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
@@ -129,7 +130,7 @@ def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_
         assert data["lateral_force"].values == pytest.approx(result.response.lateral_force)
         assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
     long_path = write_path_scene(
-        L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER, "accuracy.steps_per_cycle=50"
+        L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER_BONDS, "accuracy.steps_per_cycle=50"
     )
     assert any(
         "0.189 of the width" in w or "0.19 of the width" in w
@@ -150,6 +151,7 @@ def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_
     ],
 )
 def test_refuses_faulty_lateral_column(write_path_scene, text, message):
+    """A faulty lateral column is refused with its file, line and cause."""
     with pytest.raises(PatchfemError) as error:
         plan(write_path_scene(text))
     assert "path.csv" in str(error.value) and message in str(error.value)
@@ -170,7 +172,8 @@ def test_refuses_faulty_lateral_column(write_path_scene, text, message):
     ],
 )
 def test_refuses_unsupported_options_of_plane_path(write_path_scene, scene, sets, option):
-    path_scene = write_path_scene(L_SHAPE, scene + LONGER, *sets)
+    """Laws and options without a form in a plane are refused with a lateral column, by plan and run."""
+    path_scene = write_path_scene(L_SHAPE, scene + LONGER_BONDS, *sets)
     for call in (lambda: plan(path_scene), lambda: build(path_scene)):
         with pytest.raises(PatchfemError) as error:
             call()
@@ -194,11 +197,11 @@ def test_exact_level_strips_agree_with_patch_and_point(side):
         + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
     )
     patch, strips = (
-        run_bench(crown + write_path_scene + LONGER) for write_path_scene in ("", level)
+        run_bench(crown + write_path_scene + LONGER_BONDS) for write_path_scene in ("", level)
     )
     assert strips.force == pytest.approx(patch.force, rel=1e-9, abs=1e-9 * patch.force.max())
     assert strips.tau == pytest.approx(patch.tau, rel=1e-6, abs=1e-6 * patch.tau.max())
-    point = run_bench(POINT + LONGER)
+    point = run_bench(POINT + LONGER_BONDS)
     assert strips.force == pytest.approx(
         point.force, abs=(1e-9 if side == "upper" else 1e-3) * point.force.max()
     )

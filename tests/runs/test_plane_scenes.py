@@ -37,14 +37,13 @@ method = "march"
 steps_per_cycle = 400
 """
 LATERAL = "lateral = [4, 0]\n"
-TURN = np.pi / 6
+ROTATION = np.pi / 6
 
 
 def write_matrices(folder, name: str, angle: float, stiffness_ratio: float = 1.0) -> None:
-    """Write the matrices of two nodes with x and y each; the directions of the second are rotated
-    by `turn` [rad].
+    """Write the matrices of two nodes with x and y each; the directions of the second are rotated by `angle` [rad].
 
-    `soft` is the stiffness along y over that along x.
+    `stiffness_ratio` is the stiffness along y over that along x.
     """
     ground = np.diag([5e4, 5e4 * stiffness_ratio])
     link = np.diag([8e4, 8e4 * stiffness_ratio])
@@ -70,7 +69,7 @@ def test_exact_plane_motion_along_line_agrees_with_line_engine(tmp_path):
     for name, turn, lateral in (
         ("line", 0.0, ""),
         ("plane", 0.0, LATERAL),
-        ("turned", TURN, LATERAL),
+        ("turned", ROTATION, LATERAL),
     ):
         write_matrices(tmp_path, name, turn)
         results[name] = run_scene(tmp_path, name, NODES.format(name=name, lateral=lateral))
@@ -101,7 +100,7 @@ def test_exact_plane_motion_along_line_agrees_with_line_engine(tmp_path):
         ), name
     r = turned.response
     np.testing.assert_allclose(
-        r.extra["lateral_forces"], -np.tan(TURN) * r.extra["forces"], atol=1e-9 * 20
+        r.extra["lateral_forces"], -np.tan(ROTATION) * r.extra["forces"], atol=1e-9 * 20
     )
     assert "defined only for one direction" in turned.measures.equivalent_stiffness.reason
 
@@ -111,7 +110,7 @@ def test_exact_elliptic_motion_does_not_depend_on_frame(tmp_path):
     """An elliptic motion, which arises because the structure is softer along y, has the same
     measures in a rotated frame."""
     results = []
-    for name, turn in (("plane", 0.0), ("turned", TURN)):
+    for name, turn in (("plane", 0.0), ("turned", ROTATION)):
         write_matrices(tmp_path, name, turn, 0.7)
         npz = dict(np.load(tmp_path / f"{name}.npz"))
         rotation = np.eye(4)
@@ -141,6 +140,7 @@ SEEDS = (2, 12)  # Seeds of chains with three interfaces, of which one or two sl
 
 
 def test_always_errors_of_plane_chains_cover_independent_integration(tmp_path):
+    """At least 95 % of the errors of two random chains cover an independent integration of the rate equations."""
     rows = [row for seed in SEEDS for row in compare_chain(seed, tmp_path)["rows"]]
     assert len(rows) >= 14 and np.mean([row.holds for row in rows]) >= 0.95
 
@@ -170,6 +170,7 @@ def test_exact_plane_friction_closes_energy_and_stays_in_circle(tmp_path):
 
 
 def test_always_commands_support_plane_interfaces(tmp_path):
+    """The commands check, plan, run and sweep support plane interfaces, and the files contain both directions."""
     path = tmp_path / "chain.toml"
     path.write_text(text_of(chain(2)))
     assert cli("check", path).code == 0
@@ -198,7 +199,7 @@ def test_always_commands_support_plane_interfaces(tmp_path):
     assert sweep_answer.code == 0, sweep_answer.err
 
 
-REFUSED = {
+FAULTY_PAIRS = {
     "lateral = [3, 3]": "joins mass 3 to itself",
     "lateral = [9, 0]": "there is no mass 9",
     "lateral = [1, 0]": "mass 1 is already in `between`",
@@ -230,15 +231,17 @@ cycles = 4
 """
 
 
-@pytest.mark.parametrize("keys", REFUSED)
+@pytest.mark.parametrize("keys", FAULTY_PAIRS)
 def test_refuses_faulty_lateral_pairs(keys, tmp_path):
+    """A lateral pair that is not a second direction of the interface is refused."""
     with pytest.raises(pf.SceneError, match=r"lateral|bonded") as error:
         run_scene(tmp_path, "bad", MASSES.replace("lateral = [2, 0]", keys))
-    assert REFUSED[keys] in str(error.value)
+    assert FAULTY_PAIRS[keys] in str(error.value)
 
 
 @pytest.mark.parametrize("law", LAWS)
 def test_refuses_laws_without_plane_form(law, tmp_path):
+    """A friction law without a form in a plane is refused with an alternative."""
     more = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(
         law, ""
     )
@@ -252,6 +255,7 @@ def test_refuses_laws_without_plane_form(law, tmp_path):
 
 
 def test_refuses_plane_interface_with_patch_file_or_backbone(tmp_path):
+    """Plane interfaces are refused with a patch, a structure file, a backbone and an export of friction elements."""
     patch = MASSES.replace(
         'load = "50 N"\nlateral = [2, 0]',
         "lateral = [2, 0]\n[structure.interface.contact]\n"

@@ -22,6 +22,7 @@ def load_rig(law, *sets):
     "law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))]
 )
 def test_exact_progress_callback_changes_no_result(law, sets):
+    """A run with a progress callback has the measures and errors of a run without one."""
     without_callback = pf.run(load_rig(law, *sets))
     with_callback = pf.run(load_rig(law, *sets), progress=lambda share: None)
     assert {

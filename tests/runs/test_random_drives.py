@@ -22,7 +22,7 @@ PLASTIC = {
     "normal": {"load": "100 N"},
     "friction": {"law": "elastic-plastic", "static": 0.3, "bond_length": "50 um"},
 }
-SHAKEN = (
+RESPONSE_MEASURES = (
     "relative_displacement_rms",
     "absolute_acceleration_rms",
     "response_frequency",
@@ -53,7 +53,7 @@ def test_exact_random_response_agrees_with_scipy_lsim():
         np.abs(result.response.output - expected)[at_samples].max()
         < 1e-9 * np.abs(displacement).max()
     )
-    measures = {name: result.measures[name] for name in SHAKEN}
+    measures = {name: result.measures[name] for name in RESPONSE_MEASURES}
     assert measures["relative_displacement_rms"].value == pytest.approx(
         displacement[drive.time >= start].std(), rel=2e-3
     )
@@ -73,6 +73,8 @@ def test_exact_random_response_agrees_with_scipy_lsim():
 
 
 def test_exact_random_vibration_energies_balance():
+    """The energies of an elastic-plastic contact under random vibration balance; a stuck rig has no
+    damping of the response and gives the reason."""
     result = pf.run(RIG | PLASTIC)
     measures = result.measures
     assert measures["energy_balance"].value < 1e-11 and measures["work_check"].value < 1e-9
@@ -97,28 +99,32 @@ def test_exact_random_vibration_energies_balance():
 
 
 def test_exact_seed_determines_random_record():
-    first, repeated, other = (
+    """Equal seeds give equal records and different seeds different ones, in runs and in a sweep."""
+    seed_1, seed_1_again, seed_2 = (
         pf.run(RIG, **{"drive.seed": seed, "drive.duration": "1 s"}).measures for seed in (1, 1, 2)
     )
-    assert first["relative_displacement_rms"].value == repeated["relative_displacement_rms"].value
-    assert first["relative_displacement_rms"].value != other["relative_displacement_rms"].value
-    swept = pf.sweep(RIG, {"drive.seed": [1, 2], "drive.duration": ["1 s"]})
-    assert swept["relative_displacement_rms"].values.ravel() == pytest.approx(
-        [measures["relative_displacement_rms"].value for measures in (first, other)], rel=1e-12
+    assert (
+        seed_1["relative_displacement_rms"].value == seed_1_again["relative_displacement_rms"].value
+    )
+    assert seed_1["relative_displacement_rms"].value != seed_2["relative_displacement_rms"].value
+    sweep = pf.sweep(RIG, {"drive.seed": [1, 2], "drive.duration": ["1 s"]})
+    assert sweep["relative_displacement_rms"].values.ravel() == pytest.approx(
+        [measures["relative_displacement_rms"].value for measures in (seed_1, seed_2)], rel=1e-12
     )
 
 
 def test_exact_constant_spectrum_table_agrees_with_single_level(tmp_path):
+    """A table with a constant level gives the record of a spectrum of this level; faulty tables are refused."""
     path = tmp_path / "spectrum.csv"
     path.write_text("frequency [Hz],level [g^2/Hz]\n10,0.01\n0.4e3,0.01\n", "utf-8")
     drive = {name: one for name, one in RIG["drive"].items() if name != "spectrum"} | {
         "file": str(path)
     }
-    one, other = (
+    one, from_table = (
         pf.build(RIG | {"drive": drive_keys}).rig.drive.signal
         for drive_keys in (RIG["drive"], drive)
     )
-    assert other.value == pytest.approx(one.value, rel=1e-9) and other.band == one.band
+    assert from_table.value == pytest.approx(one.value, rel=1e-9) and from_table.band == one.band
     for text, message in (
         ("frequency [Hz],level [g^2/Hz]\n10,0.01\n5,0.01\n", r"csv:3: frequencies must be above"),
         ("frequency [Hz],level [g]\n10,0.01\n50,0.01\n", "unknown unit"),
@@ -145,6 +151,7 @@ def test_exact_constant_spectrum_table_agrees_with_single_level(tmp_path):
     ],
 )
 def test_refuses_faulty_random_drive(changes, message):
+    """A random drive with missing, contradictory or impossible keys is refused."""
     drive = {name: value for name, value in (RIG["drive"] | changes).items() if value is not None}
     with pytest.raises(pf.PatchfemError, match=message):
         pf.run(RIG | {"drive": drive})

@@ -43,7 +43,7 @@ def run_case(tmp_path_factory):
     base = tmp_path_factory.mktemp("runs")
     results = {}
 
-    def of(name):
+    def run_once(name):
         if name not in results:
             path = base / f"{name}.toml"
             path.write_text(SCENES[name], "utf-8")
@@ -52,7 +52,7 @@ def run_case(tmp_path_factory):
             results[name] = base / name, answer
         return results[name]
 
-    return of
+    return run_once
 
 
 @pytest.fixture
@@ -117,6 +117,7 @@ class FieldReader:
 @pytest.mark.share(0, 1, 2, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_summary_agrees_with_output_and_scene(run_case, name):
+    """The summary equals the printed JSON, lists the effects of the scene, and the folder contains the expected files."""
     folder, answer = run_case(name)
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
     assert json.loads(answer.out) == summary and len(answer.out.strip().splitlines()) == 1
@@ -173,6 +174,7 @@ MEASURES = {
 
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_run_has_measures_of_its_kind(run_case, name):
+    """A run has all measures of its kind, with the load of the scene and a closed energy balance."""
     measures = json.loads(run_case(name)[1].out)["measures"]
     expected = MEASURES[name.split()[0]].split() + (
         MEASURES["patch"].split() if name in WITH_FIELDS else []
@@ -187,17 +189,20 @@ def test_exact_run_has_measures_of_its_kind(run_case, name):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_resolved_scene_equals_scene(run_case, name):
+    """The resolved scene of a results folder has the effects and values of the original scene."""
     folder, _ = run_case(name)
-    first = load(folder.with_suffix(".toml"))
+    original = load(folder.with_suffix(".toml"))
     resolved = load(folder / "scene.resolved.toml")
     assert (
-        resolved.effect_names() == first.effect_names() and resolved.resolved() == first.resolved()
+        resolved.effect_names() == original.effect_names()
+        and resolved.resolved() == original.resolved()
     )
 
 
 @pytest.mark.share(0, 1, 3, 4, 5)
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_netcdf_file_has_units_and_balanced_fields(run_case, name):
+    """All variables of the dataset have units, and its pressure balances the load and excludes gaps."""
     folder, answer = run_case(name)
     data = read_netcdf(folder)
     kind = name.split()[0]
@@ -256,6 +261,7 @@ def test_exact_equation_of_motion_holds_at_every_sample(run_case, name):
 
 
 def test_exact_shear_stress_sums_to_friction_force(run_case):
+    """The shear stress of each frame adds up to the friction force and stays within the friction limit."""
     data = read_netcdf(run_case("rig patch")[0])
     total = (data.weight * data.shear_stress).sum("x").values
     expected = np.interp(data.frame_time.values[1:], data.time.values, data.friction_force.values)
@@ -264,11 +270,12 @@ def test_exact_shear_stress_sums_to_friction_force(run_case):
     assert float((np.abs(data.shear_stress) - limit).max()) <= 1e-9 * float(limit.max())
 
 
-# Field files.
+# Fields of the interface and of both pieces.
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
 def test_exact_displacements_of_both_pieces_close_the_gap(run_case, name):
+    """The displacements of both pieces at the interface differ by the gap, which is zero under pressure."""
     folder, _ = run_case(name)
     fields = FieldReader(folder)
     data = read_netcdf(folder)
@@ -325,7 +332,7 @@ def test_exact_every_row_of_elements_carries_the_load(run_case, name):
             )
 
 
-# Numbers of different ways that must agree.
+# Results of two different ways that must agree.
 
 
 def test_exact_rigid_patch_agrees_with_point_contact(monkeypatch):
@@ -389,6 +396,7 @@ def test_exact_written_mesh_gives_same_patch(write_scene, tmp_path):
     "path", sorted(STUDIES.rglob("*.toml")), ids=lambda p: str(p.relative_to(STUDIES))
 )
 def test_always_shipped_scenes_load_and_plan(path):
+    """Every scene of the studies can be loaded and planned."""
     scene = load(path)
     run_plan = plan(scene)
     assert run_plan.kind == scene.kind and set(run_plan.effects) <= set(EFFECTS)
@@ -396,6 +404,7 @@ def test_always_shipped_scenes_load_and_plan(path):
 
 
 def test_exact_json_of_plan_has_groups_and_stiffness(write_scene):
+    """The JSON output of a plan contains the dimensionless groups and the stiffness of each link."""
     answer = cli("plan", write_scene(SCENES["rig patch"]), "--json")
     output = json.loads(answer.out)
     assert answer.code == 0
@@ -418,6 +427,7 @@ def test_exact_json_of_plan_has_groups_and_stiffness(write_scene):
 
 
 def test_refuses_faulty_scene_with_one_line_per_fault(write_scene, tmp_path):
+    """Each fault of a scene is reported in one line with its place, by run and by check, and nothing is written."""
     scene = write_scene(SMALL_PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
     answer = cli("run", scene, "-o", tmp_path / "out")
     assert answer.code == 2 and answer.out == ""
@@ -427,6 +437,7 @@ def test_refuses_faulty_scene_with_one_line_per_fault(write_scene, tmp_path):
 
 
 def test_refuses_resume_mesh_and_exact_method_without_support(write_scene, tmp_path):
+    """A run without wear cannot be resumed, a point has no mesh, and a nonlocal law has no exact solution."""
     scene = write_scene(POINT + COULOMB + STRUCTURE)
     assert "only a run with [wear]" in cli("run", scene, "--resume").err
     assert cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
@@ -442,6 +453,7 @@ def test_refuses_resume_mesh_and_exact_method_without_support(write_scene, tmp_p
 
 
 def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
+    """A run with a too long bond list, or with a results folder inside a file, ends with exit code 4."""
     scene = write_scene(POINT + NONLOCAL + STRUCTURE)
     answer = cli(
         "run",
@@ -458,6 +470,7 @@ def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
 
 
 def test_exact_failing_run_keeps_previous_results_folder(write_scene, tmp_path):
+    """A run that fails while it writes leaves the previous results folder unchanged."""
     scene = write_scene(SCENES["rig patch"])
     out = tmp_path / "out"
 
@@ -475,6 +488,7 @@ def test_exact_failing_run_keeps_previous_results_folder(write_scene, tmp_path):
 
 
 def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monkeypatch):
+    """A run with a step that did not converge is written with the outcome not_converged and without errors."""
     from patchfem.dynamics.march import march as marching
 
     out = tmp_path / "out"
@@ -498,6 +512,7 @@ def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monk
 
 
 def test_refuses_to_replace_other_folders(write_scene, tmp_path, monkeypatch):
+    """A run does not replace a folder that is not a results folder, nor one that another run is writing."""
     scene = write_scene(POINT + COULOMB + SLIDE)
     user_folder = tmp_path / "mine"
     user_folder.mkdir()

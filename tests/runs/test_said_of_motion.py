@@ -91,6 +91,7 @@ def test_exact_plan_calls_interface_with_soft_bonds_elastic(length, sentence):
 
 
 def test_exact_plan_lists_stiffness_of_every_interface():
+    """The plan lists the contact stiffness of every interface, or the reason why there is none."""
     chain = pf.plan(load(PAIR)).chain
     assert chain["bonds"] == "none: it creeps" and chain["bonds_2"] == pytest.approx(2.6e5)
 

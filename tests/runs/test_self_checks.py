@@ -115,6 +115,7 @@ def test_always_wrong_mode_shape_is_detected(monkeypatch):
     build_basis = modes.build_basis
 
     def build_wrong_basis(given, mass):
+        """Return a modal basis with twice the sliding components."""
         found = build_basis(given, mass)
         return replace(found, slide=2 * found.slide)
 

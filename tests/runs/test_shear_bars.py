@@ -11,16 +11,16 @@ from patchfem.scene import loads
     "compare, seed", [(compare_joint, 3024), (compare_rig, 3000), (compare_chain, 3000)]
 )
 def test_always_errors_of_random_sheared_scenes_cover_fine_results(compare, seed, tmp_path):
-    """An error from a single coarser mesh was 22 times too small for the work of joint 3024, and
-    2.3 times for the peak of rig 3000."""
+    """The errors of random scenes with partial slip cover results on finer meshes and steps. Errors
+    from a single coarser mesh were up to 22 times too small."""
     rows = compare(seed, tmp_path)["rows"]
     assert len(rows) >= 7 and all(row.holds for row in rows), rows
 
 
 @pytest.mark.parametrize("kind", ["joint", "rig"])
 def test_exact_motion_on_two_elements_has_no_errors(kind):
-    """Two elements have no coarser mesh to estimate an error from; an earlier version stated 0.0113
-    +- 1e-12 J for a loop of 0.0128 J."""
+    """A motion on two elements has no errors, because there is no coarser mesh to estimate them
+    from. An earlier version stated 0.0113 +- 1e-12 J for a loop of 0.0128 J."""
     text = pf.new("joint") if kind == "joint" else RIG
     coarse = pf.run(
         loads(
@@ -58,13 +58,18 @@ amplitude = "1 um"
 frequency = "100 Hz"
 """
     )
-    few, more = (
+    two_modes, sixteen_modes = (
         pf.run(
             loads(text, "few.toml", ["accuracy.tolerance=1e-2", f"accuracy.shear_modes={count}"])
         )
         for count in (2, 16)
     )
-    difference = abs(few.measures["loop_area"].value - more.measures["loop_area"].value)
-    assert 0 < difference <= few.measures["loop_area"].error and few.extra["shear_modes"] == 2
-    assert more.measures["loop_area"].error < 0.1 * few.measures["loop_area"].error
-    assert any("set accuracy.shear_modes = 8" in warning for warning in few.warnings)
+    difference = abs(
+        two_modes.measures["loop_area"].value - sixteen_modes.measures["loop_area"].value
+    )
+    assert (
+        0 < difference <= two_modes.measures["loop_area"].error
+        and two_modes.extra["shear_modes"] == 2
+    )
+    assert sixteen_modes.measures["loop_area"].error < 0.1 * two_modes.measures["loop_area"].error
+    assert any("set accuracy.shear_modes = 8" in warning for warning in two_modes.warnings)

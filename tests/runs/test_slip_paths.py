@@ -10,7 +10,7 @@ from patchfem.runs.wear.slip import Frames, compute_frame_slip, count_frames
 PHASES = np.linspace(0, 1, 41)
 
 
-def sharp_reversals(angle):
+def slip_with_sharp_reversals(angle):
     """Return a slip with reversals sharper than those of a sine, as of a block that stops abruptly,
     at angles [rad]."""
     return np.arcsin(0.98 * np.sin(angle)) * 2 / np.pi
@@ -20,7 +20,7 @@ def sharp_reversals(angle):
     "slip, path",
     [
         (np.sin, 4.0),
-        (sharp_reversals, 8 / np.pi * np.arcsin(0.98)),
+        (slip_with_sharp_reversals, 8 / np.pi * np.arcsin(0.98)),
         (lambda a: np.clip(np.sin(a), -0.8, 0.8), 3.2),
         (lambda a: np.abs((a / np.pi) % 2 - 1), 2.0),
     ],
@@ -48,7 +48,7 @@ def test_always_error_of_slip_path_covers_hidden_reversals(slip, path, energy):
             assert frame_slip.path[1] == pytest.approx(frame_slip.path[0], rel=1e-12)
 
 
-def test_order_of_frame_count_in_tolerance_is_half():
+def test_order_of_frame_count_in_tolerance():
     """The number of frames grows with the inverse square root of the tolerance."""
     assert count_frames(1e-2) == 223 and count_frames(1e-3) / count_frames(1e-2) == pytest.approx(
         10**0.5, rel=0.01

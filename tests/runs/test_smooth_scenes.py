@@ -14,29 +14,33 @@ SCENE = (
     + MODE
     + DRIVE.replace("frequency", 'waveform = "sine"\nfrequency')
 )
-GROWTH = 'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
-LENGTH = 'bond_length = "5 um"'
+GROWING_BONDS = (
+    'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
+)
+CONSTANT_BONDS = 'bond_length = "5 um"'
 
 
-SHORT = 'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"'
-NAME = 'law = "nonlocal"'
-STEPS = "cycles = 30\n[accuracy]\n"
+SHORT_BONDS = (
+    'bond_length = "0.1 nm"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.01 nm"'
+)
+LAW_NAME = 'law = "nonlocal"'
+ACCURACY_TABLE = "cycles = 30\n[accuracy]\n"
 
 
 @pytest.mark.parametrize(
     "name, old, new",
     [
-        ("smooth", LENGTH, LENGTH),
-        ("smooth", LENGTH, GROWTH),
-        ("smooth", LENGTH, LENGTH + "\nbreakaway = 0.3"),
-        ("smooth", NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
-        ("smooth", NAME, 'law = "bouc-wen"\nstiffness = "1e7 N/m"'),
-        ("march", LENGTH, SHORT),
-        ("march", LENGTH, GROWTH + "\nbreakaway = 0.3"),
-        ("march", LENGTH, LENGTH + "\norder = 0.5"),
-        ("march", LENGTH, LENGTH + '\nreading = "report"'),
-        ("march", "cycles = 30", STEPS + "steps_per_cycle = 400"),
-        ("march", "cycles = 30", STEPS + 'method = "march"'),
+        ("smooth", CONSTANT_BONDS, CONSTANT_BONDS),
+        ("smooth", CONSTANT_BONDS, GROWING_BONDS),
+        ("smooth", CONSTANT_BONDS, CONSTANT_BONDS + "\nbreakaway = 0.3"),
+        ("smooth", LAW_NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
+        ("smooth", LAW_NAME, 'law = "bouc-wen"\nstiffness = "1e7 N/m"'),
+        ("march", CONSTANT_BONDS, SHORT_BONDS),
+        ("march", CONSTANT_BONDS, GROWING_BONDS + "\nbreakaway = 0.3"),
+        ("march", CONSTANT_BONDS, CONSTANT_BONDS + "\norder = 0.5"),
+        ("march", CONSTANT_BONDS, CONSTANT_BONDS + '\nreading = "report"'),
+        ("march", "cycles = 30", ACCURACY_TABLE + "steps_per_cycle = 400"),
+        ("march", "cycles = 30", ACCURACY_TABLE + 'method = "march"'),
         ("march", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
         ("march", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
     ],
@@ -45,14 +49,15 @@ def test_exact_smooth_laws_use_high_order_integrator(name, old, new):
     """Smooth friction laws are integrated by the engine `smooth`; laws and drives with jumps, and
     prescribed steps, by the march."""
     text = SCENE.replace(old, new)
-    text = text.replace(LENGTH, "") if old == NAME else text
+    text = text.replace(CONSTANT_BONDS, "") if old == LAW_NAME else text
     text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
     assert choose_numerics(pf.build(text)).engine == name
 
 
-@pytest.mark.parametrize("law", [LENGTH, GROWTH])
+@pytest.mark.parametrize("law", [CONSTANT_BONDS, GROWING_BONDS])
 def test_always_smooth_engine_and_march_agree_within_errors(law):
-    text = SCENE.replace(LENGTH, law)
+    """The high-order integrator and a march of 1600 steps per cycle agree within their errors."""
+    text = SCENE.replace(CONSTANT_BONDS, law)
     smooth = pf.run(text)
     march = pf.run(text, **{"accuracy.steps_per_cycle": 1600})
     assert (smooth.extra["engine"], march.extra["engine"]) == (

@@ -87,8 +87,8 @@ def test_exact_rigid_pad_at_step_has_uniform_pressure():
 
 
 def test_always_errors_of_narrow_contact_cover_spectral_reference():
-    """The half-width of a spectral program is 0.4162623 mm. An extrapolation by one ratio of three
-    meshes missed it by 1.46 errors."""
+    """The errors of half-width and contact fraction cover a spectral program (0.4162623 mm). An
+    extrapolation by one ratio of three meshes was wrong by 1.46 times its error."""
     narrow = run_measures(NARROW, 1e-3)
     for name, reference in (
         ("contact_half_width", 4.162623e-4),
@@ -149,9 +149,10 @@ def test_always_errors_cover_contact_interval_of_one_element(
         previous_error = measure.error
 
 
-# Errors that do not hold, by seed: (measure, tolerance). The program promises that 95 % hold; of 60 fresh scenes
-# (seeds 8300000 to 8300059) 99.4 % do at 1e-2 and 98.3 % at 1e-3. The ratios of successive changes of the stiffness of
-# seed 601 are 2.8, 5.8 and 4.3: the first one is steady enough to extrapolate by, and not that of the order.
+# Known exceptions by seed: (measure, tolerance). The program states that 95 % of its errors cover
+# the true values; of 60 new scenes (seeds 8300000 to 8300059), 99.4 % do at 1e-2 and 98.3 % at
+# 1e-3. Successive changes of the stiffness of seed 601 have the ratios 2.8, 5.8 and 4.3; the first
+# suggests a wrong order of convergence.
 MISSES = {601: {("rotational_stiffness", 1e-3)}}
 MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 

@@ -15,16 +15,16 @@ LAWS = {
     "interlock": PLASTIC,
     "lugre": 'law = "lugre"\nstiffness = "{:.4g} N/um"\nkinetic = 0.25\nstribeck_speed = "10 mm/s"',
 }
-BESIDE = {
+SPRING_TABLES = {
     "stiffening": '[structure.stiffening]\ncubic = "1e12 N/m^3"\n',
     "interlock": '[structure.bonded]\nstiffness = "1e6 N/m"\nwavelength = "40 um"\n',
 }
 SECOND = (
     '[[structure.mode]]\nname = "second"\nfrequency = "{:.4g} Hz"\ndamping = 0.01\nslide = -0.6\n'
 )
-SHARP = 5.0  # Largest ratio of stated to true error of a sharp error.
-ROUND = 1e-8  # Relative error below which an error counts as sharp anyway.
-LEFT_OUT = (
+MAX_SHARP_RATIO = 5.0  # Largest ratio of stated to true error of a sharp error.
+SMALL_ERROR = 1e-8  # Relative error below which an error counts as sharp anyway.
+IGNORED_MEASURES = (
     "energy_balance",
     "work_check",
     "normal_load",
@@ -44,7 +44,7 @@ def draw_rig(law: str, seed: int) -> str:
     )
     return (
         f'[normal]\nload = "116 N"\n[friction]\nstatic = 0.3\n{LAWS[law].format(number)}\n[structure]\n'
-        f'moving_mass = "0.884 kg"\n{modes}{BESIDE.get(law, "")}[drive]\nkind = "base"\nfrequency = "'
+        f'moving_mass = "0.884 kg"\n{modes}{SPRING_TABLES.get(law, "")}[drive]\nkind = "base"\nfrequency = "'
         f'{rng.uniform(60, 300):.5g} Hz"\nacceleration = "{10 ** rng.uniform(0.3, 1.3):.4g} g"\ncycles = 30\n'
         '[accuracy]\nmethod = "harmonic"\n'
     )
@@ -55,7 +55,9 @@ def error_rows(text: str) -> list:
     measures = pf.run(text).measures
     fine = pf.run(text, **{"accuracy.tolerance": "1e-5"}).measures
     pairs = [
-        (m, fine[name]) for name, m in measures.items() if name in fine and name not in LEFT_OUT
+        (m, fine[name])
+        for name, m in measures.items()
+        if name in fine and name not in IGNORED_MEASURES
     ]
     return [
         (m.error, abs(m.value - t.value), t.error, abs(m.value))
@@ -72,9 +74,9 @@ def test_always_errors_of_balance_cover_and_are_sharp():
     )
     error, true_error, reference_error, value = rows.T
     assert np.mean(true_error <= error + reference_error) >= 0.97
-    is_small = error <= ROUND * value
+    is_small = error <= SMALL_ERROR * value
     is_known = true_error > 2 * reference_error
-    assert np.mean((is_small | (error <= SHARP * true_error))[is_small | is_known]) >= 0.7
+    assert np.mean((is_small | (error <= MAX_SHARP_RATIO * true_error))[is_small | is_known]) >= 0.7
 
 
 @pytest.mark.parametrize("harmonics", [1, 2, 3])

@@ -79,7 +79,7 @@ def test_order_of_stick_fraction_from_samples(law, omega, more):
         assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
 
 
-NULLS = (
+UNDEFINED_MEASURES = (
     "equivalent_stiffness",
     "secant_stiffness",
     "equivalent_damping",
@@ -101,5 +101,5 @@ def test_exact_slip_phase_needs_stick_and_slip(load, reason):
     )
     is_stuck = load == "8 N"
     assert measures["stick_fraction"].value == is_stuck
-    for name in NULLS[:3]:
+    for name in UNDEFINED_MEASURES[:3]:
         assert (measures[name].value is None) is is_stuck, name

@@ -11,7 +11,7 @@ from scene_texts import FORCED, MODE, PAIR, POINT, SHEAR, SMALL_PATCH, TRIANGLE,
 import patchfem as pf
 from patchfem.scene import loads
 
-LOAD, STIFF = 26 * 0.45359237 * 9.80665, 7e6  # Load [N] and stiffness [N/m].
+LOAD, STIFFNESS = 26 * 0.45359237 * 9.80665, 7e6  # Load [N] and stiffness [N/m].
 LAW = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "180 Hz"\nacceleration = "8 g"\ncycles = 20\n'
 RIG = POINT + LAW + MODE + DRIVE
@@ -32,17 +32,18 @@ RUNS = {
 
 def format_both_ways(text: str) -> tuple:
     """Return the scene with the stiffness and with the equivalent bond length."""
-    stiff = f'stiffness = "{STIFF} N/m"\n'
+    stiff = f'stiffness = "{STIFFNESS} N/m"\n'
     length = 'bond_length = "{!r} m"\n'
     if "%s" in text:
-        return text.replace("%s", stiff), text.replace("%s", length.format(0.3 * 60 / STIFF))
+        return text.replace("%s", stiff), text.replace("%s", length.format(0.3 * 60 / STIFFNESS))
     return text.replace(LAW, LAW + stiff), text.replace(
-        LAW, LAW + length.format(0.3 * LOAD / STIFF)
+        LAW, LAW + length.format(0.3 * LOAD / STIFFNESS)
     )
 
 
 @pytest.mark.parametrize("name", RUNS)
 def test_exact_stiffness_agrees_with_equivalent_bond_length(name):
+    """A stiffness and the bond length mu N/stiffness give the same measures, in every kind of run."""
     with_stiffness, with_length = (pf.run(loads(text)) for text in format_both_ways(RUNS[name]))
     assert (
         with_stiffness.outcome == with_length.outcome
@@ -63,7 +64,7 @@ def test_exact_load_sweep_keeps_stiffness():
     for case in (0, 20, 40, 63):
         single = pf.run(
             loads(format_both_ways(RIG)[1]),
-            **{"normal.load": values[case], "friction.bond_length": 0.3 * values[case] / STIFF},
+            **{"normal.load": values[case], "friction.bond_length": 0.3 * values[case] / STIFFNESS},
         )
         for name in ("friction_force_peak", "relative_displacement_amplitude", "loop_area"):
             error = float(sweep[f"{name}_error"][case]) + single.measures[name].error
@@ -72,7 +73,7 @@ def test_exact_load_sweep_keeps_stiffness():
                 name,
             )
     is_stuck = sweep["outcome"].values == "stuck"
-    np.testing.assert_allclose(sweep["secant_stiffness"].values[is_stuck], STIFF, rtol=1e-6)
+    np.testing.assert_allclose(sweep["secant_stiffness"].values[is_stuck], STIFFNESS, rtol=1e-6)
     assert 5 < is_stuck.sum() < 60
 
 
@@ -98,14 +99,18 @@ def test_exact_load_sweep_keeps_stiffness():
     ],
 )
 def test_refuses_stiffness_with_incompatible_keys(sets, key, message):
+    """A stiffness is refused with a bond length, a varying load, grooves and zero friction."""
     text = format_both_ways(RIG)[0]
     messages = mistakes(format_both_ways(RIG)[0], *sets)
     assert len(messages) == 1 and f": {key}: " in messages[0] and message in messages[0]
     if "give" in message:  # The advice of the message works.
-        loads(text.replace(f'stiffness = "{STIFF} N/m"', 'bond_length = "5 um"'), "a.toml", sets)
+        loads(
+            text.replace(f'stiffness = "{STIFFNESS} N/m"', 'bond_length = "5 um"'), "a.toml", sets
+        )
 
 
 def test_refuses_stiffness_with_approach_or_worn_bonds():
+    """A stiffness is refused with a prescribed approach and with a bond length that changes with wear."""
     text = format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0].replace('load = "26 lbf"', "")
     text += '[contact.approach]\ndistance = "0.2 um"\n'
     assert "or contact.load in place of [contact.approach]" in mistakes(text)[0]

@@ -14,14 +14,14 @@ RIG = (
     'damping = 0.01\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 12\n'
     "[accuracy]\nsteps_per_cycle = 120\n"
 )
-PRINTED = 'reading = "report"\ninitial_bonds = 0\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.4 um"\n'
+REPORT_LAW = 'reading = "report"\ninitial_bonds = 0\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.4 um"\n'
 
 
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
     "settings", [["accuracy.merge=0.3"], ["accuracy.quadrature=truncated", "accuracy.tail=0.05"]]
 )
-@pytest.mark.parametrize("law", ["order = 0.5\n", PRINTED])
+@pytest.mark.parametrize("law", ["order = 0.5\n", REPORT_LAW])
 def test_exact_errors_of_rig_cover_truncated_and_merged_bonds(law, settings):
     """The errors cover the difference from the sum over all bonds with the same steps. A truncation
     of 5 % changes the amplitude by 7 %, which the errors of the steps alone did not cover."""

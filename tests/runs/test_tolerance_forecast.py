@@ -26,7 +26,7 @@ cycles = 60
 """
 TANH = POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "10 mm/s"\n' + MODE
 SPRING = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nstiffness = "10 N/um"\n' + MODE
-SOFT = (
+SHEARED_RIG = (
     """\
 [contact]
 length = "12.7 mm"
@@ -54,7 +54,7 @@ def add_tolerance(text: str, tolerance: float, keys: str = "") -> str:
     return f"{text}[accuracy]\ntolerance = {tolerance:g}\n{keys}"
 
 
-def forecast(text: str) -> dict:
+def forecast_tolerance(text: str) -> dict:
     """Return the forecast of the plan about the tolerance."""
     return pf.plan(pf.load(text)).as_json()["tolerance"]
 
@@ -85,7 +85,7 @@ def forecast(text: str) -> dict:
             id="patch",
         ),
         pytest.param(
-            add_tolerance(SOFT, 1e-3, "steps_per_cycle = 200\n"),
+            add_tolerance(SHEARED_RIG, 1e-3, "steps_per_cycle = 200\n"),
             {"accuracy.steps_per_cycle": 1600},
             id="rig with shear",
         ),
@@ -94,11 +94,11 @@ def forecast(text: str) -> dict:
 def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, cure, tmp_path):
     """If the plan predicts that a run misses its tolerance, the run misses it, and with the remedy
     it meets it."""
-    prediction = forecast(text)
+    prediction = forecast_tolerance(text)
     assert prediction["missed"] and prediction["cure"].items() >= cure.items() and misses(text)
     remedied = cured(text, prediction["cure"])
     assert not misses(remedied)
-    assert forecast(remedied) | {"asked": 0} == {
+    assert forecast_tolerance(remedied) | {"asked": 0} == {
         "asked": 0,
         "missed": False,
         "cure": {},
@@ -116,18 +116,20 @@ def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, cure, tmp_p
         add_tolerance(TANH, 1e-3),
         add_tolerance(BONDS, 1e-4, "steps_per_cycle = 2600\n"),
         add_tolerance(PATCH, 1e-4),
-        add_tolerance(SOFT, 1e-2, "steps_per_cycle = 800\n"),
+        add_tolerance(SHEARED_RIG, 1e-2, "steps_per_cycle = 800\n"),
         read_template("rig"),
         read_template("linear"),
         read_template("joint"),
     ],
 )
 def test_always_met_tolerance_is_not_predicted_as_missed(text):
-    assert not forecast(text)["missed"] and not misses(text)
+    """The plan predicts no missed tolerance for runs that meet it."""
+    assert not forecast_tolerance(text)["missed"] and not misses(text)
 
 
 def test_exact_remedy_of_unreachable_tolerance_is_larger_tolerance():
-    prediction = forecast(add_tolerance(PATCH, 1e-8))
+    """A tolerance that no mesh reaches has the remedy of a larger tolerance, which a run meets."""
+    prediction = forecast_tolerance(add_tolerance(PATCH, 1e-8))
     assert (
         prediction["cure"] == {"accuracy.tolerance": 1e-3}
         and "by any mesh" in prediction["sentence"]

@@ -45,6 +45,7 @@ def response_from_rest(t, omega, zeta, parts):
 
 
 def test_exact_linear_response_to_tones_is_superposition():
+    """The response of a linear rig to two tones is the sum of the closed forms of each, and the window is one beat."""
     result = pf.run(RIG)
     tones = ((96, 9.80665, 0), (102, 9.80665 / 2, np.radians(40)))
     expected = response_from_rest(result.response.time, 2 * np.pi * 100, 0.02, tones)
@@ -59,6 +60,7 @@ def test_exact_linear_response_to_tones_is_superposition():
 
 
 def test_exact_energies_under_two_tones_balance():
+    """With friction under two tones the energies balance; the drift has no value, with a reason."""
     measures = pf.run(RIG | PLASTIC).measures
     assert measures["drift_per_cycle"].value is None
     assert "within their beat without any drift" in measures["drift_per_cycle"].reason
@@ -72,6 +74,7 @@ def test_exact_energies_under_two_tones_balance():
     [((96.0, 102.0), 16), ((100.0, 90.0, 110.0), 10), ((0.3, 0.2), 3), ((1e-9, 2e-9), 1)],
 )
 def test_exact_beat_is_shortest_common_period(frequencies, cycles):
+    """The beat is the shortest number of cycles after which all tones repeat."""
     assert count_beat_cycles(frequencies) == cycles
 
 
@@ -88,6 +91,7 @@ def test_exact_beat_is_shortest_common_period(frequencies, cycles):
     ],
 )
 def test_refuses_faulty_tones(changes, message):
+    """Tones with missing, contradictory or impossible keys are refused."""
     drive = {name: value for name, value in (RIG["drive"] | changes).items() if value is not None}
     with pytest.raises(pf.PatchfemError, match=message):
         pf.run(RIG | {"drive": drive})

@@ -42,6 +42,7 @@ def rough_scene(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def run_result(rough_scene):
+    """Return the result of the rough scene."""
     return pf.run(rough_scene)
 
 

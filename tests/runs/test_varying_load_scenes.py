@@ -14,9 +14,9 @@ from patchfem.scene import loads
 PITCH = RIG.replace("slide = 0.1", 'slide = 0.1\npitch = "40 rad/m"').replace(
     "cycles = 200", "cycles = 12"
 )
-FEW = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200"]
+COARSE_SETTINGS = ["contact.element_size=400 um", "accuracy.steps_per_cycle=200"]
 POINT = STRUCTURE + BENCH.split("[slide]")[0]
-SWING = ["normal.amplitude=60 N", "normal.frequency=50 Hz"]
+VARYING_LOAD = ["normal.amplitude=60 N", "normal.frequency=50 Hz"]
 
 
 def run_text(text, *sets, estimate=False):
@@ -40,7 +40,7 @@ def test_exact_pitching_mode_balances_energy_and_fields(law):
     text = PITCH.replace('"nonlocal"', law).replace(
         'static = 0.3\nbond_length = "1 um"', "static = 0.3"
     )
-    result = run_text(text, *FEW)
+    result = run_text(text, *COARSE_SETTINGS)
     assert result.measures["energy_balance"].value <= 1e-10
     assert result.measures["energy_created"].value == 0
     fields = result.fields
@@ -59,7 +59,7 @@ def test_exact_holder_spring_acts_in_series_with_pitch():
     """At a given rotation of the holder, the piece rotates by this angle minus the moment over the
     spring stiffness."""
     settings = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]
-    patch = run_text(PITCH, *FEW, *settings, "drive.cycles=1").patch
+    patch = run_text(PITCH, *COARSE_SETTINGS, *settings, "drive.cycles=1").patch
     contact_set = make_contact_sets(patch, 2e4)
     x = patch.x
     holder_rotation = 2e-6
@@ -89,7 +89,7 @@ def test_exact_holder_spring_acts_in_series_with_pitch():
 def test_exact_rig_under_varying_load_closes_energy(law):
     """The normal load follows its formula, the energy balance closes, and friction stays below mu
     N."""
-    result = run_text(POINT, *SWING, *law, estimate=True)
+    result = run_text(POINT, *VARYING_LOAD, *law, estimate=True)
     time = result.response.time
     load = result.response.extra["normal_load"]
     assert load == pytest.approx(
@@ -105,9 +105,10 @@ def test_exact_rig_under_varying_load_closes_energy(law):
 
 
 def test_refuses_normal_motion_of_point_contact():
+    """Modes with normal motion are refused with a point contact, and an exact method with a varying load."""
     message = only(POINT, "structure.mode.axial.normal=0.1")
     assert message.startswith("--set: structure.mode.axial.normal: ")
     assert "use [contact] in place of" in message
     assert "no exact solution exists with normal.amplitude" in only(
-        POINT, *SWING, "accuracy.method=exact"
+        POINT, *VARYING_LOAD, "accuracy.method=exact"
     )

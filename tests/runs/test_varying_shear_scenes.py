@@ -8,17 +8,17 @@ from patchfem import plan
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-MOVING = RIG.replace("slide = 0.8", 'slide = 0.8\nnormal = 0.02\npitch = "5 rad/m"')
-MOVING = MOVING.replace("cycles = 200", "cycles = 12")
-MOVING = MOVING.replace("slide = 0.1", 'slide = 0.1\nnormal = 0.3\npitch = "40 rad/m"')
-SETS = ["contact.element_size=200 um", "accuracy.steps_per_cycle=200", "contact.shear={}"]
+MOVING_RIG = RIG.replace("slide = 0.8", 'slide = 0.8\nnormal = 0.02\npitch = "5 rad/m"')
+MOVING_RIG = MOVING_RIG.replace("cycles = 200", "cycles = 12")
+MOVING_RIG = MOVING_RIG.replace("slide = 0.1", 'slide = 0.1\nnormal = 0.3\npitch = "40 rad/m"')
+SETTINGS = ["contact.element_size=200 um", "accuracy.steps_per_cycle=200", "contact.shear={}"]
 PLASTIC = "friction.law=elastic-plastic"
 SKIN = 'contact.asperities={law="linear", normal_stiffness="2e14 Pa/m", tangential_ratio=0.8}'
 
 
 def run_rig(*sets, estimate=False):
     """Return the result of the rig with --set options."""
-    return run(loads(MOVING, "a.toml", sets), estimate=estimate)
+    return run(loads(MOVING_RIG, "a.toml", sets), estimate=estimate)
 
 
 def displacement_amplitude(result) -> float:
@@ -31,7 +31,7 @@ def displacement_amplitude(result) -> float:
 def test_order_of_amplitude_in_number_of_shear_modes(law):
     """The amplitude converges with the number of shear modes: 8 of 65 modes agree within 3e-4 and
     32 within 1e-5, while a piece without shear differs by more than 3e-3."""
-    results = {k: run_rig(*SETS, law, f"accuracy.shear_modes={k}") for k in (8, 32, 65)}
+    results = {k: run_rig(*SETTINGS, law, f"accuracy.shear_modes={k}") for k in (8, 32, 65)}
     deviations = [
         abs(displacement_amplitude(results[k]) / displacement_amplitude(results[65]) - 1)
         for k in (8, 32)
@@ -39,7 +39,8 @@ def test_order_of_amplitude_in_number_of_shear_modes(law):
     assert deviations[0] <= 3e-4 and deviations[1] <= 1e-5 and deviations[1] < deviations[0]
     assert (
         abs(
-            displacement_amplitude(run_rig(*SETS[:2], law)) / displacement_amplitude(results[65])
+            displacement_amplitude(run_rig(*SETTINGS[:2], law))
+            / displacement_amplitude(results[65])
             - 1
         )
         > 3e-3
@@ -54,7 +55,7 @@ def test_exact_fields_of_sheared_patch_satisfy_friction_law():
     """The displacement of the holder is the sum of slip, elastic displacement of the pieces and
     bond stretch. The stretch is at most that of springs of stiffness mu sigma/eps_0, and the
     traction at most mu times the pressure."""
-    result = run_rig(*SETS, PLASTIC, "accuracy.shear_modes=65")
+    result = run_rig(*SETTINGS, PLASTIC, "accuracy.shear_modes=65")
     fields = result.fields
     weight = result.patch.pieces.interface.weight
     n_checked = 0
@@ -74,23 +75,25 @@ def test_exact_fields_of_sheared_patch_satisfy_friction_law():
 def test_exact_run_states_shear_modes_and_includes_their_error():
     """A warning states the number of tangential modes; the error of every measure includes half as
     many modes, coarser steps and a coarser mesh."""
-    result = run_rig(*SETS, SKIN, estimate=True)
+    result = run_rig(*SETTINGS, SKIN, estimate=True)
     warnings = [line for line in result.warnings if "tangential modes" in line]
     assert len(warnings) == 1 and warnings[0].startswith(
         "[contact.shear]: the normal load changes with the"
     )
     amplitude_measure = result.measures["relative_displacement_amplitude"]
     assert 0 < amplitude_measure.error < 0.1 * amplitude_measure.value
-    run_plan = plan(loads(MOVING, "a.toml", [*SETS, SKIN, PLASTIC]))
+    run_plan = plan(loads(MOVING_RIG, "a.toml", [*SETTINGS, SKIN, PLASTIC]))
     assert [line for line in run_plan.verdict if "tangential modes" in line] and run_plan.unknowns[
         "shear_modes"
     ] == 4
     assert not [
-        line for line in plan(loads(RIG, "a.toml", SETS)).verdict if "tangential modes" in line
+        line for line in plan(loads(RIG, "a.toml", SETTINGS)).verdict if "tangential modes" in line
     ]
     assert not [
         line
-        for line in run(loads(RIG, "a.toml", [*SETS, "drive.cycles=4"]), estimate=False).warnings
+        for line in run(
+            loads(RIG, "a.toml", [*SETTINGS, "drive.cycles=4"]), estimate=False
+        ).warnings
         if "tangential modes" in line
     ]
 
@@ -99,14 +102,17 @@ def test_exact_holder_spring_of_rigid_piece_is_one_mode():
     """The tangential spring of the holder with a rigid piece is one mode for any number of shear
     modes; a very stiff spring changes nothing."""
     stiff, without_spring = (
-        run_rig(*SETS[:2], *more) for more in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
+        run_rig(*SETTINGS[:2], *more)
+        for more in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
     )
     assert displacement_amplitude(stiff) == pytest.approx(
         displacement_amplitude(without_spring), rel=1e-5
     )
     one_mode, many_modes = (
         run_rig(
-            *SETS[:2], "contact.holder.tangential_stiffness=2e7 N/m", f"accuracy.shear_modes={k}"
+            *SETTINGS[:2],
+            "contact.holder.tangential_stiffness=2e7 N/m",
+            f"accuracy.shear_modes={k}",
         )
         for k in (1, 16)
     )

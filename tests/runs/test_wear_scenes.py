@@ -37,8 +37,10 @@ SOFT_RIG = (
     + MODE
     + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
 )
-LONG = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
-THIN_COAT = TILTED + COULOMB + SINE + LONG  # The coating is worn through before the last cycle.
+LONG_WEAR = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
+WORN_THROUGH_SCENE = (
+    TILTED + COULOMB + SINE + LONG_WEAR
+)  # The coating is worn through before the last cycle.
 WORN_CROWN = """[contact]
 length = "6 mm"
 width = "8 mm"
@@ -63,7 +65,7 @@ cycles = 100000
 law = "coulomb"
 static = 0.6
 """
-LOOSE = "[accuracy]\ntolerance = 2e-2\n"
+LARGE_TOLERANCE = "[accuracy]\ntolerance = 2e-2\n"
 
 
 def run_text(text, **sets):
@@ -72,6 +74,7 @@ def run_text(text, **sets):
 
 
 def test_exact_worn_volume_is_coefficient_times_load_times_path():
+    """The worn volume is kappa N s n within 1e-12; wear widens the contact, lowers the peak and keeps the loop."""
     worn = run_text(TILTED + COULOMB + SINE + WEAR)
     volume = worn.measures["worn_volume"]
     assert volume.value == pytest.approx(KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12)
@@ -86,6 +89,7 @@ def test_exact_worn_volume_is_coefficient_times_load_times_path():
 
 @pytest.mark.parametrize("motion", [SINE, STRUCTURE], ids=["bench", "rig"])
 def test_exact_point_contact_wear_agrees_with_archard(motion):
+    """The worn volume of a point contact is kappa N 4 A n, on a bench and in a rig."""
     result = run_text(POINT + COULOMB + motion + WEAR)
     amplitude = result.measures["slip_amplitude"].value
     assert result.measures["worn_volume"].value == pytest.approx(
@@ -117,6 +121,7 @@ def test_exact_energy_form_agrees_with_archard():
     ids=["exponential", "hertz", "linear", "holder", "crown"],
 )
 def test_exact_worn_volume_does_not_depend_on_skin_or_shape(table):
+    """The worn volume is kappa N s n for every skin, holder and shape."""
     result = run_text(TILTED + table + COULOMB + SINE + WEAR)
     assert result.measures["worn_volume"].value == pytest.approx(
         KAPPA * LOAD * 40e-6 * CYCLES, rel=1e-12
@@ -140,6 +145,7 @@ def test_exact_worn_volume_does_not_depend_on_skin_or_shape(table):
     ids=["constant", "dwell", "triangle"],
 )
 def test_exact_non_periodic_slide_counts_as_one_wear_cycle(slide, path):
+    """A slide that does not repeat counts as one wear cycle of its whole path."""
     for contact in (TILTED, TILTED + SHEAR):
         volume = run_text(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
         assert volume.value == pytest.approx(
@@ -158,6 +164,7 @@ def worn_folder(tmp_path_factory):
 
 
 def test_exact_dataset_contains_wear_history(worn_folder):
+    """The dataset contains worn depth, volume and cycles of every wear step; each frame balances the load."""
     with xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
         load = (data.weight * data.normal_stress).sum("x")
         assert load.values == pytest.approx(LOAD, rel=1e-10)
@@ -273,6 +280,7 @@ def test_exact_recommended_tolerance_refines_mesh_under_wear():
 
 
 def test_refuses_wear_without_steady_motion():
+    """Wear is refused for a static patch and for a release, which has no steady motion."""
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
     release = (
         POINT
@@ -285,6 +293,7 @@ def test_refuses_wear_without_steady_motion():
 
 
 def test_always_unbounded_motion_has_no_wear():
+    """A motion that grows or leaves the contact has no wear, and a warning says so."""
     for contact, outcome in ((TILTED, "leaves_contact"), (POINT, "grows")):
         result = run_text(
             contact
@@ -302,10 +311,10 @@ def test_always_unbounded_motion_has_no_wear():
     "text",
     [
         TILTED + COULOMB + SINE + WEAR + "jumps = 3\n",
-        SOFT_RIG + WEAR + "jumps = 2\n" + LOOSE,
+        SOFT_RIG + WEAR + "jumps = 2\n" + LARGE_TOLERANCE,
         TILTED + COULOMB + SINE + WEAR,
-        SOFT_RIG + WEAR + LOOSE,
-        THIN_COAT + "jumps = 40\n",
+        SOFT_RIG + WEAR + LARGE_TOLERANCE,
+        WORN_THROUGH_SCENE + "jumps = 40\n",
     ],
     ids=["bench_jumps", "rig_jumps", "bench", "rig", "worn_through"],
 )
@@ -350,12 +359,12 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
 def test_exact_worn_through_coating_ends_run(wear_keys):
     """A run ends when the coating is worn through: the volume is that of the cycles so far, and the
     largest depth is the coating thickness of the piece that wears more."""
-    result = run_text(THIN_COAT + wear_keys)
+    result = run_text(WORN_THROUGH_SCENE + wear_keys)
     cycle = result.measures["worn_through_cycle"]
     coating = 6 * 25.4e-6
-    share = 0.8 if "share" in wear_keys else 0.5
+    wear_share = 0.8 if "share" in wear_keys else 0.5
     assert result.outcome == "worn_through" and 0 < cycle.value < 1e9
-    assert result.measures["worn_depth_max"].value * share == pytest.approx(coating, rel=1e-6)
+    assert result.measures["worn_depth_max"].value * wear_share == pytest.approx(coating, rel=1e-6)
     volume = result.measures["worn_volume"].value
     assert volume == pytest.approx(1e-13 * LOAD * 40e-6 * cycle.value, rel=1e-12)
     assert result.extra["wear"]["cycle"][-1] == cycle.value
@@ -364,19 +373,20 @@ def test_exact_worn_through_coating_ends_run(wear_keys):
             f"lower piece, {152.4:.4g} um, is worn through" in text
             for text in result.extra["notes"]
         )
-        or share == 0.5
+        or wear_share == 0.5
     )
     # The mean depth is the volume over the area; the tilt adds to the largest depth.
     mean_depth = volume / (12.7e-3) ** 2
     assert mean_depth < result.measures["worn_depth_max"].value < mean_depth + 0.1e-3 * 12.7e-3
     results = [
-        run_text(THIN_COAT.replace("1e9", repr(cycle.value + offset)) + wear_keys)
+        run_text(WORN_THROUGH_SCENE.replace("1e9", repr(cycle.value + offset)) + wear_keys)
         for offset in (-cycle.error, cycle.error)
     ]
     assert [result_.outcome == "worn_through" for result_ in results] == [False, True]
 
 
 def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
+    """An interrupted wear run is resumed only by the same scene."""
     scene = tmp_path / "worn.toml"
     save = evolve.save_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
@@ -402,6 +412,7 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     "quiet, state, n_messages", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)]
 )
 def test_exact_new_run_reports_discarded_state_once(tmp_path, quiet, state, n_messages):
+    """A new run reports once that it discards the saved state of an interrupted run."""
     scene = tmp_path / "plain.toml"
     scene.write_text(SINE + COULOMB + '[normal]\nload = "10 N"\n')
     (tmp_path / "out.partial").mkdir()
@@ -417,6 +428,7 @@ def test_exact_new_run_reports_discarded_state_once(tmp_path, quiet, state, n_me
 
 
 def test_refuses_to_resume_without_valid_state(tmp_path):
+    """Resuming is refused without a saved state, with a damaged one, and for a scene without wear."""
     scene = tmp_path / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
     answer = cli("run", scene, "-o", tmp_path / "out", "--resume")

@@ -17,8 +17,8 @@ ROLLED = STRIPS + 'roll = "0.1 mrad"\n'
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 135723\n'
-LOOSE = "[accuracy]\ntolerance = 1e-2\n"
-DRIVEN = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 60\n'
+LARGE_TOLERANCE = "[accuracy]\ntolerance = 1e-2\n"
+BASE_DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 60\n'
 LOAD, VOLUME = 26 * 4.4482216152605, 1e-14 * 26 * 4.4482216152605 * 40e-6 * 135723
 
 
@@ -33,8 +33,9 @@ def final_depth(result) -> np.ndarray:
 
 
 def test_exact_wear_of_level_strips_agrees_with_patch():
+    """Level strips have the worn depth and the measures of the single patch."""
     patch, strips = (
-        run_text(TILTED + table + COULOMB + SINE + WEAR + LOOSE) for table in ("", STRIPS)
+        run_text(TILTED + table + COULOMB + SINE + WEAR + LARGE_TOLERANCE) for table in ("", STRIPS)
     )
     assert final_depth(strips).shape == (4, final_depth(patch).size)
     assert np.abs(final_depth(strips) - final_depth(patch)).max() < 1e-13 * final_depth(patch).max()
@@ -43,8 +44,9 @@ def test_exact_wear_of_level_strips_agrees_with_patch():
 
 
 def test_exact_worn_depth_of_strips_mirrors_with_roll():
+    """Reversing the roll mirrors the worn depth over the width, and the volume is kappa N s n."""
     positive, negative = (
-        run_text(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LOOSE)
+        run_text(TILTED + ROLLED.replace("0.1", roll) + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
         for roll in ("0.1", "-0.1")
     )
     assert positive.measures["worn_volume"].value == pytest.approx(VOLUME, rel=1e-12)
@@ -91,16 +93,17 @@ def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
 
 @pytest.mark.parametrize("yaw", ["0", "20"])
 def test_exact_strips_of_rig_wear_by_their_own_slip(yaw):
+    """The worn volume of each strip follows from its own slip amplitude; with yaw, a note states the lateral motion."""
     mode = MODE + f'yaw = "{yaw} rad/m"\n'
     result = run_text(
         COATED
         + STRIPS
         + COULOMB
         + mode
-        + DRIVEN
+        + BASE_DRIVE
         + WEAR.replace("135723", "1e3")
         + "jumps = 1\n"
-        + LOOSE
+        + LARGE_TOLERANCE
     )
     slides = result.window.extra.get("slides")
     last = result.window.time >= result.window.time[-1] - (1 + 1e-9) / 143
@@ -127,8 +130,9 @@ def test_exact_strips_of_rig_wear_by_their_own_slip(yaw):
 
 
 def test_exact_files_contain_worn_depth_of_every_strip(tmp_path):
+    """The dataset and the field file contain the worn depth of every strip."""
     scene = tmp_path / "strips.toml"
-    scene.write_text(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE)
+    scene.write_text(TILTED + ROLLED + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
     assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
     with (
         xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data,
@@ -151,5 +155,6 @@ def test_exact_files_contain_worn_depth_of_every_strip(tmp_path):
 
 
 def test_refuses_wear_of_strips_with_shear():
-    sheared = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
+    """Wear of strips with [contact.shear] is refused."""
+    sheared = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + BASE_DRIVE + WEAR
     assert any("contact.strips with [contact.shear]" in line for line in mistakes(sheared))

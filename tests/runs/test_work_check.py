@@ -51,8 +51,8 @@ def test_order_of_work_check_of_march_is_two(law):
 
 @pytest.mark.parametrize("method, limit", [("exact", 1e-12), ("march", 3e-4), ("harmonic", 1e-12)])
 def test_exact_coulomb_work_check_closes_in_every_engine(method, limit):
-    """The samples at an event contain both sides of a jump of the force, and between events the
-    force of a slip is constant."""
+    """The work check closes with Coulomb's law in every engine: samples at events contain both
+    sides of a force jump, and the force is constant between events."""
     value, result = run_with_work_check(
         POINT + 'law = "coulomb"\n' + RIG, f"accuracy.method={method}"
     )
@@ -73,6 +73,7 @@ def test_exact_work_check_allows_force_drop_at_slip_start():
 
 
 def test_exact_work_check_of_two_interfaces_closes(monkeypatch):
+    """The work check of two interfaces together closes within 5e-4."""
     share_one_loop(monkeypatch)
     value, _ = run_with_work_check(PAIR, "accuracy.steps_per_cycle=800")
     assert 0 < value < 5e-4
@@ -87,6 +88,7 @@ def test_exact_work_check_of_two_interfaces_closes(monkeypatch):
     ],
 )
 def test_exact_remedy_of_failed_work_check_works(text):
+    """The warning about the work check names a number of steps with which the check closes."""
     value, result = run_with_work_check(text, "accuracy.steps_per_cycle=60")
     warnings = [line for line in result.warnings if line.startswith("work_check")]
     assert value > 1e-3 and len(warnings) == 1 and "limit 0.001" in warnings[0]

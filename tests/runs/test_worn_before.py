@@ -14,7 +14,7 @@ from patchfem.export import folder
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-HALF = "wear.cycles=1e6"
+HALF_CYCLES = "wear.cycles=1e6"
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def earlier_run_folder(tmp_path_factory):
     """Return a folder with the scene as a.toml and the results of its first 1e6 cycles in one/."""
     folder = tmp_path_factory.mktemp("before")
     (folder / "a.toml").write_text(SCENE)
-    run_in_folder(folder, HALF).save(folder / "one")
+    run_in_folder(folder, HALF_CYCLES).save(folder / "one")
     return folder
 
 
@@ -32,20 +32,22 @@ def run_in_folder(folder, *sets):
 
 
 def test_exact_two_half_runs_agree_with_closed_form(earlier_run_folder):
-    second = run_in_folder(earlier_run_folder, HALF, "wear.start=one/result.nc")
+    """Two successive runs of half of the cycles agree with the closed form of the whole, and errors add up."""
+    second = run_in_folder(earlier_run_folder, HALF_CYCLES, "wear.start=one/result.nc")
     depth = DEPTH * -np.expm1(-ALPHA * MU * LOAD / AREA * PATH * 2e6 / DEPTH)
     volume = second.measures["worn_volume"]
     scene = pf.load(earlier_run_folder / "a.toml")
     assert abs(volume.value - depth * AREA) <= volume.error < 1e-3 * volume.value
     assert abs(second.measures["static_coefficient"].value - MU * (1 - depth / DEPTH)) <= 1e-3 * MU
-    first = run_in_folder(earlier_run_folder, HALF).measures["worn_volume"]
+    first = run_in_folder(earlier_run_folder, HALF_CYCLES).measures["worn_volume"]
     assert volume.error > first.error and scene.wear.start is None
     assert second.extra["wear"]["worn_volume"][0] == pytest.approx(first.value, rel=1e-12, abs=0)
     np.testing.assert_array_equal(second.extra["wear"]["cycle"][[0, -1]], [0, 1e6])
 
 
 def test_exact_comparison_states_cycles_of_earlier_run(earlier_run_folder):
-    run_in_folder(earlier_run_folder, HALF, "wear.start=one/result.nc").save(
+    """The comparison of both runs states the wear cycles of the earlier run."""
+    run_in_folder(earlier_run_folder, HALF_CYCLES, "wear.start=one/result.nc").save(
         earlier_run_folder / "two"
     )
     comparison = pf.compare(earlier_run_folder / "one", earlier_run_folder / "two")
@@ -59,7 +61,7 @@ def test_exact_comparison_states_cycles_of_earlier_run(earlier_run_folder):
 def test_exact_volumes_of_successive_runs_add(earlier_run_folder):
     """With constant friction, V = kappa N s n: the volume of two successive runs with different
     amplitudes is the sum of separate runs within 1e-12; a note names the earlier run."""
-    archard = [HALF, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"]
+    archard = [HALF_CYCLES, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"]
     stroke = "slide.amplitude=5 um"
     first = run_in_folder(earlier_run_folder, *archard)
     second = run_in_folder(earlier_run_folder, *archard, stroke)
@@ -74,9 +76,9 @@ def test_exact_volumes_of_successive_runs_add(earlier_run_folder):
 def test_exact_run_continues_on_other_mesh(earlier_run_folder):
     """One whole run, and half of it continued on a finer mesh, differ by less than their errors."""
     sets = "contact.crown.radius=50 m", "contact.element_size=0.4 mm"
-    run_in_folder(earlier_run_folder, HALF, sets[0]).save(earlier_run_folder / "crown")
+    run_in_folder(earlier_run_folder, HALF_CYCLES, sets[0]).save(earlier_run_folder / "crown")
     continued = run_in_folder(
-        earlier_run_folder, HALF, *sets, "wear.start=crown/result.nc"
+        earlier_run_folder, HALF_CYCLES, *sets, "wear.start=crown/result.nc"
     ).measures
     whole = run_in_folder(earlier_run_folder, "wear.cycles=2e6", *sets).measures
     for name in ("worn_volume", "worn_depth_max", "static_coefficient"):
@@ -88,14 +90,15 @@ def test_exact_run_continues_on_other_mesh(earlier_run_folder):
 
 
 def test_exact_sweep_over_two_earlier_runs(earlier_run_folder):
+    """A sweep over two earlier runs agrees with single runs from each of them."""
     run_in_folder(earlier_run_folder, "wear.cycles=2e6").save(earlier_run_folder / "long")
     sweep = pf.sweep(
-        loads(SCENE, earlier_run_folder / "a.toml", [HALF]),
+        loads(SCENE, earlier_run_folder / "a.toml", [HALF_CYCLES]),
         {"wear.start": ["one/result.nc", "long/result.nc"]},
     )
     for value, file in zip(sweep["worn_volume"].values, ("one", "long")):
         single = (
-            run_in_folder(earlier_run_folder, HALF, f"wear.start={file}/result.nc")
+            run_in_folder(earlier_run_folder, HALF_CYCLES, f"wear.start={file}/result.nc")
             .measures["worn_volume"]
             .value
         )
@@ -115,6 +118,7 @@ def test_exact_sweep_over_two_earlier_runs(earlier_run_folder):
     ],
 )
 def test_refuses_worn_depth_of_other_pieces(earlier_run_folder, sets, message):
+    """A file that is not a wear result, or belongs to other pieces, is refused with the keys that differ."""
     if not (earlier_run_folder / "new.nc").exists():
         pf.run(loads(SCENE[: SCENE.index("[wear]")], earlier_run_folder / "a.toml")).save(
             earlier_run_folder / "new"
@@ -145,12 +149,13 @@ def test_refuses_worn_depth_of_other_profile(earlier_run_folder):
 
 
 def test_exact_missing_error_of_earlier_run_leaves_no_error(earlier_run_folder):
+    """If the earlier run has no error, the worn volume of the continued run has none."""
     folder.save_run(
-        run(loads(SCENE, earlier_run_folder / "a.toml", [HALF]), estimate=False),
+        run(loads(SCENE, earlier_run_folder / "a.toml", [HALF_CYCLES]), estimate=False),
         earlier_run_folder / "rough",
     )
     assert (
-        run_in_folder(earlier_run_folder, HALF, "wear.start=rough/result.nc")
+        run_in_folder(earlier_run_folder, HALF_CYCLES, "wear.start=rough/result.nc")
         .measures["worn_volume"]
         .error
         is None
@@ -158,10 +163,13 @@ def test_exact_missing_error_of_earlier_run_leaves_no_error(earlier_run_folder):
 
 
 def test_refuses_to_continue_with_worn_through_coating(earlier_run_folder):
+    """A run cannot continue from a run whose coating was worn through."""
     coat = (
         'substrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.5 um"\n'
     )
     coated = SCENE.replace('substrate = "Ti-8Al-1Mo-1V"\n', coat)
-    pf.run(loads(coated, earlier_run_folder / "a.toml", [HALF])).save(earlier_run_folder / "gone")
+    pf.run(loads(coated, earlier_run_folder / "a.toml", [HALF_CYCLES])).save(
+        earlier_run_folder / "gone"
+    )
     with pytest.raises(PatchfemError, match="the coating of the upper piece was worn through;"):
         pf.run(loads(coated, earlier_run_folder / "a.toml", ["wear.start=gone/result.nc"]))

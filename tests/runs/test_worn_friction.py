@@ -101,15 +101,16 @@ def test_always_wear_steps_resolve_rows_of_friction_table():
     moments = compute_wear(model, patch, (None, None)).moments
     assert max(item.values["static_coefficient"] for item in moments) > 1.4 * MU
     assert 1 / 1.5 < estimate_jumps(model) / (len(moments) - 1) < 1.5
-    few = run_scene(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
+    two_steps = run_scene(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
     assert [
         item
-        for item in few.warnings
+        for item in two_steps.warnings
         if "one jump of the wear passes 2 rows of the table wear.friction" in item
     ]
 
 
 def test_exact_bond_length_follows_worn_depth():
+    """The bond length follows the table over the worn depth, and the loop area is that of this bond length."""
     result = run_scene(
         "wear.form=archard",
         "friction.bond_length=4 um",
@@ -127,6 +128,7 @@ def test_exact_bond_length_follows_worn_depth():
 
 
 def test_always_wear_beyond_friction_table_gives_warning():
+    """Beyond the last depth of the table friction stays constant, and a warning says so."""
     result = run_scene(
         'wear.friction.depth=["0 um","1 um"]', "wear.friction.coefficient_factor=[1,0.9]"
     )
@@ -172,12 +174,14 @@ def test_always_wear_beyond_friction_table_gives_warning():
     ],
 )
 def test_refuses_faulty_friction_table(sets, message):
+    """A faulty table of friction over depth is refused with its key and cause."""
     with pytest.raises(SceneError) as error:
         loads(SCENE, "a.toml", sets)
     assert message in str(error.value)
 
 
 def test_refuses_friction_table_of_point_contact():
+    """Friction over the worn depth is refused for a point contact, which has no area."""
     text = '[normal]\nload = "100 N"\n' + SCENE[SCENE.index("[friction]") :]
     with pytest.raises(
         SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"
@@ -186,6 +190,7 @@ def test_refuses_friction_table_of_point_contact():
 
 
 def test_exact_sweep_over_friction_tables(tmp_path):
+    """A sweep can vary the table of friction over depth."""
     scene = tmp_path / "a.toml"
     scene.write_text(SCENE)
     answer = cli(

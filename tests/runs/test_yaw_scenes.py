@@ -76,6 +76,7 @@ def test_exact_yawing_strips_agree_between_engines(one_loop):
 
 
 def test_refuses_yaw_without_strips_or_with_bond_list():
+    """A yaw mode is refused without strips and with a law that needs a list of bonds."""
     text = TEXT.format(law="coulomb", keys="", yaw="30 rad/m", roll="0 rad", method="auto")
     assert any(
         "structure.mode.yaw.yaw" in line and "contact.strips" in line
@@ -91,7 +92,7 @@ def test_refuses_yaw_without_strips_or_with_bond_list():
     assert any("structure.mode.yaw.yaw" in line for line in mistakes(with_bond_list))
 
 
-SOFT = (
+SHEARED_TEXT = (
     PIECE
     + """\
 load = "26 lbf"
@@ -117,8 +118,8 @@ method = "{method}"
 """
 )
 STRIPS = '[contact.strips]\ncount = 4\nroll = "{}"\n'
-TURNS = '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.0\nyaw = "30 rad/m"\n'
-BEHIND = pytest.mark.parametrize(
+YAW_MODE = '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.0\nyaw = "30 rad/m"\n'
+FRICTION_LAWS = pytest.mark.parametrize(
     "law",
     ['"coulomb"', '"elastic-plastic"\nbond_length = "1 um"'],
     ids=["coulomb", "elastic-plastic"],
@@ -127,10 +128,12 @@ BEHIND = pytest.mark.parametrize(
 
 def run_sheared_strips(law, strips="", yaw="", method="march"):
     """Return the result of a patch with shear, with or without strips and a yaw mode."""
-    return run(load(SOFT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False)
+    return run(
+        load(SHEARED_TEXT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False
+    )
 
 
-@BEHIND
+@FRICTION_LAWS
 @pytest.mark.parametrize("method", ["march", "exact", "harmonic"])
 def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
     """With four strips, each is four times as compliant and carries a quarter of the load: the
@@ -138,7 +141,7 @@ def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
     patch_measures = run_sheared_strips(law, method=method).measures
     cases = [run_sheared_strips(law, STRIPS.format("0 rad"), method=method)]
     if method == "march":
-        cases.append(run_sheared_strips(law, STRIPS.format("0 rad"), TURNS))
+        cases.append(run_sheared_strips(law, STRIPS.format("0 rad"), YAW_MODE))
     for result in cases:
         for name in (
             "relative_displacement_amplitude",
@@ -154,13 +157,13 @@ def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
             ), name
 
 
-@BEHIND
+@FRICTION_LAWS
 @pytest.mark.parametrize("roll", ["0.01 mrad", "0.2 mrad"])
 def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law, roll, one_loop):
     """The friction force of each strip agrees with contact elements of the compliance 4 C_t
     computed here, under the displacement q - y yaw. The yaw moment is sum y f; at a roll of 0.2
     mrad some strips are open."""
-    result = run_sheared_strips(law, STRIPS.format(roll), TURNS)
+    result = run_sheared_strips(law, STRIPS.format(roll), YAW_MODE)
     extra = result.response.extra
     patch = result.patch
     response = result.response
@@ -228,13 +231,16 @@ def step_yielding_points(compliance, limit, length, slide):
 
 
 def test_refuses_unsupported_strips_with_shear():
+    """Strips with [contact.shear] are refused with nonlocal friction, kinetic friction or a holder spring."""
     for law, key in (
         ('"nonlocal"\nbond_length = "1 um"', "contact.strips"),
         ('"coulomb"\nkinetic = 0.2', "kinetic"),
     ):
-        text = SOFT.format(law=law, strips=STRIPS.format("0 rad"), yaw=TURNS, method="auto")
+        text = SHEARED_TEXT.format(
+            law=law, strips=STRIPS.format("0 rad"), yaw=YAW_MODE, method="auto"
+        )
         assert any(key in line for line in mistakes(text))
-    with_holder = SOFT.format(
+    with_holder = SHEARED_TEXT.format(
         law='"coulomb"',
         strips=STRIPS.format("0 rad") + '[contact.holder]\ntangential_stiffness = "5e6 N/m"\n',
         yaw="",

@@ -28,8 +28,8 @@ TEXTS = {
     "bench": PATCH + SHEAR + PLASTIC + SLIDE,
     "bench wear": PATCH + PLASTIC + SLIDE + WEAR,
 }
-# Relative tolerance of measures of the end pressure of uncoated pieces, a mean over one cell.
-ENDS = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
+# Relative tolerance of measures of the pressure at an end of uncoated pieces, a mean over one cell.
+END_TOLERANCES = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 
 
 def draw_models(kind: str, seed: int, count: int) -> list:
@@ -84,7 +84,7 @@ def assert_equal_to_single_runs(kind: str, seed: int, count: int) -> int:
         }
         for name, values in single.values.items():
             assert batch.reasons.get(name, {}).get(case) == single.reasons.get(name, {}).get(0)
-            tolerance = ENDS.get(name, 1e-12) * (abs(values[0]) + single.floors[name][0])
+            tolerance = END_TOLERANCES.get(name, 1e-12) * (abs(values[0]) + single.floors[name][0])
             for column, expected in (
                 (batch.values, values),
                 (batch.errors, single.errors[name]),
@@ -98,6 +98,7 @@ def assert_equal_to_single_runs(kind: str, seed: int, count: int) -> int:
 
 @pytest.mark.parametrize("kind", TEXTS)
 def test_exact_batch_agrees_with_single_runs(kind):
+    """A batch of each kind of run agrees with single runs of its cases."""
     assert assert_equal_to_single_runs(kind, 1, 2) == 2
 
 

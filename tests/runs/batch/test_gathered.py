@@ -13,9 +13,9 @@ from patchfem.runs.batch import batches, gathered, one_by_one
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
-FREE = COATED.replace('element_size = "0.5 mm"\n', "")
+FREE_MESH = COATED.replace('element_size = "0.5 mm"\n', "")
 SCENE = (
-    FREE
+    FREE_MESH
     + '[contact.tilt]\nangle = "0.02 mrad"\n'
     + SHEAR
     + BONDS
@@ -24,7 +24,8 @@ SCENE = (
     + DRIVE
     + "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 200\n"
 )
-NARROW = 0.1  # Fraction of the sum of both errors that a typical difference must not exceed.
+# Fraction of the sum of both errors that a typical difference must not exceed.
+TYPICAL_FRACTION = 0.1
 
 
 def draw_models(seed: int, count: int) -> list:
@@ -49,8 +50,8 @@ def draw_models(seed: int, count: int) -> list:
 
 
 def count_deviations(reduced, full) -> tuple:
-    """Return the number of values, of those that differ by more than NARROW times the sum of both
-    errors and floors, and of those that differ by more than the whole sum."""
+    """Return the number of values, of those that differ by more than TYPICAL_FRACTION times the sum
+    of both errors and floors, and of those that differ by more than the whole sum."""
     differences = []
     limits = []
     for name, column in reduced.values.items():
@@ -70,7 +71,7 @@ def count_deviations(reduced, full) -> tuple:
     limits = np.concatenate(limits)
     return (
         differences.size,
-        int((differences > NARROW * limits + 1e-300).sum()),
+        int((differences > TYPICAL_FRACTION * limits + 1e-300).sum()),
         int((differences > limits + 1e-300).sum()),
     )
 
@@ -101,8 +102,8 @@ def remove_error_sizes(warnings: dict) -> dict:
 def test_always_reduced_patches_agree_within_errors():
     """Measures of patches reduced to a few points agree with those of the full patches within the
     sum of both errors; at most 3 % differ by more than a tenth of this sum."""
-    count, above_tenth, outside = compare_with_single_runs(1, 2)
-    assert count > 40 and outside == 0 and above_tenth <= 0.03 * count
+    count, above_tenth, beyond_errors = compare_with_single_runs(1, 2)
+    assert count > 40 and beyond_errors == 0 and above_tenth <= 0.03 * count
 
 
 def test_always_measured_table_prevents_batch_only_if_unreadable(tmp_path):

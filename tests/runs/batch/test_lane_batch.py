@@ -23,7 +23,7 @@ from patchfem.runs.batch.lumped import (
 from patchfem.scene import format_assignments
 
 # Laws with an exact batch; other laws are compared with single runs.
-EXACT = ("coulomb", "weakening", "elastic-plastic", "iwan")
+LAWS_WITH_EXACT_BATCH = ("coulomb", "weakening", "elastic-plastic", "iwan")
 
 
 def draw_models(law: str, seed: int, count: int) -> list:
@@ -54,7 +54,9 @@ def assert_lanes_agree(law: str, seed: int, count: int, max_cases: int | None = 
     )
     in_lanes = in_lanes[:max_cases]
     compared = [cases[case] for case in in_lanes]
-    reference = solve_by_group(compared) if law in EXACT else one_by_one.solve(compared)
+    reference = (
+        solve_by_group(compared) if law in LAWS_WITH_EXACT_BATCH else one_by_one.solve(compared)
+    )
     lanes = results.select(np.array(in_lanes))
     assert (lanes.outcome == reference.outcome).all()
     assert np.mean([row.holds for compared in rows(lanes, reference) for row in compared]) >= 0.97
@@ -66,7 +68,8 @@ def assert_lanes_agree(law: str, seed: int, count: int, max_cases: int | None = 
 def test_always_97_of_100_measures_lie_within_both_errors(law):
     """At least 97 % of the measures of random cases in lanes agree with the exact engine within the
     sum of both errors."""
-    is_slow = law not in EXACT[:3]  # References for the Iwan law and single runs take seconds.
+    # References for the Iwan law and single runs take seconds.
+    is_slow = law not in LAWS_WITH_EXACT_BATCH[:3]
     assert_lanes_agree(law, 1, 64 if is_slow else 150, 20 if is_slow else None)
 
 
@@ -86,13 +89,13 @@ def test_exact_chunks_of_study_agree_with_whole():
     """The values of a case do not depend on the other cases of its chunk: chunks of 1, 29 and 50
     cases agree with the whole study to the last bit."""
     cases = draw_models("coulomb", 4, 80)
-    whole = batches.solve_models(cases)
+    whole_study = batches.solve_models(cases)
     parts = [batches.solve_models(part, study=80) for part in (cases[:1], cases[1:30], cases[30:])]
-    for name, values in whole.values.items():
-        joined = np.concatenate(
+    for name, values in whole_study.values.items():
+        concatenated = np.concatenate(
             [part.values.get(name, np.full(len(part), np.nan)) for part in parts]
         )
-        np.testing.assert_array_equal(joined, values)
+        np.testing.assert_array_equal(concatenated, values)
 
 
 def test_always_failed_lane_check_makes_batch_exact(monkeypatch):
@@ -143,7 +146,7 @@ def test_always_single_failed_lane_check_replaces_only_this_case(monkeypatch):
         np.testing.assert_array_equal(results.values[name][others], values[others])
 
 
-@pytest.mark.parametrize("law", EXACT[:3])
+@pytest.mark.parametrize("law", LAWS_WITH_EXACT_BATCH[:3])
 def test_exact_stuck_cases_in_lanes_agree_with_exact_batch(law):
     """Cases that end stuck, with free vibration, agree with the exact batch within the errors and
     have the same measures."""

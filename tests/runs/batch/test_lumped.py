@@ -69,6 +69,7 @@ def solve_by_group(cases) -> CaseResults:
 @pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
 @pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 20) for law in LAWS])
 def test_exact_batch_agrees_with_single_runs(law, count):
+    """The exact batch of lumped cases agrees with single runs in values, errors and texts."""
     cases = draw_models(law, 1, count)
     held_against(cases, one_by_one.solve(cases), solve_by_group(cases))
 

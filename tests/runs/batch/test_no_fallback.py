@@ -51,7 +51,7 @@ MODELS = {  # Name of the batch: function that builds its models.
     ),
 }
 # Batches that solve some of their cases with the exact engine.
-LANES = {"lumped.lanes", "lumped.tabled"}
+LANE_BATCHES = {"lumped.lanes", "lumped.tabled"}
 
 
 @pytest.fixture
@@ -71,6 +71,7 @@ def single_runs(monkeypatch) -> list:
 
 
 def test_exact_every_batch_has_models():
+    """Every batch of the program has models in this test."""
     assert [batch.name for batch in batches.BATCHES] == list(MODELS)
 
 
@@ -87,7 +88,7 @@ def test_always_batch_solves_its_cases_together(name, single_runs):
         assert all(plan.model.patch.solved is not None for plan in single_runs)
     else:
         assert len(single_runs) <= 0.25 * len(models)
-    if name in LANES:
+    if name in LANE_BATCHES:
         engines = [numerics["engine"] for numerics in results.numerics.values()]
         assert engines.count("lanes") > 0.7 * len(models)
     assert not results.messages
@@ -110,9 +111,8 @@ def test_always_batch_fault_is_noted_in_each_case(name, module, function, single
     fault."""
     models = MODELS[name]()
     monkeypatch.setattr(module, function, lambda *given, **options: 1 / 0)
-    monkeypatch.setattr(
-        one_by_one, "run", lambda plan, *given, **options: pf.run(BENCH)
-    )  # Any result will do: the test reads only the notes.
+    # Any result will do: the test reads only the notes.
+    monkeypatch.setattr(one_by_one, "run", lambda plan, *given, **options: pf.run(BENCH))
     results = batches.solve_models(models)
     for case in range(len(models)):
         assert f"{name}: ZeroDivisionError: division by zero" in results.notes[case][-1]

@@ -28,13 +28,14 @@ SKIN = (
 )
 CROWN = '[contact.crown]\nradius = "2 m"\n'
 HOLDER = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
-# Relative tolerance of the end pressure of uncoated pieces, a mean over a cell of 1 um (largest difference: 1.5e-12).
-PEAK = 1e-11
+# Relative tolerance of the end pressure of uncoated pieces, a mean over a cell of 1 um (largest
+# difference seen: 1.5e-12).
+PEAK_TOLERANCE = 1e-11
 # A given element size, so that no mesh is chosen automatically.
-PINNED = 'element_size = "0.2 mm"\n'
+FIXED_SIZE = 'element_size = "0.2 mm"\n'
 
 
-def build_family(tables, *values, loads=(100.0, 600.0), size=PINNED):
+def build_family(tables, *values, loads=(100.0, 600.0), size=FIXED_SIZE):
     """Return models on shared meshes for all values of the tables and all loads."""
     texts = [TEXT.format(size, load, tables.format(value)) for value in values for load in loads]
     return with_shared_meshes([build(scene.loads(text)) for text in texts])
@@ -60,7 +61,7 @@ def assert_equal_to_single_runs(models, solve_together=None):
         single.units,
     )
     for name, values in single.values.items():
-        tolerance = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
+        tolerance = PEAK_TOLERANCE if name in ("pressure_peak", "loaded_fraction") else 1e-12
         # Size of the terms whose difference is the value.
         size = np.abs(values) + single.floors[name]
         if name == "rotation":  # Difference of the approaches of both ends, divided by the length.
@@ -84,6 +85,7 @@ def assert_equal_to_single_runs(models, solve_together=None):
     ],
 )
 def test_exact_patches_pressed_together_agree_with_single_runs(tables, values):
+    """Patches with different tilts, skins, load lines or holders that are pressed together agree with single runs."""
     models = build_family(tables, *values)
     assert all(patches.refuses(model) == "" for model in models)
     assert all(
@@ -96,6 +98,7 @@ def test_exact_patches_pressed_together_agree_with_single_runs(tables, values):
 
 
 def test_exact_patches_on_automatic_mesh_agree_with_single_runs():
+    """Patches that are pressed together on a shared automatic mesh agree with single runs."""
     assert_equal_to_single_runs(build_family(TILT + SKIN, -1e-4, 1e-3, loads=(100.0,), size=""))
 
 
@@ -112,11 +115,11 @@ def test_exact_mixed_patches_agree_with_single_runs():
         (LINE.format(-2e-3), "pairs = 2\n"),
     ]
     texts = [
-        TEXT.format(PINNED + more, load, tables)
+        TEXT.format(FIXED_SIZE + more, load, tables)
         for tables, more in parts
         for load in (100.0, 600.0)
     ]
-    tall = TEXT.format(PINNED + "pairs = 2\n", 2e7, TILT.format(1e-3)).replace(
+    tall = TEXT.format(FIXED_SIZE + "pairs = 2\n", 2e7, TILT.format(1e-3)).replace(
         '"6.35 mm"', '"38.1 mm"'
     )
     texts += [text.replace("1e-2", "1e-5") for text in texts[:2]] + [
@@ -173,7 +176,7 @@ def test_exact_columns_of_sweep_agree_with_separate_models():
     """A sweep stored as one model with columns of numbers agrees with separate models of its cases
     within 1e-12."""
     values = [(-4.5, 2.0, 300.0), (-3.2, 0.4, 700.0), (-3.9, 20.0, 90.0)]
-    text = TEXT.format(PINNED, 100.0, TILT.format(1e-4) + CROWN)
+    text = TEXT.format(FIXED_SIZE, 100.0, TILT.format(1e-4) + CROWN)
     keys = {
         "contact.tilt.angle": [f"{10**a!r} rad" for a, _, _ in values],
         "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
@@ -202,7 +205,7 @@ def test_refuses_measured_profile_in_patch_batch(tmp_path):
     (tmp_path / "waves.csv").write_text(
         "x [mm],z [um]\n" + "".join(f"{0.1 * k},{k % 3}\n" for k in range(-70, 71))
     )
-    text = TEXT.format(PINNED, 100.0, '[contact.profile]\nfile = "waves.csv"\n')
+    text = TEXT.format(FIXED_SIZE, 100.0, '[contact.profile]\nfile = "waves.csv"\n')
     models = with_shared_meshes(
         [build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)]
     )

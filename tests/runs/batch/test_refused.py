@@ -40,7 +40,7 @@ def replace_in_rig(*pairs) -> str:
 
 
 # Absolute tolerance of measures that are differences of larger terms.
-LAST = {"acceleration_distortion": 1e-13, "drift_per_cycle": 1e-16}
+ABSOLUTE_TOLERANCES = {"acceleration_distortion": 1e-13, "drift_per_cycle": 1e-16}
 KINDS = {
     "wear": RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n',
     "two modes": POINT + COULOMB + MODE + SECOND + DRIVE,
@@ -69,14 +69,14 @@ KINDS = {
         ('law = "coulomb"', 'law = "convolution"\nbond_length = "1 um"')
     ),
 }
-MARCHED = {
+MARCHED_CASES = {
     "a load that varies": replace_in_rig(
         ('"26 lbf"\n', '"26 lbf"\namplitude = "10 N"\nfrequency = "50 Hz"\n')
     ),
     "a spring that stiffens": RIG + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n',
     "the march by name": RIG + '[accuracy]\nmethod = "march"\n',
 }
-ENDS = {  # Name: (replacements in the rig, outcome, whether the steady amplitude is estimated).
+OUTCOMES = {  # Name: (replacements in the rig, outcome, whether the steady amplitude is estimated).
     "grows": ((("0.003", "0"), ("26 lbf", "1 lbf")), "grows", False),
     "settles": (
         (("cycles = 20", "cycles = 60"), ("0.003", "0.01"), ("26 lbf", "12 lbf")),
@@ -116,7 +116,7 @@ def assert_equal_to_single_run(model):
     names = [name for name in single.values if single.has(name, 0)]
     assert {name for name in batch.values if batch.has(name, 0)} == set(names)
     for name in set(names) - {"energy_balance", "work_check"}:  # Both measures are round-off.
-        size = 1e-10 * abs(single.values[name][0]) + LAST.get(name, 0.0)
+        size = 1e-10 * abs(single.values[name][0]) + ABSOLUTE_TOLERANCES.get(name, 0.0)
         np.testing.assert_allclose(
             batch.values[name], single.values[name], rtol=0, atol=size, err_msg=name
         )
@@ -129,17 +129,20 @@ def assert_equal_to_single_run(model):
 @pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8, 10, 12, 14)
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_batch_agrees_with_single_run_for_every_kind(kind):
+    """Each kind of lumped case agrees with its single run, in a batch or not."""
     assert_equal_to_single_run(build(KINDS[kind]))
 
 
-@pytest.mark.parametrize("kind", MARCHED)
+@pytest.mark.parametrize("kind", MARCHED_CASES)
 def test_refuses_marched_cases_in_batches(kind):
-    assert batches.choose_batch(build(MARCHED[kind])) is None
+    """Cases that need a march have no batch."""
+    assert batches.choose_batch(build(MARCHED_CASES[kind])) is None
 
 
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("end", OUTCOMES)
 def test_exact_batch_outcomes_agree_with_single_runs(end):
-    pairs, outcome, estimated = ENDS[end]
+    """A batch gives the outcome of a single run, whether a motion grows, settles, beats, is steady or sticks."""
+    pairs, outcome, estimated = OUTCOMES[end]
     model = build(replace_in_rig(*pairs))
     results = assert_equal_to_single_run(model)
     assert batches.choose_batch(model) is not None and results.outcome[0] == outcome
@@ -147,10 +150,10 @@ def test_exact_batch_outcomes_agree_with_single_runs(end):
     assert bool(results.warnings) == (end == "remarked on")
 
 
-@pytest.mark.parametrize("end", ENDS)
+@pytest.mark.parametrize("end", OUTCOMES)
 def test_exact_elastic_plastic_outcomes_agree_with_single_runs(end):
     """The same cases with an elastic-plastic element have the outcomes of single runs."""
-    text = replace_in_rig(*ENDS[end][0])
+    text = replace_in_rig(*OUTCOMES[end][0])
     model = build(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"'))
     assert batches.choose_batch(model) is not None
     assert_equal_to_single_run(model)

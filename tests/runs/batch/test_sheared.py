@@ -64,4 +64,5 @@ def count_cases_solved_in_batch(law: str, seed: int, count: int) -> int:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_batch_of_patches_agrees_with_single_runs(law):
+    """A batch of six random patches agrees with single runs and solves at least three of them itself."""
     assert count_cases_solved_in_batch(law, 1, 6) >= 3

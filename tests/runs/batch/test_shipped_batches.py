@@ -18,9 +18,9 @@ from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one
 
 RIG = (Path(__file__).parents[3] / "studies/rig/rig.toml").read_text().split("[measured]")[0]
-CLOSE = "[accuracy]\ntolerance = 1e-3\n"
+SMALL_TOLERANCE = "[accuracy]\ntolerance = 1e-3\n"
 PIECES = RIG.split("[contact.shear]")[0]
-MOVED = (
+MOTION = (
     RIG[RIG.index("[structure]") : RIG.index('[[structure.mode]]\nname = "yaw"')]
     + RIG[RIG.index("[drive]") : RIG.index("[accuracy]")]
 )
@@ -28,10 +28,10 @@ SCENES = {
     "rig": RIG.replace("tolerance = 1e-2", "tolerance = 1e-3"),
     "jenkins": PIECES
     + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
-    + MOVED
-    + CLOSE,
-    "static": PIECES + CLOSE,
-    "crowned": PIECES + '[contact.crown]\nradius = "5 m"\n' + CLOSE,
+    + MOTION
+    + SMALL_TOLERANCE,
+    "static": PIECES + SMALL_TOLERANCE,
+    "crowned": PIECES + '[contact.crown]\nradius = "5 m"\n' + SMALL_TOLERANCE,
 }
 BATCHES = {"rig": "gathered", "jenkins": "lumped.tabled", "static": "patches", "crowned": "patches"}
 
@@ -68,8 +68,8 @@ def count_deviations(kind: str, seed: int, count: int) -> tuple:
     single = one_by_one.solve(cases)
     assert not batch.messages and not single.messages
     assert list(batch.outcome) == list(single.outcome)
-    compared = 0
-    outside = 0
+    n_compared = 0
+    n_outside = 0
     for name, column in batch.values.items():
         value = single.values[name]
         difference = np.abs(column - single.values[name])
@@ -82,12 +82,13 @@ def count_deviations(kind: str, seed: int, count: int) -> tuple:
             + batch.floors[name]
         )
         is_outside = (difference > limit) | (np.isnan(column) != np.isnan(value))
-        compared += int((~np.isnan(value)).sum())
-        outside += int(is_outside.sum())
-    return compared, outside
+        n_compared += int((~np.isnan(value)).sum())
+        n_outside += int(is_outside.sum())
+    return n_compared, n_outside
 
 
 @pytest.mark.parametrize(("kind", "count"), [("jenkins", 2), ("static", 5), ("crowned", 5)])
 def test_always_batch_agrees_with_single_runs_within_errors(kind, count):
-    compared, outside = count_deviations(kind, 11, count)
-    assert compared >= 10 * count and outside == 0
+    """All measures of a batch agree with single runs within the sum of both errors."""
+    n_compared, n_outside = count_deviations(kind, 11, count)
+    assert n_compared >= 10 * count and n_outside == 0

@@ -30,6 +30,7 @@ def compare_lanes_with_exact(family: str, seed: int, count: int) -> tuple:
 
 @pytest.mark.parametrize("family", ["tilt x friction"])
 def test_always_97_of_100_measures_lie_within_both_errors(family):
+    """At least 97 % of the measures of patches in lanes agree with the exact batch within the sum of both errors."""
     lanes, misses, count = compare_lanes_with_exact(family, 7, 6)
     assert sum(numerics["engine"] == "lanes" for numerics in lanes.numerics.values()) >= 4
     assert len(misses) <= 0.03 * count
