@@ -72,18 +72,18 @@ def test_exact_limit_cycle_of_two_modes_agrees_with_dop853():
     [cycle] = limit_cycles.find_relay_cycles(modes, modes.slide, 9.0, 10.0)
     start = reversal_state(modes, 9.0, np.pi / cycle.omega)
 
-    def stops(t, y):
+    def slide_speed(t, y):
         return y[2:] @ modes.slide
 
     # the velocity is negative, so that the slide stops when it rises through zero
-    stops.terminal = True
-    stops.direction = 1.0
+    slide_speed.terminal = True
+    slide_speed.direction = 1.0
     run = solve_ivp(
         lambda t, y: np.concatenate([y[2:], modal_accelerations(modes, y, -9.0)]),
         (0.0, 0.02),
         start,
         "DOP853",
-        events=[stops],
+        events=[slide_speed],
         rtol=1e-12,
         atol=1e-15,
     )
@@ -136,24 +136,24 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
         amplitude."""
         stretches = np.minimum(yield_slides, amplitude)
 
-        def along(t, y):
+        def state_derivative(t, y):
             elastic = (np.abs(y[2:]) < yield_slides) | (y[2:] * y[1] < 0)
             force = float(stiffness @ np.clip(y[2:], -yield_slides, yield_slides))
             return [y[1], *modal_accelerations(modes, y[:2], force), *(elastic * y[1])]
 
-        def stops(t, y):
+        def speed(t, y):
             return y[1]
 
-        stops.terminal, state, time = True, np.array([amplitude, 0.0, *stretches]), 0.0
+        speed.terminal, state, time = True, np.array([amplitude, 0.0, *stretches]), 0.0
         for direction in (1.0, -1.0):
-            stops.direction = direction
+            speed.direction = direction
             state[1] = -direction * 1e-12
             run = solve_ivp(
-                along,
+                state_derivative,
                 (time, time + 0.1),
                 state,
                 "DOP853",
-                events=[stops],
+                events=[speed],
                 rtol=1e-9,
                 atol=1e-13,
                 max_step=2e-5,

@@ -47,7 +47,7 @@ def integrate_step(modes, drive, start, state, force, dt):
     n = modes.omega.size
     d = modes.damping_matrix
 
-    def rate(t, y):
+    def state_derivative(t, y):
         z = y[:n]
         v = y[n : 2 * n]
         a = float(drive.values(np.array([start + t]))[0])
@@ -59,7 +59,9 @@ def integrate_step(modes, drive, start, state, force, dt):
             modes.mass * v @ d @ v,
         ]
 
-    solution = solve_ivp(rate, (0, dt), [*state, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18)
+    solution = solve_ivp(
+        state_derivative, (0, dt), [*state, 0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-18
+    )
     return solution.y[: 2 * n, -1], solution.y[2 * n, -1], solution.y[2 * n + 1, -1]
 
 

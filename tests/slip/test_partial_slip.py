@@ -216,7 +216,7 @@ def test_exact_initial_stroke_satisfies_ciavarella_jaeger_theorem(shape):
         assert force == pytest.approx(MU * (1 - load_fraction) * LOAD, rel=1e-10)
 
 
-# stiffness [N/m] of both complete bodies bonded over the contact, 200 cells, uncondensed
+# stiffness [N/m] of two complete bodies that are bonded over the contact, with 200 cells
 @pytest.mark.parametrize(
     "angle, bonded", [*zip(TILTS, (4.04955667e8, 4.04942844e8, 2.30395570e8, 1.22044346e8))]
 )

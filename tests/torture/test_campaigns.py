@@ -1,6 +1,6 @@
 """A small fraction of the trials of every campaign.
 
-All trials of a campaign run with `python tests/support/torture --campaign NAME --share 1`.
+`python tests/support/torture --campaign NAME --share 1` runs all trials of a campaign.
 """
 
 import os

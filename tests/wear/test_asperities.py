@@ -91,8 +91,8 @@ def test_always_anisotropy_agrees_with_independent_program(seeds):
     0.684 +- 0.019 after 6 um. The values here are relative to wear without a stroke, so that the
     scatter of few surfaces cancels."""
 
-    def band(*surfaces_):
-        return np.mean([anisotropy(z, STEP)["band"] for z in surfaces_])
+    def mean_anisotropy(*surfaces):
+        return np.mean([anisotropy(z, STEP)["band"] for z in surfaces])
 
     ratios = {0: [], 2: [], 4: []}
     for seed in range(seeds):
@@ -100,7 +100,9 @@ def test_always_anisotropy_agrees_with_independent_program(seeds):
         for stroke, rows in ratios.items():
             half = rub(*pair, STEP, stroke * STEP, 6 * UM, bite=0.02 * UM)
             end = rub(half.lower, half.upper, STEP, stroke * STEP, 6 * UM, bite=0.02 * UM)
-            rows.append((band(half.lower, half.upper), band(end.lower, end.upper)))
+            rows.append(
+                (mean_anisotropy(half.lower, half.upper), mean_anisotropy(end.lower, end.upper))
+            )
     without_stroke, short, long = (np.mean(rows, axis=0) for rows in ratios.values())
     assert without_stroke == pytest.approx(1, abs=0.05)
     assert short / without_stroke == pytest.approx([0.950, 0.849], abs=0.032)

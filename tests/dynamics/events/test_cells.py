@@ -52,6 +52,7 @@ def test_order_two_in_number_of_iwan_cells():
     stretches = np.linspace(0.3, 0.7, 2001) * yields.max()
 
     def force(elements):
+        """Return the force at all stretches in a first loading."""
         return np.minimum(stretches[:, None], elements.yield_displacement) @ elements.stiffness
 
     coarse_error, coarser_error = (np.abs(force(a) - force(fine)).mean() for a in (coarse, coarser))

@@ -220,12 +220,12 @@ def test_exact_tanh_law_on_grooves_agrees_with_dop853(lifted):
         100,
     )
 
-    def slopes(t, x):
+    def state_derivative(t, x):
         friction = case.static * np.tanh(np.hypot(1, flank(case, x[0])[0]) * x[1] / speed)
         return [x[1], forces(case, t, x[0], x[1], 1.0, friction)[0]]
 
     expected = solve_ivp(
-        slopes, (0, duration), [0.0, 0.0], "DOP853", rtol=1e-11, atol=[1e-16, 1e-13]
+        state_derivative, (0, duration), [0.0, 0.0], "DOP853", rtol=1e-11, atol=[1e-16, 1e-13]
     ).y[:, -1]
     assert result.response.slide[-1] == pytest.approx(expected[0], rel=1e-7)
     assert result.response.slide_rate[-1] == pytest.approx(expected[1], rel=1e-6)

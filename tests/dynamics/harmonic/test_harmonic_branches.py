@@ -60,10 +60,10 @@ def test_exact_continuation_follows_circle_through_fold():
 def test_exact_pitchfork_is_reported_as_crossing():
     """On x (p - 1/3 - x^2) = 0 along x = 0 the branch point at p = 1/3 is reported within 0.02."""
 
-    def fork(x, p):
+    def pitchfork(x, p):
         return x * (p - 1 / 3) - x**3, np.array([[p - 1 / 3 - 3 * x[0] ** 2]]), x
 
-    path = follow_curve(fork, [0.0], 0.0, (0.0, 1.0), True, PathSettings(0.02, 0.02, size=1.0))
+    path = follow_curve(pitchfork, [0.0], 0.0, (0.0, 1.0), True, PathSettings(0.02, 0.02, size=1.0))
     assert (
         path.ended == "end" and len(path.crossings) == 1 and abs(path.crossings[0] - 1 / 3) < 0.02
     )
@@ -86,11 +86,11 @@ def test_refuses_start_without_nearby_branch():
 def duffing_equation(drive, friction=0.0):
     """Return the right-hand side of the Duffing equation under a drive."""
 
-    def rhs(t, y):
+    def state_derivative(t, y):
         z, v = y
         return [v, -(W**2) * z - 0.006 * W * v - CUBIC / MASS * z**3 - drive.values(t)]
 
-    return rhs
+    return state_derivative
 
 
 def test_exact_branch_stability_agrees_with_time_integration():
@@ -216,16 +216,24 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
     p = find_point(modes, drive, bonds(limit, length), tolerance=1e-6)
     response = make_cycle_response(p, modes, drive, 4096)
 
-    def rhs(t, y):
+    def state_derivative(t, y):
         z, v, u = y
         return [v, -z - 0.1 * v - limit * u - np.sin(1.2 * t), (v - abs(v) * u) / length]
 
-    def end(state):
-        return solve_ivp(rhs, (0, drive.period), state, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
+    def integrate_period(state):
+        return solve_ivp(
+            state_derivative, (0, drive.period), state, "DOP853", rtol=1e-10, atol=1e-12
+        ).y[:, -1]
 
     start = np.array([response.modal[0, 0], response.modal_rate[0, 0], response.force[0] / limit])
-    assert end(start) == pytest.approx(start, abs=2e-5)
-    columns = np.stack([(end(start + d) - end(start - d)) / 2e-4 for d in 1e-4 * np.eye(3)], axis=1)
+    assert integrate_period(start) == pytest.approx(start, abs=2e-5)
+    columns = np.stack(
+        [
+            (integrate_period(start + d) - integrate_period(start - d)) / 2e-4
+            for d in 1e-4 * np.eye(3)
+        ],
+        axis=1,
+    )
     scale = np.array(
         [1.0, 1.2, 1 / length]
     )  # the matrix uses rates per radian and the stretch u length

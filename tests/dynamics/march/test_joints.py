@@ -192,7 +192,7 @@ def integrate_by_dop853(modes, drive, elements, duration, times):
     rows = np.array([row for row, _, _ in elements])
     k, limit = (np.array(part) for part in zip(*[(k, limit) for _, k, limit in elements]))
 
-    def rate_of(t, y):
+    def state_derivative(t, y):
         z = y[:n]
         v = y[n : 2 * n]
         s = y[2 * n :]
@@ -209,7 +209,7 @@ def integrate_by_dop853(modes, drive, elements, duration, times):
         ]
 
     solution = solve_ivp(
-        rate_of,
+        state_derivative,
         (0, duration),
         np.zeros(2 * n + len(elements)),
         "DOP853",

@@ -169,7 +169,7 @@ def test_order_two_against_integrated_rate_equations(growth):
     drive = 5 * 9.80665
     law = Bonds(0.4, length, **growth)
 
-    def rhs(t, y):
+    def state_derivative(t, y):
         q, v, z, eps = y
         grows = 0.0
         if growth:
@@ -185,7 +185,7 @@ def test_order_two_against_integrated_rate_equations(growth):
 
     times = np.arange(2 * 50 + 1) / 50 / 143
     reference = solve_ivp(
-        rhs,
+        state_derivative,
         (0, times[-1]),
         [0.0, 0.0, 0.0, length],
         method="LSODA",
