@@ -254,8 +254,8 @@ def test_exact_work_check_allows_force_jump_at_reversal():
     [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5), (-0.6, 0.0, 3e-6)],
 )
 def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
-    """The area and the tip of the loop agree within their errors with the closed form (Segalman
-    2005); the tip of the first loading is that of the loop."""
+    """The area and the peak force of the steady loop of the Iwan law agree within their errors with
+    the closed form (Segalman 2005)."""
     scene = loads(
         '[normal]\nload = "5 kN"\n[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "1e9 N/m"\n'
         f'chi = {chi}\nbeta = {beta}\n[slide]\nkind = "sine"\namplitude = "{amplitude!r} m"\n'

@@ -29,8 +29,8 @@ DWELL = '[slide]\nkind = "dwell"\nspeed = "1 mm/s"\ndistance = "40 um"\nhold = "
 
 
 def bond_lengths_at_rest(hold, scale=1.0):
-    """Return the bond lengths at the start and at the end of a rest (2.10 with v = 0): eps_0 -
-    (eps_0 - eps) exp(-a_s t/v_h)."""
+    """Return the bond lengths at the start and at the end of a rest, by equation 2.10 of the report
+    for v = 0: eps_0 - (eps_0 - eps) exp(-a_s t/v_h)."""
     sliding_length = steady_bond_length(SPEED, LENGTH * scale, RATIO, A_S, L_K * scale)
     return sliding_length, LENGTH * scale - (LENGTH * scale - sliding_length) * np.exp(
         -A_S * hold / FLOOR
@@ -38,8 +38,8 @@ def bond_lengths_at_rest(hold, scale=1.0):
 
 
 def friction_after_rest(hold, x, scale=1.0):
-    """Return F/(mu_s N) at x [m] after a rest, from an integration of dz/dx = 1 - z/eps with 2.10
-    along the path."""
+    """Return F/(mu_s N) at x [m] after a rest, from an integration of dz/dx = 1 - z/eps with the
+    bond length eps by equation 2.10."""
     sliding_length, start = bond_lengths_at_rest(hold, scale)
     rate = A_S / SPEED**2 + 1 / (L_K * scale)
     solution = solve_ivp(

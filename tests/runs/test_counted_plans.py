@@ -88,8 +88,8 @@ tolerance = 0.01
 
 
 def test_always_plan_estimates_bond_list_under_step_load():
-    """The plan estimates the strips of bonds of a block under a step load. The block hardly moves,
-    and each step adds a strip: 3800 strips were kept where 66 were estimated."""
+    """The plan estimates the number of strips of bonds of a block under a step load. The block
+    hardly moves and each step adds a strip; an earlier version estimated 66 of 3800 strips."""
     scene = load(STEP_LOAD.format(cycles=12))
     estimate = plan(scene).unknowns["bond_list_about"]
     counts = run(scene, estimate=False).extra["book"]

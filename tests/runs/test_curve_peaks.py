@@ -47,10 +47,10 @@ def draw_scene(seed: int) -> tuple:
         masses = ", ".join(f'"{mass * r.uniform(0.3, 2)!r} kg"' for _ in range(3))
         text = f"[structure]\nmasses = [{masses}]\n"
         for a, b in ((1, 2), (2, 3), (3, 0)):
-            stiff = k * r.uniform(0.5, 2)
+            spring = k * r.uniform(0.5, 2)
             text += (
-                f'[[structure.spring]]\nbetween = [{a}, {b}]\nstiffness = "{stiff!r} N/m"\n'
-                f'[[structure.damper]]\nbetween = [{a}, {b}]\ncoefficient = "{damping * stiff / (2 * frequency)!r} N s/m"\n'
+                f'[[structure.spring]]\nbetween = [{a}, {b}]\nstiffness = "{spring!r} N/m"\n'
+                f'[[structure.damper]]\nbetween = [{a}, {b}]\ncoefficient = "{damping * spring / (2 * frequency)!r} N s/m"\n'
             )
         text += (
             f'[[structure.interface]]\nbetween = [3, 0]\nlaw = "elastic-plastic"\nstatic = 0.3\n'
@@ -71,12 +71,12 @@ def draw_scene(seed: int) -> tuple:
             f"output = {1.0 if n == 0 else r.uniform(-1, 1)!r}\n" + "base = 1.0\n" * (n == 0)
         )
     if law != "none":
-        stiff = f'stiffness = "{limit / reach * draw_log_uniform(r, 1, 30)!r} N/m"\n'
+        spring = f'stiffness = "{limit / reach * draw_log_uniform(r, 1, 30)!r} N/m"\n'
         keys = {
             "coulomb": "",
             "elastic-plastic": f'bond_length = "{slips}"\n',
-            "bouc-wen": stiff,
-            "iwan": stiff + "chi = -0.5\nbeta = 0.5\n",
+            "bouc-wen": spring,
+            "iwan": spring + "chi = -0.5\nbeta = 0.5\n",
         }[law]
         text += (
             f'[normal]\nload = "{limit / 0.3!r} N"\n[friction]\nlaw = "{law}"\nstatic = 0.3\n{keys}'
@@ -110,9 +110,11 @@ def peak_of_sine_runs(run_sine, curve) -> float:
         curve.measures["peak_frequency"].value + np.linspace(-span, span, 9), f.min(), f.max()
     )
     k = int(np.argmin([height(x) for x in places]))
-    ends = places[max(k - 1, 0)], places[min(k + 1, 8)]
+    bounds = places[max(k - 1, 0)], places[min(k + 1, 8)]
     return float(
-        minimize_scalar(height, bounds=ends, method="bounded", options={"xatol": 1e-8 * ends[1]}).x
+        minimize_scalar(
+            height, bounds=bounds, method="bounded", options={"xatol": 1e-8 * bounds[1]}
+        ).x
     )
 
 
@@ -164,12 +166,12 @@ def test_exact_peak_of_stuck_damper_agrees_with_receptance():
     single_scene = text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
     measures = pf.run(single_scene, **{"structure.interface[1].load": "100 kN"}).measures
     mass = np.diag([0.15, 0.25])
-    damp = np.array([[2.0, -2], [-2, 12]])
-    stiff = np.array([[1e6, -1e6], [-1e6, 6e6 + 70e6]])
+    damping = np.array([[2.0, -2], [-2, 12]])
+    stiffness = np.array([[1e6, -1e6], [-1e6, 6e6 + 70e6]])
 
     def height(f):
         w = 2 * np.pi * f
-        return -20 * abs(np.linalg.inv(stiff - w**2 * mass + 1j * w * damp)[0, 0])
+        return -20 * abs(np.linalg.inv(stiffness - w**2 * mass + 1j * w * damping)[0, 0])
 
     reference = minimize_scalar(
         height, bounds=(405, 415), method="bounded", options={"xatol": 1e-10}
@@ -206,9 +208,9 @@ def run_to_steady_state(seed: int) -> tuple | None:
     "seeds", [(73_000_045,), (73_000_047,), tuple(range(73_000_000, 73_000_070))]
 )
 def test_always_steady_amplitude_agrees_with_harmonic_balance(seeds):
-    """The estimated steady amplitude of a run agrees with the harmonic balance within the errors.
-    Of 25 steady runs, 18 ended outside the error of their last window; of the 19 estimates, 18
-    agreed."""
+    """The estimated steady amplitude of a run agrees with the harmonic balance within the errors in
+    nine of ten random rigs. Of 25 steady runs, 18 had a last window outside its error; of their 19
+    estimates, 18 agreed."""
     is_covered = []
     for seed in seeds:
         if (

@@ -25,7 +25,7 @@ SLIDE = 2.5
 
 
 def format_rig(
-    law: str, method: str = "auto", slide: float = 1.0, more: str = "", drive: str = ""
+    law: str, method: str = "auto", slide: float = 1.0, second_mode: str = "", drive: str = ""
 ) -> str:
     """Return a rig of 2 kg with a mode of 120 Hz whose sliding component is `slide` per unit of its
     coordinate."""
@@ -44,7 +44,7 @@ frequency = "120 Hz"
 damping = 0.02
 slide = {slide}
 base = {1 / slide}
-{more}
+{second_mode}
 [drive]
 kind = "base"
 frequency = "110 Hz"
@@ -113,7 +113,7 @@ def test_exact_second_sliding_mode_gives_no_damping_ratio():
     value."""
     second_mode = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
     with_second_mode, with_first_mode = (
-        pf.run(load(format_rig("coulomb", slide=SLIDE, more=second_mode.format(slide))))
+        pf.run(load(format_rig("coulomb", slide=SLIDE, second_mode=second_mode.format(slide))))
         for slide in (2.5, 0.001)
     )
     contributions = with_second_mode.window.modal * with_second_mode.plan.model.rig.modes.slide

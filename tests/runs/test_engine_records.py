@@ -19,7 +19,7 @@ def test_always_every_engine_lists_supported_features():
 
 def list_motion_features():
     """Yield the features of motions for every law and every combination of effects."""
-    for law, soft, varies, yaws, spring, waveform in product(
+    for law, shear, varies, yaws, spring, waveform in product(
         LAWS,
         ("", "[contact.shear]"),
         ("", "with normal.amplitude"),
@@ -29,14 +29,18 @@ def list_motion_features():
     ):
         for count in (1, 2):
             yield MotionFeatures(
-                [Joint(Friction(law=law, static=0.3), soft)] * count, varies, yaws, spring, waveform
+                [Joint(Friction(law=law, static=0.3), shear)] * count,
+                varies,
+                yaws,
+                spring,
+                waveform,
             )
 
 
-def list_missing_features(m) -> list:
+def list_missing_features(motion) -> list:
     """Return the features of a motion that each engine of the method "exact" lacks."""
     return [
-        find_unsupported_feature(name, m)
+        find_unsupported_feature(name, motion)
         for name, engine in ENGINES.items()
         if engine.method == "exact"
     ]
@@ -45,7 +49,7 @@ def list_missing_features(m) -> list:
 def test_exact_march_supports_every_feature():
     """The march supports every combination; a varying load or a stiffening spring has no other
     engine."""
-    for m in list_motion_features():
-        assert find_unsupported_feature("march", m) == ""
-        if m.load_change or m.spring:
-            assert all([*list_missing_features(m), find_unsupported_feature("smooth", m)])
+    for motion in list_motion_features():
+        assert find_unsupported_feature("march", motion) == ""
+        if motion.load_change or motion.spring:
+            assert all([*list_missing_features(motion), find_unsupported_feature("smooth", motion)])

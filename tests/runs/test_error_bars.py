@@ -32,53 +32,55 @@ def draw_settings(seed: int, kind: str) -> list:
     stress and skin.
     """
     r = np.random.default_rng(seed)
-    out = []
+    options = []
 
     def draw_log_uniform(low, high):
         return 10 ** r.uniform(np.log10(low), np.log10(high))
 
-    out.append(f"contact.load={draw_log_uniform(1, 1e4):.6g} N")
+    options.append(f"contact.load={draw_log_uniform(1, 1e4):.6g} N")
     if coated := r.random() < 0.8:
-        out.append(f"contact.coating.thickness={draw_log_uniform(1e-5, 5e-4):.4g} m")
-        out.append(f"contact.coating.material={r.choice(['WC-Co', 'steel', 'WC-Co sintered'])}")
+        options.append(f"contact.coating.thickness={draw_log_uniform(1e-5, 5e-4):.4g} m")
+        options.append(f"contact.coating.material={r.choice(['WC-Co', 'steel', 'WC-Co sintered'])}")
     if tilted := r.random() < 0.6:
-        out.append(f"contact.tilt.angle={draw_log_uniform(1e-6, 3e-3):.4g} rad")
+        options.append(f"contact.tilt.angle={draw_log_uniform(1e-6, 3e-3):.4g} rad")
     draw = r.random()
     if draw < 0.4:
-        out.append(f"contact.crown.radius={draw_log_uniform(1e-2, 30):.4g} m")
+        options.append(f"contact.crown.radius={draw_log_uniform(1e-2, 30):.4g} m")
     elif draw < 0.55:
-        out += [
+        options += [
             f"contact.step.height={draw_log_uniform(1e-7, 1e-5):.3g} m",
             f"contact.step.at={r.uniform(-5, 5):.3g} mm",
         ]
     draw = r.random()
     if draw < 0.25:
-        out.append(f"contact.holder.rotational_stiffness={draw_log_uniform(1e2, 1e6):.3g} N m/rad")
+        options.append(
+            f"contact.holder.rotational_stiffness={draw_log_uniform(1e2, 1e6):.3g} N m/rad"
+        )
         if r.random() < 0.3:
-            out.append(f"contact.load_line.offset={r.uniform(-5, 5):.3g} mm")
+            options.append(f"contact.load_line.offset={r.uniform(-5, 5):.3g} mm")
     elif draw < 0.4 and not tilted:
-        out.append(f"contact.load_line.offset={r.uniform(-6, 6):.3g} mm")
+        options.append(f"contact.load_line.offset={r.uniform(-6, 6):.3g} mm")
     draw = r.random()
     if draw < 0.15:
-        out.append("contact.upper.coating=none" if coated else "contact.upper.substrate=steel")
+        options.append("contact.upper.coating=none" if coated else "contact.upper.substrate=steel")
     elif draw < 0.25:
-        out.append(f"contact.upper.height={draw_log_uniform(3e-3, 2e-2):.3g} m")
+        options.append(f"contact.upper.height={draw_log_uniform(3e-3, 2e-2):.3g} m")
     if r.random() < 0.3:
-        out.append("contact.plane=stress")
+        options.append("contact.plane=stress")
     draw = r.random()
     if draw < 0.15:
-        out += [
+        options += [
             "contact.asperities.law=linear",
             f"contact.asperities.normal_stiffness={draw_log_uniform(1e11, 1e15):.3g} Pa/m",
         ]
     elif draw < 0.3:
-        out += [
+        options += [
             "contact.asperities.law=exponential",
             f"contact.asperities.decay_length={draw_log_uniform(1e-8, 3e-6):.3g} m",
         ]
     if kind == "uniform":
-        out.append(f"contact.element_size={12.7 / r.integers(40, 130):.6g} mm")
-    return [*out, "accuracy.tolerance=1e-2"]
+        options.append(f"contact.element_size={12.7 / r.integers(40, 130):.6g} mm")
+    return [*options, "accuracy.tolerance=1e-2"]
 
 
 def compare_with_refined_meshes(seed: int, kind: str) -> dict:
@@ -156,7 +158,7 @@ def collect_campaign_rows(kind: str, first_seed: int, count: int) -> dict:
 @pytest.mark.parametrize("ratio", [4, 3, 2])
 def test_exact_limit_of_geometric_series(ratio):
     """The extrapolation of 1 + 1/r + 1/r^2 + ... gives r/(r - 1); the error of the finest value is
-    1.8 times what it lacks."""
+    1.8 times its distance from this limit."""
     sums = np.cumsum(ratio ** -np.arange(4.0))
     estimate = extrapolate(sums)
     limit = ratio / (ratio - 1)

@@ -84,9 +84,11 @@ WEAKENING_SCENE = {
 @pytest.mark.share(1)
 @pytest.mark.parametrize("ratio, grows", [(0.995, False), (1.005, True)])
 def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
-    """Under a velocity-weakening law, releases 0.5 % below the flutter amplitude decay, and those
-    0.5 % above it grow. Motions in micro-slip cannot be continued there. Den Hartog's balance gives
-    12.90 mm with the kinetic coefficient alone."""
+    """Under a velocity-weakening law, releases 0.5 % below the flutter amplitude decay, and those 0.5 % above it grow.
+
+    The flutter amplitude cannot be followed from micro-slip there. Den Hartog's balance with the
+    kinetic coefficient alone gives 12.90 mm.
+    """
     result = pf.run(WEAKENING_SCENE, **{"drive.displacement": ratio * 12.88e-3})
     final_amplitude = result.measures["relative_displacement_amplitude"].value
     flutter = result.measures["flutter_amplitude"]
@@ -104,22 +106,22 @@ SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "{} Hz"\ndamping = 0.
 
 @pytest.mark.filterwarnings("error")
 def test_exact_flutter_amplitude_with_two_modes():
-    """With a second mode, the free vibration of a stuck interface may gain energy, so the note
-    promises no rest. A rigid mode leaves no flutter amplitude and gives a reason."""
-    two, rigid = (
+    """With a second mode, the free vibration of a stuck interface may gain energy, so the note does
+    not predict rest. With a rigid mode, the flutter amplitude has no value and gives a reason."""
+    two_modes, with_rigid_mode = (
         format_scene(start=0.9 * FLUTTER_AMPLITUDE)
         .replace("[structure.start]\n", SECOND.format(frequency))
         .replace(' mm"]', ' mm", "0 mm"]')
         for frequency in (400, 0)
     )
-    result = pf.run(pf.load(two))
+    result = pf.run(pf.load(two_modes))
     flutter = result.measures["flutter_amplitude"]
     assert (
         flutter.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=0.1)
         and 0 < flutter.error < 1e-6 * flutter.value
     )
     assert "a free oscillation of smaller amplitude decays, and" in result.notes[-1]
-    flutter = pf.run(pf.load(rigid)).measures["flutter_amplitude"]
+    flutter = pf.run(pf.load(with_rigid_mode)).measures["flutter_amplitude"]
     assert flutter.value is None and "a mode of 0 Hz" in flutter.reason
 
 
@@ -161,7 +163,10 @@ def test_refuses_negative_damping_without_friction():
 def test_always_missing_flutter_amplitude_has_reason():
     """If the flutter amplitude cannot be computed, the measure states a reason."""
     small_release = format_scene(
-        law="nonlocal", more='bond_length = "20 um"\nreading = "report"', start=0.01, cycles=3
+        law="nonlocal",
+        more='bond_length = "20 um"\nreading = "report"',
+        start=0.01,
+        cycles=3,
     )
     flutter = pf.run(pf.load(small_release)).measures["flutter_amplitude"]
     assert flutter.value is None and flutter.reason

@@ -90,23 +90,29 @@ def test_always_plan_estimates_memory_of_histories(method, cycles):
         )
         for n in (1000.0, cycles)
     ]
-    few, many = (
+    short_plan, long_plan = (
         plan_text(text, f"accuracy.method={method}", f"drive.cycles={n}") for n in (1000.0, cycles)
     )
-    assert 0.4 < (many.bytes - few.bytes) / (peak_bytes[1] - peak_bytes[0]) < 2.5
-    assert any("drive.cycles sets their size" in text_line for text_line in many.verdict)
-    assert UPPER_LIMIT_NOTE in many.verdict
+    assert 0.4 < (long_plan.bytes - short_plan.bytes) / (peak_bytes[1] - peak_bytes[0]) < 2.5
+    assert any("drive.cycles sets their size" in text_line for text_line in long_plan.verdict)
+    assert UPPER_LIMIT_NOTE in long_plan.verdict
     assert UPPER_LIMIT_NOTE not in plan_text(text, "drive.cycles=50").verdict
 
 
 def test_exact_memory_estimate_scales_with_nodes_and_steps():
     """The estimated memory grows with the square of the number of nodes, and linearly with the
     steps of the stored cycles."""
-    few, many = (plan_text(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1))
-    assert 3.6 < many / few < 4.0
-    few, many = (plan_text(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4))
+    coarse_bytes, fine_bytes = (
+        plan_text(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1)
+    )
+    assert 3.6 < fine_bytes / coarse_bytes < 4.0
+    coarse_bytes, fine_bytes = (
+        plan_text(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4)
+    )
     # Of 30 cycles, the last 3 are stored.
-    assert many - few == pytest.approx(costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01)
+    assert fine_bytes - coarse_bytes == pytest.approx(
+        costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01
+    )
 
 
 def test_refuses_extremely_long_run_with_key():

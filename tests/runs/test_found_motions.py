@@ -14,7 +14,8 @@ from patchfem.core import Measure, Outcome, SineDrive
 from patchfem.response import judge_outcome, settling
 
 FOUND = Path(__file__).parent / "found"
-# Scene, measure, reference (DOP853 between reversals at 3e-14, or a march with 4000 steps per cycle), its digits.
+# Scene, measure, reference and its uncertainty; the references are from DOP853 between reversals
+# (tolerance 3e-14) or from a march of 4000 steps per cycle.
 REFERENCES = (
     ("peak_bouc_wen_53", "friction_force_peak", 20.594500409, 3e-8),
     ("peak_bouc_wen_53", "absolute_acceleration_peak", 217.5187442529, 1e-8),

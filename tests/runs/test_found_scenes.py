@@ -57,8 +57,8 @@ def test_exact_random_scene_agrees_with_independent_program(
         settings["tolerance"] = 1e-6
     result = run(written(settings, tmp_path)).measures[measure]
     assert abs(result.value - reference) <= result.error + round_off
-    # Steps that meet the tolerance leave 1 % of the floor; an event adds 1e-7 and 1e-4 of its
-    # floor.
+    # The error of converged steps is at most 1 % of the floor. Measures of an event may have a
+    # relative error of 1e-7, and 1e-4 of their floor.
     assert result.error <= 1e-6 * abs(result.value) + 0.0101 * result.floor
 
 

@@ -115,10 +115,14 @@ def test_exact_rig_on_grooves_slips_with_kinetic_coefficient():
         RIG,
         **{"friction.kinetic": "0.3", "normal.grooves.amplitude": "1e-11 um", "drive.cycles": "10"},
     )
-    plain = run_with_keys(remove_grooves(RIG), **{"friction.kinetic": "0.3", "drive.cycles": "10"})
-    assert grooved.extra["engine"] == "march" and plain.extra["engine"] != "march"
+    ungrooved = run_with_keys(
+        remove_grooves(RIG), **{"friction.kinetic": "0.3", "drive.cycles": "10"}
+    )
+    assert grooved.extra["engine"] == "march" and ungrooved.extra["engine"] != "march"
     for name in ("friction_work", "loop_area", "relative_displacement_amplitude"):
-        assert measure_value(grooved, name) == pytest.approx(measure_value(plain, name), rel=1e-5)
+        assert measure_value(grooved, name) == pytest.approx(
+            measure_value(ungrooved, name), rel=1e-5
+        )
 
 
 def test_exact_tanh_loop_on_grooves_agrees_with_limits():
@@ -186,9 +190,9 @@ def test_exact_rigid_patch_on_grooves_agrees_with_point():
 def test_exact_grooves_of_zero_amplitude_change_nothing(text):
     """Grooves of amplitude 0 give the numbers of the scene without grooves."""
     grooved = run_with_keys(text, **{"normal.grooves.amplitude": "0 um"})
-    plain = run_with_keys(remove_grooves(text))
+    ungrooved = run_with_keys(remove_grooves(text))
     assert {name: measure.value for name, measure in grooved.measures.items()} == {
-        name: measure.value for name, measure in plain.measures.items()
+        name: measure.value for name, measure in ungrooved.measures.items()
     }
 
 
@@ -206,7 +210,7 @@ def test_refuses_normal_motion_with_grooves():
 
 
 @pytest.mark.parametrize(
-    ("text", "sets", "key", "words"),
+    ("text", "sets", "key", "message"),
     [
         (
             BENCH,
@@ -254,11 +258,11 @@ def test_refuses_normal_motion_with_grooves():
         (BENCH, ["normal.grooves.amplitude=-1 um"], "normal.grooves.amplitude", ""),
     ],
 )
-def test_refuses_keys_incompatible_with_grooves(text, sets, key, words):
+def test_refuses_keys_incompatible_with_grooves(text, sets, key, message):
     """Keys that are not supported with grooves are refused with a message that names them."""
     with pytest.raises(SceneError) as error:
         loads(text, sets=sets)
-    assert any(f" {key}: " in line and words in line for line in error.value.mistakes), (
+    assert any(f" {key}: " in line and message in line for line in error.value.mistakes), (
         error.value.mistakes
     )
 

@@ -142,8 +142,8 @@ SHEARED_PIECES = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
     ],
 )
 def test_exact_wear_of_sheared_patch_agrees_with_friction_work(text, keys):
-    """The sum of the wear of all points is kappa times the friction work (form 'energy') or this
-    over mu, and the grooves lose their share of it."""
+    """The wear of all points adds up to kappa times the friction work (form 'energy'), or to this
+    divided by mu (form 'archard'); half of the volume is taken from each piece."""
     for form, divisor in (("archard", MU), ("energy", 1.0)):
         result = run_with_keys(
             SHEARED_PIECES + text,
@@ -167,10 +167,10 @@ def test_exact_wear_on_flat_grooves_agrees_with_contact_elements():
     grooved = run_with_keys(
         SHEARED_PIECES + SLIDE, False, **keys, **{"contact.grooves.amplitude": "1e-11 um"}
     )
-    plain = run_with_keys(
+    ungrooved = run_with_keys(
         SHEARED_PIECES + SLIDE, False, **keys, **{"contact.grooves.amplitude": "0 um"}
     )
-    np.testing.assert_allclose(grooved.patch.unloaded_gap, plain.patch.unloaded_gap, rtol=2e-3)
+    np.testing.assert_allclose(grooved.patch.unloaded_gap, ungrooved.patch.unloaded_gap, rtol=2e-3)
     slip_paths = grooved.patch.unloaded_gap / grooved.patch.pressure.sigma_n
     assert np.ptp(slip_paths) > 0.05 * slip_paths.mean()
 

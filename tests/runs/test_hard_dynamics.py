@@ -17,18 +17,18 @@ OMEGA = 2 * pi * 100  # Angular frequency [rad/s] of the mode of 1 kg.
 LOAD = 100.0
 
 
-def format_rig(friction, drive, damping=0.003, frequency=100.0, more="", law="coulomb"):
+def format_rig(friction, drive, damping=0.003, frequency=100.0, extra_keys="", law="coulomb"):
     """Return a scene of one mode of 1 kg under 100 N with the given keys of [friction] and [drive]."""
     return f"""\
 [structure]
 moving_mass = "1 kg"
-{more if more.startswith("travel") else ""}
+{extra_keys if extra_keys.startswith("travel") else ""}
 [[structure.mode]]
 name = "axial"
 frequency = "{frequency} Hz"
 damping = {damping}
 slide = 1.0
-{more if not more.startswith("travel") else ""}
+{extra_keys if not extra_keys.startswith("travel") else ""}
 [normal]
 load = "{LOAD} N"
 [friction]
@@ -77,14 +77,19 @@ def assert_energy_balance(result, bound):
 SECOND = '[[structure.mode]]\nname = "other"\nfrequency = "271 Hz"\ndamping = 0.01\nslide = 0.0\nbase = 0.0\n'
 
 
-@pytest.mark.parametrize("more", ["", SECOND], ids=["one mode", "general"])
-@pytest.mark.parametrize("power", range(4, 11))
-def test_exact_first_slip_near_friction_limit(power, more):
-    """Just above the onset the first slip is 9/2 (1 - D)^2 a/omega^2, up to terms of relative order
-    1 - D and round-off over 1 - D."""
-    excess = 10.0**-power
+@pytest.mark.parametrize("second_mode", ["", SECOND], ids=["one mode", "general"])
+@pytest.mark.parametrize("exponent", range(4, 11))
+def test_exact_first_slip_near_friction_limit(exponent, second_mode):
+    """For a friction limit of D times the peak drive force, with D just below 1, the first slip is
+    9/2 (1 - D)^2 a/omega^2, up to terms of relative order 1 - D and round-off over 1 - D."""
+    excess = 10.0**-exponent
     result = run_text(
-        format_rig("static = 0.3", format_base_drive(30.0 / (1 - excess), 0.5), 0.0, more=more),
+        format_rig(
+            "static = 0.3",
+            format_base_drive(30.0 / (1 - excess), 0.5),
+            0.0,
+            extra_keys=second_mode,
+        ),
         estimate=False,
     )
     expected = 4.5 * excess**2 * 30.0 / OMEGA**2
@@ -114,23 +119,24 @@ def amplitude_with_two_stops(d):
     return brentq(residual, grid[k], grid[k + 1], xtol=1e-15)
 
 
-def solve_sliding_phase(begin, x, d):
-    """Return the functions x(t) and x'(t) of x'' + x = sin t - d from (x, 0) at the time `begin`."""
-    c = x + d + begin * cos(begin) / 2
-    s = cos(begin) / 2 - begin * sin(begin) / 2
+def solve_sliding_phase(start, x, d):
+    """Return the functions x(t) and x'(t) of x'' + x = sin t - d from (x, 0) at the time `start`."""
+    c = x + d + start * cos(start) / 2
+    s = cos(start) / 2 - start * sin(start) / 2
 
     def displacement(t):
-        return -d - t * cos(t) / 2 + c * cos(t - begin) + s * sin(t - begin)
+        return -d - t * cos(t) / 2 + c * cos(t - start) + s * sin(t - start)
 
     def velocity(t):
-        return -cos(t) / 2 + t * sin(t) / 2 - c * sin(t - begin) + s * cos(t - begin)
+        return -cos(t) / 2 + t * sin(t) / 2 - c * sin(t - start) + s * cos(t - start)
 
     return displacement, velocity
 
 
 def test_exact_amplitude_above_resonance_threshold():
-    """At D = pi/4 + 1e-3 without damping, the amplitude is bounded and agrees with the half-period
-    solution; at D = 0.8 this solution is the printed 0.299431041748427515."""
+    """For a friction limit of D = pi/4 + 1e-3 times the peak drive force, without damping, the
+    amplitude at resonance is bounded and agrees with the half-period solution; at D = 0.8 this
+    solution is the printed 0.299431041748427515."""
     assert amplitude_with_two_stops(0.8) == pytest.approx(0.299431041748427515, abs=1e-13)
     d = pi / 4 + 1e-3
     expected = amplitude_with_two_stops(d)
@@ -153,7 +159,8 @@ def test_exact_amplitude_above_resonance_threshold():
 
 
 def test_exact_growth_below_resonance_threshold():
-    """At D = pi/4 - 1e-3 without damping, the amplitude grows by (pi - 4 D) a/omega^2 per cycle."""
+    """For a friction limit of D = pi/4 - 1e-3 times the peak drive force, without damping, the
+    amplitude at resonance grows by (pi - 4 D) a/omega^2 per cycle."""
     d = pi / 4 - 1e-3
     short_run, long_run = (
         run_text(format_rig("static = 0.3", format_base_drive(30.0 / d, n), 0.0))
@@ -177,13 +184,22 @@ def test_exact_free_block_on_table_agrees_with_closed_form():
         0.0,
         0.0,
     )
-    begin = asin(d)
-    end = brentq(lambda t: cos(begin) - cos(t) - d * (t - begin), begin + 0.1, begin + pi)
-    slip = cos(begin) * (end - begin) - sin(end) + sin(begin) - d * (end - begin) ** 2 / 2
+    slip_start = asin(d)
+    slip_end = brentq(
+        lambda t: cos(slip_start) - cos(t) - d * (t - slip_start), slip_start + 0.1, slip_start + pi
+    )
+    slip = (
+        cos(slip_start) * (slip_end - slip_start)
+        - sin(slip_end)
+        + sin(slip_start)
+        - d * (slip_end - slip_start) ** 2 / 2
+    )
     exact = run_text(text)
     assert exact.plan.model.rig.structure.frequencies.tolist() == [0]
     assert measure_value(exact) == pytest.approx(slip / 2 * (30 / d) / w**2, rel=1e-11)
-    assert measure_value(exact, "stick_fraction") == pytest.approx(1 - (end - begin) / pi, rel=1e-9)
+    assert measure_value(exact, "stick_fraction") == pytest.approx(
+        1 - (slip_end - slip_start) / pi, rel=1e-9
+    )
     assert abs(measure_value(exact, "drift_per_cycle")) <= 1e-12 * measure_value(exact)
     assert_energy_balance(exact, 1e-10)
     marched = run_text(text, "accuracy.method=march")
@@ -259,16 +275,17 @@ def test_exact_phase_after_many_cycles(cycles):
 
 
 def test_exact_static_above_kinetic_has_two_steady_states():
-    """At 135/143 of the natural frequency with static friction of 7 and kinetic friction of 4 over
-    a drive of 6, the mass stays at rest, or moves with the amplitude 4.83011 a/omega^2."""
+    """Under 60 m/s^2 at 135/143 of the natural frequency, a mass of 1 kg with 70 N of static and 40
+    N of kinetic friction stays at rest or moves with the amplitude 4.83011 a/omega^2, depending on
+    its start."""
     text = format_rig("static = 0.7\nkinetic = 0.4", format_base_drive(60.0, 400, 135 / 143))
-    rest = run_text(text)
+    at_rest = run_text(text)
     moving = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}')
-    assert rest.outcome == "stuck" and measure_value(rest) == 0.0
+    assert at_rest.outcome == "stuck" and measure_value(at_rest) == 0.0
     assert moving.outcome == "steady"
     # The printed value is relative to omega_n^2.
     assert measure_value(moving) == pytest.approx(4.83011 * 60.0 / OMEGA**2, rel=1e-5)
-    for result in (rest, moving):
+    for result in (at_rest, moving):
         assert_energy_balance(result, 1e-10)
     marched = run_text(text, 'structure.start={velocity = ["0.5 m/s"]}', "accuracy.method=march")
     assert_within_error(marched, "relative_displacement_amplitude", measure_value(moving))
@@ -327,7 +344,7 @@ def test_refuses_start_beyond_travel():
     text = format_rig(
         "static = 0.05",
         'kind = "free"\ndisplacement = "0.5 mm"\ncycles = 10',
-        more='travel = "0.4 mm"',
+        extra_keys='travel = "0.4 mm"',
     )
     for method in ("exact", "march"):
         with pytest.raises(

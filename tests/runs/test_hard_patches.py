@@ -147,8 +147,8 @@ def test_exact_soft_thin_coating_agrees_with_winkler_foundation():
     nu = 0.3
     thick = 50e-6
     radius = 1.0
-    stiff = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thick / 2
-    half = (3 * LOAD / WIDTH * radius / (2 * stiff)) ** (1 / 3)
+    foundation_stiffness = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thick / 2
+    half = (3 * LOAD / WIDTH * radius / (2 * foundation_stiffness)) ** (1 / 3)
     result = run_and_check(
         "contact.crown.radius=1 m",
         "contact.element_size=0.1 mm",
@@ -156,7 +156,7 @@ def test_exact_soft_thin_coating_agrees_with_winkler_foundation():
     )
     assert half / thick > 20 and half < 0.45 * SIZE
     assert measure_value(result, "pressure_peak") == pytest.approx(
-        stiff * half**2 / (2 * radius), rel=0.02
+        foundation_stiffness * half**2 / (2 * radius), rel=0.02
     )
     assert measure_value(result, "contact_half_width") == pytest.approx(half, abs=0.1e-3)
     assert error_covers(result, "contact_half_width", half)
@@ -202,7 +202,7 @@ def test_exact_patch_test_with_elongated_elements():
 
 @pytest.mark.parametrize("fraction", [0.499, -0.499])
 def test_exact_load_near_edge_is_carried_at_edge(fraction):
-    """A load line close to an edge is carried by at most two nodes at this edge, and the piece rotates towards it."""
+    """A load close to an edge is carried by at most two nodes at this edge, and the piece rotates towards it."""
     result = run_and_check(f"contact.load_line.offset={fraction * SIZE} m", COARSE)
     assert measure_value(result, "pressure_centre") == pytest.approx(fraction * SIZE, rel=1e-9)
     assert np.sign(measure_value(result, "rotation")) == -np.sign(fraction)

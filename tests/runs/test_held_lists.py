@@ -142,8 +142,8 @@ MAX_PUSH = 0.662 * 54.08 / 0.5617 / 0.8 / 2
     ],
 )
 def test_exact_report_law_sticks_up_to_half_friction_limit(text, is_stuck):
-    """The plan predicts a block that sticks on growing bonds up to half of the friction limit, only
-    with the law of the report."""
+    """Only with the law of the report, the plan predicts that a block sticks on a growing list of
+    bonds, up to half of the friction limit."""
     assert any(GROWTH_SENTENCE in sentence for sentence in plan(text).verdict) is is_stuck
 
 
@@ -178,7 +178,7 @@ def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     """The computing time grows with the square of the number of cycles. The run is stopped early,
     with an estimate of its time."""
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
-    begin = process_time()
+    start = process_time()
     assert GROWTH_SENTENCE in str(plan(scene))
     monkeypatch.setattr(lists, "MAX_LIST_SECONDS", 3.0)
     with pytest.raises(
@@ -188,4 +188,4 @@ def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     ) as error:
         run(scene, estimate=False)
     assert float(re.search(r"about (\d+) s", str(error.value))[1]) >= 3
-    assert process_time() - begin < 30
+    assert process_time() - start < 30

@@ -42,11 +42,11 @@ def test_exact_holder_limits_are_free_and_clamped():
     spring = '[contact.holder]\nrotational_stiffness = "{} N m/rad"\n'
     free = solve_patch(tables=load_line)[1]
     clamped = solve_patch(tables=tilt)[1]
-    soft = solve_patch(tables=load_line + spring.format("1e-6"))[1]
-    stiff = solve_patch(tables=tilt + spring.format("1e13"))[1]
+    soft_holder = solve_patch(tables=load_line + spring.format("1e-6"))[1]
+    stiff_holder = solve_patch(tables=tilt + spring.format("1e13"))[1]
     for name in ("contact_fraction", "rotation", "moment", "approach", "pressure_peak"):
-        assert soft[name] == pytest.approx(free[name], rel=1e-8)
-        assert stiff[name] == pytest.approx(clamped[name], rel=1e-6)
+        assert soft_holder[name] == pytest.approx(free[name], rel=1e-8)
+        assert stiff_holder[name] == pytest.approx(clamped[name], rel=1e-6)
 
 
 @given(st.floats(0, 8), st.floats(-2e-4, 2e-4), st.floats(-5e-3, 5e-3))

@@ -20,20 +20,20 @@ STIFF_LAW = 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "50 nm"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "240 Hz"\nacceleration = "8 g"\ncycles = 40\n'
 
 
-def format_contact(table: str, load: float, radius: float, more: str = "") -> str:
+def format_contact(table: str, load: float, radius: float, keys: str = "") -> str:
     """Return the tables of a crowned patch with shear."""
     return (
         f'[{table}]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "8 mm"\nload = "{load} N"\nsubstrate = "steel"\n'
-        f'{more}[{table}.crown]\nradius = "{radius} m"\n[{table}.shear]\n'
+        f'{keys}[{table}.crown]\nradius = "{radius} m"\n[{table}.shear]\n'
     )
 
 
 def format_interface(
-    between: str, load: float, radius: float, law: str = LAW, more: str = ""
+    between: str, load: float, radius: float, law: str = LAW, keys: str = ""
 ) -> str:
     """Return an interface with a patch."""
     return f"[[structure.interface]]\nbetween = {between}\n{law}" + format_contact(
-        "structure.interface.contact", load, radius, more
+        "structure.interface.contact", load, radius, keys
     )
 
 
@@ -90,17 +90,17 @@ def test_exact_single_interface_agrees_with_contact_rig(law, method):
         if expected.value is None:
             assert actual.value is None
             continue
-        size = max(abs(expected.value), expected.error or 0.0, expected.floor)
-        assert actual.value == pytest.approx(expected.value, abs=1e-9 * size), name
+        magnitude = max(abs(expected.value), expected.error or 0.0, expected.floor)
+        assert actual.value == pytest.approx(expected.value, abs=1e-9 * magnitude), name
         assert (actual.error or 0.0) == pytest.approx(
-            expected.error or 0.0, rel=1e-6, abs=1e-9 * size
+            expected.error or 0.0, rel=1e-6, abs=1e-9 * magnitude
         ), name
     if method != "march":  # A march stores only the fields of the pressed state.
         fields = interface.extra["faces"][0].fields
         for name in ("time", "normal_stress", "shear_stress", "slip", "status"):
-            size = np.abs(rig.fields[name]).max()
+            magnitude = np.abs(rig.fields[name]).max()
             np.testing.assert_allclose(
-                fields[name], rig.fields[name], atol=1e-9 * size, err_msg=name
+                fields[name], rig.fields[name], atol=1e-9 * magnitude, err_msg=name
             )
     slip_amplitude = interface.measures["slip_amplitude"]
     assert slip_amplitude.value > 100 * slip_amplitude.error > 0
@@ -291,9 +291,8 @@ def test_always_errors_cover_finer_meshes(chain_result):
 
 
 def test_exact_patch_with_point_interface_and_without_load():
-    """A second interface without load changes nothing, as a patch or as a point. With a rigid
-    point, the march replaces the exact engine of contact elements and agrees with a very stiff
-    point."""
+    """A second interface without load changes nothing, whether it is a patch or a point. With a
+    rigid point the march is chosen, and it agrees with the exact engine for a very stiff point."""
     point = f'[[structure.interface]]\nbetween = [2, 1]\n{LAW}load = "0 N"\n'
     head = (
         format_masses(2)
@@ -324,17 +323,18 @@ def test_exact_patch_with_point_interface_and_without_load():
 def test_exact_contact_elements_of_strips_agree_with_patch():
     """The contact elements of three strips of equal pressure carry the force of the whole patch."""
     strips = "[structure.interface.contact.strips]\ncount = 3\n"
-    strip_interface, whole = (
+    strip_interface, patch_interface = (
         pf.build(
-            pf.load(SINGLE_INTERFACE.replace("[drive]", more + "[drive]"))
+            pf.load(SINGLE_INTERFACE.replace("[drive]", table + "[drive]"))
         ).rig.friction.interfaces[0]
-        for more in (strips, "")
+        for table in (strips, "")
     )
     for slide in (2e-8, 1e-7, 1e-6):
         force = [
             float(k @ np.minimum(slide, limits))
             for k, limits, _ in (
-                faces.make_elements(interface, 1e-3) for interface in (strip_interface, whole)
+                faces.make_elements(interface, 1e-3)
+                for interface in (strip_interface, patch_interface)
             )
         ]
         assert force[0] == pytest.approx(force[1], rel=1e-3)

@@ -118,15 +118,15 @@ def run_scene(tmp_path_factory):
     base = tmp_path_factory.mktemp("interfaces")
     results = {}
 
-    def run_once(text, *words):
-        if (text, words) not in results:
+    def run_once(text, *arguments):
+        if (text, arguments) not in results:
             path = base / f"scene{len(results)}.toml"
             path.write_text(text, "utf-8")
-            answer = cli("run", path, "-o", base / path.stem, "--json", *words)
+            answer = cli("run", path, "-o", base / path.stem, "--json", *arguments)
             assert answer.code == 0, answer.err
             with xr.open_dataset(base / path.stem / "result.nc") as data:
-                results[text, words] = json.loads(answer.out), data.load()
-        return results[text, words]
+                results[text, arguments] = json.loads(answer.out), data.load()
+        return results[text, arguments]
 
     return run_once
 
@@ -161,11 +161,11 @@ def test_exact_figure_16_of_the_report(run_scene):
 @pytest.mark.parametrize("method", ["exact", "march"])
 def test_exact_two_equal_masses_agree_with_single_mass(run_scene, method):
     """Two equal masses with equal interfaces move as a single mass: measures, histories and events agree."""
-    words = ("--set", f"accuracy.method={method}")
+    arguments = ("--set", f"accuracy.method={method}")
     if method == "march":
-        words += ("--set", "accuracy.steps_per_cycle=400")
-    pair, data = run_scene(SIDE_BY_SIDE + DRIVE, *words)
-    single, single_data = run_scene(SINGLE_MASS + DRIVE, *words)
+        arguments += ("--set", "accuracy.steps_per_cycle=400")
+    pair, data = run_scene(SIDE_BY_SIDE + DRIVE, *arguments)
+    single, single_data = run_scene(SINGLE_MASS + DRIVE, *arguments)
     for name in ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area"):
         expected = single["measures"][name]
         first = pair["measures"][name]
@@ -194,8 +194,8 @@ def test_exact_slip_of_second_interface_alone_is_not_stuck():
     """With a hundred times the normal load the first interface sticks and only the second slips;
     the outcome is not `stuck`, in both engines."""
     text = CHAIN.replace('"0.5 N"', '"50 N"')
-    for words in ((), ("accuracy.method=march",)):
-        result = run(loads(text, sets=["drive.cycles=20", *words]), estimate=False)
+    for settings in ((), ("accuracy.method=march",)):
+        result = run(loads(text, sets=["drive.cycles=20", *settings]), estimate=False)
         assert result.outcome != "stuck" and result.measures["slip_amplitude"].value < 1e-12
         assert result.measures["slip_amplitude_2"].value > 0.01
         assert result.measures["stick_fraction"].value == pytest.approx(1)

@@ -67,14 +67,14 @@ def run_case(tmp_path_factory):
 
     def run_once(engine, drive):
         if (engine, drive) not in results:
-            words = []
+            settings = []
             if engine.startswith("march"):
-                words = ["accuracy.method=march"]
+                settings = ["accuracy.method=march"]
             path = folder / "scene.toml"
             path.write_text(ENGINES[engine] + DRIVES[drive], "utf-8")
             from patchfem.scene import load
 
-            scene = load(path, words)
+            scene = load(path, settings)
             results[engine, drive] = scene, run(scene, estimate=False)
         return results[engine, drive]
 
@@ -95,10 +95,10 @@ def test_always_last_two_cycles_have_hundred_samples_each(run_case, engine, driv
     end = result.window.time[-1]
     assert np.all(np.diff(r.time) > 0) and r.time[0] == 0 and r.time[-1] == end
     assert r.time.size >= 100
-    begin = max(0.0, end - 2 * sine.period)
-    last_times = r.time[r.time >= begin * (1 - 1e-9)]
-    assert last_times.size >= 100 * (end - begin) / sine.period
-    assert last_times[0] - begin < 1e-6 * sine.period and np.diff(
+    start = max(0.0, end - 2 * sine.period)
+    last_times = r.time[r.time >= start * (1 - 1e-9)]
+    assert last_times.size >= 100 * (end - start) / sine.period
+    assert last_times[0] - start < 1e-6 * sine.period and np.diff(
         last_times
     ).max() <= sine.period / 100 * (1 + 1e-6)
 
@@ -172,19 +172,21 @@ def test_exact_short_history_has_measures_of_full_history(text):
     """
     model = build(loads(text))
     numerics = replace(choose_numerics(model), engine="march", steps=100)
-    full, short = (
+    full_run, short_run = (
         run_march(model, replace(numerics, whole=is_whole), None) for is_whole in (True, False)
     )
     sums = {
-        name: full.values[name]
+        name: full_run.values[name]
         for name in ("friction_work", "energy_dissipated", "energy_balance", "work_check")
     }
-    assert {name: short.values[name] for name in sums} == pytest.approx(sums, rel=1e-13, abs=1e-13)
-    assert short.values | sums == full.values and short.outcome == full.outcome
+    assert {name: short_run.values[name] for name in sums} == pytest.approx(
+        sums, rel=1e-13, abs=1e-13
+    )
+    assert short_run.values | sums == full_run.values and short_run.outcome == full_run.outcome
     for name in ("time", "output", "force", "slip"):
-        assert np.array_equal(getattr(short.window, name), getattr(full.window, name)), name
-    assert np.array_equal(short.amplitudes[-1:], full.amplitudes[-1:])
-    count = short.response.time.size
-    assert count < full.response.time.size and np.array_equal(
-        short.response.output, full.response.output[-count:]
+        assert np.array_equal(getattr(short_run.window, name), getattr(full_run.window, name)), name
+    assert np.array_equal(short_run.amplitudes[-1:], full_run.amplitudes[-1:])
+    count = short_run.response.time.size
+    assert count < full_run.response.time.size and np.array_equal(
+        short_run.response.output, full_run.response.output[-count:]
     )

@@ -55,8 +55,8 @@ def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_pat
     """A mesh whose face `lower_far` is fixed on 2 of its 16 edges (1.6 of 12.8 mm) gives a note, in
     three file formats."""
     m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
-    far = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
-    removed = far[np.argsort(m.points[m.edges[far], 0].mean(axis=1))][n_fixed:]
+    fixed_edges = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
+    removed = fixed_edges[np.argsort(m.points[m.edges[fixed_edges], 0].mean(axis=1))][n_fixed:]
     m.edges, m.edge_tags = np.delete(m.edges, removed, axis=0), np.delete(m.edge_tags, removed)
     approaches = []
     for form in ("gmsh 2.2 binary", "vtu", "inp lines"):
@@ -152,7 +152,7 @@ def test_exact_lateral_slide_beyond_width_leaves_contact(tmp_path):
 
 @pytest.mark.share(1, 2)
 @pytest.mark.parametrize(
-    "law, more, engine",
+    "law, accuracy, engine",
     [
         (COULOMB, "", "exact"),
         (COULOMB, '[accuracy]\nmethod = "march"\nsteps_per_cycle = 100\n', "march"),
@@ -160,17 +160,17 @@ def test_exact_lateral_slide_beyond_width_leaves_contact(tmp_path):
         (COULOMB, '[accuracy]\nmethod = "harmonic"\n', "harmonic"),
     ],
 )
-def test_exact_motion_beyond_piece_leaves_contact_in_every_engine(law, more, engine):
+def test_exact_motion_beyond_piece_leaves_contact_in_every_engine(law, accuracy, engine):
     """A drive of 60 g moves the block by 48 mm on a piece of 12.7 mm; the outcome is
     `leaves_contact`, also if only the second of three levels is so large."""
     sine = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "60 g"\ncycles = 30\n'
-    result = run_text(COATED + law + MODE + sine + more, False)
+    result = run_text(COATED + law + MODE + sine + accuracy, False)
     assert result.extra["engine"] == engine and result.outcome == "leaves_contact"
     if engine != "harmonic":
         steps = sine.replace(
             'acceleration = "60 g"', 'waveform = "levels"\nlevels = ["5 g", "60 g", "5 g"]'
         )
-        assert run_text(COATED + law + MODE + steps + more, False).outcome == "leaves_contact"
+        assert run_text(COATED + law + MODE + steps + accuracy, False).outcome == "leaves_contact"
 
 
 # ---- approaches that no load reaches
@@ -220,7 +220,7 @@ def test_refuses_approach_within_jump_between_contact_nodes():
 
 
 @pytest.mark.parametrize(
-    "tilt, more",
+    "tilt, shape",
     [
         (10, ""),
         (1, ""),
@@ -229,12 +229,12 @@ def test_refuses_approach_within_jump_between_contact_nodes():
         (1, '[contact.step]\nheight = "1 um"\nat = "0 mm"\n'),
     ],
 )
-def test_always_plan_predicts_full_contact_correctly(tilt, more):
+def test_always_plan_predicts_full_contact_correctly(tilt, shape):
     """The plan predicts full contact only where the run finds it. At 10 urad, bars would touch
     everywhere, but elastic pieces touch on 94 % of the length."""
     text = (
         COATED.replace('element_size = "0.5 mm"\n', "")
-        + f'[contact.tilt]\nangle = "{tilt} urad"\n{more}'
+        + f'[contact.tilt]\nangle = "{tilt} urad"\n{shape}'
     )
     scene = loads(text, "a.toml", ["accuracy.tolerance=1e-2"])
     is_full = any(text.endswith("the pieces touch everywhere") for text in plan(scene).verdict)

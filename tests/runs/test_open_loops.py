@@ -29,13 +29,13 @@ def run_with_loop_warnings(law: str, cycles) -> tuple:
 
 def test_exact_warning_names_cycles_until_loop_is_steady():
     """The warning about an open loop states the steady loop area and the number of cycles that reach it."""
-    first, warnings = run_with_loop_warnings(BOUC_WEN, 1)
-    second, no_warnings = run_with_loop_warnings(BOUC_WEN, 2)
-    third, _ = run_with_loop_warnings(BOUC_WEN, 3)
+    one_cycle, warnings = run_with_loop_warnings(BOUC_WEN, 1)
+    two_cycles, no_warnings = run_with_loop_warnings(BOUC_WEN, 2)
+    three_cycles, _ = run_with_loop_warnings(BOUC_WEN, 3)
     assert len(warnings) == 1 and warnings[0].endswith("set slide.cycles = 2") and not no_warnings
-    steady = third.measures["loop_area"].value
-    assert second.measures["loop_area"].value == pytest.approx(steady, rel=1e-3)
-    assert abs(first.measures["loop_area"].value - steady) > 0.03 * steady
+    steady = three_cycles.measures["loop_area"].value
+    assert two_cycles.measures["loop_area"].value == pytest.approx(steady, rel=1e-3)
+    assert abs(one_cycle.measures["loop_area"].value - steady) > 0.03 * steady
     assert f"{1e6 * steady:.4g} uJ" in warnings[0]
 
 

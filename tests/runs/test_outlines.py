@@ -61,8 +61,8 @@ def graded_columns(place: float, half: float, smallest: float, growth: float = 1
 
 
 def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
-    """Return the patch solved on columns x of its interface with rows graded alike and every cell
-    halved repeatedly."""
+    """Return the patch solved on columns x of its interface, with rows graded alike and every
+    element halved `halvings` times."""
     pieces = (
         (patch.pieces.lower,)
         if patch.pieces.are_alike
@@ -278,7 +278,7 @@ def test_refuses_profile_shorter_than_interface(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "more, planned, notes",
+    "table, planned, notes",
     [
         (
             "",
@@ -293,8 +293,8 @@ def test_refuses_profile_shorter_than_interface(tmp_path):
         ),
     ],
 )
-def test_always_plan_and_result_name_assembly_of_stiffness(more, planned, notes):
+def test_always_plan_and_result_name_assembly_of_stiffness(table, planned, notes):
     """The plan and the notes of the result name the same assembly of the stiffness."""
-    scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")
+    scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + table, "scene.toml")
     assert [text for text in pf.plan(scene).verdict if "assemble" in text] == [planned]
     assert [text for text in pf.run(scene).notes if "assemble" in text] == notes

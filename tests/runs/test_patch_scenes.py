@@ -272,11 +272,11 @@ def test_exact_unlike_meshes_transfer_load_to_both_pieces(tmp_path):
             TILT.format(1e-4), write_pair_mesh(tmp_path, coarse, fine), path=tmp_path / "scene.toml"
         )
     ).patch
-    low, high = make_piece_meshes(model)
-    patch = solve(model, low, high)
-    assert patch.pair.joint is not None and (low.x.size, high.x.size) == (61, 97)
+    lower, upper = make_piece_meshes(model)
+    patch = solve(model, lower, upper)
+    assert patch.pair.joint is not None and (lower.x.size, upper.x.size) == (61, 97)
     forces = patch.pair.forces(patch.pressure.sigma_n * patch.pieces.interface.weight)
-    for body, force in zip((low, high), forces):
+    for body, force in zip((lower, upper), forces):
         assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
         assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
     like_meshes = values(
@@ -309,16 +309,16 @@ def test_refuses_mesh_with_other_dimensions_than_scene(tmp_path):
     ):
         run(faulty_scene)
     faulty_scene.path.write_text(faulty_scene.text, "utf-8")
-    for words in (
+    for command in (
         ["plan", faulty_scene.path, "--probe"],
         ["mesh", faulty_scene.path, "-o", tmp_path / "other.msh"],
         ["cost", faulty_scene.path, "--over", "element_size", "-q"],
     ):
-        message = cli(*words).err
+        message = cli(*command).err
         assert (
             f"{faulty_scene.path}:4: contact.height: 0.009 m" in message
             and message.count("scene.toml") == 1
-        ), words
+        ), command
 
 
 def test_exact_rounded_mesh_agrees_with_crown(tmp_path):

@@ -43,7 +43,7 @@ def list_differences(exact, march, *ignored):
     # The exact engine estimates it from its events; samples cannot.
     steady = {"relative_displacement_amplitude_steady"}
     assert set(exact.measures) - steady == set(march.measures) - steady
-    out = []
+    differences = []
     for name, march_measure in march.measures.items():
         exact_measure = exact.measures.get(name, march_measure)
         if (
@@ -56,8 +56,10 @@ def list_differences(exact, march, *ignored):
             abs(exact_measure.value - march_measure.value)
             > 1.5 * (march_measure.error or 0.0) + exact_measure.error + march_measure.floor
         ):
-            out.append((name, exact_measure.value, march_measure.value, march_measure.error))
-    return out if len(out) > 1 else []
+            differences.append(
+                (name, exact_measure.value, march_measure.value, march_measure.error)
+            )
+    return differences if len(differences) > 1 else []
 
 
 @pytest.mark.share(1, 3)
@@ -108,9 +110,9 @@ def test_exact_two_interfaces_agree_with_march(monkeypatch):
 
 
 def test_exact_errors_of_levels_include_mesh_error():
-    """The errors of the first level are those of a run at its force alone within a factor of 4,
-    those of the last level are those of the run. The onset levels of two meshes agree within their
-    errors.
+    """The errors of a drive level of a patch include the error of the mesh: at the first level they
+    agree within a factor of 4 with those of a single run, and at the last level with those of the
+    final measures. The onset levels of two meshes agree within their errors.
 
     The errors were 1e-9 of the values in an earlier version.
     """
@@ -121,18 +123,21 @@ def test_exact_errors_of_levels_include_mesh_error():
         + KILOGRAM
         + '[drive]\nkind = "force"\nfrequency = "90 Hz"\ncycles = 10\n'
     )
-    alone = pf.run(text + 'force = "600 N"\n[accuracy]\ntolerance = 1e-2').measures
+    single_force = pf.run(text + 'force = "600 N"\n[accuracy]\ntolerance = 1e-2').measures
     levels = (
         text
         + 'waveform = "levels"\nonset = "slip"\nlevels = ["600 N", "1200 N"]\n[accuracy]\ntolerance = '
     )
     coarse, fine = (pf.run(levels + tolerance) for tolerance in ("1e-2", "1e-3"))
-    first, last = coarse.extra["levels"]
-    for name, value in last.values.items():
-        assert last.errors[name] == pytest.approx(
+    first_level, last_level = coarse.extra["levels"]
+    for name, value in last_level.values.items():
+        assert last_level.errors[name] == pytest.approx(
             coarse.measures[name].error, rel=1e-6, abs=3e-9 * abs(value)
         ), name
-    assert all(1 / 4 < first.errors[name] / alone[name].error < 4 for name in first.values)
+    assert all(
+        1 / 4 < first_level.errors[name] / single_force[name].error < 4
+        for name in first_level.values
+    )
     a, b = (result.measures["onset_level"] for result in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
     assert any(
@@ -176,11 +181,11 @@ def test_always_automatic_method_chooses_cheaper_engine():
 
 def test_refuses_exact_run_with_unlimited_cost():
     """An exact run with too many events is refused; the message advises the march only if this is cheaper."""
-    stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
+    text = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
     pattern = r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"
     with pytest.raises(pf.Missing, match=pattern) as error:
-        pf.run(stiff)
-    march = pf.plan(stiff, **{"accuracy.method": "march"}).seconds
+        pf.run(text)
+    march = pf.plan(text, **{"accuracy.method": "march"}).seconds
     seconds = float(str(error.value).partition("computing time of about ")[2].split(" s")[0])
     assert ("accuracy.method" in str(error.value)) == (march < seconds)
 

@@ -66,14 +66,14 @@ def test_exact_plane_motion_along_line_agrees_with_line_engine(tmp_path):
     """A motion along one direction gives the same measures with the engine of one direction and
     with that of the plane, in any rotated frame."""
     results = {}
-    for name, turn, lateral in (
+    for name, angle, lateral in (
         ("line", 0.0, ""),
         ("plane", 0.0, LATERAL),
         ("turned", ROTATION, LATERAL),
     ):
-        write_matrices(tmp_path, name, turn)
+        write_matrices(tmp_path, name, angle)
         results[name] = run_scene(tmp_path, name, NODES.format(name=name, lateral=lateral))
-    line, plane, turned = results.values()
+    line, plane, rotated = results.values()
     assert line.measures.slip_amplitude.value > 1e-4
     assert line.extra["engine"] == plane.extra["engine"] == "march"
     for name, measure in line.measures.items():
@@ -92,17 +92,17 @@ def test_exact_plane_motion_along_line_agrees_with_line_engine(tmp_path):
         "friction_work",
         "energy_dissipated",
     ):
-        assert turned.measures[name].value == pytest.approx(line.measures[name].value, rel=1e-9), (
+        assert rotated.measures[name].value == pytest.approx(line.measures[name].value, rel=1e-9), (
             name
         )
-        assert turned.measures[name].error == pytest.approx(
+        assert rotated.measures[name].error == pytest.approx(
             line.measures[name].error, rel=1e-3, abs=1e-9 * line.measures[name].value
         ), name
-    r = turned.response
+    r = rotated.response
     np.testing.assert_allclose(
         r.extra["lateral_forces"], -np.tan(ROTATION) * r.extra["forces"], atol=1e-9 * 20
     )
-    assert "defined only for one direction" in turned.measures.equivalent_stiffness.reason
+    assert "defined only for one direction" in rotated.measures.equivalent_stiffness.reason
 
 
 @pytest.mark.share(0, 2)
@@ -110,8 +110,8 @@ def test_exact_elliptic_motion_does_not_depend_on_frame(tmp_path):
     """An elliptic motion, which arises because the structure is softer along y, has the same
     measures in a rotated frame."""
     results = []
-    for name, turn in (("plane", 0.0), ("turned", ROTATION)):
-        write_matrices(tmp_path, name, turn, 0.7)
+    for name, angle in (("plane", 0.0), ("turned", ROTATION)):
+        write_matrices(tmp_path, name, angle, 0.7)
         npz = dict(np.load(tmp_path / f"{name}.npz"))
         rotation = np.eye(4)
         # The force on the first node acts along neither axis.
@@ -121,8 +121,10 @@ def test_exact_elliptic_motion_does_not_depend_on_frame(tmp_path):
             **{key: rotation @ matrix @ rotation.T for key, matrix in npz.items()},
         )
         results.append(run_scene(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
-    first, second = results
-    assert np.ptp(first.window.extra["lateral_slides"]) > 0.1 * np.ptp(first.window.slide) > 0
+    unrotated, rotated = results
+    assert (
+        np.ptp(unrotated.window.extra["lateral_slides"]) > 0.1 * np.ptp(unrotated.window.slide) > 0
+    )
     for name in (
         "relative_displacement_amplitude",
         "friction_force_peak",
@@ -131,9 +133,9 @@ def test_exact_elliptic_motion_does_not_depend_on_frame(tmp_path):
         "stick_fraction",
         "energy_dissipated",
     ):
-        assert second.measures[name].value == pytest.approx(first.measures[name].value, rel=1e-8), (
-            name
-        )
+        assert rotated.measures[name].value == pytest.approx(
+            unrotated.measures[name].value, rel=1e-8
+        ), name
 
 
 SEEDS = (2, 12)  # Seeds of chains with three interfaces, of which one or two slide in a plane.
@@ -242,14 +244,14 @@ def test_refuses_faulty_lateral_pairs(keys, tmp_path):
 @pytest.mark.parametrize("law", LAWS)
 def test_refuses_laws_without_plane_form(law, tmp_path):
     """A friction law without a form in a plane is refused with an alternative."""
-    more = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(
+    keys = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(
         law, ""
     )
     with pytest.raises(pf.SceneError) as error:
         run_scene(
             tmp_path,
             "bad",
-            MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', more),
+            MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', keys),
         )
     assert LAWS[law] in str(error.value)
 

@@ -89,7 +89,7 @@ def solve_profile_on_points(tmp_path, x, z, text, *settings):
         )
     ).patch
     assert trace.can_use_points(patch_model)
-    return trace.solve_on_points(patch_model, lambda found: True).measures
+    return trace.solve_on_points(patch_model, lambda measures: True).measures
 
 
 def test_exact_profile_on_points_agrees_with_independent_program(tmp_path):

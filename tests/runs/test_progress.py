@@ -24,14 +24,14 @@ def load_rig(law, *sets):
 def test_exact_progress_callback_changes_no_result(law, sets):
     """A run with a progress callback has the measures and errors of a run without one."""
     without_callback = pf.run(load_rig(law, *sets))
-    with_callback = pf.run(load_rig(law, *sets), progress=lambda share: None)
+    with_callback = pf.run(load_rig(law, *sets), progress=lambda fraction: None)
     assert {
         name: (measure.value, measure.error) for name, measure in without_callback.measures.items()
     } == {name: (measure.value, measure.error) for name, measure in with_callback.measures.items()}
 
 
 def test_always_long_run_reports_progress():
-    """A sweep reports its progress on the way; a run that becomes steady would end early."""
+    """A long sweep reports its progress on the way, in increasing fractions up to 1."""
     head, drive = (
         read_template("rig")
         .replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}')

@@ -114,10 +114,10 @@ def test_always_wrong_mode_shape_is_detected(monkeypatch):
     and the right value."""
     build_basis = modes.build_basis
 
-    def build_wrong_basis(given, mass):
+    def build_wrong_basis(mode_list, mass):
         """Return a modal basis with twice the sliding components."""
-        found = build_basis(given, mass)
-        return replace(found, slide=2 * found.slide)
+        basis = build_basis(mode_list, mass)
+        return replace(basis, slide=2 * basis.slide)
 
     monkeypatch.setattr("patchfem.structure.modes.build_basis", build_wrong_basis)
     result = pf.run(SCENES["exact"].replace("8 g", "8.1 g"))
@@ -153,7 +153,7 @@ def test_always_wrong_loop_measures_are_detected(monkeypatch):
     monkeypatch.setattr(
         rows,
         "interface_loop",
-        lambda *given: {name: 2 * value for name, value in interface_loop(*given).items()},
+        lambda *arguments: {name: 2 * value for name, value in interface_loop(*arguments).items()},
     )
     result = pf.run(SCENES["march"])
     assert result.outcome is Outcome.NOT_CONVERGED

@@ -186,12 +186,12 @@ def test_always_unlike_pieces_have_note_with_dundurs_parameter():
     Poisson ratio of 0, and the effect of friction; like pieces have no note."""
 
     def run_notes(nu):
-        hard = '{young = "1e6 GPa", poisson = 0.3, density = "1 kg/m^3"}'
-        soft = f'{{young = "1 GPa", poisson = {nu}, density = "1 kg/m^3"}}'
+        hard_material = '{young = "1e6 GPa", poisson = 0.3, density = "1 kg/m^3"}'
+        soft_material = f'{{young = "1 GPa", poisson = {nu}, density = "1 kg/m^3"}}'
         return pf.run(
             PIECE
-            + f'load = "100 N"\nelement_size = "0.5 mm"\nsubstrate = {hard}\n[contact.upper]\n'
-            f"substrate = {soft}\n"
+            + f'load = "100 N"\nelement_size = "0.5 mm"\nsubstrate = {hard_material}\n[contact.upper]\n'
+            f"substrate = {soft_material}\n"
         ).extra["notes"]
 
     (note,) = [text for text in run_notes(0.0) if "Dundurs" in text]

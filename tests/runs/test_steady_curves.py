@@ -35,7 +35,7 @@ def linear_response(
 
 @pytest.fixture
 def reduced_point_count(monkeypatch):
-    """Reduce curves to 13 points, apart from refinement at bends."""
+    """Compute curves with 13 points, refined only where they bend."""
     monkeypatch.setattr(curves, "N_SWEEP_POINTS", 13)
 
 
@@ -129,7 +129,8 @@ def test_exact_onset_of_slip_agrees_with_closed_form():
 
 
 def test_exact_level_with_unbounded_motion_grows():
-    """Without damping, friction bounds the motion at resonance only up to a/mu N = 4/pi."""
+    """Without damping, friction bounds the motion at resonance only up to a drive force of 4/pi
+    times mu N; levels above it have the outcome grows."""
     text = POINT + COULOMB + MODE.replace("0.003", "0") + LEVELS.format('"3 g", "4.5 g", "6 g"', 12)
     run = pf.run(text, **STEADY)
     assert [level.outcome for level in run.extra["levels"]] == ["stuck", "steady", "grows"]

@@ -91,8 +91,8 @@ def test_exact_stress_of_sheared_patch_agrees_with_long_run():
     keys = {"contact.element_size": "0.4 mm"}
     keys |= {"drive.frequency": "120 Hz", "structure.mode.axial.damping": "0.05"}
     steady, run = (
-        pf.run(text, **keys, **more)
-        for more in (STEADY, {"accuracy.method": "exact", "drive.cycles": "120"})
+        pf.run(text, **keys, **accuracy)
+        for accuracy in (STEADY, {"accuracy.method": "exact", "drive.cycles": "120"})
     )
     assert steady.extra["map"] == "yields" and list_differences(steady, run, 1e-7) == []
     steady_stress = steady.fields["shear_stress"][1:]

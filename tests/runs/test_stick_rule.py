@@ -31,10 +31,12 @@ cycles = {cycles}
 SECOND = '[[structure.mode]]\nname = "b"\nfrequency = "0.55 Hz"\ndamping = 0.02\nslide = 0.4\nbase = 0.0\noutput = 0.2'
 
 
-def format_scene(law, omega, more="", cycles=20):
+def format_scene(law, omega, second_mode="", cycles=20):
     """Return the scene of a block with a friction law and a drive of angular frequency `omega`
     [rad/s]."""
-    return SCENE.format(law=law, more=more, own=0.5 / pi, drive=omega / (2 * pi), cycles=cycles)
+    return SCENE.format(
+        law=law, more=second_mode, own=0.5 / pi, drive=omega / (2 * pi), cycles=cycles
+    )
 
 
 def run_exact_and_march(scene, steps: int) -> list:
@@ -55,7 +57,7 @@ def run_exact_and_march(scene, steps: int) -> list:
 
 @pytest.mark.share(0, 2, 4)
 @pytest.mark.parametrize(
-    "law, omega, more",
+    "law, omega, second_mode",
     [
         ('law = "coulomb"', 1.0, ""),
         ('law = "coulomb"\nkinetic = 0.5', 0.3, ""),
@@ -65,12 +67,12 @@ def run_exact_and_march(scene, steps: int) -> list:
         ('law = "elastic-plastic"\nbond_length = "0.05 m"', 0.5, SECOND),
     ],
 )
-def test_order_of_stick_fraction_from_samples(law, omega, more):
+def test_order_of_stick_fraction_from_samples(law, omega, second_mode):
     """Each event is uncertain by one step: the stick fraction from samples agrees within four steps
     per cycle with that from events, and the phase within 4 pi/steps."""
     for steps in (400, 3200):
         (exact, start, _), (sampled, phase, _) = run_exact_and_march(
-            format_scene(law, omega, more), steps
+            format_scene(law, omega, second_mode), steps
         )
         assert 0.02 < exact < 0.98 and abs(sampled - exact) < 4 / steps
         if "0.2\n" in f"{law}\n":  # The block slips several times per half cycle.

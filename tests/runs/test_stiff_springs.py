@@ -32,12 +32,14 @@ RUNS = {
 
 def format_both_ways(text: str) -> tuple:
     """Return the scene with the stiffness and with the equivalent bond length."""
-    stiff = f'stiffness = "{STIFFNESS} N/m"\n'
-    length = 'bond_length = "{!r} m"\n'
+    stiffness_key = f'stiffness = "{STIFFNESS} N/m"\n'
+    length_key = 'bond_length = "{!r} m"\n'
     if "%s" in text:
-        return text.replace("%s", stiff), text.replace("%s", length.format(0.3 * 60 / STIFFNESS))
-    return text.replace(LAW, LAW + stiff), text.replace(
-        LAW, LAW + length.format(0.3 * LOAD / STIFFNESS)
+        return text.replace("%s", stiffness_key), text.replace(
+            "%s", length_key.format(0.3 * 60 / STIFFNESS)
+        )
+    return text.replace(LAW, LAW + stiffness_key), text.replace(
+        LAW, LAW + length_key.format(0.3 * LOAD / STIFFNESS)
     )
 
 

@@ -35,7 +35,7 @@ def test_exact_errors_of_rig_cover_truncated_and_merged_bonds(law, settings):
 
 
 def test_exact_bond_sum_error_of_every_engine():
-    """The NumPy sum, used for a pressure that varies, has the truncation of the scene; the
+    """The NumPy sum, used for a pressure that varies, has the truncation error of the scene; the
     recursion and the direct sum have no error."""
     text = (
         '[normal]\nload = "90 N"\namplitude = "9 N"\nfrequency = "10 Hz"\n[friction]\nstatic = 0.3\n'

@@ -60,7 +60,7 @@ def forecast_tolerance(text: str) -> dict:
 
 
 @pytest.mark.parametrize(
-    "text, cure",
+    "text, remedy",
     [
         pytest.param(
             add_tolerance(TANH, 1e-3, "steps_per_cycle = 100\n"),
@@ -91,11 +91,11 @@ def forecast_tolerance(text: str) -> dict:
         ),
     ],
 )
-def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, cure, tmp_path):
+def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, remedy, tmp_path):
     """If the plan predicts that a run misses its tolerance, the run misses it, and with the remedy
     it meets it."""
     prediction = forecast_tolerance(text)
-    assert prediction["missed"] and prediction["cure"].items() >= cure.items() and misses(text)
+    assert prediction["missed"] and prediction["cure"].items() >= remedy.items() and misses(text)
     remedied = cured(text, prediction["cure"])
     assert not misses(remedied)
     assert forecast_tolerance(remedied) | {"asked": 0} == {

@@ -25,12 +25,12 @@ PLASTIC = {
 }
 
 
-def response_from_rest(t, omega, zeta, parts):
+def response_from_rest(t, omega, zeta, tones):
     """Return the displacement of an oscillator from rest under base tones (f, a, phase), in closed
     form."""
     omega_damped = omega * np.sqrt(1 - zeta**2)
     displacement = 0.0
-    for f, a, phi in parts:
+    for f, a, phi in tones:
         w = 2 * np.pi * f
         steady = -a * np.exp(1j * phi) / (omega**2 - w * w + 2j * zeta * omega * w)
         initial = steady.imag

@@ -101,11 +101,11 @@ def test_exact_run_states_shear_modes_and_includes_their_error():
 def test_exact_holder_spring_of_rigid_piece_is_one_mode():
     """The tangential spring of the holder with a rigid piece is one mode for any number of shear
     modes; a very stiff spring changes nothing."""
-    stiff, without_spring = (
-        run_rig(*SETTINGS[:2], *more)
-        for more in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
+    stiff_spring, without_spring = (
+        run_rig(*SETTINGS[:2], *settings)
+        for settings in (["contact.holder.tangential_stiffness=1e14 N/m"], [])
     )
-    assert displacement_amplitude(stiff) == pytest.approx(
+    assert displacement_amplitude(stiff_spring) == pytest.approx(
         displacement_amplitude(without_spring), rel=1e-5
     )
     one_mode, many_modes = (

@@ -30,9 +30,9 @@ coefficient = "1e-14 m^2/N"
 TILT, CROWN = '[contact.tilt]\nangle = "{}"\n', '[contact.crown]\nradius = "{}"\n'
 
 
-def build_wear_model(shape: str, more: str):
+def build_wear_model(shape: str, keys: str):
     """Return the model of a worn bench with a shape of the gap."""
-    return pf.build(SCENE.replace("[friction]", shape + "[friction]") + more)
+    return pf.build(SCENE.replace("[friction]", shape + "[friction]") + keys)
 
 
 @pytest.mark.share(1, 3)

@@ -254,10 +254,10 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
     while state.cycle < problem.cycles:
         state = take_jump(problem, state, 1e-2)
         count = count + 1
-    inside = np.abs(x) < stick
+    in_stick_zone = np.abs(x) < stick
     assert count < 60
-    assert (state.path[inside] == 0).all() and not state.depth[inside].any()
-    assert state.force[inside].sum() == pytest.approx(load, rel=1e-9)
+    assert (state.path[in_stick_zone] == 0).all() and not state.depth[in_stick_zone].any()
+    assert state.force[in_stick_zone].sum() == pytest.approx(load, rel=1e-9)
     assert state.path @ state.force < 1e-9 * initial_work
     centre_ratio = (state.force / area)[np.argmin(np.abs(x))] / peak
     assert centre_ratio == pytest.approx(
@@ -327,8 +327,8 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
 
     save = evolve.save_state
 
-    def save_and_record(path, *more):
-        save(path, *more)
+    def save_and_record(path, *arguments):
+        save(path, *arguments)
         states.append(path.read_bytes())
 
     with monkeypatch.context() as patched:
@@ -391,8 +391,8 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     save = evolve.save_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
-    def save_and_interrupt(*asked):
-        save(*asked)
+    def save_and_interrupt(*arguments):
+        save(*arguments)
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:

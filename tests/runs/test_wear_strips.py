@@ -63,7 +63,7 @@ def test_exact_worn_depth_of_strips_mirrors_with_roll():
 def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
     """On a Winkler foundation in full contact, the pressure tends to the mean: p = p_mean + (p_0 -
     p_mean) exp(-kappa s k N)."""
-    stiff = (
+    rigid_pieces = (
         PIECE
         + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, '
         'density = "1000 kg/m^3"}\n'
@@ -72,7 +72,7 @@ def test_exact_worn_depth_of_rolled_rigid_pad_agrees_with_closed_form():
     k = 1e12
     n = 5e4
     result = run_text(
-        stiff
+        rigid_pieces
         + skin
         + ROLLED.replace("0.1", "0.05")
         + COULOMB
@@ -106,13 +106,13 @@ def test_exact_strips_of_rig_wear_by_their_own_slip(yaw):
         + LARGE_TOLERANCE
     )
     slides = result.window.extra.get("slides")
-    last = result.window.time >= result.window.time[-1] - (1 + 1e-9) / 143
+    last_cycle = result.window.time >= result.window.time[-1] - (1 + 1e-9) / 143
     volumes = final_depth(result).mean(axis=1) * 12.7e-3**2 / 4
     if yaw == "0":
         assert slides is None
         expected = np.full(4, result.measures["slip_amplitude"].value)
     else:
-        expected = np.ptp(slides[last], axis=0) / 2
+        expected = np.ptp(slides[last_cycle], axis=0) / 2
         assert np.ptp(expected) > 1e-2 * expected.mean()
     assert volumes == pytest.approx(1e-14 * LOAD / 4 * 4 * expected * 1e3, rel=5e-3)
     notes = [note for note in result.extra["notes"] if "across x" in note]

@@ -80,13 +80,13 @@ def test_exact_run_continues_on_other_mesh(earlier_run_folder):
     continued = run_in_folder(
         earlier_run_folder, HALF_CYCLES, *sets, "wear.start=crown/result.nc"
     ).measures
-    whole = run_in_folder(earlier_run_folder, "wear.cycles=2e6", *sets).measures
+    whole_run = run_in_folder(earlier_run_folder, "wear.cycles=2e6", *sets).measures
     for name in ("worn_volume", "worn_depth_max", "static_coefficient"):
         assert (
-            abs(continued[name].value - whole[name].value)
-            <= continued[name].error + whole[name].error
+            abs(continued[name].value - whole_run[name].value)
+            <= continued[name].error + whole_run[name].error
         ), name
-    assert continued["worn_volume"].error < 1e-2 * whole["worn_volume"].value
+    assert continued["worn_volume"].error < 1e-2 * whole_run["worn_volume"].value
 
 
 def test_exact_sweep_over_two_earlier_runs(earlier_run_folder):

@@ -162,7 +162,7 @@ def test_exact_level_strips_with_shear_agree_with_patch(law, method, one_loop):
 def test_exact_rolled_strips_with_shear_agree_with_separate_elements(law, roll, one_loop):
     """The friction force of each strip agrees with contact elements of the compliance 4 C_t
     computed here, under the displacement q - y yaw. The yaw moment is sum y f; at a roll of 0.2
-    mrad some strips are open."""
+    mrad some strips are not in contact."""
     result = run_sheared_strips(law, STRIPS.format(roll), YAW_MODE)
     extra = result.response.extra
     patch = result.patch

@@ -35,7 +35,7 @@ END_TOLERANCES = {"pressure_peak": 1e-9, "loaded_fraction": 1e-9}
 def draw_models(kind: str, seed: int, count: int) -> list:
     """Return `count` random models of a kind; as in a sweep, several models share a tilt or a load."""
     r = np.random.default_rng(seed)
-    out = []
+    models = []
     tilts = 10 ** r.uniform(-6, -2.3, max(2, count // 5))
     loads = 10 ** r.uniform(1.5, 2.7, 3)
     for _ in range(count):
@@ -50,8 +50,8 @@ def draw_models(kind: str, seed: int, count: int) -> list:
             }
         if "bench" in kind:
             sets |= {"slide.amplitude": float(10 ** r.uniform(-5.3, -4.3))}
-        out.append(pf.build(TEXTS[kind], **sets))
-    return with_shared_meshes(out)
+        models.append(pf.build(TEXTS[kind], **sets))
+    return with_shared_meshes(models)
 
 
 def solve_single(model):

@@ -104,10 +104,10 @@ def test_always_failed_lane_check_makes_batch_exact(monkeypatch):
     cases = draw_models("coulomb", 5, 64)
     collect_runs = lane_runs.collect_runs
 
-    def collect_wrong_runs(models, *given):
-        runs, *rest = collect_runs(models, *given)
+    def collect_wrong_runs(models, *arguments):
+        runs, *further = collect_runs(models, *arguments)
         runs.values["loop_area"][:] *= 1.01
-        return runs, *rest
+        return runs, *further
 
     monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
     results = batches.solve_models(cases)
@@ -131,19 +131,19 @@ def test_always_single_failed_lane_check_replaces_only_this_case(monkeypatch):
     checked = lane_check.select_checked_cases(numbers, is_fast)[0]
     collect_runs = lane_runs.collect_runs
 
-    def collect_wrong_runs(models, *given):
-        runs, *rest = collect_runs(models, *given)
+    def collect_wrong_runs(models, *arguments):
+        runs, *further = collect_runs(models, *arguments)
         is_checked = np.array([model is cases[checked] for model in models])
         runs.values["loop_area"][is_checked] *= 1.01
-        return runs, *rest
+        return runs, *further
 
     monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
     results = batches.solve_models(cases)
     assert results.numerics[checked]["engine"] == "exact"
     assert "differed from it in 1, in loop_area of this case" in results.notes[checked][-1]
-    others = np.arange(96) != checked
+    unchecked = np.arange(96) != checked
     for name, values in untouched.values.items():
-        np.testing.assert_array_equal(results.values[name][others], values[others])
+        np.testing.assert_array_equal(results.values[name][unchecked], values[unchecked])
 
 
 @pytest.mark.parametrize("law", LAWS_WITH_EXACT_BATCH[:3])

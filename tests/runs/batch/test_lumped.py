@@ -26,13 +26,13 @@ def draw_models(law: str, seed: int, count: int) -> list:
     """Return random models with a friction law that stick, stop or slide all the time, near and
     away from resonance."""
     r = np.random.default_rng(seed)
-    out = []
+    models = []
     for _ in range(count):
         kind = str(r.choice(["base", "base", "force"]))
-        push = 10 ** r.uniform(0.3, 2)
+        drive_amplitude = 10 ** r.uniform(0.3, 2)
         mode = "structure.mode.axial"
         sets = {
-            "normal.load": r.uniform(2, 1.5 * push),
+            "normal.load": r.uniform(2, 1.5 * drive_amplitude),
             "drive.frequency": r.uniform(60, 250),
             f"{mode}.damping": float(r.choice([0, 0.003, 0.05, 0.3, 1.0, 1.4])),
             f"{mode}.slide": float(r.choice([1, -0.7])),
@@ -41,17 +41,17 @@ def draw_models(law: str, seed: int, count: int) -> list:
             "accuracy.tolerance": float(r.choice([1e-3, 1e-5])),
         }
         sets |= (
-            {"drive.acceleration": push, f"{mode}.base": r.uniform(0.4, 1)}
+            {"drive.acceleration": drive_amplitude, f"{mode}.base": r.uniform(0.4, 1)}
             if kind == "base"
-            else {"drive.force": push}
+            else {"drive.force": drive_amplitude}
         )
         if r.random() < 0.2:
             sets["structure.start.velocity"] = [0.05]
         if law == "elastic-plastic":
             sets["friction.bond_length"] = 10 ** r.uniform(-7, -4)
         scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
-        out.append(build(get_base_scene(scene).override(format_assignments(sets))))
-    return out
+        models.append(build(get_base_scene(scene).override(format_assignments(sets))))
+    return models
 
 
 def solve_by_group(cases) -> CaseResults:
@@ -80,9 +80,13 @@ def test_always_errors_of_coarse_iwan_cells_cover_fine_cells():
     base = get_base_scene(
         load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"]))
     )
-    for push in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
+    for acceleration in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
         coarse_model, fine_model = (
-            build(base.override([f"drive.acceleration={push}", f"accuracy.tolerance={tolerance}"]))
+            build(
+                base.override(
+                    [f"drive.acceleration={acceleration}", f"accuracy.tolerance={tolerance}"]
+                )
+            )
             for tolerance in (1e-3, 1e-6)
         )
         coarse = lumped.solve([coarse_model])

@@ -111,10 +111,10 @@ def test_exact_groups_of_batch_return_in_case_order(set_batch):
 
     def solve(models, say):
         groups.append([model.point.load for model in models])
-        out = CaseResults(np.full(len(models), "done", object))
-        out.measure("load", "N")
-        out.values["load"][:] = groups[-1]
-        return out
+        results = CaseResults(np.full(len(models), "done", object))
+        results.measure("load", "N")
+        results.values["load"][:] = groups[-1]
+        return results
 
     loads = [1.0, 2.0, 3.0, 4.0]
     models = [pf.build(BENCH, **{"normal.load": load}) for load in loads]

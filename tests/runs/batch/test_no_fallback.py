@@ -61,9 +61,9 @@ def single_runs(monkeypatch) -> list:
     plans = []
     run = one_by_one.run
 
-    def record(plan, *given, **options):
+    def record(plan, *arguments, **options):
         plans.append(plan)
-        return run(plan, *given, **options)
+        return run(plan, *arguments, **options)
 
     monkeypatch.setattr(one_by_one, "run", record)
     monkeypatch.chdir(STUDIES / "rig")

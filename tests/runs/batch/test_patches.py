@@ -63,15 +63,17 @@ def assert_equal_to_single_runs(models, solve_together=None):
     for name, values in single.values.items():
         tolerance = PEAK_TOLERANCE if name in ("pressure_peak", "loaded_fraction") else 1e-12
         # Size of the terms whose difference is the value.
-        size = np.abs(values) + single.floors[name]
+        magnitude = np.abs(values) + single.floors[name]
         if name == "rotation":  # Difference of the approaches of both ends, divided by the length.
-            size = size + np.abs(single.values["approach"]) / models[0].patch.pieces.length
+            magnitude = (
+                magnitude + np.abs(single.values["approach"]) / models[0].patch.pieces.length
+            )
         for column, expected in (
             (results.values, values),
             (results.errors, single.errors[name]),
             (results.floors, single.floors[name]),
         ):
-            assert (np.abs(column[name] - expected) <= tolerance * size).all(), name
+            assert (np.abs(column[name] - expected) <= tolerance * magnitude).all(), name
     return results
 
 
@@ -106,17 +108,17 @@ def test_exact_mixed_patches_agree_with_single_runs():
     """Cases with different skins, tolerances, tilts and load lines, which cannot share a group,
     agree with single runs. Warnings about tall pieces and large strains, and notes about keys
     without meaning, are kept."""
-    soft = SKIN.replace("1e14", "1e13")
-    parts = [
+    soft_skin = SKIN.replace("1e14", "1e13")
+    tables_and_keys = [
         (TILT.format(1e-4), ""),
         (TILT.format(2e-4) + SKIN, ""),
-        (TILT.format(1e-4) + soft, ""),
+        (TILT.format(1e-4) + soft_skin, ""),
         (LINE.format(3e-3), ""),
         (LINE.format(-2e-3), "pairs = 2\n"),
     ]
     texts = [
-        TEXT.format(FIXED_SIZE + more, load, tables)
-        for tables, more in parts
+        TEXT.format(FIXED_SIZE + keys, load, tables)
+        for tables, keys in tables_and_keys
         for load in (100.0, 600.0)
     ]
     tall = TEXT.format(FIXED_SIZE + "pairs = 2\n", 2e7, TILT.format(1e-3)).replace(

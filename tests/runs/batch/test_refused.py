@@ -116,12 +116,12 @@ def assert_equal_to_single_run(model):
     names = [name for name in single.values if single.has(name, 0)]
     assert {name for name in batch.values if batch.has(name, 0)} == set(names)
     for name in set(names) - {"energy_balance", "work_check"}:  # Both measures are round-off.
-        size = 1e-10 * abs(single.values[name][0]) + ABSOLUTE_TOLERANCES.get(name, 0.0)
+        abs_tol = 1e-10 * abs(single.values[name][0]) + ABSOLUTE_TOLERANCES.get(name, 0.0)
         np.testing.assert_allclose(
-            batch.values[name], single.values[name], rtol=0, atol=size, err_msg=name
+            batch.values[name], single.values[name], rtol=0, atol=abs_tol, err_msg=name
         )
         np.testing.assert_allclose(
-            batch.errors[name], single.errors[name], rtol=1e-6, atol=size, err_msg=name
+            batch.errors[name], single.errors[name], rtol=1e-6, atol=abs_tol, err_msg=name
         )
     return batch
 
@@ -139,21 +139,21 @@ def test_refuses_marched_cases_in_batches(kind):
     assert batches.choose_batch(build(MARCHED_CASES[kind])) is None
 
 
-@pytest.mark.parametrize("end", OUTCOMES)
-def test_exact_batch_outcomes_agree_with_single_runs(end):
+@pytest.mark.parametrize("name", OUTCOMES)
+def test_exact_batch_outcomes_agree_with_single_runs(name):
     """A batch gives the outcome of a single run, whether a motion grows, settles, beats, is steady or sticks."""
-    pairs, outcome, estimated = OUTCOMES[end]
+    pairs, outcome, estimated = OUTCOMES[name]
     model = build(replace_in_rig(*pairs))
     results = assert_equal_to_single_run(model)
     assert batches.choose_batch(model) is not None and results.outcome[0] == outcome
     assert ("relative_displacement_amplitude_steady" in results.values) == estimated
-    assert bool(results.warnings) == (end == "remarked on")
+    assert bool(results.warnings) == (name == "remarked on")
 
 
-@pytest.mark.parametrize("end", OUTCOMES)
-def test_exact_elastic_plastic_outcomes_agree_with_single_runs(end):
+@pytest.mark.parametrize("name", OUTCOMES)
+def test_exact_elastic_plastic_outcomes_agree_with_single_runs(name):
     """The same cases with an elastic-plastic element have the outcomes of single runs."""
-    text = replace_in_rig(*OUTCOMES[end][0])
+    text = replace_in_rig(*OUTCOMES[name][0])
     model = build(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"'))
     assert batches.choose_batch(model) is not None
     assert_equal_to_single_run(model)

@@ -25,7 +25,7 @@ SKIN = (
 def draw_models(law: str, seed: int, count: int) -> list:
     """Return random models near and away from resonance, on their own, prescribed or shared meshes."""
     r = np.random.default_rng(seed)
-    out = []
+    models = []
     for k in range(count):
         sets = {
             "contact.tilt.angle": float(10 ** r.uniform(-6, -2.3)) * float(r.choice([-1, 1])),
@@ -38,8 +38,8 @@ def draw_models(law: str, seed: int, count: int) -> list:
         }
         if k % 3 == 1:
             sets["contact.element_size"] = 3e-4
-        out.append(pf.build(LAWS[law] + SKIN * (k % 4 == 3), **sets))
-    return with_shared_meshes(out) if seed % 2 else out
+        models.append(pf.build(LAWS[law] + SKIN * (k % 4 == 3), **sets))
+    return with_shared_meshes(models) if seed % 2 else models
 
 
 def count_cases_solved_in_batch(law: str, seed: int, count: int) -> int:

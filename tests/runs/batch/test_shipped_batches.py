@@ -40,7 +40,7 @@ def draw_models(kind: str, seed: int, count: int) -> list:
     """Return models with random tilts over two decades, loads, friction coefficients and drive
     levels on shared meshes."""
     r = np.random.default_rng(seed)
-    out = []
+    models = []
     for _ in range(count):
         sets = {
             "contact.tilt.angle": float(10 ** r.uniform(-5, -3)),
@@ -55,8 +55,8 @@ def draw_models(kind: str, seed: int, count: int) -> list:
             }
         if kind == "rig":
             sets["friction.kinetic"] = sets["friction.static"]
-        out.append(pf.build(SCENES[kind], **sets))
-    return with_shared_meshes(out)
+        models.append(pf.build(SCENES[kind], **sets))
+    return with_shared_meshes(models)
 
 
 def count_deviations(kind: str, seed: int, count: int) -> tuple:
