@@ -135,7 +135,7 @@ def test_exact_peaks_agree_with_finely_sampled_motion(name):
     reference.tolerance *= 1e-2
     samples = reference.response(reference.run_to(end, np.linspace(begin, end, 100001)))
     for found, values in (
-        (fine.acceleration_peak, np.abs(samples.acceleration)),
+        (fine.values["absolute_acceleration_peak"], np.abs(samples.acceleration)),
         (fine.loops[0].max_force, np.abs(samples.force)),
     ):
         lower, upper = maximum_bounds(values)
