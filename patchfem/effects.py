@@ -424,7 +424,7 @@ WAVEFORMS = {
     for name, effect in EFFECTS.items()
     if name.startswith("drive.waveform=")
 }
-NO_WAVEFORM = Waveform()  # of a release, and of an unknown name
+NO_WAVEFORM = Waveform()  # for a release, and for an unknown name
 SINE_WAVEFORM = WAVEFORMS["sine"]  # default of a scene
 # support of the readings and orders of the law `nonlocal` that need the sum over all bonds
 BOND_LIST_SUPPORT = "two-directions"

@@ -87,7 +87,7 @@ PUBLIC = {
     "outcome": (
         "AMPLITUDE_ROUND_OFF",
         "OPEN_LOOP",
-        "UNSETTLED",
+        "NOT_SETTLED_WARNING",
         "note_on_changing_drive",
         "check_piece_length",
         "classify_periodic",

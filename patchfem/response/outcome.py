@@ -28,7 +28,7 @@ from .settling import (
 # Fraction of the tolerance; if the amplitude will still change by more, the page states the steady
 # estimate.
 ESTIMATE_TOL = 0.02
-UNSETTLED = "the interface sticks, but the amplitude has not settled"
+NOT_SETTLED_WARNING = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
 # Safety factor on the cycles that the decay needs, because the last amplitudes may beat.
 CYCLES_SAFETY_FACTOR = 1.5
@@ -404,8 +404,9 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
         proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
         remedy = f"set drive.cycles = {proposed:g}"
     return [
-        f"{UNSETTLED}: by up to {100 * free_vibration / amplitude:.2g} % (limit {100 * tolerance:g} %) it is free vibration "
-        f"that will decay, so relative_displacement_amplitude is that of a transient; {remedy}"
+        f"{NOT_SETTLED_WARNING}: by up to {100 * free_vibration / amplitude:.2g} % (limit "
+        f"{100 * tolerance:g} %) it is free vibration that will decay, so "
+        f"relative_displacement_amplitude is that of a transient; {remedy}"
     ]
 
 

@@ -9,8 +9,12 @@ from ..formatting import format_length
 from .profile import Profile
 
 AS_LONG = "the trace is as long as the patch"
-CENTRED = "the trace is centred on the patch"
-NOTES = (AS_LONG, CENTRED, "is rounded to")  # parts of sentences that cast no doubt on a result
+CENTRED_NOTE = "the trace is centred on the patch"
+NOTES = (
+    AS_LONG,
+    CENTRED_NOTE,
+    "is rounded to",
+)  # parts of sentences that cast no doubt on a result
 ROUND_OFF = 1e-3  # fraction of the step; shorter lengths are round-off of x in the file
 MAX_MISSING_ELEMENTS = 0.5000001  # elements that a trace may lack at either end, with round-off
 MAX_STEP_ELEMENTS = 1.5  # elements; a larger sample spacing gets a note
@@ -81,7 +85,7 @@ def _describe_centring(source: str, known, x, shift: float) -> str:
     )
     return (
         f"{source}: x runs from {first} to {last} in the file and does not cover the patch, from "
-        f"{format_length(x[0])} to {format_length(x[-1])}; {CENTRED}, which adds {added} to x"
+        f"{format_length(x[0])} to {format_length(x[-1])}; {CENTRED_NOTE}, which adds {added} to x"
     )
 
 

@@ -15,8 +15,8 @@ OUTLIER_FRACTION = 0.01  # fraction of the heights at either end, which may be m
 MIN_ROUNDED = 10  # positions; fewer do not show whether they are even apart from rounding
 MAX_ROUNDING = 0.75  # printed digits between a position and the fitted line, half of it by rounding
 DIGIT_TOL = 1e-4  # relative to the last printed digit; a smaller deviation from it is round-off
-METRES = "in the file, heights and length are in metres"  # sentence on the origin of the units
-GIVEN = "heights and length were read in the given units"
+METRES_NOTE = "in the file, heights and length are in metres"  # sentence on the origin of the units
+GIVEN_UNITS_NOTE = "heights and length were read in the given units"
 
 
 class Places(NamedTuple):
@@ -42,7 +42,7 @@ def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
     factors : tuple
         Factors of x and z to metres.
     stated : str
-        Who states the units, METRES or GIVEN.
+        Who states the units, METRES_NOTE or GIVEN_UNITS_NOTE.
 
     Returns
     -------
@@ -212,7 +212,7 @@ def check_span(path, x, z, stated: str = "") -> tuple:
         For messages.
     x, z : arrays [m]
     stated : str
-        Who states the units, METRES or GIVEN.
+        Who states the units, METRES_NOTE or GIVEN_UNITS_NOTE.
 
     Returns
     -------

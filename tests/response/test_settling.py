@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.response import CHANGE_NOT_RESOLVED_REASON, UNSETTLED, settling
+from patchfem.response import CHANGE_NOT_RESOLVED_REASON, NOT_SETTLED_WARNING, settling
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -316,16 +316,18 @@ def test_exact_a_motion_that_sticks_and_rings_on_is_said_to_be_transient(cycles,
     omega = 2 * np.pi * 150
     steady = 1 / abs(own**2 + 1e6 - omega**2 + 0.02j * own * omega)
     amplitude = done.measures["relative_displacement_amplitude"].value
-    told = [one for one in done.warnings if one.startswith(UNSETTLED)]
+    told = [one for one in done.warnings if one.startswith(NOT_SETTLED_WARNING)]
     assert done.outcome == "stuck" and (abs(amplitude / steady - 1) < 0.01) == settled == (not told)
     assert settled or "drive.cycles = " in told[0]
 
 
 def test_exact_the_cycles_that_are_named_let_a_motion_that_sticks_settle():
     told = next(
-        one for one in pf.run(HOLDS.format(cycles=20)).warnings if one.startswith(UNSETTLED)
+        one
+        for one in pf.run(HOLDS.format(cycles=20)).warnings
+        if one.startswith(NOT_SETTLED_WARNING)
     )
     cycles = float(told.rpartition("drive.cycles = ")[2])
     assert cycles < 600 and not any(
-        one.startswith(UNSETTLED) for one in pf.run(HOLDS.format(cycles=cycles)).warnings
+        one.startswith(NOT_SETTLED_WARNING) for one in pf.run(HOLDS.format(cycles=cycles)).warnings
     )

@@ -26,9 +26,9 @@ MAX_CANDIDATES = 6
 # Maximum rise of a quantity above its values at the nodes, over its range in the step.
 MAX_RISE_RATIO = 0.5
 # Gauss rule with 12 points on [0, 1].
-GAUSS_POINTS, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(12)
-GAUSS_POINTS = (1 + GAUSS_POINTS) / 2
-GAUSS_WEIGHTS = GAUSS_WEIGHTS / 2
+_GAUSS_RULE = np.polynomial.legendre.leggauss(12)
+GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2
+GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2
 # Number of bisections of the interval in which slip begins or ends.
 N_BISECTIONS = 30
 # Fraction of the velocity; an interface slips where more of it is irreversible, as in `response.measures`.

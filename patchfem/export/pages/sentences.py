@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ... import formatting
 from ...core import Measure, Outcome, compute_allowed_error
-from ...response.outcome import OPEN_LOOP, UNSETTLED
+from ...response.outcome import NOT_SETTLED_WARNING, OPEN_LOOP
 from ...response.rows import TABLE as MOTION
 from ...response.rows import add_interface_number, remove_interface_number
 from ...runs.results.patch_rows import TABLE as STATIC
@@ -304,7 +304,7 @@ def verdict_sentence(summary: dict) -> str:
         for name in ("friction_force_peak", "relative_displacement_amplitude")
     )
     rings = " The amplitude has not settled: it is that of a transient." * any(
-        one.startswith(UNSETTLED) for one in summary.get("warnings", ())
+        one.startswith(NOT_SETTLED_WARNING) for one in summary.get("warnings", ())
     )
     part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
     for kind, threshold, form in (

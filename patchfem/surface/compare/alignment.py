@@ -9,7 +9,15 @@ from ...core import PatchfemError, frozen_array
 from ..profile import Profile, find_runs
 from .boxes import N_PARTS, average_parts, make_boxes, part_edges
 from .errors import DrawnErrors, correlation_length, draw_errors, estimate_noise
-from .model import BENT, DATUM, MIN_HEIGHTS, RIGID, STRAIGHT, Parameter, TraceModel
+from .model import (
+    BENT_PARAMETERS,
+    DATUM,
+    MIN_HEIGHTS,
+    RIGID_PARAMETERS,
+    STRAIGHT_PARAMETERS,
+    Parameter,
+    TraceModel,
+)
 from .robust import MAX_NOISE, MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
 from .section import find_flank_ends, noise_threshold
 
@@ -170,19 +178,21 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
     """
     model = TraceModel(before, after, shift)
     thin = model.thin(N_THINNED)
-    found = _choose_floor(find_floors(thin, model.start(shift), list(STRAIGHT), [0, 1]), thin)
+    found = _choose_floor(
+        find_floors(thin, model.start(shift), list(STRAIGHT_PARAMETERS), [0, 1]), thin
+    )
     if found is None:
         raise PatchfemError(f"{after.source}: no heights of this trace agree with {before.source}")
     model.smooth_slope(found.scale)
     thin.slope = model.slope
-    best = _fit_all_heights(model, found.state, STRAIGHT)
+    best = _fit_all_heights(model, found.state, STRAIGHT_PARAMETERS)
     if is_straight:
         return replace(_align_straight_datum(model, best), is_straight=True)
     bent = _choose_floor(
-        find_floors(thin, best.state * [1, 1, 1, 1, 0], list(BENT), [0, 1, 4]), thin
+        find_floors(thin, best.state * [1, 1, 1, 1, 0], list(BENT_PARAMETERS), [0, 1, 4]), thin
     )
     if bent is not None and bent.scale < BEND_GAIN * max(best.noise, model.min_scale):
-        curved = _fit_all_heights(model, bent.state, BENT)
+        curved = _fit_all_heights(model, bent.state, BENT_PARAMETERS)
         if curved.noise < BEND_GAIN * best.noise:
             best = curved
     return _check_for_wide_scar(model, best)
@@ -361,10 +371,10 @@ def _fit_line_through_ends(
         return None
     worn = ~ends & (depth > MAX_UNWORN * scale)
     for _ in range(3):
-        state, scale = fit_biweight(model, state, list(STRAIGHT), worn, rounds=20)
+        state, scale = fit_biweight(model, state, list(STRAIGHT_PARAMETERS), worn, rounds=20)
         depth, _ = model.linearize(state)
         worn = widen_to_flank_ends(depth, scale, find_worn_samples(depth, scale))
-    found = _make_alignment(model, state, STRAIGHT, scale, worn)
+    found = _make_alignment(model, state, STRAIGHT_PARAMETERS, scale, worn)
     return found if found.unworn[ends].mean() >= MIN_UNWORN_FRACTION else None
 
 
@@ -402,7 +412,9 @@ def _check_for_wide_scar(model, best: Alignment) -> Alignment:
 
 def _align_straight_datum(model, best: Alignment) -> Alignment:
     """Align traces of a straight datum, where short flanks on a common line count as unworn."""
-    line = _fit_line_through_ends(model, best, model.start(model.guess), RIGID, SHORT_FLANK)
+    line = _fit_line_through_ends(
+        model, best, model.start(model.guess), RIGID_PARAMETERS, SHORT_FLANK
+    )
     if line is None:
         return best
     is_quieter = MAX_SCALE_RATIO * line.noise < best.noise

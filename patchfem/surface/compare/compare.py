@@ -31,7 +31,7 @@ from .ratios import (
     resample,
     widen_ratio,
 )
-from .readings import BENT, Reading, find_ambiguity, find_worn_flanks
+from .readings import BENT_DATUM_HEADLINE, Reading, find_ambiguity, find_worn_flanks
 from .reference import Reference, cut_at_wear, find_reference, has_grown, limit_hidden_wear
 from .search import Match
 from .section import Section
@@ -464,7 +464,7 @@ def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool
         worn=make_unknown_worn(reason),
         tracks=NO_TRACKS,
         flanks=None,
-        ambiguity="" if is_straight else BENT,
+        ambiguity="" if is_straight else BENT_DATUM_HEADLINE,
     )
 
 

@@ -33,9 +33,9 @@ class Parameter(IntEnum):
 
 
 DATUM = (Parameter.OFFSET, Parameter.SLOPE)
-RIGID = (*DATUM, Parameter.SHIFT)
-STRAIGHT = (*RIGID, Parameter.STRETCH)
-BENT = (*STRAIGHT, Parameter.BEND)
+RIGID_PARAMETERS = (*DATUM, Parameter.SHIFT)
+STRAIGHT_PARAMETERS = (*RIGID_PARAMETERS, Parameter.STRETCH)
+BENT_PARAMETERS = (*STRAIGHT_PARAMETERS, Parameter.BEND)
 
 
 class TraceModel:

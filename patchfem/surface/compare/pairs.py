@@ -18,7 +18,7 @@ KINDS = {
     "nothing": "traces that cannot be registered to each other",
 }
 # quantities that have a mean; positions have none, because they depend on where a trace begins
-AVERAGED = (
+AVERAGED_QUANTITIES = (
     "worn_volume",
     "grown_volume",
     "worn_share",
@@ -202,7 +202,7 @@ def _average(parts: list) -> dict:
     names = dict.fromkeys(name for part in parts for name in part)
     means = {}
     for name in names:
-        if name.removesuffix("_x").removesuffix("_y") not in AVERAGED:
+        if name.removesuffix("_x").removesuffix("_y") not in AVERAGED_QUANTITIES:
             continue
         known = [part[name] for part in parts if part.get(name, {}).get("high") is not None]
         mean = average_quantities([parse_quantity(data) for data in known], "mean over the pairs")

@@ -18,8 +18,8 @@ from .robust import MAX_NOISE
 from .section import median_of_five
 
 # headlines of traces that have two interpretations
-BENT = "a scar or a bent datum, both are possible"
-GREW = "a scar or material that grew at the ends, both are possible"
+BENT_DATUM_HEADLINE = "a scar or a bent datum, both are possible"
+GROWN_ENDS_HEADLINE = "a scar or material that grew at the ends, both are possible"
 NOISE = "a scar or noise, both are possible"
 DRIFT = "a scar or a datum that drifts, both are possible"
 # depth of a scar / standard deviation of the drift: three times the width of an interval of +-2 deviations
@@ -73,8 +73,8 @@ def _have_different_areas(one: Alignment, other: Alignment) -> bool:
 
 def _name_ambiguity(bow: Alignment) -> str:
     if bow.bend and not _has_grown_more(bow):
-        return BENT
-    return GREW if _has_changed(bow) else NOISE
+        return BENT_DATUM_HEADLINE
+    return GROWN_ENDS_HEADLINE if _has_changed(bow) else NOISE
 
 
 def detrended_means(depth, unworn=None) -> np.ndarray:

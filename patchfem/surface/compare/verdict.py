@@ -78,7 +78,7 @@ class _Facts(NamedTuple):
     def change(self) -> str:
         """Headline on wear and waviness, without position and order of the surfaces."""
         if self.scan_headline and self.waves == "not known":
-            is_plain = self.scan_headline in (scans.WORN, scans.NONE)
+            is_plain = self.scan_headline in (scans.WORN_HEADLINE, scans.NONE)
             return self.scan_headline if is_plain else "waves not known"
         if self.waves != NO_CHANGE:
             return f"worn, waves {self.waves}" if self.is_worn else self.waves
@@ -95,7 +95,9 @@ def _collect_facts(parts: list) -> _Facts:
         waves = ", ".join(word + name for word, name in zip(words, names))
     change = parts[0].change
     scan_headline = "" if change is None else scans.find_headline(change)
-    is_worn = scan_headline == scans.WORN or any(is_significant(part.worn.mean) for part in parts)
+    is_worn = scan_headline == scans.WORN_HEADLINE or any(
+        is_significant(part.worn.mean) for part in parts
+    )
     is_flatter = any(describe_ratio_change(part.ratios.slope) == "reduced" for part in parts)
     return _Facts(parts, waves, scan_headline, is_worn, is_flatter)
 

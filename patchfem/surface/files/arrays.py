@@ -14,7 +14,7 @@ from ...core import PatchfemError
 from ...inputs.matlab import read_variables
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, make_trace
+from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .raster import make_scan_of_matrix, make_scan_of_points
 from .raw import MAX_POINTS, RawFile, shorten
 from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
@@ -44,7 +44,11 @@ def read_npy(raw: RawFile, units: tuple | None) -> Profile | Areal:
         factor = length_factors(raw, units[1:] * 2).height
         rows, columns = table.shape
         return make_scan_of_matrix(
-            raw.path, np.arange(columns) * pixel, np.arange(rows) * pixel, table * factor, GIVEN
+            raw.path,
+            np.arange(columns) * pixel,
+            np.arange(rows) * pixel,
+            table * factor,
+            GIVEN_UNITS_NOTE,
         )
     factors = length_factors(raw, units)
     if table.ndim == 2 and table.shape[0] in (2, 3) and table.shape[1] > 3:
@@ -108,8 +112,10 @@ def _read_table(raw: RawFile, table, factors: LengthFactors) -> Profile | Areal:
     if len(columns[0]) < 2:
         raise PatchfemError(f"{raw.path}: {len(columns[0])} rows; a trace needs at least two")
     if len(columns) == 2:
-        return make_trace(raw.path, *columns, None, factors, GIVEN)
-    return make_scan_of_points(raw.path, columns, None, (factors.lateral, *factors), GIVEN)
+        return make_trace(raw.path, *columns, None, factors, GIVEN_UNITS_NOTE)
+    return make_scan_of_points(
+        raw.path, columns, None, (factors.lateral, *factors), GIVEN_UNITS_NOTE
+    )
 
 
 def _read_variables(raw: RawFile, places: list, z, factors: LengthFactors) -> Profile | Areal:
@@ -122,7 +128,7 @@ def _read_variables(raw: RawFile, places: list, z, factors: LengthFactors) -> Pr
         return _read_table(raw, np.column_stack([*flat, z.ravel()]), factors)
     if len(flat) == 2 and z.shape == (flat[1].size, flat[0].size):
         x, y = (values * factors.lateral for values in flat)
-        return make_scan_of_matrix(raw.path, x, y, z * factors.height, GIVEN)
+        return make_scan_of_matrix(raw.path, x, y, z * factors.height, GIVEN_UNITS_NOTE)
     shapes = ", ".join(str(np.shape(values)) for values in (*places, z))
     raise PatchfemError(
         f"{raw.path}: x, y and z of shapes {shapes} do not fit together; z needs a row for each y "

@@ -17,7 +17,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, make_trace
+from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .arrays import length_factors
 from .raster import make_scan_of_matrix
 from .raw import MAX_POINTS, UNPACK_ERRORS, RawFile, shorten, shorten_reason
@@ -53,7 +53,7 @@ def read_instrument(raw: RawFile, units: tuple | None) -> Profile | Areal:
             *(values * factors.lateral for values in arrays[:-1]),
             arrays[-1] * factors.height,
         ]
-        stated = GIVEN
+        stated = GIVEN_UNITS_NOTE
     library = f"SurfaceTopography {shorten(about['version'])}"
     notes = (f"{raw.path}: read as {shorten(about['format'])} by {library}",)
     if about["unit"] and units:

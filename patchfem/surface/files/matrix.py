@@ -8,7 +8,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, make_trace
+from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .head import Fact, Head, has_column_names
 from .raster import make_scan_of_matrix
 from .raw import shorten
@@ -104,7 +104,7 @@ def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> 
     step_y = Scale(1.0) if rows == 1 else _find_step(path, "y", rows, facts, units)
     factor = _find_height_factor(path, facts, units)
     notes = (*step_x.notes, *step_y.notes, *factor.notes)
-    stated = GIVEN if units else ""
+    stated = GIVEN_UNITS_NOTE if units else ""
     x = np.arange(columns) * step_x.value
     z = table * factor.value
     if rows == 1:

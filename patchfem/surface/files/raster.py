@@ -88,7 +88,7 @@ def make_scan_of_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> P
         Increasing or decreasing.
     z : (m, n) array [m]
     stated : str
-        Who states the units, METRES or GIVEN of `samples`; then steep heights get a note and are
+        Who states the units, METRES_NOTE or GIVEN_UNITS_NOTE of `samples`; then steep heights get a note and are
         not refused.
     notes : tuple
         Sentences on the file.

@@ -18,7 +18,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, make_trace
+from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .head import HEADER_EXAMPLE, ColumnNames, Fact, parse_column, read_head
 from .matrix import is_matrix, read_scan
 from .raster import make_scan_of_points
@@ -26,7 +26,7 @@ from .raw import RawFile, shorten
 from .rows import read_columns
 from .units import GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
-_QUOTED = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
+_QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
@@ -98,7 +98,7 @@ def read_text(raw: RawFile, units: tuple | None = None) -> Profile | Areal:
             "columns",
         )
     factors = _find_factors(line, columns, named, facts, units)
-    stated = GIVEN if units else ""
+    stated = GIVEN_UNITS_NOTE if units else ""
     if "y" in columns:
         surface = make_scan_of_points(
             path, [values[name] for name in "xyz"], lines, factors.values, stated
@@ -119,7 +119,7 @@ def decode_text(raw: RawFile) -> str:
     text = (
         data.decode(_find_encoding(raw), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     )
-    return _QUOTED.sub(r"\1.\2", text).replace('"', "") if '"' in text else text
+    return _QUOTED_NUMBER.sub(r"\1.\2", text).replace('"', "") if '"' in text else text
 
 
 def _find_encoding(raw: RawFile) -> str:

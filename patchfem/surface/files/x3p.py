@@ -19,7 +19,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import METRES
+from ..samples import METRES_NOTE
 from .raster import make_scan_of_matrix, make_scan_of_points
 from .raw import MAX_POINTS, MIB, RawFile, open_zip, read_member, shorten, shorten_reason
 
@@ -144,7 +144,7 @@ def _make_grid(
             )
     x, y = (axis.scale(np.arange(count)) for axis, count in zip(axes, counts))
     return make_scan_of_matrix(
-        package.raw.path, x, y, heights.reshape(shape.rows, shape.columns), METRES, notes
+        package.raw.path, x, y, heights.reshape(shape.rows, shape.columns), METRES_NOTE, notes
     )
 
 
@@ -159,7 +159,7 @@ def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> P
     if known.sum() < 2:
         raise package.refuse(f"{known.sum()} points with coordinates; a trace needs at least two")
     points = [values[known] for values in (*places, columns[-1])]
-    return make_scan_of_points(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES)
+    return make_scan_of_points(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES_NOTE)
 
 
 def _read_axis(package: Package, name: str) -> Axis:

@@ -16,7 +16,7 @@ from ..areal import Areal
 from ..compare.alignment import MAX_ROUNDS, MAX_SCALE_RATIO
 from ..compare.robust import MAX_UNWORN, MIN_UNWORN, Floor, find_floors, fit_biweight
 from .errors import ScanErrors, draw_scan_errors, estimate_placement_covariance
-from .model import ALL, PLACE, PLANE, Parameter, Raster, ScanModel, make_raster
+from .model import ALL, PLACE_PARAMETERS, PLANE, Parameter, Raster, ScanModel, make_raster
 from .search import (
     SIZE,
     Placement,
@@ -130,7 +130,9 @@ def _fit_images(before: Areal, after: Areal, state, step: float) -> tuple:
     model = ScanModel(*rasters, N_IMAGE_POINTS)
     state = np.concatenate([np.zeros(3), state[3:]])
     try:
-        state, scale = fit_biweight(model.cut(state), state, [Parameter.OFFSET, *PLACE], rounds=30)
+        state, scale = fit_biweight(
+            model.cut(state), state, [Parameter.OFFSET, *PLACE_PARAMETERS], rounds=30
+        )
     except PatchfemError:
         return np.inf, state
     return scale / max(float(np.nanstd(rasters[0].z)), 1e-300), state

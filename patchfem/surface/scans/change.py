@@ -31,20 +31,20 @@ PLACEMENT = {  # name: (unit, definition)
         "rotation of the second scan (after wear) relative to the first, anticlockwise",
     ),
 }
-HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
+HIDDEN_WEAR_MEANING = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
 MIN_CORRELATION = 0.95  # correlation of the unworn heights of scans of the same area
 MIN_CORRELATION_UNSURE = 0.98  # the same if the search found no significant position
 MIN_UNMEASURED = 0.1  # fraction of the worn part without heights that a sentence reports
 HALF_TURN_TOL = 0.2  # [rad] difference from pi below which a scan counts as turned by 180 degrees
 N_DIGITS = 4  # significant digits of volumes in sentences
-WORN = "worn"
+WORN_HEADLINE = "worn"
 NONE = "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable point by point"
 OPEN = "changed: either one part is worn, or another part has grown"
 EITHER = "in each of two parts the scans agree up to a plane, and either part may be the unworn one"
 UNSURE = "the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
-GROWN = f"apart from what grew, {UNSURE}"
+GROWN_HEADLINE = f"apart from what grew, {UNSURE}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,17 +181,17 @@ def remove_spikes(scan: Areal) -> tuple:
 def refuse_hidden_wear(change: Change) -> Quantity:
     """Return the quantity of wear that a plane may hide, which cannot be known."""
     if change.volumes is None:
-        return make_unknown("m", HIDDEN, change.why)
+        return make_unknown("m", HIDDEN_WEAR_MEANING, change.why)
     if change.volumes.values["worn_volume"].low > 0:
-        return make_unknown("m", HIDDEN, "unworn parts are used for the alignment")
-    return make_unknown("m", HIDDEN, _why_no_wear(change.volumes))
+        return make_unknown("m", HIDDEN_WEAR_MEANING, "unworn parts are used for the alignment")
+    return make_unknown("m", HIDDEN_WEAR_MEANING, _why_no_wear(change.volumes))
 
 
 def _why_no_wear(volumes: Volumes) -> str:
     """Explain in a sentence why a comparison shows no wear."""
     if volumes.is_ambiguous:
         return EITHER
-    return GROWN if volumes.values["grown_volume"].low > 0 else UNSURE
+    return GROWN_HEADLINE if volumes.values["grown_volume"].low > 0 else UNSURE
 
 
 def find_headline(change: Change) -> str:
@@ -203,7 +203,7 @@ def find_headline(change: Change) -> str:
         return GREW
     if change.volumes.is_ambiguous:
         return OPEN
-    return WORN if worn.low > 0 else NONE
+    return WORN_HEADLINE if worn.low > 0 else NONE
 
 
 def describe_change(change: Change) -> list:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..compare.errors import N_DRAWS, block_length, correlation_length, student_factor
 from ..compare.robust import BIWEIGHT
-from .model import PLACE, Parameter, ScanModel
+from .model import PLACE_PARAMETERS, Parameter, ScanModel
 
 N_TILES = 40  # tiles along the shorter side of the depth map
 MIN_TILE_SIDE = 4  # heights along the side of a tile; smaller maps have fewer tiles
@@ -185,4 +185,4 @@ def estimate_placement_covariance(model: ScanModel, state, scale: float, changed
         vector = vector / size
         moved = np.abs(vector[[Parameter.SHIFT_X, Parameter.SHIFT_Y]]).max()
         covariance += np.outer(vector, vector) * (model.reach / max(moved, 1e-300)) ** 2
-    return covariance[np.ix_(PLACE, PLACE)]
+    return covariance[np.ix_(PLACE_PARAMETERS, PLACE_PARAMETERS)]

@@ -43,8 +43,8 @@ class Parameter(IntEnum):
 
 
 PLANE = (Parameter.OFFSET, Parameter.SLOPE_X, Parameter.SLOPE_Y)
-PLACE = (Parameter.ANGLE, Parameter.SHIFT_X, Parameter.SHIFT_Y)
-ALL = (*PLANE, *PLACE)
+PLACE_PARAMETERS = (Parameter.ANGLE, Parameter.SHIFT_X, Parameter.SHIFT_Y)
+ALL = (*PLANE, *PLACE_PARAMETERS)
 
 
 class Raster(NamedTuple):

@@ -58,7 +58,7 @@ TEXTS = {  # name: (unit, definition)
     ),
     "volume": ("m3", "area lost in the mean section times the length of the track"),
 }
-SIGNED = ("from", "to", "area_net")  # sizes that may be negative
+SIGNED_SIZES = ("from", "to", "area_net")  # sizes that may be negative
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +341,7 @@ def _widen_by_plane_error(means: dict, error: float, step: float) -> dict:
         reach = float(np.hypot(mean.high - mean.value, SIDE * shared))
         low = mean.value - reach
         values[name] = mean._replace(
-            low=low if name in SIGNED else max(low, 0.0), high=mean.value + reach
+            low=low if name in SIGNED_SIZES else max(low, 0.0), high=mean.value + reach
         )
     return values
 

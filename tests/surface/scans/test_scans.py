@@ -99,7 +99,7 @@ def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(worn):
     assert place["rotation"] == pytest.approx(0.03, abs=5e-5)
     assert (place["shift_x"], place["shift_y"]) == pytest.approx((12e-6, -18e-6), abs=0.02e-6)
     assert found.volumes.values["grown_volume"].value < 1e-3 * truth
-    assert change.find_headline(found) == change.WORN
+    assert change.find_headline(found) == change.WORN_HEADLINE
 
 
 @pytest.mark.share(0)
@@ -236,7 +236,7 @@ def test_always_what_grew_stands_beside_the_reason_why_no_wear_is_shown():
     assert (
         found.values["worn_volume"].reason
         == change.refuse_hidden_wear(found).reason
-        == change.GROWN
+        == change.GROWN_HEADLINE
     )
 
 
