@@ -26,8 +26,8 @@ SYNONYMS = {
     "mikron": 1e-6,
 }
 PREFIXES = {"": 1.0, "milli": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9}
-METRES_NOTE = ("meter", "meters", "metre", "metres")
-SYNONYMS |= {prefix + metre: factor for prefix, factor in PREFIXES.items() for metre in METRES_NOTE}
+METRE_NAMES = ("meter", "meters", "metre", "metres")
+SYNONYMS |= {prefix + metre: factor for prefix, factor in PREFIXES.items() for metre in METRE_NAMES}
 UNIT_LIST = ", ".join(UNITS)
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 GIVE_PIXEL_SIZE = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
