@@ -1010,8 +1010,9 @@ def export(
         Results folder, or a scene file.
     out : path
         File whose extension gives the format. Fields: .pvd, .vtu, .vtkhdf or .csv (the interface). Histories and loops:
-        .uff, .mat, or .csv with `histories` or if the folder has no fields. A script that plays the last cycle in
-        ParaView: .py. Matrices and friction elements of a scene: .mat for NLvib, .npz for TMDSimPy and pyHarm.
+        .uff, .mat, or .csv with `histories` or if the folder has no fields. A script that plays the last cycle
+        (of a bench: the whole slide) in ParaView: .py. Matrices and friction elements of a scene: .mat for NLvib, .npz
+        for TMDSimPy and pyHarm.
     frame : int, optional
         Number of the frame of a .vtu or .csv. Default: the last.
     histories : bool
@@ -1067,7 +1068,7 @@ def view(
     folder : path
         Results folder of a scene with [contact].
     out : path, optional
-        A picture (.png), or the last cycle as .gif, .mp4 or .html. Default: a window.
+        A picture (.png), or the last cycle (of a bench: the whole slide) as .gif, .mp4 or .html. Default: a window.
     frame : int, optional
         Number of the frame. Default: the last.
     magnify : float, optional

@@ -48,7 +48,9 @@ MAX_TRIAL_SECONDS = 10.0
 # A warning of a run ends with its tolerance and what to do; this second part may name a setting
 # that can be tried here.
 _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
-_PROPOSED_SETTING = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
+_PROPOSED_SETTING = re.compile(
+    r"(?:set|.*try) accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)"
+)
 MIN_ELAPSED_TO_CPU_RATIO = 1.5  # Ratio of elapsed to CPU time above which both times are reported.
 EQUAL_COST_RATIO = 1.1  # Ratio of CPU times up to which two runs count as equally expensive.
 TIMING_SCATTER = 2e-3  # Difference of the CPU times of repeated runs of a short scene [s].
@@ -519,10 +521,13 @@ def cost_sentence(runs: list, tolerance: float) -> str:
     names = measures_with_error(runs)
     fastest = fastest_run(runs, tolerance)
     if fastest is not None:
-        return (
-            f"{fastest.words}: {_format_seconds(fastest)} per run, with every measure within the "
-            f"tolerance {tolerance:g}{_no_effect_sentence(runs, tolerance)}"
-        )
+        cost = f"{_format_seconds(fastest)} per run"
+        if len(runs) > 1 and not _has_effect(runs, tolerance):
+            return (
+                f"this setting changes no result by more than the tolerance {tolerance:g}; fastest in these timings: "
+                f"{fastest.words}, {cost}"
+            )
+        return f"{fastest.words}: {cost}, with every measure within the tolerance {tolerance:g}"
     known = [run for run in runs if run.errors or run.distances]
     best = min(known, key=lambda run: worst_error(run, names, tolerance))
     worst = worst_error(best, names, tolerance)
@@ -542,18 +547,14 @@ def cost_sentence(runs: list, tolerance: float) -> str:
     )
 
 
-def _no_effect_sentence(runs: list, tolerance: float) -> str:
-    """Return the text that other settings change no result; "" if they do."""
-    names = changed_measures(runs)
-    if len(runs) < 2:
-        return ""
+def _has_effect(runs: list, tolerance: float) -> bool:
+    """Return whether a result of any run differs from that of the best run by more than the tolerance."""
     for run in runs:
-        for name in names:
+        for name in changed_measures(runs):
             distance = run.distances.get(name, 0.0)
             if name in run.values and not run._allows(name, distance, tolerance):
-                return ""
-    extent = " by more than the tolerance" if names else " of this scene"
-    return f"; the other settings change no result{extent}"
+                return True
+    return False
 
 
 def _format_seconds(run: Cost) -> str:

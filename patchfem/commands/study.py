@@ -42,7 +42,7 @@ def cost(
     /,
     *,
     over: text_option(
-        "vary only one setting: element_size, steps_per_cycle, shear_modes or jumps"
+        "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps"
     ) = "",
     verbose: flag_option(
         "vary also each setting alone, and print the errors of several measures", "-v", "--verbose"

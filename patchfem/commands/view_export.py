@@ -24,7 +24,7 @@ def export(
         Parameter(
             name=["-o", "--out"],
             help="file to write; fields: fields.pvd (all frames, for any version of ParaView), "
-            ".vtu, .csv or .vtkhdf; script that plays the last cycle in ParaView: cycle.py; "
+            ".vtu, .csv or .vtkhdf; script that plays the last cycle (of a bench: the whole slide) in ParaView: cycle.py; "
             "histories: histories.uff, .mat or .csv; matrices and friction elements of a "
             "scene: .mat (NLvib) or .npz (TMDSimPy, pyHarm)",
         ),
@@ -64,7 +64,7 @@ def view(
     *,
     out: out_option(
         "file to write instead of opening a window: picture.png for one frame; .gif, "
-        ".mp4 or .html for the last cycle"
+        ".mp4 or .html for the last cycle (of a bench: the whole slide)"
     ) = None,
     frame: Frame = None,
     magnify: Annotated[

@@ -64,7 +64,7 @@ def export_results(
     if out.suffix == ".py":
         if frame is not None:
             raise PatchfemError(
-                "--frame: cannot be used with a script, which plays the whole last cycle"
+                "--frame: cannot be used with a script, which plays all frames of the motion"
             )
         with _create_parent_folder(out):
             return paraview.write_script(folder, out, of or "von_mises")
@@ -98,7 +98,7 @@ def view_results(
         return ""
     if frame is not None or magnify is not None:
         raise PatchfemError(
-            "--frame, --magnify: cannot be used with a page, which shows the last cycle and has "
+            "--frame, --magnify: cannot be used with a page, which shows the motion and has "
             "sliders for frame and magnification"
         )
     with _create_parent_folder(out):

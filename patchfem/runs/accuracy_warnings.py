@@ -351,8 +351,8 @@ def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
 def _describe_missing_order(name: str, steps: int) -> str:
     """Return the clause that a measure does not converge with the steps."""
     return (
-        f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed "
-        f"{name} at least as much as the first"
+        f"of the results with {steps // 4}, {steps // 2} and {steps} steps per cycle the last two differ in {name} at "
+        "least as much as the first two"
     )
 
 
@@ -362,13 +362,18 @@ def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
     Steps that the scene does not fix are doubled until the displacement meets the tolerance.
     """
     if exact:
-        return f", so more steps may not help; {exact}"
+        return f"; {exact}"
     is_pinned = model.kind == "rig" and model.accuracy.steps_per_cycle is not None
     may_double = is_pinned and 2 * steps <= costs.MAX_MARCH_STEPS
     if may_double and "relative_displacement_amplitude" in excess:
         return (
             "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps "
             "until the displacement meets the tolerance"
+        )
+    if 2 * steps <= costs.MAX_MARCH_STEPS:
+        return (
+            f", so the effect of more steps is not known; try accuracy.steps_per_cycle = {2 * steps}, or "
+            f"{USE_ERROR_ADVICE}"
         )
     return f", so more steps may not help; {USE_ERROR_ADVICE}"
 

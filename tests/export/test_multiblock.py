@@ -73,6 +73,18 @@ def test_exact_every_frame_has_the_numbers_of_the_written_file(crowned, frames, 
         assert blocks["lower"].field_data["TimeValue"][0] == crowned.fields["time"][number]
 
 
+def test_exact_the_way_of_the_guide_to_a_later_frame_reads_that_frame(crowned, frames, tmp_path):
+    """`pyvista.read` returns the first frame of the series, in which nothing slides."""
+    path = crowned.save(tmp_path / "run") / "fields.vtkhdf"
+    assert not pyvista.read(path)["interface"]["shear_stress"].any()
+    reader = pyvista.get_reader(path)
+    for number in (3, len(frames) - 1):
+        reader.reader.SetStep(number)
+        values = reader.read()["interface"]["shear_stress"]
+        expected = frames[number]["interface"]["shear_stress"] * MPA
+        assert values.any() and np.allclose(values, expected, rtol=3e-7, atol=0)
+
+
 def test_exact_the_last_frame_is_that_of_the_patch(crowned):
     patch = crowned.patch
     line = crowned.to_pyvista()["interface"]

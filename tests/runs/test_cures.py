@@ -11,6 +11,7 @@ from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
 from patchfem import build, run
 from patchfem.core import ErrorCauses, Measure
 from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
+from patchfem.scene import choose_law, compose_scene
 
 SHAKEN_RIG = POINT + NONLOCAL + MODE + DRIVE
 SIXTEEN_STEPS = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
@@ -86,6 +87,18 @@ def test_exact_warning_names_main_measures_first(errors, warning):
     }
     finding = Finding(build(SHAKEN_RIG + SIXTEEN_STEPS), measures, None, {"steps_per_cycle": 16})
     assert tolerance_warnings(finding) == [warning]
+
+
+def test_error_without_order_of_convergence_meets_tolerance_with_proposed_steps():
+    """The steps of the first three runs are too long for bonds that age, so their results show no
+    order. The warning proposes twice the steps, which suffice here."""
+    slide = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\ncycles = 3\n'
+    ageing = compose_scene(choose_law("rest", "ageing"))
+    scene = ageing[: ageing.index("[slide]")] + slide + "[accuracy]\ntolerance = 1e-2\n"
+    result = run(scene)
+    assert "results with 32, 64 and 128 steps" in result.warnings[0]
+    assert "try accuracy.steps_per_cycle = 256, or use" in result.warnings[0]
+    assert not run(scene, **{"accuracy.steps_per_cycle": 256}).warnings
 
 
 def test_always_unresolved_free_vibration_is_solved_by_exact_engine():

@@ -32,7 +32,7 @@ def accuracy_charts(curve: AccuracyCurve) -> list:
     limit = f"tolerance {format_number(curve.tolerance, 2)}"
     marks.append(charts.make_line(ends, 2 * [curve.tolerance], "soft", limit, dash="dotted"))
     x_axis = charts.make_axis("CPU seconds of the motion", "", True) | {"range": ends}
-    y_axis = charts.make_axis("error of the worst measure", "", True)
+    y_axis = charts.make_axis("error of the worst main measure", "", True)
     y_axis["range"] = _axis_range(errors)
     return [charts.make_chart("What accuracy costs", x_axis, y_axis, marks)]
 
@@ -41,7 +41,8 @@ def accuracy_caption(curve: AccuracyCurve) -> str:
     """Return the sentences that name the run, the next cheaper and the next better setting."""
     cheaper = curve.coarser[0]
     sentences = [
-        "Worst error of the main measures of the motion, as the tolerance that would allow it, against "
+        "Worst error of the main measures of the motion, as the tolerance that would allow it (a warning names other "
+        "measures that miss the tolerance), against "
         "the CPU time of the motion alone, without pieces, error estimates and files. The error of a "
         "coarser run is its distance from this run plus the error of this run.",
         f"This run: {curve.present.steps} steps per cycle, {_describe(curve.present)}.",

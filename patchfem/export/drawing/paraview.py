@@ -34,7 +34,7 @@ STRESSES = {
 STATUS = "status"  # state of the interface: 0 open, 1 sticks, 2 slips
 
 SCRIPT = '''\
-"""Show the last cycle: {title} in both pieces, contact pressure on their interface.
+"""Show the last cycle (of a bench: the whole slide): {title} in both pieces, contact pressure on their interface.
 
     pvpython THIS.py            plays the cycle three times
     pvpython THIS.py cycle.png  writes a picture of each frame; .avi or .ogv writes a film, if ParaView can write it

@@ -42,7 +42,7 @@ def view(
     ----------
     folder : Path
     out : Path or None
-        Picture, or film (.gif, .mp4) of the last cycle; None for a window.
+        Picture, or film (.gif, .mp4) of the last cycle (of a bench: the whole slide); None for a window.
     frame : int, optional
         Number of the frame; by default the last.
     magnify : float, optional
@@ -85,7 +85,7 @@ def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | Non
     """Write the last cycle of a results folder as an animation."""
     if frame is not None:
         raise PatchfemError(
-            f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame"
+            f"--frame: {out.suffix} shows all frames of the motion; use a .png for one frame"
         )
     film.check_ffmpeg(out)
     with Series(folder) as series:

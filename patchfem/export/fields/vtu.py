@@ -67,7 +67,7 @@ def export_fields(folder: Path, out: Path, frame: int | None = None) -> str:
     out = Path(out)
     if out.suffix not in ENDINGS:
         raise PatchfemError(
-            f"{out}: fields are exported as {', '.join(ENDINGS)}, the last cycle with a script "
+            f"{out}: fields are exported as {', '.join(ENDINGS)}, the motion with a script "
             "for ParaView as .py; histories and loops as .uff, .mat, .csv --histories"
         )
     if frame is not None and out.suffix in (".pvd", ".vtkhdf"):
