@@ -195,6 +195,7 @@ def _static_remedy(finding: Finding, excess: dict, coarse) -> str:
         finding.model,
         [(finding, coarse)],
         is_at_limit=excess.keys() <= set(patch_rows.MESH_MEASURES),
+        mesh="mesh" if finding.model.kind == "patch" else "mesh of the pressed pieces",
     )
 
 
@@ -216,7 +217,9 @@ def _strip_remedy(patch_model, excess: dict) -> str:
     )
 
 
-def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
+def _mesh_remedy(
+    model, places: list, *, is_at_limit: bool = False, mesh: str = "mesh of the motion"
+) -> str:
     """Return the advice to refine the meshes of patches.
 
     Parameters
@@ -226,9 +229,12 @@ def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
         Pairs of a Finding and its coarser patches.
     is_at_limit : bool
         Whether the ladder of meshes has ended.
+    mesh : str
+        Name of the mesh: pressed pieces and motion may have different ones.
     """
     patch_models = [finding.model.patch for finding, _ in places]
-    cause = f"the mesh ({max(finding.patch.x.size for finding, _ in places)} interface nodes) causes this error"
+    n_nodes = max(finding.patch.x.size for finding, _ in places)
+    cause = f"the {mesh} ({n_nodes} interface nodes) causes this error"
     if any(patch.mesh.file is not None for patch in patch_models):
         return faces.use_scene_keys(model, f"{cause}; split the elements of contact.mesh")
     if not all(patch.mesh.is_automatic for patch in patch_models):

@@ -162,6 +162,9 @@ NOT_THERE = [  # words, file that is not there; exit code 4
     (("compare", "trace.csv", "none.csv"), "none.csv: there is no such file"),
     (("compare", "--pairs", "none.csv"), "none.csv: no such table"),
     (("profile", "none.csv"), "none.csv: there is no such file"),
+    (("export", "none", "-o", "a.vtu"), "none: no such results folder"),
+    (("view", "none"), "none: no such results folder"),
+    (("report", "none"), "none: no such results folder"),
 ]
 CASES = [
     ((*verb.split(), *words), says, 2) for verb, rows in REFUSED.items() for words, says in rows

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import Missing, PatchfemError
 from ...formatting import UNIT_LADDERS, choose_axis_unit
 from ..drawing.charts import COLOURS, make_mark
 from ..read_results import is_real, read_variables, reading_errors, require_valid
@@ -68,6 +68,8 @@ class FinishedRun(NamedTuple):
 def read_run(folder: Path) -> FinishedRun:
     """Read the run in a results folder; PatchfemError if there is none."""
     folder = Path(folder)
+    if not folder.exists():
+        raise Missing(f"{folder}: no such results folder")
     try:
         summary = read_summary(folder / "summary.json")
         resolved = tomllib.loads((folder / "scene.resolved.toml").read_text(encoding="utf-8"))
