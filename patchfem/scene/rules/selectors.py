@@ -113,11 +113,8 @@ def check_selector(facts: TableFacts, selector: Selector) -> None:
     reason = f"{selector.key} '{value}'"
     for word in selector.choices[value][0].split():
         alternatives = word.split("|")
-        written = [
-            key
-            for key in alternatives
-            if facts.has(key) or f"{facts.table_key}.{key}" in draft.suggested_keys
-        ]
+        keys = {key: f"{facts.table_key}.{key}" for key in alternatives}
+        written = [key for key in keys if facts.has(key) or keys[key] in draft.suggested_keys]
         if not written:
             first, *others = alternatives
             needs = " or ".join((f"{reason} needs this key", *others))
