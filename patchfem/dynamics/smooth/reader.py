@@ -297,8 +297,10 @@ def measure_parts(response, drive, ends) -> tuple:
     values = {
         "relative_displacement_amplitude": parts.find_half_range("output"),
         "absolute_acceleration_peak": acceleration,
-        "drift_per_cycle": parts.drift(),
     }
+    drift = parts.drift()
+    if drift is not None:
+        values["drift_per_cycle"] = drift
     measures = IntegratedMeasures(
         values,
         _acceleration_harmonics(parts, drive, ends),

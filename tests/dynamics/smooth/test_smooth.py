@@ -300,3 +300,11 @@ def test_exact_grazing_speed_agrees_with_scipy(second_slide):
     )
     motion, force = relative_errors(modes, SHORT, ref.bonds, 3, SineDrive(60.0, OMEGA))
     assert motion < 1e-9 and force < 1e-8
+
+
+def test_exact_a_run_below_two_cycles_leaves_its_drift_to_the_samples():
+    """The engine knows no drift below 1.5 cycles; a value None would remove that of the samples."""
+    short = simulate(ONE, SINE, make_element(SHORT), 1, 1e-6, 1)
+    long = simulate(ONE, SINE, make_element(SHORT), 4, 1e-6, 4)
+    assert "drift_per_cycle" not in short.integrated.values
+    assert "drift_per_cycle" in long.integrated.values
