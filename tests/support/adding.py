@@ -1,4 +1,4 @@
-"""The examples of patchfem/ADDING.md in a copy of the package, as the page prints them."""
+"""Code examples of patchfem/ADDING.md, which the tests apply to a copy of the package."""
 
 import os
 import re
@@ -30,19 +30,19 @@ for words in map(shlex.split, sys.argv[1:]):
 
 
 class Block(NamedTuple):
-    """A block of code of the page: its language and its text."""
+    """Code block of a Markdown page: its language and its text."""
 
     language: str
     text: str
 
 
 def blocks(page: str) -> list:
-    """Return the blocks of code of a page in their order."""
+    """Return the code blocks of a Markdown page in their order."""
     return [Block(*found) for found in re.findall(r"^```(\w+)\n(.*?)^```$", page, re.S | re.M)]
 
 
 def commands(page: str) -> list:
-    """Return the commands of a page in their order, without the word patchfem."""
+    """Return the shell commands of a page in their order, without the leading word patchfem."""
     lines = [
         line for block in blocks(page) if block.language == "sh" for line in block.text.splitlines()
     ]
@@ -51,7 +51,7 @@ def commands(page: str) -> list:
 
 
 def place(block: Block, package: Path) -> None:
-    """Put a block of Python into the copy of the package where its first line says."""
+    """Insert a Python block into the copied package at the place that its first line names."""
     head, _, code = block.text.partition("\n")
     if found := re.fullmatch(r"# new file (\S+)", head):
         path = package / found[1]
@@ -72,7 +72,7 @@ def place(block: Block, package: Path) -> None:
 
 
 def copied(folder: Path, page: str) -> Path:
-    """Return a copy of the package in a folder, with every block of Python of a page placed."""
+    """Copy the package into a folder, apply every Python block of a page, and return the path of the copy."""
     copy = shutil.copytree(
         PACKAGE, folder / "patchfem", ignore=shutil.ignore_patterns("__pycache__")
     )
@@ -83,7 +83,7 @@ def copied(folder: Path, page: str) -> Path:
 
 
 def run(folder: Path, lines: list) -> str:
-    """Run commands of a copy in one process and return what they print; AssertionError if one of them fails."""
+    """Run commands with a copied package in a new process and return their output; AssertionError if one of them fails."""
     done = subprocess.run(
         [sys.executable, "-c", COMMANDS, *lines],
         cwd=folder,

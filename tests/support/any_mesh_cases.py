@@ -1,4 +1,4 @@
-"""Pieces and pairs of any mesh, and the files they are stored in."""
+"""Unstructured meshes of single bodies and of pairs, and functions that write them in every supported file format."""
 
 from __future__ import annotations
 
@@ -16,7 +16,10 @@ NO_QUADS = np.empty((0, 4), np.int64)
 
 
 def of_grid(grid, split=0.0, seed=None):
-    """The tensor grid as an unstructured piece, a share of its quads cut in two; nodes renumbered by `seed`."""
+    """Return a structured grid as an unstructured mesh.
+
+    A fraction `split` of its quadrilaterals is cut into triangles; `seed` renumbers the nodes.
+    """
     nx = grid.x.size
     ny = grid.depth.size
     points = np.stack([np.repeat(grid.x, ny), np.tile(grid.depth, nx)], axis=1)
@@ -44,7 +47,10 @@ def of_grid(grid, split=0.0, seed=None):
 
 
 def cloud(half_length, height, size, coating=0.0):
-    """Triangles of Delaunay on rows of points whose spacing is size(x, depth); rows on the coating's lower face."""
+    """Return a Delaunay mesh of rows of points with spacing size(x, depth).
+
+    One row lies on the lower face of the coating.
+    """
     levels = [0.0]
     depth = 0.0
     while depth < height:
@@ -86,7 +92,7 @@ NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
 
 
 def drawn(kind="mixed", grid=GRID):
-    """Points, triangles, quads, edges and their tags of a pair; 'mixed' splits every other quad."""
+    """Return points, cells, edges and tags of the mesh of a pair; kind "mixed" splits every other quadrilateral."""
     pair = pair_mesh(grid)
     split = {"quads": np.zeros, "triangles": np.ones}.get(kind, lambda n, t: np.arange(n) % 2 == 0)
     split = split(len(pair["quads"]), bool)
@@ -103,7 +109,7 @@ def drawn(kind="mixed", grid=GRID):
 
 
 def blocks(m):
-    """(kind, cells, tags) of what a mesh has."""
+    """Return (cell type, cells, tags) of the triangles, quadrilaterals and lines that the mesh contains."""
     every = [
         ("triangle", m.triangles, m.triangle_tags),
         ("quad", m.quads, m.quad_tags),
@@ -113,7 +119,7 @@ def blocks(m):
 
 
 def write_msh22(m, path, binary=True):
-    """Gmsh 2.2 through meshio."""
+    """Write a mesh in Gmsh format 2.2 with meshio."""
     mesh = meshio.Mesh(
         np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)]
     )
@@ -125,7 +131,7 @@ def write_msh22(m, path, binary=True):
 
 
 def write_msh41(m, path):
-    """Gmsh 4.1 in text, one entity per tag, as Gmsh itself writes it."""
+    """Write a mesh as text in Gmsh format 4.1 with one entity per tag, as Gmsh itself does."""
     parts = [(k, c[t == tag], int(tag)) for k, c, t in blocks(m) for tag in np.unique(t)]
     dims = {"line": 1, "triangle": 2, "quad": 2}
     curves, areas = (list(dict.fromkeys(p[2] for p in parts if dims[p[0]] == d)) for d in (1, 2))
@@ -148,7 +154,7 @@ def write_msh41(m, path):
 
 
 def write_vtu(m, path):
-    """VTK with the cell array `tag`."""
+    """Write a mesh as a VTK file whose cell array `tag` holds the tags."""
     mesh = meshio.Mesh(
         np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)]
     )
@@ -157,9 +163,9 @@ def write_vtu(m, path):
 
 
 def write_inp(m, path, lines=True, capitals=True):
-    """A deck; the edges as sets of line elements or as sets of nodes."""
+    """Write a mesh as an Abaqus input file; the edges are sets of line elements, or sets of nodes if `lines` is false."""
     text = ["*HEADING", "two pieces", "** a comment", "*NODE, NSET=ALL"]
-    # numbers with gaps
+    # Node numbers are not consecutive, as is permitted in this format.
     text += [f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())]
     number = 0
     for kind, cells, tags in blocks(m):
@@ -182,7 +188,7 @@ def write_inp(m, path, lines=True, capitals=True):
 
 
 def write_med(m, path):
-    """A MED file, whose families of cells have one group each."""
+    """Write a mesh as a MED file in which every family of cells belongs to one group."""
     import meshio
 
     found = blocks(m)
@@ -205,16 +211,18 @@ FORMATS = {
 
 
 def stored(m, folder, form="gmsh 2.2 binary"):
-    """The pair after a trip through a file."""
+    """Write the mesh of a pair to a file, read the file, and return the two meshes."""
     path = folder / f"pair{FORMATS[form][0]}"
     FORMATS[form][1](m, path)
     return read_pieces(path)
 
 
 def move(m, at, by):
+    """Shift the points with indices `at` by the vector `by`."""
     m.points[at] += by
 
 
 def interface_node(m, side="upper", k=3):
+    """Return the index of the k-th interface node of a body, counted along x."""
     nodes = np.unique(m.edges[m.edge_tags == EDGE_TAGS[f"{side}_interface"]])
     return nodes[np.argsort(m.points[nodes, 0])][k]

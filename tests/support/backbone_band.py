@@ -1,20 +1,24 @@
-"""Random joints: the band of a backbone against marched steady responses and released decays.
+"""Random joints: error band of a backbone curve against marched steady responses and released decays.
 
-Campaign `backbone-bands` of `campaigns`. A row is a frequency or a damping ratio at an amplitude: its value is the middle
-of the band, its error the half-width, its truth the reading of a test.
+Campaign `backbone-bands` of `campaigns`. A row is a frequency or a damping ratio at an amplitude:
+its value is the middle of the band, its error the half-width of the band, and its truth the value
+from a simulated test.
 
-A joint has 1 + (seed // 6) % 3 modes and law LAWS[seed % 6]. Mass 0.3 to 3 kg, first mode 50 to 300 Hz, the next one 1.25
-to 2.5 times the one before, damping ratios of 2e-3 to 2e-2, a joint of 0.05 to 1 of the stiffness of the first mode, a
-load of 20 to 500 N with a coefficient of 0.2 to 0.6, all drawn evenly in logarithms. The first mode slides and moves the
-output by 1, the others by 0.2 to 1 of either sign.
+A joint has 1 + (seed // 6) % 3 modes and law LAWS[seed % 6]. Mass 0.3 to 3 kg, first mode 50 to 300
+Hz, each further frequency 1.25 to 2.5 times the previous one, damping ratios of 2e-3 to 2e-2, a
+joint stiffness of 0.05 to 1 times that of the first mode, a load of 20 to 500 N and a friction
+coefficient of 0.2 to 0.6, all log-uniform. The first mode has a participation of 1 in the interface
+and the output, the others 0.2 to 1 with either sign.
 
-- Steady responses: `march_steady` integrates the equation of motion under a sinusoidal force at the output with its own
-  leapfrog scheme and its own form of each law, from a start at the amplitude until the cycles repeat. It shares no code
-  with the package. F conj(X) = m Z^2 (w0^2 - w^2 + 2 i zeta w0^2) gives the frequency w0 and the damping ratio, with the
-  first harmonics X of the output and Z of the modes. A second run has the frequency of the first reading. Four forces.
+- Steady responses: `march_steady` integrates the equation of motion under a sinusoidal force at the
+output with a leapfrog scheme and separate code for each law, from the wanted amplitude until the
+cycles repeat. It shares no code with the package. F conj(X) = m Z^2 (w0^2 - w^2 + 2 i zeta w0^2)
+gives the frequency w0 and the damping ratio, with the first harmonics X of the output and Z of the
+modes. A second run is driven at the frequency that the first one gave. There are four forces.
+
 - Decays: method `decay` of the package, at every third amplitude.
 
-Seeds below 58000 are for making the band, those from 58000 on are held out.
+Seeds below 58000 were used in developing the band, those from 58000 on only to test it.
 """
 
 from pathlib import Path
@@ -31,17 +35,18 @@ from patchfem.campaigns import compute_backbone
 from patchfem.core import PatchfemError
 
 LAWS = ("elastic-plastic", "iwan", "bouc-wen", "lugre", "tanh", "coulomb")
-FRACTIONS = (0.3, 0.6, 0.72, 0.88)  # of the logarithmic range of amplitudes; forces aim at these
-STEPS = {"iwan": 1000}  # per cycle of the drive; other laws need more
+# Positions in the logarithmic range of amplitudes at which the forces aim.
+FRACTIONS = (0.3, 0.6, 0.72, 0.88)
+STEPS = {"iwan": 1000}  # Steps per cycle of the drive; laws not named here need MOST_STEPS.
 MOST_STEPS = 4000
 MAX_CYCLES = 1500
-BLOCK = 25  # cycles between two looks at the change of a cycle
-REPEATS = 1e-4  # of the response: expected further change at which the march ends
-N_DECAY = 3  # a decay counts at every third amplitude
+BLOCK = 25  # Cycles between two checks of whether the motion repeats.
+REPEATS = 1e-4  # Expected further change, relative to the response, at which the march ends.
+N_DECAY = 3  # The decay is evaluated at every third amplitude.
 
 
 class Joint(NamedTuple):
-    """A drawn joint; arrays of modes (n,), and friction numbers of its law."""
+    """Random joint: arrays of modes (n,), the friction law and its parameters."""
 
     law: str
     mass: float
@@ -55,7 +60,7 @@ class Joint(NamedTuple):
 
 
 class Reading(NamedTuple):
-    """Reading of a steady response: amplitude [m], frequency [Hz], damping, and the doubts of the last two."""
+    """Amplitude [m], frequency [Hz] and damping ratio of a steady response, with the uncertainties of the last two."""
 
     amplitude: float
     frequency: float
@@ -65,10 +70,11 @@ class Reading(NamedTuple):
 
 
 def draw_joint(seed: int) -> Joint:
-    """Draw the joint of a seed."""
+    """Draw the random joint of a seed."""
     rng = np.random.default_rng(seed)
 
     def even(low, high, size=None):
+        """Draw from a log-uniform distribution."""
         return np.exp(rng.uniform(np.log(low), np.log(high), size))
 
     count = 1 + (seed // 6) % 3
@@ -97,7 +103,7 @@ def draw_joint(seed: int) -> Joint:
 
 
 def write_scene(joint: Joint) -> dict:
-    """Write a joint as the tables of a scene."""
+    """Return the scene tables of a joint."""
     modes = [
         {
             "name": f"mode{k + 1}",
@@ -117,7 +123,10 @@ def write_scene(joint: Joint) -> dict:
 
 
 def law_numbers(joint: Joint) -> tuple:
-    """Stiffness (s,) [N/m] and limit (s,) [N] of sliders, or the numbers of another law in the first of both."""
+    """Return stiffness (s,) [N/m] and slip force (s,) [N] of the sliders.
+
+    Other laws have their parameters in the first array.
+    """
     limit = joint.static * joint.load
     numbers = joint.numbers
     if joint.law == "iwan":
@@ -136,14 +145,14 @@ def law_numbers(joint: Joint) -> tuple:
 
 @numba.njit
 def step_law(kind, numbers, limits, state, move, speed):
-    """Friction force after a move, whose speed is given; the state is changed."""
+    """Return the friction force after a displacement step at a given speed, and update the state in place."""
     if kind <= 1:
         force = 0.0
         for k in range(numbers.size):
             state[k] = min(max(state[k] + numbers[k] * move, -limits[k]), limits[k])
             force += state[k]
         return force
-    if kind == 2:  # Bouc-Wen with weight 1/2, by the midpoint rule
+    if kind == 2:  # Bouc-Wen with both weights 1/2, by the midpoint rule.
         middle = state[0]
         for part in (0.5, 1.0):
             fall = abs(middle) ** numbers[1] * (0.5 * np.sign(move * middle) + 0.5)
@@ -160,7 +169,10 @@ def step_law(kind, numbers, limits, state, move, speed):
 
 @numba.njit
 def march(kind, numbers, limits, state, modes, mass, drive, steps, cycles, motion, q, v, force):
-    """March some cycles with the leapfrog scheme; the last two go to `motion` (2 steps, n). Returns the force."""
+    """March some cycles with the leapfrog scheme and return the friction force at the end.
+
+    The last two cycles are stored in `motion` (2 steps, n).
+    """
     omega, zeta, slide, output = modes
     size, frequency = drive
     dt = 2 * np.pi / frequency / steps
@@ -188,7 +200,7 @@ def march(kind, numbers, limits, state, modes, mass, drive, steps, cycles, motio
 
 
 def march_steady(joint: Joint, force: float, frequency: float, start: float) -> Reading:
-    """March a joint under a sinusoidal force at the output until its cycles repeat, and read it.
+    """March a joint under a sinusoidal force at the output until its cycles repeat, and evaluate its last cycle.
 
     force [N], frequency [Hz], start: displacement of the first mode [m].
     """
@@ -221,7 +233,7 @@ def march_steady(joint: Joint, force: float, frequency: float, start: float) -> 
             friction,
         )
         before, after = (read_cycle(joint, part, force, omega) for part in np.split(motion, 2))
-        # the transient falls by exp(-2 pi zeta) a cycle at least
+        # The transient decays by at least exp(-2 pi zeta) per cycle.
         rest = 1 / max(1 - np.exp(-2 * np.pi * joint.zeta.min()), 1e-3)
         change = rest * np.abs(np.subtract(after, before))
         if (change <= REPEATS * np.abs(after)).all():
@@ -230,10 +242,10 @@ def march_steady(joint: Joint, force: float, frequency: float, start: float) -> 
 
 
 def read_cycle(joint: Joint, motion, force: float, omega: float) -> tuple:
-    """Amplitude [m], frequency [Hz] and damping ratio of a cycle (steps, n) of modal coordinates."""
+    """Return amplitude [m], frequency [Hz] and damping ratio of a cycle (steps, n) of modal coordinates."""
     steps = len(motion)
     output = motion @ joint.output
-    # a sample follows the step whose force it is beside
+    # Each sample is taken at the end of its step, so its phase is one step later than its index.
     turn = np.exp(-2j * np.pi * np.arange(1, steps + 1) / steps) * 2 / steps
     modal = turn @ motion
     work = force * np.conj(turn @ output) / (joint.mass * np.sum(np.abs(modal) ** 2))
@@ -243,7 +255,10 @@ def read_cycle(joint: Joint, motion, force: float, omega: float) -> tuple:
 
 
 def band_rows(band, name: str, points) -> list:
-    """Rows of readings (amplitude, frequency, damping, doubts of both) inside the amplitudes of a band."""
+    """Return the rows of the points that lie within the amplitudes of a band.
+
+    points: (amplitude, frequency, damping, uncertainties of both).
+    """
     rows = []
     x = np.log(band.amplitude)
     for amplitude, *values in points:
@@ -261,7 +276,7 @@ def band_rows(band, name: str, points) -> list:
 
 
 def steady_points(joint: Joint, curve) -> list:
-    """Readings of marched steady responses that aim at some amplitudes of a curve."""
+    """Return steady responses whose forces aim at some amplitudes of a curve."""
     points = []
     for fraction in FRACTIONS:
         k = int(fraction * (curve.amplitude.size - 1))

@@ -1,4 +1,4 @@
-"""Random campaigns: how many stated errors hold against independent references.
+"""Random campaigns: how often stated errors cover the differences from independent references.
 
     python tests/support/campaigns.py run KIND FILE --first SEED --count N [--truth OTHER]
     python tests/support/campaigns.py score FILE...
@@ -25,7 +25,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-KINDS = {  # name on the command line -> module and function
+KINDS = {  # Name on the command line -> module and function.
     "rigs": ("random_rigs", "compare_rig"),
     "harmonic": ("random_rigs", "compare_harmonic_rig"),
     "reduced": ("reduced_chains", "compare_chain"),
@@ -50,15 +50,17 @@ KINDS = {  # name on the command line -> module and function
     "roughness": ("roughness_coverage", "compare_trace"),
     "backbone-bands": ("backbone_band", "compare_band"),
 }
-MAX_CPU_SECONDS = 60  # of one scene with its reference; a longer one is noted as failed
-SHARP_FACTOR = 5.0  # a sharp error is at most so many times the true error
-SHARP_FRACTION = 1e-8  # of the value; a smaller error is sharp because nobody can use more digits
-FLOOR_FRACTION = 1e-3  # of the floor of a measure; a smaller difference does not count
-ROUND_OFF = 1e-9  # of the value; a smaller difference does not count
+# Time limit of a scene with its reference; a longer one is recorded as failed.
+MAX_CPU_SECONDS = 60
+SHARP_FACTOR = 5.0  # Largest ratio of a sharp error to the true error.
+# Smaller errors, relative to the value, count as sharp because more digits have no use.
+SHARP_FRACTION = 1e-8
+FLOOR_FRACTION = 1e-3  # Smaller differences, relative to the floor of a measure, do not count.
+ROUND_OFF = 1e-9  # Smaller differences, relative to the value, do not count.
 
 
 class Row(NamedTuple):
-    """A measure of a scene beside its reference; `doubt` is the uncertainty of the reference itself."""
+    """Measure of a scene beside its reference value; `doubt` is the uncertainty of the reference itself."""
 
     name: str
     value: float
@@ -69,7 +71,7 @@ class Row(NamedTuple):
 
     @property
     def true_error(self) -> float:
-        """Difference from the reference; a phase is compared modulo pi."""
+        """Absolute difference from the reference; a phase is compared modulo pi."""
         gap = abs(self.truth - self.value)
         if self.name == "slip_start_phase":
             return min(gap, abs(np.pi - gap))
@@ -77,13 +79,16 @@ class Row(NamedTuple):
 
     @property
     def holds(self) -> bool:
-        """Whether the stated error is at least the true error, apart from the doubt of the reference."""
+        """Whether the stated error is at least the true error minus the uncertainty of the reference."""
         ignored = max(FLOOR_FRACTION * self.floor, ROUND_OFF * abs(self.value))
         return self.true_error <= self.error + self.doubt + ignored
 
     @property
     def is_sharp(self) -> bool | None:
-        """Whether the stated error is not much larger than the true error; None where the reference cannot say."""
+        """Whether the stated error is at most five times the true error.
+
+        None if the reference is too uncertain to decide.
+        """
         if self.error <= max(self.floor, SHARP_FRACTION * abs(self.value)):
             return True
         if self.true_error <= 2 * self.doubt:
@@ -92,7 +97,7 @@ class Row(NamedTuple):
 
 
 class Score(NamedTuple):
-    """Shares of a list of lines: of scenes whose errors all hold, of errors that hold, of errors that are sharp."""
+    """Fractions over a list of lines: scenes whose errors all hold, errors that hold, and errors that are sharp."""
 
     n_scenes: int
     right_scenes: float
@@ -102,7 +107,7 @@ class Score(NamedTuple):
 
 
 def measure_rows(measures, truths: dict, doubts: dict, names=None) -> list:
-    """List the measures (of a result) that have a value, an error and a reference.
+    """Return a row for each measure of a result that has a value, an error and a reference value.
 
     Parameters
     ----------
@@ -128,18 +133,18 @@ def strip_number(name: str) -> str:
 
 
 def rows_of(line: dict) -> list:
-    """Rows of a stored line."""
+    """Return the rows of a stored line."""
     return [Row(*row) for row in line["rows"]]
 
 
 def fraction(values: list) -> float:
-    """Fraction of the known values (not None) that are true."""
+    """Return the fraction of the values other than None that are true."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known else float("nan")
 
 
 def score(lines: list) -> Score:
-    """Score the lines that have rows."""
+    """Return the score of the lines that have rows."""
     scenes = [rows_of(line) for line in lines if line["rows"]]
     rows = [row for scene in scenes for row in scene]
     return Score(
@@ -152,7 +157,7 @@ def score(lines: list) -> Score:
 
 
 def print_score(lines: list) -> None:
-    """Print the errors that do not hold, then the shares for each measure and each engine."""
+    """Print the errors that do not hold, then the fractions for each measure and each engine."""
     by_name = defaultdict(list)
     for line in lines:
         for row in rows_of(line):
@@ -175,12 +180,12 @@ def print_score(lines: list) -> None:
 
 
 def engines_of(lines: list) -> list:
-    """Names of the engines of the lines that have rows."""
+    """Return the names of the engines of the lines that have rows."""
     return sorted({line.get("engine") or "" for line in lines if line["rows"]} - {""})
 
 
 def describe(shares: Score) -> str:
-    """Write a score in one sentence."""
+    """Return a score as a sentence."""
     return (
         f"{shares.n_scenes} scenes, all errors hold in {shares.right_scenes:.1%}; {shares.n_errors} errors, "
         f"{shares.held:.1%} hold, {shares.sharp:.1%} are sharp"
@@ -188,7 +193,7 @@ def describe(shares: Score) -> str:
 
 
 def print_comparison(before: list, after: list) -> None:
-    """Print the scores of two files, and the ratios of seconds and steps, for the scenes that both contain."""
+    """Print the scores of two files and their ratios of seconds and steps, for the scenes in both files."""
     old = {line["seed"]: line for line in before}
     pairs = [(old[line["seed"]], line) for line in after if line["seed"] in old]
     pairs = [pair for pair in pairs if all(line["rows"] for line in pair)]
@@ -219,12 +224,12 @@ def read_lines(names) -> list:
 
 
 def stop_scene(*_) -> None:
-    """End a scene that takes too long (a signal handler)."""
+    """Raise TimeoutError in a scene that takes too long (a signal handler)."""
     raise TimeoutError(f"more than {MAX_CPU_SECONDS} CPU seconds")
 
 
 def run_campaign(compare_scene, seeds, file: Path, earlier: dict) -> None:
-    """Compare the scenes of the seeds that the file does not contain; store a line after each.
+    """Compare the scenes of all seeds that are not yet in the file, and append a line for each.
 
     Parameters
     ----------

@@ -1,4 +1,7 @@
-"""A headless Chromium driven over a pipe: real pointer and keys, both themes, prints; one start for many pages."""
+"""Headless Chromium controlled over a pipe: pointer and keyboard input, light and dark themes, printing.
+
+One browser process serves many pages.
+"""
 
 import base64
 import fcntl
@@ -20,11 +23,11 @@ FLAGS = (
     "--disable-extensions",
     "--mute-audio",
 )
-PATIENCE = 60  # s without a word after which it counts as hung
+PATIENCE = 60  # Time without a message [s] after which the browser counts as hung.
 
 
 def program() -> str | None:
-    """The Chromium of this machine."""
+    """Return the path of the installed Chromium or Chrome, or None."""
     return next(
         (
             found
@@ -35,11 +38,12 @@ def program() -> str | None:
     )
 
 
-LATER = "document.addEventListener('unpacked', () => {{{}}})"  # a script that waits until the page is unpacked
+# Script that runs once the page is unpacked.
+LATER = "document.addEventListener('unpacked', () => {{{}}})"
 
 
 class Chromium:
-    """A browser with one page; `opened` shows a text of HTML, what was wrong in its scripts is in `faults`."""
+    """Browser with one page; `faults` collects the errors of the page's scripts."""
 
     def __init__(self, home: Path):
         self.home = home
@@ -48,7 +52,7 @@ class Chromium:
         self.events = []
         self.buffer = b""
         (take, self.out), (self.into, give) = os.pipe(), os.pipe()
-        # 3 and 4 are where it listens and speaks
+        # The browser reads commands from descriptor 3 and writes to descriptor 4.
         far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]
         null = os.open(os.devnull, os.O_RDWR)
         places = [
@@ -73,6 +77,7 @@ class Chromium:
         self._attach()
 
     def _attach(self) -> None:
+        """Attach a new session to the current page."""
         self.session = None
         self.session = self.ask("Target.attachToTarget", targetId=self.target, flatten=True)[
             "sessionId"
@@ -81,6 +86,7 @@ class Chromium:
             self.ask(f"{part}.enable")
 
     def _next(self) -> dict:
+        """Return the next message of the browser, and record script errors and events."""
         while b"\0" not in self.buffer:
             if not select.select([self.into], [], [], PATIENCE)[0]:
                 raise TimeoutError(f"the browser has said nothing for {PATIENCE} s")
@@ -101,7 +107,7 @@ class Chromium:
         return said
 
     def ask(self, method: str, **params) -> dict:
-        """The answer to one message of the browser's protocol."""
+        """Send a command of the DevTools protocol and return its result."""
         self.number += 1
         message = {"id": self.number, "method": method, "params": params}
         message |= {"sessionId": self.session} if self.session else {}
@@ -112,14 +118,14 @@ class Chromium:
         return said["result"]
 
     def asked(self, event: str, method: str, **params) -> None:
-        """Send a message and wait for an event, which may come before the answer."""
+        """Send a command and wait for an event, which may arrive before the result."""
         self.events.clear()
         self.ask(method, **params)
         while event not in self.events:
             self._next()
 
     def visit(self, path: Path, width: int = 1200, height: int = 900) -> "Chromium":
-        """Show a page of a folder, whose scripts and styles lie beside it."""
+        """Load a page from a folder that also contains its scripts and styles."""
         self._fresh()
         self.sized(width, height)
         self.faults = []
@@ -129,7 +135,7 @@ class Chromium:
     def opened(
         self, text: str, width: int = 1200, height: int = 900, dark: bool = False
     ) -> "Chromium":
-        """Show a page and wait until its pictures stand."""
+        """Load a page given as HTML and wait until its charts are drawn."""
         self._fresh()
         self.sized(width, height)
         self.themed(dark)
@@ -138,7 +144,7 @@ class Chromium:
         return self
 
     def after(self, text: str, milliseconds: float) -> str:
-        """The document that a page has become after some time of its own clock, which waits for nothing."""
+        """Return the HTML of a page after some milliseconds of virtual time."""
         self._fresh()
         self.sized(1200, 900)
         self._to(text)
@@ -151,7 +157,7 @@ class Chromium:
         return self.js("document.documentElement.outerHTML")
 
     def _fresh(self) -> None:
-        """Another page: the clock of the one before may stand still."""
+        """Replace the page by a new one, because the virtual clock of the old page may have stopped."""
         old = self.target
         self.session = None
         self.target = self.ask("Target.createTarget", url="about:blank")["targetId"]
@@ -159,13 +165,14 @@ class Chromium:
         self._attach()
 
     def _to(self, text: str) -> None:
+        """Write HTML to a file and load it."""
         path = self.home / f"page{self.number}.html"
         path.write_text(text, "utf-8")
         self.faults = []
         self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
 
     def settled(self) -> None:
-        """Wait until the page is unpacked and every picture of BokehJS is drawn."""
+        """Wait until the page is unpacked and every BokehJS chart is drawn."""
         self.js("""new Promise((done) => {
             const stands = () => !document.getElementById('library') &&
                 [...document.querySelectorAll('.chart')].every((one) => one.firstElementChild?.shadowRoot);
@@ -192,6 +199,7 @@ class Chromium:
         })()""")
 
     def sized(self, width: int, height: int) -> None:
+        """Set the size of the window [px]."""
         self.ask(
             "Emulation.setDeviceMetricsOverride",
             width=width,
@@ -201,6 +209,7 @@ class Chromium:
         )
 
     def themed(self, dark: bool, media: str = "") -> None:
+        """Set the preferred color scheme and the media type."""
         self.ask(
             "Emulation.setEmulatedMedia",
             media=media,
@@ -208,17 +217,17 @@ class Chromium:
         )
 
     def js(self, text: str):
-        """The value of an expression in the page, a promise waited for."""
+        """Return the value of a JavaScript expression in the page; a promise is awaited."""
         found = self.ask("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
     def pointed(self, x: float, y: float, kind: str = "mouseMoved", **more) -> None:
-        """Move or press the pointer at a place of the window."""
+        """Move or press the pointer at a position in the window."""
         self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
     def pressed(self, key: str) -> None:
-        """Press a key on what has the focus."""
+        """Press a key on the focused element."""
         code = {
             "ArrowRight": 39,
             "ArrowLeft": 37,
@@ -241,7 +250,7 @@ class Chromium:
             )
 
     def picture(self, path: Path | None = None, whole: bool = False) -> bytes:
-        """What the window shows as PNG; whole: all of the page."""
+        """Return the window as a PNG image, or the full page if `whole` is set."""
         found = base64.b64decode(
             self.ask("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
         )
@@ -250,7 +259,7 @@ class Chromium:
         return found
 
     def printed(self) -> bytes:
-        """The page as PDF."""
+        """Return the page as a PDF."""
         return base64.b64decode(self.ask("Page.printToPDF", printBackground=True)["data"])
 
     def close(self) -> None:
@@ -258,7 +267,7 @@ class Chromium:
         try:
             self.session = None
             self.ask("Browser.close")
-        except (EOFError, OSError):  # it may hang up before it answers
+        except (EOFError, OSError):  # The browser may close the pipe before it answers.
             pass
         os.close(self.out), os.close(self.into)
         os.waitpid(self.process, 0)

@@ -1,4 +1,4 @@
-"""The command line inside the test process, and code in a fresh interpreter."""
+"""Run the command line in the test process, and code in a new interpreter."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ ALWAYS = {"pyvista", "meshio", "numba"}
 
 
 class CommandResult(NamedTuple):
-    """Exit code, stdout and stderr."""
+    """Exit code, standard output and standard error of a command."""
 
     code: int
     out: str
@@ -49,7 +49,7 @@ class CommandResult(NamedTuple):
 
 
 def cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
-    """Run `patchfem WORDS` in this process; `stdout` is a stream that takes what is printed."""
+    """Run `patchfem WORDS` in this process; `stdout` may be a stream that receives the output."""
     out = io.StringIO() if stdout is None else stdout
     err = io.StringIO()
     with (
@@ -62,7 +62,7 @@ def cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
 
 
 def loaded(code: str, *words) -> set:
-    """Names in sys.modules after `code` ran in a fresh interpreter."""
+    """Return the names in sys.modules after `code` was run in a new interpreter."""
     done = subprocess.run(
         [sys.executable, "-c", code, *map(str, words)],
         capture_output=True,
@@ -75,13 +75,13 @@ def loaded(code: str, *words) -> set:
 
 
 def loaded_again(code: str, *words) -> set:
-    """What `loaded` gives where all compiled code is kept: a run that had to compile is run once more."""
+    """Return the modules that `code` loads once all compiled code is cached; a run that had to compile is repeated."""
     modules = loaded(code, *words)
     return loaded(code, *words) if "numba" in modules else modules
 
 
 def has_code_of(modules: set, name: str) -> bool:
-    """Return whether modules of a package of others, or of a folder or module of ours, are among those loaded.
+    """Return whether modules of another package, or of a folder or module of this one, are among those loaded.
 
     The `__init__` of a folder that has only a docstring and the table of its public names does not count: Python
     loads it with any module of the folder that is named and not yet used.
@@ -94,7 +94,7 @@ def has_code_of(modules: set, name: str) -> bool:
 
 
 def absent(modules: set, *names) -> None:
-    """Assert that none of these folders, modules and packages, and none of the packages in ALWAYS, is loaded."""
+    """Assert that none of the named folders, modules and packages, nor any package in ALWAYS, is loaded."""
     assert not [name for name in {*ALWAYS, *names} if has_code_of(modules, name)]
 
 

@@ -1,4 +1,4 @@
-"""Cases that a sweep in this process computes: they are recorded, and the work can be interrupted."""
+"""Recorder of the cases that a sweep in this process computes, which can also interrupt the sweep."""
 
 import math
 
@@ -23,7 +23,7 @@ class ComputedCases:
         monkeypatch.setattr(batches, "solve_models", self)
 
     def __call__(self, models, *more):
-        """Compute a chunk of models as the sweep does."""
+        """Compute a chunk of models in the same way as the sweep."""
         if self.chunks_before_interrupt <= 0:
             raise KeyboardInterrupt
         self.chunks_before_interrupt -= 1

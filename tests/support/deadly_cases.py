@@ -1,4 +1,4 @@
-"""What worker processes are given in tests: objects of a module that they can import."""
+"""Objects for tests of worker processes, in a module that the workers can import."""
 
 import os
 import signal
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Deadly:
-    """Kills the process that tells of certain cases: always, or the first time only."""
+    """Measure that kills its worker process in certain cases: always, or only the first time."""
 
     numbers: tuple
     seen: Path

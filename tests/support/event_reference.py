@@ -1,7 +1,4 @@
-"""Independent version of the exact engine: DOP853 with events.
-
-It tries every choice of signs.
-"""
+"""Independent version of the exact engine: DOP853 with events, in which every combination of slip directions is tried."""
 
 from collections.abc import Callable
 from itertools import product
@@ -12,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 
 class Stretch(NamedTuple):
-    """A smooth stretch of a drive that begins at `start` [s].
+    """Smooth piece of a drive that begins at `start` [s].
 
     value: function of t; amplitude: largest value; omega: largest angular frequency.
     """
@@ -25,11 +22,13 @@ class Stretch(NamedTuple):
 
 
 def stretches(drive, count: int) -> list:
-    """Return the first stretches of a drive without segments, each with its own formula."""
+    """Return the first smooth pieces of a drive without segments, each with its own formula."""
     starts = [0.0, *map(float, drive.breaks)][:count]
 
     def value(number):
-        if hasattr(drive, "time"):  # straight lines, which are extended beyond the row
+        """Return the drive in a piece as a function of time."""
+        # The sampled drive is linear between samples and is extended beyond them.
+        if hasattr(drive, "time"):
             t, v = (part[number : number + 2] for part in (drive.time, drive.value))
             return lambda x: (
                 v[0] + (v[1] - v[0]) / (t[1] - t[0]) * (x - t[0]) if len(t) == 2 else 0.0
@@ -43,10 +42,10 @@ def stretches(drive, count: int) -> list:
 
 
 def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False):
-    """Choose the signs of all faces; those in `active` have no slip velocity.
+    """Return the slip directions of all interfaces; those in `active` have zero slip velocity.
 
-    pull (n,) is without friction. Of several choices without a contradiction it is the one in which
-    the fewest faces slide, or the most if `most_sliding` is set.
+    `pull` (n,) is the acceleration without friction. Among consistent combinations the one with the
+    fewest sliding interfaces is chosen, or with the most if `most_sliding` is set.
     """
     options = sorted(
         product((0, 1, -1), repeat=len(active)),
@@ -75,7 +74,7 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
 
 
 def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_sliding=False):
-    """Return [(time, signs, z, v)] at the start of every stretch and at the end."""
+    """Return [(time, directions, z, v)] at the start of every smooth piece and at the end."""
     faces = np.asarray(modes.interfaces)
     mass = modes.mass
     n = modes.omega.size
@@ -87,14 +86,17 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
     scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
 
     def accel(part, t):
+        """Return the base acceleration in a piece of the drive."""
         if isinstance(part, Stretch):
             return part.value(t)
         return part.constant + part.amplitude * np.sin(part.omega * (t - part.start) + part.phase)
 
     def pull(part, t, z, v):
+        """Return the modal accelerations without friction."""
         return -square * z - dampers @ v - modes.base * accel(part, t)
 
     def forces_of(signs, part, t, z, v):
+        """Return the friction forces of all interfaces for given slip directions."""
         known = pull(part, t, z, v) - faces.T @ (signs * kinetic) / mass
         out = signs * kinetic
         stuck = np.flatnonzero(signs == 0)
@@ -188,10 +190,10 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
 
 
 def march_reference(modes, drive, limit, end, z, v, steps):
-    """Return (time, z) of a Moreau march with theta = 1/2, solved by Gauss-Seidel.
+    """Return (time, z) of Moreau's time stepping with theta = 1/2, solved by Gauss-Seidel iteration.
 
-    Impulses within +-limit h leave each face without mean slip, or act against it; static = kinetic
-    = limit (i,).
+    Impulses within +-limit h either prevent the mean slip of an interface or oppose it; static and
+    kinetic friction equal limit (i,).
     """
     faces = np.asarray(modes.interfaces)
     n = modes.omega.size

@@ -1,4 +1,4 @@
-"""Coulomb runs for tests: one call with limits instead of elements, and the run as phases from event to event."""
+"""Coulomb runs for tests: calls with friction limits instead of elements, and runs as phases between events."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from patchfem.dynamics.events.positions_kernels import ROW_BEGIN, Column
 
 
 def groups_of(modes, static, kinetic) -> list:
-    """A rigid element per interface, from limits [N] that are one for all or (i,)."""
+    """Return one rigid element per interface, from limits [N] that are scalars or have shape (i,)."""
     count = len(modes.interfaces)
     pairs = zip(np.broadcast_to(static, count), np.broadcast_to(kinetic, count))
     return [make_coulomb_elements(float(one), float(other)) for one, other in pairs]
@@ -19,26 +19,29 @@ def groups_of(modes, static, kinetic) -> list:
 def simulate(
     modes, drive, static, kinetic, cycles, window=10, travel=np.inf, progress=None, start=None
 ):
-    """`histories.simulate` of Coulomb friction."""
+    """Call `histories.simulate` with Coulomb friction."""
     groups = groups_of(modes, static, kinetic)
     return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
 
 
 def steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
-    """`stick_steady.solve_steady` of Coulomb friction."""
+    """Call `stick_steady.solve_steady` with Coulomb friction."""
     return stick_steady.solve_steady(
         modes, drive, groups_of(modes, static, kinetic), start, cycles, periods
     )
 
 
 def period_map(modes, drive, static, kinetic, state, periods=1):
-    """`stick_steady.map_period` of Coulomb friction."""
+    """Call `stick_steady.map_period` with Coulomb friction."""
     return stick_steady.map_period(modes, drive, groups_of(modes, static, kinetic), state, periods)
 
 
 @dataclass(frozen=True)
 class Signal:
-    """Columns of `dense_kernels.evaluate_rows` of a run, weighted, from the start of a phase on; their rates beside them."""
+    """Weighted sum of columns of `dense_kernels.evaluate_rows` over a phase of a run.
+
+    `rates` are the columns of its time derivative.
+    """
 
     run: object
     rows: np.ndarray
@@ -47,15 +50,16 @@ class Signal:
     weights: tuple
 
     def many(self, t):
-        """Values (j,) at times t (j,) [s] since the phase began."""
+        """Return values (j,) at times t (j,) [s] after the start of the phase."""
         return self._of(self.columns, np.asarray(t, float))
 
     def _of(self, columns, t):
+        """Return the weighted sum of some columns at times t (j,) [s]."""
         at = self.rows[0, 0] + t
         owner = np.clip(
             np.searchsorted(self.rows[:, 0], at, side="right") - 1, 0, len(self.rows) - 1
         )
-        # from the offset in the cycle, which has more digits than the time
+        # The offset within the cycle has more digits than the absolute time.
         since = np.concatenate([[0.0], np.cumsum(self.rows[:-1, 1])])
         tau = np.clip(t - since[owner], 0.0, self.rows[owner, 1])
         order = np.argsort(owner, kind="stable")
@@ -64,15 +68,16 @@ class Signal:
         return out[:, columns] @ np.array(self.weights)
 
     def __call__(self, t):
+        """Return the value at one time t [s]."""
         return float(self.many(np.array([t]))[0])
 
     def rate(self):
-        """The time derivative."""
+        """Return the time derivative as a signal."""
         return Signal(self.run, self.rows, self.rates, (), self.weights)
 
 
 def combine(signals, factors) -> Signal:
-    """Sum of signals over the same phase, weighted with `factors`."""
+    """Return the sum of signals of the same phase, weighted with `factors`."""
     first = signals[0]
     return Signal(
         first.run,
@@ -85,8 +90,11 @@ def combine(signals, factors) -> Signal:
 
 @dataclass(frozen=True)
 class Phase:
-    """Motion from one event to the next, `span` [s] long from `time` [s] and drive phase `theta`; directions (i,) of
-    slip, 0 in stick; modal: a Signal of every coordinate; forces: of every interface [N]."""
+    """Motion between two events.
+
+    It begins at `time` [s] with drive phase `theta` and lasts `span` [s]. directions: of slip (i,),
+    0 in stick; modal: a Signal per coordinate; forces: of the interfaces [N].
+    """
 
     time: float
     theta: float
@@ -98,17 +106,17 @@ class Phase:
 
     @property
     def direction(self) -> int:
-        """Of the first interface."""
+        """Slip direction of the first interface."""
         return self.directions[0]
 
     @property
     def force(self) -> Signal:
-        """Of the first interface."""
+        """Friction force of the first interface."""
         return self.forces[0]
 
 
 def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
-    """(run, rows of all its pieces) from rest or `start`, the clock put to the cycle `begin` at first."""
+    """Return the run and the rows of all its pieces, from rest or `start`; the clock begins at cycle `begin`."""
     groups = groups_of(modes, static, kinetic)
     one = histories.start_event_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
     one.time_state.now[0] = begin
@@ -118,7 +126,7 @@ def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple
 
 
 def run(modes, drive, static, kinetic, duration, start=None) -> list:
-    """The phases of a run up to `duration` [s]; the last one is cut there."""
+    """Return the phases of a run of `duration` [s]; the last one ends there."""
     one, rows = rows_of(modes, drive, static, kinetic, duration / drive.period, start)
     begins = np.flatnonzero(rows[:, 4] >= ROW_BEGIN.stick_or_slip)
     n = len(modes.omega)
@@ -137,7 +145,7 @@ def run(modes, drive, static, kinetic, duration, start=None) -> list:
 
 
 def starts(done) -> np.ndarray:
-    """Phases modulo pi of the releases of the first interface in the window of a EventRunResult."""
+    """Return the phases, modulo pi, at which the first interface is released in the window of an EventRunResult."""
     log = done.log
     late = (log.interface == 0) & (np.abs(log.kind) == 1) & (log.time > done.window.time[0])
     return log.phase[late] % np.pi

@@ -1,4 +1,4 @@
-"""Shared by the export tests: a small series of any cells with random numbers, and the scene of a small run."""
+"""Data of the export tests: a small series of mixed cells with random values, and the scene of a small run."""
 
 from __future__ import annotations
 
@@ -42,7 +42,10 @@ steps_per_cycle = 40
 
 
 def body(sign: float, frames: int, rng) -> dict:
-    """Three columns of two quads, one of them cut in two; node 3 * column + row."""
+    """Return the data of a body of three columns of two quadrilaterals, one of them split.
+
+    The number of a node is 3 * column + row.
+    """
     x, depth = np.meshgrid([-1e-3, -0.2e-3, 0.3e-3, 1e-3], [0.0, 1e-4, 1e-3], indexing="ij")
     node = np.arange(12).reshape(4, 3)
     quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(
@@ -63,7 +66,7 @@ def body(sign: float, frames: int, rng) -> dict:
 
 
 def write_small(folder, frames: int = 3, seed: int = 0, times=None):
-    """A results folder with only fields.vtkhdf; what was given to the writer."""
+    """Write a results folder that contains only fields.vtkhdf, and return the data passed to the writer."""
     rng = np.random.default_rng(seed)
     gap = rng.random((frames, 4)) * 1e-6
     interface = {
@@ -80,7 +83,7 @@ def write_small(folder, frames: int = 3, seed: int = 0, times=None):
 
 
 def waves(frames: int, across: int, deep: int) -> Block:
-    """Quads with a smooth field that wanders, as a rubbing piece has."""
+    """Return a block of quadrilaterals with smooth fields that move along x, as in a sliding body."""
     x, y = np.meshgrid(
         np.linspace(0, 12.7e-3, across + 1), np.linspace(0, 6.35e-3, deep + 1), indexing="ij"
     )
@@ -117,7 +120,7 @@ def waves(frames: int, across: int, deep: int) -> Block:
 
 
 def write_waves(path, frames: int, across: int, deep: int) -> Block:
-    """A series of one block of `waves`."""
+    """Write a series with the single block of `make_wave_block`, and return the block."""
     block = waves(frames, across, deep)
     vtkhdf.write_series(
         path,
@@ -130,5 +133,5 @@ def write_waves(path, frames: int, across: int, deep: int) -> Block:
 
 
 def at(values, frame: int):
-    """One frame of an array that may be constant."""
+    """Return one frame of an array that may be constant in time."""
     return values[frame if len(values) > 1 else 0]

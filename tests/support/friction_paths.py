@@ -1,6 +1,6 @@
-"""Paths, pressure patterns and a sum over bonds written out by hand, shared by the tests of the friction laws.
+"""Paths, pressure patterns and explicit sums over bonds for tests of the friction laws.
 
-Everything here is in units of eps_0 and mu_s sigma unless a law says otherwise.
+Lengths are in units of eps_0 and tractions in units of mu_s sigma, unless a law says otherwise.
 """
 
 import sys
@@ -29,7 +29,10 @@ class Walk(NamedTuple):
 
 
 def triangle(amplitude, cycles, per_stroke, start=0.0):
-    """Knots of a triangle wave, `per_stroke` equal steps between turns; from -amplitude when start < 0, else from 0."""
+    """Return the knots of a triangle wave with `per_stroke` equal steps between reversals.
+
+    It begins at -amplitude if start < 0, else at 0.
+    """
     one = np.linspace(-amplitude, amplitude, per_stroke + 1)
     cycle = np.concatenate([one[1:], one[::-1][1:]])
     whole = np.concatenate([[-amplitude], *[cycle] * cycles])
@@ -39,18 +42,18 @@ def triangle(amplitude, cycles, per_stroke, start=0.0):
 
 
 def upper_pressure(sigma):
-    """Pressure that rides on the upper piece: the same at every slide."""
+    """Return a pressure that is fixed to the upper body, and so does not depend on the relative displacement."""
     sigma = np.asarray(sigma, float)
     return lambda q: sigma
 
 
 def lower_pressure(x, wave, floor=0.0):
-    """Pressure fixed to the lower piece with bare places: max(0, sin) pattern at x + q, (m,)."""
+    """Return a pressure (m,) fixed to the lower body with unloaded zones: max(0, sine) pattern at x + q."""
     return lambda q: np.maximum(np.sin(2 * np.pi * (np.asarray(x) + q) / wave) + floor, 0.0)
 
 
 def walk(law, path, pressure, dt=1.0):
-    """March `law` over the knots `path`; `pressure` maps a slide to (m,) values; dt scalar or one per step."""
+    """March `law` along the knots `path`; `pressure` maps a displacement to (m,) values; dt: scalar or per step."""
     times = np.broadcast_to(dt, len(path) - 1)
     state = law.start(pressure(path[0]))
     rows = []
@@ -69,7 +72,7 @@ class Pulled(NamedTuple):
 
 
 def pulled(law, path, pressure, dt=1.0) -> Pulled:
-    """As `walk`, without means and energies: of a sum over bonds at a tenth of the cost."""
+    """March like `march_path` without means and energies, which takes a tenth of the time for a sum over bonds."""
     times = np.broadcast_to(dt, len(path) - 1)
     state = law.start(pressure(path[0]))
     rows = []
@@ -81,12 +84,15 @@ def pulled(law, path, pressure, dt=1.0) -> Pulled:
 
 
 def rates(law, speed):
-    """(rest rate, slide rate) of 2.10 at a constant speed [1/s]."""
+    """Return the growth rates of the bond length at rest and in slip (2.10) at a constant speed [1/s]."""
     return law.rest_growth / max(abs(speed), law.rest_speed), abs(speed) / law.slip_growth
 
 
 def lengths_by_hand(law, path, times):
-    """(length at the knots, length half way through each step): 2.10 at constant speed, solved in closed form."""
+    """Return the bond lengths at the knots and in the middle of each step.
+
+    They solve 2.10 at constant speed in closed form.
+    """
     knots = [law.length]
     middles = []
     for dq, dt in zip(np.diff(path), times):
@@ -102,11 +108,12 @@ def lengths_by_hand(law, path, times):
 
 
 def bonds_of_strokes(law, path, dt, longest):
-    """Yield (number, weights, stretches u, forces) of the bonds of every stroke of `path`, 12 Gauss points per piece.
+    """Yield (step, weights, stretches u, forces) of the bonds formed in each step of `path`.
 
-    No bond is lost, kept apart or summed cleverly. stretch: damage with the length of the middle of a step; report:
-    every bond integrates its own length from zero through every later step. `longest` is the largest piece of a stroke
-    in bond lengths; the forces are (x/eps)^p exp(-x/eps) with x = |u| or the path R.
+    Each piece has 12 Gauss points. No bond is dropped or merged. Reading "stretch": damage uses the
+    bond length in the middle of a step; reading "report": each bond integrates its own length from
+    zero through every later step. `longest` is the largest piece of a step in bond lengths; the
+    forces are (x/eps)^p exp(-x/eps) with x = |u| or the distance R.
     """
     steps = np.diff(path)
     times = np.broadcast_to(dt, len(steps)).astype(float)
@@ -142,7 +149,7 @@ def bonds_of_strokes(law, path, dt, longest):
 
 
 def sum_by_hand(law, path, pressure, dt=1.0):
-    """Return the traction (m,) at the end of `path` over mu_s: 2.17 as a plain sum over bonds."""
+    """Return the traction (m,) over mu_s at the end of `path`: 2.17 as an explicit sum over bonds."""
     total = np.zeros_like(pressure(path[0]), float)
     for k, weight, u, force in bonds_of_strokes(law, path, dt, 0.5):
         mean = (pressure(path[k]) + pressure(path[k + 1])) / 2
@@ -161,7 +168,10 @@ def sum_by_hand(law, path, pressure, dt=1.0):
 
 
 def energy_by_hand(law, path, dt=1.0):
-    """Return the energy at the end of `path` [m] per mu_s N: force times stretch at frozen damage, over all bonds."""
+    """Return the stored energy at the end of `path` [m] per mu_s N.
+
+    It is force times stretch at constant damage, summed over bonds.
+    """
     total = sum(
         weight @ (force * np.abs(u))
         for _, weight, u, force in bonds_of_strokes(law, path, dt, 0.25)
@@ -170,5 +180,5 @@ def energy_by_hand(law, path, dt=1.0):
 
 
 def random_walk(seed, count, size):
-    """Knots of a walk from 0 with normal steps."""
+    """Return the knots of a random walk from 0 with normally distributed steps."""
     return np.concatenate([[0], np.cumsum(np.random.default_rng(seed).normal(0, size, count))])

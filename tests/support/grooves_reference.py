@@ -1,7 +1,8 @@
-"""Coulomb friction on flanks that the load climbs, by Newton's laws of block and lifted mass and DOP853 with events.
+"""Reference for Coulomb friction on grooves whose flanks lift a mass: Newton's laws and DOP853 with events.
 
-Nothing of the closed form of the force is used: normal force R and acceleration of the slide are the two unknowns of
-two linear equations, along x and upwards, for every way of the slide.
+The closed form of the force is not used: normal force R and acceleration of the relative
+displacement are the unknowns of two linear equations, along x and upwards, for each direction of
+slip.
 """
 
 from typing import NamedTuple
@@ -11,8 +12,11 @@ from scipy.integrate import solve_ivp
 
 
 class Case(NamedTuple):
-    """One mode on grooves: mass [kg], omega [rad/s], zeta, base acceleration [m s-2], its omega [rad/s]; load [N],
-    wavelength [m], amplitude [m], phase [rad], lifted mass [kg]; mu_s, mu_k."""
+    """Single mode on grooves.
+
+    mass [kg], omega [rad/s], zeta; base acceleration [m s-2] and its angular frequency [rad/s];
+    load [N]; wavelength [m], amplitude [m], phase [rad]; lifted mass [kg]; mu_s, mu_k.
+    """
 
     mass: float
     omega: float
@@ -29,7 +33,7 @@ class Case(NamedTuple):
 
 
 def case_of(seed: int) -> Case:
-    """A random case about the rig's: it slips, with and without a lifted mass and a smaller kinetic coefficient."""
+    """Draw a random case that slips, with or without a lifted mass and a smaller kinetic coefficient."""
     rng = np.random.default_rng(seed)
     omega = 2 * np.pi * rng.uniform(80, 200)
     mass = rng.uniform(0.5, 2)
@@ -55,17 +59,17 @@ def case_of(seed: int) -> Case:
 
 
 def flank(c: Case, q: float) -> tuple:
-    """(slope, its rate over the slide) of the flank at q, by z = A (1 - cos)."""
+    """Return the slope of the flank at q and its derivative, for the height z = A (1 - cos)."""
     k = 2 * np.pi / c.wavelength
     return c.amplitude * k * np.sin(k * q - c.phase), c.amplitude * k * k * np.cos(k * q - c.phase)
 
 
 def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tuple:
-    """(acceleration of the slide, normal force on the flank, force along x) in motion."""
+    """Return the acceleration in slip, the normal force on the flank and the force along x."""
     steep, bend = flank(c, q)
     cosine = 1 / np.hypot(1, steep)
     sine = steep * cosine
-    # what a newton on the flank gives
+    # Components of the contact force along x and upwards, per newton of normal force.
     across = sine + way * mu * cosine
     up = cosine - way * mu * sine
     free = -2 * c.zeta * c.omega * v - c.omega**2 * q - c.acceleration * np.sin(c.drive * t)
@@ -77,14 +81,18 @@ def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tupl
 
 
 def held(c: Case, t: float, q: float) -> tuple:
-    """(force that holds the slide, how steep it would have to be): the angle of friction at rest decides."""
+    """Return the force needed to stick and its inclination to the flank normal, which the angle of friction limits."""
     need = c.mass * (-(c.omega**2) * q - c.acceleration * np.sin(c.drive * t))
     return need, np.arctan2(need, c.load) - np.arctan(flank(c, q)[0])
 
 
 def run(c: Case, end: float, times) -> tuple:
-    """(samples (k, 5): slide, speed, friction's loss along the flank, drive's work, work against the load at `times`
-    (k,) that end at `end`, time at which the normal force ends: infinite where it stays)."""
+    """Integrate a case up to `end` [s].
+
+    Returns samples (k, 5) at `times` (k,), which must end at `end`: displacement, speed, frictional
+    loss, work of the drive, work against the load; and the time at which contact is lost, infinite
+    if never.
+    """
     cone = np.arctan(c.static)
     t = 0.0
     y = np.zeros(5)
@@ -112,6 +120,7 @@ def run(c: Case, end: float, times) -> tuple:
             continue
 
         def slopes(s, x, way=way):
+            """Return the derivatives of displacement, speed and the three energies."""
             gain, press, _ = forces(c, s, x[0], x[1], way, c.kinetic)
             own = way * c.kinetic * press * np.hypot(1, flank(c, x[0])[0]) * x[1]
             return [
@@ -123,9 +132,11 @@ def run(c: Case, end: float, times) -> tuple:
             ]
 
         def turns(s, x, way=way, begin=t):
+            """Return the speed in the direction of slip, whose zero ends the slip; positive just after a start."""
             return way * x[1] if s > begin + 1e-9 / c.drive else 1e-12
 
         def lifts(s, x, way=way):
+            """Return the normal force on the flank, whose zero ends the contact."""
             return forces(c, s, x[0], x[1], way, c.kinetic)[1]
 
         turns.terminal = True

@@ -1,4 +1,4 @@
-"""Structures and a plain march that the tests of harmonic balance share."""
+"""Structures and a simple time march for tests of harmonic balance."""
 
 import numpy as np
 from modal_bases import basis_of
@@ -9,21 +9,22 @@ from patchfem.friction import Bonds, TanhLaw, points_element
 
 
 def of_speed(limit, speed):
-    """limit tanh(v/speed)."""
+    """Return the law limit tanh(v/speed)."""
     return SpeedLaw(TanhLaw(limit, speed).element(1.0))
 
 
 def bonds(limit, length):
-    """The bond recursion u' = sgn - u per length, F = limit u."""
+    """Return the law of bonds, F = limit u with du/dq = sgn(v) - u per unit of length."""
     return FlowLaw(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
 
 
 def sdof(xi=0.003, omega=1.0, mass=1.0):
+    """Return a modal basis with a single mode."""
     return basis_of(omega, xi, mass=mass)
 
 
 def five(damping=None, zeta=0.02):
-    """Five modes with a first one near 1."""
+    """Return a basis of five modes with the first frequency at 1 rad/s."""
     omega = np.array([1.0, 2.3, 3.9, 6.1, 8.8])
     slide = np.array([1.0, 0.7, -0.5, 0.4, 0.3])
     base = np.array([1.0, 0.3, 0.2, -0.1, 0.1])
@@ -33,14 +34,14 @@ def five(damping=None, zeta=0.02):
 
 
 def many(count=100, total=6.0, limit=1.2):
-    """(stiffness, limit slide) of parallel elements with a force limit in all."""
+    """Return stiffnesses and yield displacements of parallel elements with a given total stiffness and force limit."""
     k = np.full(count, total / count)
     w = np.linspace(0.2, 1.8, count)
     return k, w * limit / (k @ w)
 
 
 def plain_jenkins(places, stiffness, limit):
-    """Forces along a path from the virgin state at 0, element by element; and the last stretch."""
+    """Return the forces of parallel Jenkins elements along a path from the virgin state at 0, and the last stretches."""
     stretch = np.zeros(len(stiffness))
     last = 0.0
     out = []
@@ -52,7 +53,10 @@ def plain_jenkins(places, stiffness, limit):
 
 
 def march(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
-    """Exact propagation of the modes under a force linear in each step, found by fixed point: rows (z, v), forces."""
+    """Propagate the modes exactly under a force that is linear in each step, found by fixed-point iteration.
+
+    Returns rows (z, v) and forces.
+    """
     n = modes.omega.size
     m = modes.mass
     w = drive.omega
@@ -71,7 +75,8 @@ def march(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
     force = stiffness @ stretch
     rows = [y]
     forces = [force]
-    gain = modes.slide @ e[:n, 2 * n + 3] / dt  # slide per change of the force over the step
+    # Displacement at the interface per change of the force over a step.
+    gain = modes.slide @ e[:n, 2 * n + 3] / dt
     for i in range(steps * cycles):
         s = np.array([np.sin(w * i * dt), np.cos(w * i * dt)])
         q = modes.slide @ y[:n]

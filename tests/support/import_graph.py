@@ -1,7 +1,8 @@
-"""Imports of the package, read from its sources without importing them.
+"""Imports of the package, found in its source files without importing them.
 
-`imports` lists what one file imports: every statement, also inside functions and under TYPE_CHECKING, and every
-compiled module that is loaded by its literal name. `import_graph` joins the lists of all files.
+`imports` lists what one file imports: every statement, also inside functions and under
+TYPE_CHECKING, and every compiled module that is loaded by its literal name. `import_graph` joins
+the lists of all files.
 """
 
 import ast
@@ -12,11 +13,11 @@ from typing import NamedTuple
 
 PACKAGE = "patchfem"
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-LOADERS = ("load", "import_module")  # functions whose first argument is the name of a module
+LOADERS = ("load", "import_module")  # Functions whose first argument is the name of a module.
 
 
 class Import(NamedTuple):
-    """One imported name."""
+    """A name imported by a module."""
 
     target: str  # dotted name of the module inside the package ("" is its top), or the name of another package
     name: str  # name imported from the target, "" for the module itself
@@ -25,7 +26,7 @@ class Import(NamedTuple):
 
 
 def sources(root: Path, folder: str = PACKAGE) -> dict:
-    """Read the sources of a folder: {dotted name inside the folder: text}, "" for its top."""
+    """Read the source files of a folder: {dotted name inside the folder: text}, "" for its top."""
     tree = {}
     for path in sorted((Path(root) / folder).rglob("*.py")):
         parts = path.relative_to(Path(root) / folder).with_suffix("").parts
@@ -35,7 +36,7 @@ def sources(root: Path, folder: str = PACKAGE) -> dict:
 
 @cache
 def syntax_nodes(text: str) -> tuple:
-    """Parse a source once and return all its nodes, the module first."""
+    """Parse a source file once and return all its nodes, the module first."""
     was_enabled = gc.isenabled()
     gc.disable()  # the collector would visit all nodes of all files again and again
     try:
@@ -47,18 +48,19 @@ def syntax_nodes(text: str) -> tuple:
 
 @cache
 def folders_and_modules(names: tuple) -> frozenset:
-    """Return the dotted names of all modules and of the folders that hold them."""
+    """Return the dotted names of all modules and of the folders that contain them."""
     parts = [name.split(".") for name in names]
     return frozenset(".".join(part[:k]) for part in parts for k in range(1, len(part) + 1))
 
 
 def imports(name: str, text: str, tree: dict) -> tuple:
-    """List the imports of the file with the dotted name `name`; np.load("data.npz") is not an import."""
+    """Return the imports of the file with the dotted name `name`; np.load("data.npz") is not an import."""
     return _imports(name, text, tuple(tree))
 
 
 @cache
 def _imports(name: str, text: str, names: tuple) -> tuple:
+    """Return the imports of a file, given the dotted names of all files; cached."""
     known = folders_and_modules(names)
     is_package = any(other.startswith(f"{name}.") for other in names)
     folder = name if is_package else name.rpartition(".")[0]
@@ -99,7 +101,7 @@ def _imported_names(node, package: list):
 
 
 def _literal_text(node) -> str:
-    """Return a literal text; of an f-string, the folder that it names before its first placeholder."""
+    """Return the value of a literal string; for an f-string, the folder that it names before its first placeholder."""
     is_format = isinstance(node, ast.JoinedStr) and bool(node.values)
     first = node.values[0] if is_format else node
     text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
@@ -118,7 +120,7 @@ def import_graph(tree: dict) -> dict:
 
 
 def import_cycles(graph: dict) -> list:
-    """Return the groups of files that import each other over any number of steps, the largest group first."""
+    """Return the groups of files that import each other directly or indirectly, the largest group first."""
     reachable = {name: set(targets) for name, targets in graph.items()}
     for middle in graph:
         for targets in reachable.values():

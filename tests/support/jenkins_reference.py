@@ -1,12 +1,11 @@
-"""Elastic-plastic elements one by one under DOP853, restarted at every yield and turning point: an independent
-reference."""
+"""Independent reference for elastic-plastic elements: DOP853, restarted at every yield and reversal."""
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 
 class Reference:
-    """Modes (core.ModalBasis) behind elements: (stiffness (t,), yield slide (t,)) of every interface, from rest."""
+    """Modes (core.ModalBasis) on elements (stiffness (t,), yield displacement (t,)) at every interface, from rest."""
 
     def __init__(self, modes, drive, elements, rtol=1e-12, atol=1e-14, method="DOP853"):
         self.modes = modes
@@ -16,7 +15,8 @@ class Reference:
         self.method = method
         self.k, self.y = ([np.asarray(one[j], float) for one in elements] for j in (0, 1))
         self.stretch = [np.zeros(k.size) for k in self.k]
-        self.way = [np.zeros(k.size) for k in self.k]  # of the elements that slip
+        # Direction of each slipping element, 0 of those that stick.
+        self.way = [np.zeros(k.size) for k in self.k]
         self.faces = np.asarray(modes.interfaces)
         n = modes.omega.size
         self.state = np.zeros(2 * n)
@@ -25,6 +25,7 @@ class Reference:
         self.peak = 0.0
 
     def forces(self, z, frozen):
+        """Return the friction force of every interface; `frozen` holds the displacements at the last restart."""
         slide = self.faces @ z
         return np.array(
             [
@@ -36,7 +37,7 @@ class Reference:
         )
 
     def go(self, end: float) -> np.ndarray:
-        """State (2 n,) at `end` [s]."""
+        """March to the time `end` [s] and return the state (2 n,)."""
         modes = self.modes
         n = self.modes.omega.size
         step = 0.05 * self.drive.period
@@ -96,6 +97,7 @@ class Reference:
         return self.state
 
     def _land(self, found, frozen):
+        """Update the stretches and slip directions of the elements at the end of a piece."""
         n = self.modes.omega.size
         self.peak = max(self.peak, np.abs(self.modes.output @ found.y[:n]).max())
         self.time = float(found.t[-1])

@@ -1,8 +1,8 @@
-"""Pairs of traces of known truth, before and after, of the kinds that a laboratory brings to `compare`.
+"""Pairs of traces with known wear, of the kinds that a laboratory compares.
 
-Written from what a stylus does, without sight of the method that compares them. A pair is made of one long surface that
-two traces run over; each trace has its own start, tilt, offset and noise. Lengths in m. Seeds 41000 to 41019 served to
-set rules.
+Based on how a stylus works and made without knowledge of the comparison method. Both traces of a
+pair are taken from one long surface; each has its own start, tilt, offset and noise. Lengths in m.
+Seeds 41000 to 41019 were used in developing the method.
 """
 
 from dataclasses import dataclass, field
@@ -29,26 +29,30 @@ KINDS = (
     "elsewhere",
     "scale",
 )
-# the waves did not change
+# Kinds in which the short waves did not change.
 SAME = ("unworn", "even", "wedge", "dust", "mirrored", "turned", "elsewhere")
-RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # beside heights that are unworn
+RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # Kinds with both worn and unworn parts.
 
 
 @dataclass(frozen=True)
 class Pair:
-    """Two traces and what is true of them: depths (m) at the points of the trace after, > 0 where material went."""
+    """Two traces and their true difference.
+
+    worn: depths [m] at the points of the trace after, positive where material was removed.
+    """
 
     kind: str
     seed: int
     before: tuple  # x, z (n) each
     after: tuple
-    worn: np.ndarray = field(repr=False)  # worn depth at each point of after
-    shift: float = 0.0  # of the trace after: x on the piece less x of the file, beyond that of the trace before
-    spoilt: tuple = (0, 0)  # points that are dust or dropouts in either trace
+    worn: np.ndarray = field(repr=False)  # Worn depth at each point of `after`.
+    # Offset of the trace after relative to the trace before: x on the surface minus x in the file.
+    shift: float = 0.0
+    spoilt: tuple = (0, 0)  # Number of points of dust or dropouts in each trace.
 
 
 def surface(draw, length: float, style: str):
-    """Heights (m) over x (m), as fine as the finest trace: self-affine, turned or with a plateau."""
+    """Return x and heights [m] at the spacing of the finest trace: self-affine, turned, or with a plateau."""
     step = 0.25e-6
     count = int(2 ** np.ceil(np.log2(length / step)))
     wave = np.fft.rfftfreq(count, step)
@@ -72,14 +76,14 @@ def surface(draw, length: float, style: str):
 
 
 def trough(x, start: float, stop: float, depth: float, ramp: float):
-    """A track of the given depth whose sides rise over `ramp`."""
+    """Return a worn track of a given depth whose sides are `ramp` wide."""
     into = np.clip((x - start) / ramp, 0, 1)
     out = np.clip((stop - x) / ramp, 0, 1)
     return depth * (3 * into**2 - 2 * into**3) * (3 * out**2 - 2 * out**3)
 
 
 def pair(kind: str, seed: int) -> Pair:
-    """The pair of `kind` that `seed` draws."""
+    """Draw the pair of a kind for a seed."""
     draw = np.random.default_rng([seed, KINDS.index(kind)])
     style = ("self-affine", "turned", "plateau")[draw.integers(3)]
     length = draw.uniform(1.5e-3, 6e-3)
@@ -100,11 +104,11 @@ def pair(kind: str, seed: int) -> Pair:
         a = start + draw.uniform(0.2, 0.4) * length
         b = a + draw.uniform(0.2, 0.35) * length
         wear += trough(x, a, b, depth, draw.uniform(20e-6, 150e-6))
-    elif kind == "edge":  # rubbed from within the trace to beyond its end
+    elif kind == "edge":  # The wear begins inside the trace and continues beyond its end.
         a = start + draw.uniform(0.25, 0.6) * length
         wear += trough(x, a, x[-1] + 1e-3, depth, draw.uniform(20e-6, 150e-6))
     old = new - wear
-    if kind == "run-in":  # tops cut, valleys whole
+    if kind == "run-in":  # The peaks are worn and the valleys are not.
         level = np.quantile(new, draw.uniform(0.5, 0.85))
         old = np.where(new > level, level + draw.uniform(0.0, 0.15) * (new - level), new)
         wear = new - old
@@ -122,6 +126,7 @@ def pair(kind: str, seed: int) -> Pair:
         begin = start + draw.uniform(1.2, 2.0) * length
 
     def traced(heights, place, spacing, gain=1.0, stretch=1.0):
+        """Return points, heights and surface positions of a trace that starts at `place`."""
         points = np.arange(0, length, spacing)
         inside = place + stretch * points
         keep = inside < x[-1]
@@ -139,7 +144,7 @@ def pair(kind: str, seed: int) -> Pair:
     worn = np.interp(inside, x, wear)
     spoilt = [0, 0]
     if kind == "dust":
-        which = draw.integers(1, 4)  # before, after, both
+        which = draw.integers(1, 4)  # 1: before, 2: after, 3: both.
         for k, z in enumerate((zb, za)):
             if which & (k + 1):
                 for at in draw.integers(5, z.size - 5, draw.integers(1, 4)):
@@ -166,7 +171,7 @@ def pair(kind: str, seed: int) -> Pair:
 
 
 def profiles(one: Pair) -> tuple:
-    """Both traces as `Profile`."""
+    """Return both traces as `Profile`."""
     return tuple(
         Profile(*map(frozen_array, trace), name)
         for trace, name in ((one.before, "before"), (one.after, "after"))

@@ -1,4 +1,4 @@
-"""Files as instruments write them: universal files by pyuff alone, and an elastic-plastic loop known in closed form."""
+"""Files as instruments write them: universal files by pyuff, and an elastic-plastic loop known in closed form."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ INCH = SI | {
 
 
 def record(time, values, kind, **more) -> dict:
-    """A binary, unevenly spaced time response at node 1, +x."""
+    """Return a binary universal dataset of a time response at node 1, +x, with uneven spacing."""
     return {
         "type": 58,
         "binary": 1,
@@ -57,14 +57,21 @@ def record(time, values, kind, **more) -> dict:
 
 
 def written(path, sets):
-    """The file that pyuff makes of datasets; a binary first one is lost by its mode "overwrite"."""
+    """Write datasets to a universal file with pyuff.
+
+    Mode "overwrite" of pyuff loses a binary first dataset, so the file is deleted and written in
+    mode "add".
+    """
     path.unlink(missing_ok=True)
     pyuff.UFF(str(path)).write_sets(sets, "add")
     return path
 
 
 def loop(count=80, cycles=2) -> tuple:
-    """(time, slide, force) of an elastic-plastic point along a sine of 10 um at 100 Hz: one clip per straight leg."""
+    """Return (time, displacement, force) of an elastic-plastic point along a sine of 10 um at 100 Hz.
+
+    The forces are exact at every sample.
+    """
     time = np.arange(count * cycles + 1) / count / 100
     slide = 10e-6 * np.sin(2 * np.pi * 100 * time)
     out = [0.0]

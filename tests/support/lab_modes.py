@@ -14,10 +14,10 @@ TIME = STEP * np.arange(SAMPLES)
 
 
 def driven(quantity: str, seed: int = 1) -> tuple:
-    """(input, response) of the modes from rest to sines of every line of the record up to 730 Hz, of random phases.
+    """Return (input, response) of the modes from rest to sines with random phases.
 
-    The steady response is a sum over the lines; what rings from the start is the free decay that cancels its place and
-    speed there.
+    The sines are at all lines of the record up to 730 Hz. The steady response is a sum over the
+    lines; the transient is the free decay that cancels its initial displacement and velocity.
     """
     lines = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
     spectrum = np.zeros(lines.size, complex)
@@ -32,7 +32,7 @@ def driven(quantity: str, seed: int = 1) -> tuple:
         place = np.fft.irfft(steady, SAMPLES)[0]
         speed = np.fft.irfft(lines * steady, SAMPLES)[0]
         pole = complex(-z * w, w * np.sqrt(1 - z * z))
-        # Re(start e^(pole t)) and its slope at 0
+        # The transient is Re(start exp(pole t)) with this start.
         start = complex(-place, (speed - pole.real * place) / pole.imag)
         total += np.fft.irfft(lines**power * steady, SAMPLES) + np.real(
             pole**power * start * np.exp(pole * TIME)
@@ -41,7 +41,7 @@ def driven(quantity: str, seed: int = 1) -> tuple:
 
 
 def free(amplitudes=(0.3, 0.2), offset=0.01, count=3000) -> tuple:
-    """(time, displacement) of the modes let go."""
+    """Return (time, displacement) of the modes released from rest."""
     time = TIME[:count]
     return time, offset + sum(
         a * np.exp(-z * w * time) * np.cos(w * np.sqrt(1 - z * z) * time + k)

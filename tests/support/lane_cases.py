@@ -1,7 +1,8 @@
 """Random cases of sweeps that are integrated together, in lanes, against single runs.
 
-Campaign `lanes` of `campaigns`: each seed is one law, or one family of rigs with a patch. The doubt of a single run is
-its own stated error, so that a row holds if the two results agree within the sum of both errors.
+Campaign `lanes` of `campaigns`: each seed selects one law, or one family of rigs with a patch. The
+uncertainty of a single run is its stated error, so a row holds if the two results agree within the
+sum of both errors.
 """
 
 from pathlib import Path
@@ -62,7 +63,8 @@ cycles = 200
 [accuracy]
 tolerance = 1e-3
 """
-FAMILIES = {  # keys that vary in a sweep of rigs with a patch -> draw of a value in SI units
+# Keys that vary in a sweep of rigs with a patch -> function that draws a value in SI units.
+FAMILIES = {
     "tilt x friction": {
         "contact.tilt.angle": lambda r: 10 ** r.uniform(-6, -3.3),
         "friction.static": lambda r: r.uniform(0.1, 0.6),
@@ -76,13 +78,16 @@ FAMILIES = {  # keys that vary in a sweep of rigs with a patch -> draw of a valu
         "contact.load": lambda r: 10 ** r.uniform(1.3, 2.5),
     },
 }
-N_CASES = 400  # of a sweep of points
-N_PATCHES = 64  # of a sweep of patches, the fewest that are integrated in lanes
-N_SINGLES = 30  # cases that are computed by single runs too
+N_CASES = 400  # Cases of a sweep without a patch.
+N_PATCHES = 64  # Cases of a sweep with patches: the smallest number that is integrated in lanes.
+N_SINGLES = 30  # Cases that are also computed by single runs.
 
 
 def draw_points(law: str, seed: int, count: int) -> list:
-    """Draw models of a law that lanes take: from sliding all the time to sticking, near resonance and away."""
+    """Draw models of a law that lanes can integrate.
+
+    They range from permanent sliding to sticking, near resonance and away from it.
+    """
     r = np.random.default_rng(seed)
     base = get_base_scene(pf.load(SCENE.format(law=LAWS[law])))
     out = []
@@ -112,7 +117,7 @@ def draw_patches(family: str, seed: int, count: int) -> list:
 
 
 def of_law(law: str, r, load: float, speed: float) -> dict:
-    """Keys of a law drawn for a load [N] and a scale of the speeds [m/s]."""
+    """Draw the keys of a law for a load [N] and a typical speed [m/s]."""
     if law == "iwan":
         return {
             "friction.stiffness": 0.3 * load * 10 ** r.uniform(4.3, 5.5),
@@ -143,10 +148,11 @@ def of_law(law: str, r, load: float, speed: float) -> dict:
 
 
 def rows(found, ones) -> list[list]:
-    """List the rows of each case of two Answers: values and errors of the first beside those of the second.
+    """Return the rows of each case of two Answers: values and errors of the first beside those of the second.
 
-    A value that one of them lacks is NaN and does not hold. A decay that the second lacks is left out: a run with so
-    many cells of the law that yields outnumber its samples has none.
+    A value that only one of them has is NaN in the other and does not hold. A ringing measure that
+    the second lacks is left out: a single run has none if the law has more cells that yield than
+    the run has samples.
     """
     out = []
     for case in range(len(found)):

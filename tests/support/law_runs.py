@@ -1,4 +1,4 @@
-"""One law of friction in every run that carries it: bench, rig, two masses, steady motion, fit."""
+"""Runs of a friction law in every kind of scene: bench, rig, two masses, steady motion, fit."""
 
 import csv
 import json
@@ -16,7 +16,7 @@ from patchfem.runs.bench import bench
 from patchfem.runs.run import run
 from patchfem.scene import load, loads
 
-LOAD = 100.0  # N on every contact
+LOAD = 100.0  # Normal load of every interface [N].
 POINT = '[normal]\nload = "100 N"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "100 Hz"\ncycles = 2\n'
 MASSES = """\
@@ -38,19 +38,19 @@ coefficient = "{damper} N s/m"
 
 
 def table(law: str) -> str:
-    """[friction] of the keys `law`."""
+    """Return the table [friction] with the keys `law`."""
     return "[friction]\n" + law
 
 
 def bench_along(law: str, time, slide, *sets):
-    """The BenchRun of a law along samples slide (k,) [m] at equal times (k,) [s]."""
+    """Return the BenchRun of a law along displacements (k,) [m] at equally spaced times (k,) [s]."""
     return bench.run(
         build(loads(POINT + table(law) + SINE, sets=sets)), None, 4, path=(time, slide, 0, 0.0)
     )
 
 
 def rig(law: str, *sets, cycles: int = 60, steps: int = 0):
-    """The Result of one mode under a base sine at its resonance."""
+    """Return the Result of one mode under a base sine at its resonance."""
     more = f"[accuracy]\nsteps_per_cycle = {steps}\n" if steps else ""
     mode = MODE.replace("damping = 0.003", "damping = 0.02")
     return run(
@@ -74,7 +74,7 @@ def released(law: str, *sets):
 
 
 def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
-    """The Result of two like masses beside each other, one or both of them on an interface of the law."""
+    """Return the Result of two equal masses, one or both of them on an interface with the law."""
     faces = "".join(
         f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
         for k in range(1, interfaces + 1)
@@ -95,8 +95,11 @@ print(json.dumps([both.extra["slides"].T.tolist(), alone.slide.tolist(),
 
 
 def plain_masses(law: str):
-    """(slides (2, t), slide of one alone (t,), peak forces of both runs) of `masses` in a process that compiles
-    nothing."""
+    """Run `run_two_masses` in a process without compilation.
+
+    Returns displacements (2, t) with both interfaces, displacement (t,) with one, and the peak
+    forces of both runs.
+    """
     where = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
     done = subprocess.run(
         [sys.executable, "-c", PLAIN, law],
@@ -111,7 +114,7 @@ def plain_masses(law: str):
 
 
 def fitted(folder, law: str, loop: tuple, free: str):
-    """What `fit` finds of a law from the loop (time [s], slide [m], force [N])."""
+    """Return the fit of a law to the loop (time [s], displacement [m], force [N])."""
     path = folder / "scene.toml"
     path.write_text(POINT + table(law) + SINE, "utf-8")
     with open(folder / "loop.csv", "w", newline="") as file:
@@ -122,6 +125,6 @@ def fitted(folder, law: str, loop: tuple, free: str):
 
 
 def shrinking(count: int = 400, cycles: int = 3, amplitude: float = 10e-6):
-    """(time, slide) of a sine of 100 Hz that swings less and less, and so leaves minor loops open."""
+    """Return (time, displacement) of a sine of 100 Hz with decreasing amplitude, which leaves minor loops open."""
     time = np.arange(count * cycles + 1) / count / 100
     return time, amplitude * (1 - 0.6 * time / time[-1]) * np.sin(2 * np.pi * 100 * time)

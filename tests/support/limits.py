@@ -1,4 +1,4 @@
-"""Limits on what this process may do."""
+"""Limits on what this process may write."""
 
 import resource
 import sys
@@ -7,8 +7,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def limited(size: int):
-    """No file of this process grows beyond `size` bytes, nor is bytecode written, which the limit would cut short for
-    all later processes."""
+    """Limit the size of files that this process writes to `size` bytes.
+
+    Bytecode is not written either, because a truncated file would break later processes.
+    """
     (soft, hard), wrote = resource.getrlimit(resource.RLIMIT_FSIZE), sys.dont_write_bytecode
     sys.dont_write_bytecode = True
     resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))

@@ -1,4 +1,4 @@
-"""The compiled list of bonds along a path, and energies of 2.17 written out by hand, for the tests of the engines."""
+"""The compiled list of bonds along a path, and the energies of 2.17 in closed form, for tests of the engines."""
 
 from typing import NamedTuple
 
@@ -18,12 +18,13 @@ from patchfem.friction.bonds import list_kernels
 from patchfem.friction.bonds.quadrature import cutoff_age
 
 for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.list_step):
-    if hasattr(kernel, "enable_caching"):  # not where numba is told to compile nothing
-        kernel.enable_caching()  # called from Python here alone: compiled once for all workers and runs
+    if hasattr(kernel, "enable_caching"):  # Without compilation there is no cache to enable.
+        # Only tests call these kernels from Python, so only here is their compiled code cached.
+        kernel.enable_caching()
 
 
 class Listed(NamedTuple):
-    """Step means, forces after the steps, forces foreseen for their ends, energies after them, and the tally."""
+    """Step means, forces after the steps, forces predicted for their ends, energies after them, and the status array."""
 
     mean: np.ndarray
     after: np.ndarray
@@ -33,7 +34,7 @@ class Listed(NamedTuple):
 
 
 def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
-    """A list before any slide, as the functions of `list_kernels` take it."""
+    """Return a list of bonds before any displacement, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff_age(law.order, tail) if tail else np.inf, merge)
     now = make_clocks(law)
     return BondList(
@@ -50,7 +51,7 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
 
 
 def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
-    """March the list over the knots `path`, times scalar or one per step."""
+    """March the list along the knots `path`; times: scalar or one per step."""
     held = empty_list(law, tail, merge, capacity)
     rows = []
     status = held.status

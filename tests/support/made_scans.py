@@ -1,4 +1,4 @@
-"""Alignments of scans with a given map of depths, as if place and plane were known."""
+"""Scan alignments with a given map of depths, as if position and reference plane were known."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""A basis of one mode, and a prescribed path through the compiled loop of the march."""
+"""Modal basis with one mode, and the compiled march along a prescribed path."""
 
 import numpy as np
 from modal_bases import basis_of
@@ -7,7 +7,7 @@ from patchfem.dynamics import STEP_TOL, JointsModel, element_model, load_instanc
 from patchfem.friction import TanhLaw
 
 OMEGA = 2 * np.pi * 143
-# laws of the one compiled loop of joints that most tests share
+# Laws of the compiled loop of joints that most tests share.
 ALL = (
     *(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
     "dynamics.interfaces.spring_kernels",
@@ -15,7 +15,7 @@ ALL = (
 
 
 def share_one_loop(monkeypatch) -> None:
-    """Joints of whatever laws march in the loop of ALL."""
+    """Make joints of all laws march in the compiled loop that contains the laws of ALL."""
     own = JointsModel.laws.fget
     monkeypatch.setattr(
         JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own(model)})))
@@ -28,11 +28,16 @@ def rate_model(limit: float, speed: float):
 
 
 def one_mode(omega, zeta, mass):
+    """Return a modal basis with one mode."""
     return basis_of(omega, zeta, mass=mass)
 
 
 def follow(model, path, dt=0.3):
-    """(force at the samples, step means, slip), (dissipated, stored), unconverged, contact of loops.follow_path."""
+    """March a model along a prescribed path with loops.follow_path.
+
+    Returns (force at the samples, step means, slip), (dissipated, stored), unconverged steps,
+    contact.
+    """
     loops = load_instances()
     contact = model.build()
     energies = np.zeros((path.size, 2))

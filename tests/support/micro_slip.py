@@ -1,12 +1,12 @@
 """Random benches with [contact.shear] against a separate partial-slip solver.
 
-Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both, coated or not, and
-slide by 0.02 to 2 of the relative displacement at which the whole patch slips, at tolerances of
-1e-2 to 1e-4.
+Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both, coated or not, with
+amplitudes of 0.02 to 2 times the relative displacement at which the whole patch slips, at
+tolerances of 1e-2 to 1e-4.
 
-The solver shares nothing with patchfem: pressure and compliances are those of `static_reference`, at
-the nodes of elements of order 4. With the limits g = mu f of the nodes, the missing shear r = g - t at
-the slide q solves r >= 0, C r >= C g - q, r (C r - C g + q) = 0, and
+The solver shares nothing with patchfem: pressure and compliances are those of `static_reference`,
+at the nodes of elements of order 4. With the friction limits g = mu f of the nodes, the missing
+shear r = g - t at the displacement q solves r >= 0, C r >= C g - q, r (C r - C g + q) = 0, and
 Masing's rule gives the loop. Each bench is solved on two grids; their difference is the uncertainty
 of the reference.
 """
@@ -22,12 +22,12 @@ from scipy.interpolate import PchipInterpolator
 import patchfem as pf
 
 MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e9, 0.33))
-COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
-FINE = 5e-4  # cell at a contact edge / width of the contact
+COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio.
+FINE = 5e-4  # Ratio of a cell at a contact edge to the contact width.
 
 
 def missing_shear(compliance, right) -> np.ndarray:
-    """Solve f >= 0, compliance f >= right, f (compliance f - right) = 0 by an active set."""
+    """Solve f >= 0, compliance f >= right, f (compliance f - right) = 0 by an active-set method."""
     active = right > 0
     for _ in range(200):
         index = np.flatnonzero(active)
@@ -42,7 +42,7 @@ def missing_shear(compliance, right) -> np.ndarray:
 
 
 class Bench:
-    """A bench in SI: pieces, shapes, law, slide and tolerance."""
+    """Random bench in SI units: bodies, shapes, friction law, amplitude and tolerance."""
 
     def __init__(self, seed):
         draw = np.random.default_rng(seed)
@@ -56,7 +56,7 @@ class Bench:
         self.thick = draw.choice([0.0, 1.0], p=[0.6, 0.4])
         self.thick *= draw.uniform(50e-6, 400e-6)
         plane = self.young / (1 - self.poisson**2)
-        reach = draw.uniform(0.15, 1.8) * self.length / 2  # half-width of Hertz
+        reach = draw.uniform(0.15, 1.8) * self.length / 2  # Half-width of Hertzian contact.
         self.radius = reach**2 * np.pi * plane / 2 / (4 * self.load / self.width)
         opening = 2 * self.load * 2 * self.height / (plane * self.length * self.width) / self.length
         self.angle = 10 ** draw.uniform(-0.7, 1.5) * opening
@@ -70,7 +70,7 @@ class Bench:
 
     @property
     def scene(self):
-        """What `static_reference` solves."""
+        """Scene for `static_reference`."""
         base = (self.young, self.poisson)
         layers = (COATING if self.thick else base, base)
         piece = static.PieceInterface(self.length, self.height, self.thick, layers)
@@ -81,7 +81,7 @@ class Bench:
         )
 
     def text(self):
-        """Return the text of the scene, for which the amplitude must be set."""
+        """Return the text of the scene; the amplitude must have been set."""
         out = [
             f'[contact]\nlength = "{self.length!r} m"\nwidth = "{self.width!r} m"\nheight = "{self.height!r} m"',
             f'load = "{self.load!r} N"',
@@ -106,7 +106,7 @@ class Bench:
 
 
 class Reference:
-    """Solution of a bench on the columns of a lap of `static_reference`."""
+    """Solution of a bench on the columns of a refinement step of `static_reference`."""
 
     def __init__(self, bench, edges, lap):
         self.bench = bench
@@ -134,6 +134,7 @@ class Reference:
         area = curve.antiderivative()
 
         def loop(a):
+            """Return the area of the loop of an amplitude by Masing's rule."""
             return float(4 * a * curve(a) - 8 * area(a))
 
         force = self.stiffness * amplitude - float(curve(amplitude))

@@ -1,4 +1,4 @@
-"""Modal bases of any modes and interfaces, and random ones."""
+"""Modal bases with given or random modes and interfaces."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from patchfem.core import ModalBasis
 
 
 def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
-    """Return a basis of numbers or lists; `base` and `output` are by default the first of the interfaces.
+    """Return a basis from scalars or lists; `base` and `output` default to the first interface.
 
     faces: participation (n,) of the only interface, or (i, n) of all.
     """
@@ -28,6 +28,7 @@ def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0,
 
 
 def random_basis(rng, n, faces, coupled=True, rigid=False):
+    """Return a random basis of n modes, with coupled damping or a rigid-body mode on request."""
     omega = rng.uniform(0.3, 3, n)
     root = rng.normal(size=(n, n)) * 0.15
     if rigid:

@@ -1,8 +1,8 @@
 """Friction laws as differential equations between events, for `motion_reference`.
 
-A law has the parameters of one contact; its state is s (k,). Its mode is +-1, the sign of the
-relative velocity, or 0 if the contact sticks (Coulomb) or stretches (elastic-plastic). Nothing is
-imported from the package.
+A law has the parameters of one interface; its state is s (k,). Its mode is +-1, the sign of the
+relative velocity, or 0 if the interface sticks (Coulomb) or deforms elastically (elastic-plastic).
+Nothing is imported from the package.
 """
 
 from itertools import pairwise
@@ -16,14 +16,14 @@ class Law:
 
     - force(s, v, t): friction force [N]
     - rate(s, v, t): rate of the state
-    - reversible(s): reversible part of the slide [m]
+    - reversible(s): reversible part of the relative displacement [m]
     - split(s, v, t): rate of its irreversible part [m/s]
     - energy(s): stored energy [J]; None if the law has none
-    - guards(s, v, t): values whose decrease through zero ends a stretch
-    - turned: changes mode and state at an event
+    - guards(s, v, t): values whose decrease through zero is an event
+    - apply_event: changes mode and state at an event
     """
 
-    # `splits`: whether slip and the reversible part of the slide can be distinguished.
+    # `splits` states whether the law distinguishes slip from the reversible displacement.
     size = 1
     set_valued = False
     split_by_mode = False
@@ -33,34 +33,31 @@ class Law:
         self.limit = limit
         self.mode = 1
         self.keys = keys
-        self.side = 1  # side of a second border, if a law has one
+        self.side = 1  # Side of the law's second switching surface, if it has one.
 
     def begin(self, v: float, accel: float) -> None:
         """Set the mode for a motion that begins with velocity v and acceleration accel."""
         self.mode = 1 if (v if v != 0 else accel) >= 0 else -1
 
     def resume(self, s) -> None:
-        """Set the sides of borders for a motion that begins in a state s other than 0."""
+        """Set `side` for a motion that begins in a state s other than 0."""
 
     def take_branch(self, s, v: float, way: float) -> None:
-        """Choose the branch of the rate equation at a state s and a velocity v.
-
-        way: direction of the motion, +-1.
-        """
+        """Choose the branch of the rate equation at a state s and a velocity v; `way` is the direction, +-1."""
         self.mode = way
 
     def guards(self, s, v, t) -> list:
-        """Return the values whose decrease through zero is an event."""
+        """Return the event functions: values whose decrease through zero is an event."""
         return [self.mode * v]
 
     def turned(self, k: int, s, v, accel: float):
         """Change the mode at event k and return the state."""
-        # At the next evaluation the velocity is beyond zero, whatever round-off does to it.
+        # The mode changes here, not by the sign of the velocity, which round-off may keep.
         self.mode = -self.mode
         return s
 
     def scale(self) -> float:
-        """Return the size of the state, which is also the slide that reverses it."""
+        """Return the typical size of the state, which is also the displacement that reverses it."""
         return (
             self.keys.get("bond_length", 1.0)
             if "stiffness" not in self.keys
@@ -72,7 +69,7 @@ class Law:
         return None
 
     def reversible(self, s) -> float:
-        """Return the reversible part of the slide [m]."""
+        """Return the reversible part of the relative displacement [m]."""
         return s[0] if self.size else 0.0
 
 
@@ -82,37 +79,46 @@ class Tanh(Law):
     size = 0
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         return self.limit * np.tanh(v / self.keys["reference_speed"])
 
     def rate(self, s, v, t):
+        """Return the rate of the state, which is empty."""
         return np.zeros(0)
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         return v
 
 
 class Plastic(Law):
-    """F' = mu N v/eps, |F| <= mu N: stretches in mode 0, slips in modes +-1."""
+    """F' = mu N v/eps, |F| <= mu N: elastic in mode 0, slipping in modes +-1."""
 
     split_by_mode = True
 
     def begin(self, v, accel):
+        """Begin in the elastic mode."""
         self.mode = 0
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         return self.limit * s[0] / self.keys["bond_length"]
 
     def rate(self, s, v, t):
+        """Return the rate of the stretch."""
         return np.array([v if self.mode == 0 else 0.0])
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         return 0.0 if self.mode == 0 else v
 
     def guards(self, s, v, t):
+        """Return the margins to yield in the elastic mode, and the slip velocity in slip."""
         eps = self.keys["bond_length"]
         return [eps - s[0], eps + s[0]] if self.mode == 0 else [self.mode * v]
 
     def turned(self, k, s, v, accel):
+        """Yield, or return to the elastic mode."""
         if self.mode:
             self.mode = 0
             return s
@@ -120,6 +126,7 @@ class Plastic(Law):
         return np.array([self.mode * self.keys["bond_length"]])
 
     def energy(self, s):
+        """Return the stored energy [J]."""
         return 0.5 * self.limit * s[0] ** 2 / self.keys["bond_length"]
 
 
@@ -135,12 +142,15 @@ class Stretch(Law):
         self.size = 2 if self.grows else 1
 
     def start(self):
+        """Return the initial state."""
         return np.array([0.0, self.keys["bond_length"]])[: self.size]
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         return self.limit * s[0] / self.keys["bond_length"]
 
     def rate(self, s, v, t):
+        """Return the rates of the stretch and of the bond length."""
         first = self.keys["bond_length"]
         k = self.keys
         speed = self.mode * v
@@ -156,22 +166,27 @@ class Stretch(Law):
         )
 
     def take_branch(self, s, v, way):
+        """Choose the direction, and the side of the speed limit of ageing."""
         super().take_branch(s, v, way)
         if self.grows:
             self.side = 1 if self.mode * v > self.keys["rest_speed"] else -1
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         return self.mode * v * s[0] / (s[1] if self.grows else self.keys["bond_length"])
 
     def begin(self, v, accel):
+        """Set direction and side for the start of a motion."""
         super().begin(v, accel)
         self.side = 1 if self.grows and abs(v) > self.keys["rest_speed"] else -1
 
     def guards(self, s, v, t):
+        """Return the slip velocity and the margin to the speed limit of ageing."""
         rest = [self.side * (self.mode * v - self.keys["rest_speed"])] if self.grows else []
         return [self.mode * v, *rest]
 
     def turned(self, k, s, v, accel):
+        """Reverse the direction, or cross the speed limit of ageing."""
         if k:
             self.side = -self.side
             return s
@@ -179,16 +194,18 @@ class Stretch(Law):
 
 
 class Maturing(Stretch):
-    """Bonds of which only a fraction m is formed: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
+    """Bonds of which only a fraction m has formed: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
         self.size = 2
 
     def start(self):
+        """Return the initial state."""
         return np.array([0.0, self.keys["initial"]])
 
     def rate(self, s, v, t):
+        """Return the rates of the stretch and of the fraction."""
         length = self.keys["bond_length"]
         speed = self.mode * v
         return np.array([s[1] * v - speed * s[0] / length, speed * (1 - s[1]) / length])
@@ -198,9 +215,11 @@ class BoucWen(Law):
     """z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)), F = mu N z."""
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         return self.limit * s[0]
 
     def rate(self, s, v, t):
+        """Return the rate of z."""
         n = self.keys["exponent"]
         share = self.keys["shape"]
         eps = self.limit / self.keys["stiffness"]
@@ -208,27 +227,34 @@ class BoucWen(Law):
         return np.array([v / eps * (1 - abs(s[0]) ** n * (share * way + 1 - share))])
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         return v - self.limit / self.keys["stiffness"] * self.rate(s, v, t)[0]
 
     def reversible(self, s):
+        """Return the reversible part of the relative displacement [m]."""
         return self.limit / self.keys["stiffness"] * s[0]
 
     def guards(self, s, v, t):
+        """Return the slip velocity and z, each times its sign."""
         return [self.mode * v, self.side * s[0]]
 
     def begin(self, v, accel):
+        """Set direction and sign of z for the start of a motion."""
         super().begin(v, accel)
         self.side = self.mode
 
     def resume(self, s):
+        """Set the sign of z for a start in a state other than 0."""
         if s[0]:
             self.side = 1 if s[0] > 0 else -1
 
     def take_branch(self, s, v, way):
+        """Choose the direction and the sign of z."""
         super().take_branch(s, v, way)
         self.side = 1 if s[0] > 0 else -1
 
     def turned(self, k, s, v, accel):
+        """Reverse the direction, or change the sign of z."""
         if k:
             self.side = -self.side
             return s
@@ -239,6 +265,7 @@ class LuGre(Law):
     """z' = v - k |v| z/g, F = k z + s_1 z' + s_2 v."""
 
     def rate(self, s, v, t):
+        """Return the rate of z."""
         k = self.keys
         g = (
             self.limit
@@ -251,15 +278,17 @@ class LuGre(Law):
         return np.array([v - k["stiffness"] * self.mode * v * s[0] / g])
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         k = self.keys
         return k["stiffness"] * s[0] + k["micro_damping"] * self.rate(s, v, t)[0] + k["viscous"] * v
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         return v - self.rate(s, v, t)[0]
 
 
 class Iwan(Law):
-    """Segalman's sliders by Masing's rules; the state is the slide, a stack has reversals."""
+    """Segalman's sliders by Masing's rules; the state is the relative displacement, and a stack holds the reversals."""
 
     def __init__(self, limit, **keys):
         super().__init__(limit, **keys)
@@ -269,11 +298,11 @@ class Iwan(Law):
         self.top = limit * (1 + beta) / (k * (beta + (chi + 1) / (chi + 2)))
         self.density = k * (chi + 1) / (1 + beta) / self.top ** (chi + 1)
         self.last = k * beta / (1 + beta)
-        # (slide, force, mean stretch) at reversals; the first is the virgin state
+        # (displacement, force, mean stretch) at reversals; the first is the virgin state.
         self.turns = [(0.0, 0.0, 0.0)]
 
     def loading(self, u: float) -> float:
-        """Return the force of a first loading to u >= 0."""
+        """Return the force of the initial loading at a displacement u >= 0."""
         chi = self.keys["chi"]
         u = min(u, self.top)
         inside = u ** (chi + 2) / (chi + 2) + u * (self.top ** (chi + 1) - u ** (chi + 1)) / (
@@ -282,7 +311,7 @@ class Iwan(Law):
         return self.density * inside + self.last * u
 
     def stretch(self, u: float) -> float:
-        """Return the mean stretch of the sliders at a first loading to u, weighted by their limits."""
+        """Return the mean stretch of the sliders on the initial loading at u, weighted by their limits."""
         chi = self.keys["chi"]
         u = min(u, self.top)
         inside = u ** (chi + 3) / (chi + 3) + u * (self.top ** (chi + 2) - u ** (chi + 2)) / (
@@ -291,16 +320,16 @@ class Iwan(Law):
         return (self.density * inside + self.last * self.top * u) / self.limit
 
     def held(self, u: float) -> float:
-        """Return the derivative of this mean stretch by the slide."""
+        """Return the derivative of this mean stretch with respect to the displacement."""
         chi = self.keys["chi"]
         u = min(u, self.top)
         inside = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
         return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
 
     def masing(self, s, of, start: int) -> float:
-        """Return a first loading `of` from the last reversal by Masing's rules.
+        """Return a function `of` of the initial loading, continued from the last reversal by Masing's rules.
 
-        start: index of its own value in the reversal.
+        start: index of the value of this function in a reversal.
         """
         turn = self.turns[-1]
         way = s[0] - self.turns[-1][0]
@@ -309,28 +338,34 @@ class Iwan(Law):
         return turn[start] + np.sign(way) * 2 * of(abs(way) / 2)
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         return self.masing(s, self.loading, 1)
 
     def reversible(self, s) -> float:
+        """Return the reversible part of the relative displacement [m]."""
         return self.masing(s, self.stretch, 2)
 
     def rate(self, s, v, t):
+        """Return the rate of the displacement."""
         return np.array([v])
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         way = abs(s[0]) if len(self.turns) == 1 else abs(s[0] - self.turns[-1][0]) / 2
         return v * (1 - self.held(way))
 
     def guards(self, s, v, t):
+        """Return the slip velocity and the distance to the end of the present loop."""
         out = [self.mode * v]
-        if len(self.turns) > 2:  # a minor loop closes at the reversal before the last one
+        if len(self.turns) > 2:  # A minor loop closes at the reversal before the last one.
             out.append(self.mode * (self.turns[-2][0] - s[0]))
         elif len(self.turns) == 2:
-            # back on the first loading, at the opposite end of the first stroke
+            # The motion joins the initial loading at the opposite end of the first stroke.
             out.append(self.mode * (-self.turns[1][0] - s[0]))
         return out
 
     def turned(self, k, s, v, accel):
+        """Push a reversal onto the stack, or remove a closed loop from it."""
         if k == 0:
             # A start in the other direction is not a reversal.
             if len(self.turns) > 1 or abs(s[0]) > 1e-12 * self.top:
@@ -347,8 +382,8 @@ class Report(Law):
     """Eq. 2.17 as printed: F = mu N int (R/eps)^p exp(-R/eps) sgn(u) dR/eps.
 
     u is the displacement since a bond formed. Between reversals of the path u changes its sign at
-    most once, so that every stroke is a difference of incomplete gamma functions. The state is
-    (slide, path); reversals of both are kept as long as they count.
+    most once, so each stroke is a difference of incomplete gamma functions. The state is
+    (displacement, path); reversals of both are kept as long as they matter.
     """
 
     size = 2
@@ -360,6 +395,7 @@ class Report(Law):
         self.turns = [(0.0, 0.0)]
 
     def force(self, s, v, t):
+        """Return the friction force [N]."""
         q = s[0]
         path = s[1]
         eps = self.keys["bond_length"]
@@ -368,7 +404,7 @@ class Report(Law):
         rho = (path - places[:, 0]) / eps
         u = q - places[:, 1]
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
-        # age at which a stroke was at the present position, if it was
+        # Age of the bond that formed at the present position, if the stroke passed it.
         passed = rho[:-1] - np.abs(u[:-1]) / eps
         inside = u[:-1] * u[1:] < 0
         middle = np.where(inside, gammainc(p + 1, np.maximum(passed, 0.0)), sums[1:])
@@ -378,12 +414,15 @@ class Report(Law):
         return self.limit * (total + first)
 
     def rate(self, s, v, t):
+        """Return the rates of displacement and path."""
         return np.array([v, self.mode * v])
 
     def split(self, s, v, t):
+        """Return 0; slip is not distinguished in this law."""
         return 0.0
 
     def turned(self, k, s, v, accel):
+        """Store a reversal and drop those that are too old to matter."""
         turns = [*self.turns, (float(s[1]), float(s[0]))]
         old = s[1] - 60 * self.keys["bond_length"]
         self.turns, self.mode = (
@@ -394,7 +433,7 @@ class Report(Law):
 
 
 class Coulomb(Law):
-    """|F| <= static while it sticks; the kinetic force against the velocity while it slips."""
+    """|F| <= static while sticking; the kinetic force against the velocity while slipping."""
 
     size = 0
     set_valued = True
@@ -406,12 +445,15 @@ class Coulomb(Law):
         self.mode = 0
 
     def begin(self, v, accel):
+        """Begin in the direction of the velocity, or stuck."""
         self.mode = int(np.sign(v))
 
     def rate(self, s, v, t):
+        """Return the rate of the state, which is empty."""
         return np.zeros(0)
 
     def split(self, s, v, t):
+        """Return the rate of the irreversible displacement [m/s]."""
         return v if self.mode else 0.0
 
 

@@ -1,4 +1,4 @@
-"""Measures of a motion of `motion_reference`, each by its definition."""
+"""Measures of a motion of `motion_reference`, each computed by its definition."""
 
 from itertools import pairwise
 
@@ -6,7 +6,7 @@ import numpy as np
 from motion_reference import Motion
 from scipy.optimize import brentq, minimize_scalar
 
-# relative distance to the largest node within which peaks are refined, and their largest number
+# Peaks within this relative distance of the largest node are refined; largest number of them.
 NEAR, MOST = 1e-4, 12
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 
@@ -43,13 +43,14 @@ class Window:
         self.out = self.y[:, :n] @ motion.plant.output
 
     def restore(self, one) -> None:
-        """Set the laws to the modes and reversals of a stretch."""
+        """Set the laws to the modes and reversals of a smooth piece."""
         for k, law in enumerate(self.motion.laws):
             law.mode, law.side = one.modes[k]
             if one.turns:
                 law.turns = one.turns[k]
 
     def _take(self, columns, one, t, w) -> None:
+        """Append the values at times t with weights w of a smooth piece."""
         m = self.motion
         Y = one.solution(t).T
         self.parts.append((one, t))
@@ -79,7 +80,7 @@ class Window:
         return own + m.drive(t) if m.moving else own
 
     def top(self, values, of, where=None) -> float:
-        """Return the largest value over the window, refined in the steps in which it lies.
+        """Return the maximum over the window, refined in the steps in which it lies.
 
         Parameters
         ----------
@@ -105,7 +106,7 @@ class Window:
             }:
                 one, t = self.parts[part]
                 if where is not None and not where[part * each + 1 : part * each + each - 1].all():
-                    continue  # the next cycle begins here and may go farther
+                    continue  # The next cycle begins in this step and may have a larger maximum.
                 inside = min(max(k - part * each, 0), each - 1)
                 self.restore(one)
                 found = minimize_scalar(
@@ -210,7 +211,7 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
                 xtol=1e-16,
             )
             places.append(float(row @ one.solution(at)[:n]))
-        else:  # an event at the reversal
+        else:  # The reversal coincides with an event.
             places.append(float(w.out[a : b + 1][np.argmin(np.abs(rate[a : b + 1]))]))
     least = 0.25 * np.ptp(w.out[w.t >= w.end - period])
     back = [float(w.out[-1]), *places[::-1]]
@@ -232,7 +233,7 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
 
 
 def works(motion: Motion, stretches, begin: float, end: float) -> dict:
-    """Return the work on a single interface between two times [s], and the dissipated part.
+    """Return the work of a single interface between two times [s], and the dissipated part.
 
     The latter is left out if the law has no stored energy.
     """
@@ -257,9 +258,9 @@ def at(stretches, time: float) -> np.ndarray:
 
 
 def _stuck(w: Window, law, k: int) -> tuple:
-    """Return the fraction of the time that the contact sticks, and the starts of slip (j,) [s].
+    """Return the fraction of time in which the interface sticks, and the starts of slip (j,) [s].
 
-    The contact sticks while less than half of its slide is irreversible.
+    It sticks while less than half of the displacement rate is irreversible.
     """
     if law.split_by_mode:
         stuck = w.stuck[:, k]
@@ -272,6 +273,7 @@ def _stuck(w: Window, law, k: int) -> tuple:
     face = w.motion.plant.faces[k]
 
     def above(t, y):
+        """Return the irreversible fraction of the displacement rate minus one half."""
         v = face @ y[motion.n : 2 * motion.n]
         return abs(law.split(y[part], v, t) / v) - 0.5 if v else -0.5
 
@@ -291,7 +293,7 @@ def _stuck(w: Window, law, k: int) -> tuple:
         sides = np.array([t[0], *turns, t[-1]])
         below += float(np.diff(sides)[int(row[0] >= 0) :: 2].sum())
         starts += turns[int(row[0] >= 0) :: 2]
-        if number and values[number * t.size - 1] < 0 <= row[0]:  # at an event
+        if number and values[number * t.size - 1] < 0 <= row[0]:  # The slip starts at an event.
             starts.append(t[0])
     return below / (w.end - w.begin), np.array(starts)
 
@@ -299,8 +301,8 @@ def _stuck(w: Window, law, k: int) -> tuple:
 def _secant(w: Window, motion: Motion, period: float, window: int) -> float | None:
     """Return the mean secant stiffness of the cycles, for laws whose force does not jump.
 
-    It is the difference of the forces at the largest and smallest slide over that of the slides.
-    None if a cycle ends before the slide reverses.
+    It is the difference of the forces at the largest and smallest displacement over that of the
+    displacements. None if a cycle ends before the displacement reverses.
     """
     out = []
     for c in range(window):
@@ -314,7 +316,7 @@ def _secant(w: Window, motion: Motion, period: float, window: int) -> float | No
 
 
 def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
-    """Return (slide, force) at a reversal next to node k; None if there is none."""
+    """Return (displacement, force) at a reversal next to node k; None if there is none."""
     each = NODES.size + 2
     face = motion.plant.faces[0]
     if w.v[k, 0] == 0:
@@ -332,17 +334,18 @@ def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
         )
         y = one.solution(turn)
         return face @ y[: motion.n], motion.forces(turn, y)[0]
-    rest = 1e-9 * np.abs(w.v[:, 0]).max()  # an event of a turn lies at a node
+    rest = 1e-9 * np.abs(w.v[:, 0]).max()  # The event of a reversal lies at a node.
     return (w.q[k, 0], w.f[k, 0]) if abs(w.v[k, 0]) <= rest else None
 
 
 def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
-    """Stiffness and damping of the first interface, and the distortion of the acceleration."""
+    """Return stiffness and damping of the first interface, and the distortion of the acceleration."""
     omega = 2 * np.pi / period
     q = w.q[:, 0]
     f = w.f[:, 0]
 
     def part(values, order=1):
+        """Return the complex amplitude of a harmonic of the drive."""
         return 2 * np.sum(w.w * values * np.exp(-1j * order * omega * w.t)) / (w.end - w.begin)
 
     first, third = (abs(part(w.a, order)) for order in (1, 3))

@@ -13,14 +13,14 @@ from motion_laws import LAWS
 from scipy.integrate import DOP853, OdeSolution
 from scipy.optimize import brentq
 
-LOOKS = 4  # evaluations of the guards in a step of the integrator
+LOOKS = 4  # Evaluations of the event functions per step of the integrator.
 
 
 class ModalSystem(NamedTuple):
     """M x'' + C x' + K x = -base a(t) - faces^T F.
 
-    output: (n,); first: stiffness of the first mode at the contact [N/m]; cubic: of the spring
-    [N/m3]; fastest: largest natural frequency [Hz].
+    output: (n,); first: stiffness of the first mode at the interface [N/m]; cubic: coefficient of
+    the nonlinear spring [N/m3]; fastest: largest natural frequency [Hz].
     """
 
     M: np.ndarray
@@ -108,6 +108,7 @@ def drive_of(s: dict):
         last = len(s["levels"]) - 1
 
         def value(t):
+            """Return the base acceleration of a drive with several levels."""
             return s["levels"][min(int(t / length * (1 + 1e-12)), last)] * np.sin(omega * t)
 
         return value, [length * (k + 1) for k in range(last)], True
@@ -122,35 +123,16 @@ def drive_of(s: dict):
 
 
 class TooLong(Exception):
-    """Raised if a motion takes more steps than it is worth."""
+    """Raised if a motion takes more steps than are permitted."""
 
 
 def stretched(
     motion, t: float, y, stop: float, guards, tolerances: tuple, most: float = np.inf
 ) -> tuple:
-    """Integrate from t [s] to the first guard that decreases through zero, or to `stop` [s].
+    """Integrate from t [s] to the first event function that decreases through zero, or to `stop` [s].
 
-    The guards are evaluated LOOKS times in every step, on its dense output; a value that decreases
-    and increases between two evaluations is not noticed.
-
-    Parameters
-    ----------
-    motion : Motion
-    t : float
-    y : array
-        State.
-    stop : float
-    guards : list
-        From `Motion.guards`.
-    tolerances : tuple
-        Relative and absolute error of a step.
-    most : float
-        Number of steps above which TooLong is raised.
-
-    Returns
-    -------
-    tuple
-        Dense solution, and the guard or None.
+    The event functions are evaluated LOOKS times in every step, on its dense output; a value that
+    decreases and increases between two evaluations is not noticed.
     """
     first, (rtol, atol) = motion.longest(y, motion.slope(t, y)), tolerances
     solver = DOP853(
@@ -192,7 +174,7 @@ def stretched(
 
 
 class Stretch(NamedTuple):
-    """One stretch between events: modes, reversals, dense solution, times of its steps."""
+    """Smooth piece of a motion between events: modes, reversals, dense solution, times of its steps."""
 
     modes: tuple
     turns: list
@@ -220,6 +202,7 @@ class Motion:
         self.size = int(ends[-1])
 
     def start(self) -> np.ndarray:
+        """Return the initial state."""
         y = np.zeros(self.size + 1)
         if self.s["drive"] == "free":
             x = np.array(self.s["start"])
@@ -230,6 +213,7 @@ class Motion:
         return y
 
     def pull(self, t, y):
+        """Return the modal forces without friction."""
         p = self.plant
         x = y[: self.n]
         v = y[self.n : 2 * self.n]
@@ -237,6 +221,7 @@ class Motion:
         return out - p.cubic * (p.output @ x) ** 3 * p.output if p.cubic else out
 
     def forces(self, t, y, pull=None):
+        """Return the friction forces of all interfaces [N]."""
         pull = self.pull(t, y) if pull is None else pull
         rates = self.plant.faces @ y[self.n : 2 * self.n]
         if not self.laws[0].set_valued:
@@ -252,6 +237,7 @@ class Motion:
         return out
 
     def slope(self, t, y):
+        """Return the time derivative of the state."""
         pull = self.pull(t, y)
         v = y[self.n : 2 * self.n]
         force = self.forces(t, y, pull)
@@ -265,12 +251,13 @@ class Motion:
         return out
 
     def accelerations(self, t, y):
+        """Return the relative accelerations at the interfaces."""
         return self.plant.faces @ self.slope(t, y)[self.n : 2 * self.n]
 
     def guards(self) -> list:
-        """Return the events of the present modes.
+        """Return the event functions of the present modes.
 
-        They are tuples (number of the interface, number of the guard, function).
+        They are tuples (number of the interface, number of the event, function).
         """
         out = []
         for k, law in enumerate(self.laws):
@@ -310,9 +297,9 @@ class Motion:
         return out
 
     def choose(self, t, y, active) -> None:
-        """Choose the modes of set-valued interfaces in `active`, none of which slides.
+        """Choose the modes of the set-valued interfaces in `active`, none of which slides.
 
-        It is the first choice without a contradiction.
+        It is the first consistent choice.
         """
         for option in sorted(
             product((0, 1, -1), repeat=len(active)), key=lambda c: sum(map(abs, c))
@@ -334,16 +321,17 @@ class Motion:
     def longest(self, y, slope) -> float:
         """Return the longest step [s] of the integrator from a state y with its derivative.
 
-        It is a fraction of the shortest period. The slide, or the change of the velocity, is
-        limited to the scale over which a law relaxes, because beyond it dense output is not better
-        than 1e-4.
+        It is a fraction of the shortest period. The displacement, or the change of the velocity, is
+        limited to the scale over which a law relaxes, because with longer steps the dense output
+        has errors of 1e-4.
         """
         out = self.share / max(self.plant.fastest, self.s["frequency"])
         n = self.n
         speed = np.abs(self.plant.faces @ y[n : 2 * n]).max()
         gain = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
-            way = 30 * self.share * min(law.scale() for law in self.laws)  # |v| h + |a| h^2/2
+            # Limit of the displacement |v| h + |a| h^2/2 in a step.
+            way = 30 * self.share * min(law.scale() for law in self.laws)
             out = min(out, 2 * way / (speed + np.sqrt(speed**2 + 2 * gain * way)))
         if self.s["law"] in ("tanh", "lugre"):
             unit = self.s["keys"][
@@ -353,7 +341,7 @@ class Motion:
         return out
 
     def run(self, end: float, rtol: float, start=None, most: float = np.inf) -> list:
-        """Return the stretches of the motion from 0 to `end` [s].
+        """Return the smooth pieces of the motion from 0 to `end` [s].
 
         Parameters
         ----------
@@ -398,7 +386,7 @@ class Motion:
                 if count > most:
                     raise TooLong
                 same = same + 1 if done.t_max - t < 1e-9 / self.s["frequency"] else 0
-                # such a motion would stick: a printed law of order 0 that starts from rest
+                # Such a motion would stick: the printed law of order 0 that starts from rest.
                 if same >= 50:
                     raise TooLong("events without end")
                 t = float(done.t_max)
@@ -410,7 +398,7 @@ class Motion:
         return out
 
     def turn(self, t, y, k: int, g: int) -> None:
-        """What the event g of interface k changes."""
+        """Apply event g of interface k to the modes and the state."""
         law = self.laws[k]
         n = self.n
         face = self.plant.faces[k]

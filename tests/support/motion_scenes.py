@@ -44,12 +44,12 @@ DRIVES = (
 
 
 def draw_log_uniform(r, low: float, high: float) -> float:
-    """Draw a number whose logarithm is uniformly distributed."""
+    """Draw from a log-uniform distribution."""
     return float(np.exp(r.uniform(np.log(low), np.log(high))))
 
 
 def spec(seed: int) -> dict:
-    """Return the numbers of a random scene by name, in SI; a seed gives always the same scene."""
+    """Return the numbers of the random scene of a seed by name, in SI units."""
     r = np.random.default_rng(seed)
     law = str(r.choice(LAWS))
     drive = str(r.choice(DRIVES))
@@ -93,8 +93,8 @@ def spec(seed: int) -> dict:
     return out
 
 
-HELD_OUT = 29_000_000  # the first seed of the held-out rigs
-# Laws that each method can compute: events, yields, smooth laws, and those that are only marched.
+HELD_OUT = 29_000_000  # First seed of the rigs that were not used in developing the program.
+# Laws that each method can compute: events, yields, smooth laws, and laws that can only be marched.
 METHODS = {
     "events": ("coulomb", "weakening"),
     "yields": ("elastic-plastic", "iwan"),
@@ -107,7 +107,7 @@ METHODS = {
 def held_out(count: int) -> list:
     """Return specs of `count` rigs with 1 to 4 modes, for each method in turn.
 
-    A march and harmonic balance are named in the scene; otherwise the program chooses the method.
+    The march and harmonic balance are named in the scene; otherwise the program chooses the method.
     """
     seeds = from_(HELD_OUT)
     out = []
@@ -120,7 +120,7 @@ def held_out(count: int) -> list:
 
 
 def fits(s: dict, method: str) -> bool:
-    """Return whether a method can compute a spec and is chosen, or can be named, for it."""
+    """Return whether a method can compute a spec, and is chosen or can be named for it."""
     if s["law"] not in METHODS[method]:
         return False
     if method == "harmonic":
@@ -162,7 +162,7 @@ def _modes(r, own: float) -> list:
 def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
     """Return the keys of [friction] by name.
 
-    The lengths are fractions of the motion that the drive alone would cause.
+    The lengths are fractions of the displacement that the drive would cause without friction.
     """
     length = reach * draw_log_uniform(r, 0.01, 0.6)
     out = {"static": 0.3}
@@ -203,7 +203,7 @@ def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
 def _structure(r, out: dict, omega: float) -> None:
     """Draw the structure: modes with one interface, or two masses with an interface each.
 
-    There may be a spring in parallel with the contact, bonded or nonlinear.
+    There may be a spring in parallel with the interface, linear or nonlinear.
     """
     out["several"] = out["law"] not in ("order", "report", "convolution") and r.random() < 0.12
     if out["several"]:
@@ -312,7 +312,7 @@ NAMES = {
 
 
 def write_law_keys(s: dict) -> dict:
-    """Return the keys of the law as a scene writes them."""
+    """Return the keys of the law as text values of a scene."""
     name = NAMES.get(s["law"], s["law"])
     out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
     return out | {
@@ -483,7 +483,7 @@ def _accuracy(s: dict) -> str:
 
 
 def record(s: dict) -> str:
-    """Return the table of a recorded drive."""
+    """Return the table of a recorded drive as text."""
     return "time [s],acceleration [m/s^2]\n" + "".join(
         f"{t!r},{a!r}\n" for t, a in zip(*s["record"])
     )

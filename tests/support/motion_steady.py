@@ -1,16 +1,16 @@
-"""Steady motion of a spec under a sine by the independent program: long runs, then Newton's method on its period."""
+"""Steady motion of a spec under a sine by the independent program: a long run, then Newton's method over a period."""
 
 import numpy as np
 from motion_reference import Motion
 
-SETTLED = 40  # cycles before Newton's method
-CLOSE = 1e-10  # of the state
+SETTLED = 40  # Cycles before Newton's method.
+CLOSE = 1e-10  # Change over a period, relative to the state, at which Newton's method ends.
 
 
 def periodic(motion: Motion, period: float, rtol: float = 1e-11, most: float = 8000):
-    """State (x, x', states of the law) that comes back after a period [s]; None where Newton's method finds none.
+    """Return the state (x, x', states of the law) that repeats after a period [s]; None if Newton's method fails.
 
-    Only of laws that are differential equations of a state.
+    Only for laws that are differential equations of a state.
     """
     if motion.laws[0].set_valued or motion.laws[0].split_by_mode or motion.s["law"] == "iwan":
         return None
@@ -35,5 +35,5 @@ def periodic(motion: Motion, period: float, rtol: float = 1e-11, most: float = 8
 
 
 def _end(motion: Motion, stretches) -> np.ndarray:
-    """Last state of a motion, without its work."""
+    """Return the last state of a motion, without the friction work."""
     return stretches[-1].solution(stretches[-1].times[-1])[: motion.size]

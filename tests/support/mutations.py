@@ -52,19 +52,19 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "patchfem"
-# Most faults are caught by tests that take this long together without a fault [s]; they are run first.
+# Time of the first stage of tests without a fault [s]; these catch most faults.
 FIRST_SECONDS = 15.0
-# Tests hang if a process takes this many times their duration without a fault in CPU time.
+# Ratio of CPU time to the duration without a fault above which tests count as hanging.
 HANG_FACTOR = 4.0
-# This CPU time is added for imports [s], and the second one for kernels that are compiled anew.
+# CPU time added for imports [s], and for kernels that are compiled again.
 HANG_SECONDS = 30.0
 COMPILE_SECONDS = 120.0
-# Processes that wait for something without end are ended after this many times the CPU time.
+# Ratio of elapsed time to the CPU limit after which waiting processes are killed.
 WAIT_FACTOR = 8.0
-# Address space of a process under test, so that a fault cannot exhaust the machine [bytes].
+# Address space of a process under test [bytes], so that a fault cannot exhaust the memory.
 MAX_BYTES = 8 << 30
 NOT_COPIED = (".git", ".venv", "__pycache__", ".pytest_cache", ".hypothesis", ".ruff_cache")
-# Times of modification: Python recognises a changed source by its time in whole seconds.
+# Modification times: Python detects a changed source file by whole seconds.
 CLOCK = count(int(time.time()))
 
 SWAPPED_OPERATORS = {
@@ -157,7 +157,7 @@ def changed_expressions(node: ast.expr):
 
 
 def with_fields(node: ast.AST, **fields):
-    """Return a copy of a node with other fields."""
+    """Return a copy of a node in which some fields are replaced."""
     other = copy.copy(node)
     for name, value in fields.items():
         setattr(other, name, value)
@@ -165,14 +165,14 @@ def with_fields(node: ast.AST, **fields):
 
 
 def is_text(node: ast.expr) -> bool:
-    """Return whether an operand is visibly a text, which other operators do not take."""
+    """Return whether an operand is a string literal, which the other operators do not accept."""
     return isinstance(node, ast.JoinedStr) or (
         isinstance(node, ast.Constant) and isinstance(node.value, str)
     )
 
 
 def faults_of_statement(node: ast.stmt):
-    """Yield (kind, node, changed node) for each fault of a statement without the statements inside it."""
+    """Yield (kind, node, changed node) for each fault of a statement, without the statements inside it."""
     roots = []
     match node:
         case (
@@ -238,7 +238,7 @@ def operands(node: ast.expr):
 
 
 def statements(body: list):
-    """Yield the statements of a body and of those inside them, without what stands under `if TYPE_CHECKING`."""
+    """Yield the statements of a body and those nested in them, except under `if TYPE_CHECKING`."""
     for node in body:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             continue
@@ -250,7 +250,7 @@ def statements(body: list):
 
 
 def faults_of_file(file: str, text: str) -> list[Fault]:
-    """Return all faults of a source that still compile."""
+    """Return all faults of a source file that still compile."""
     lines = text.encode().split(b"\n")
     faults = []
     for statement in statements(ast.parse(text).body):
@@ -268,7 +268,7 @@ def faults_of_file(file: str, text: str) -> list[Fault]:
 
 
 def is_valid(fault: Fault, text: str) -> bool:
-    """Return whether the source with this fault is still a program, and another one."""
+    """Return whether the source file with this fault compiles and differs from the original."""
     try:
         return ast.dump(ast.parse(with_fault(fault, text))) != ast.dump(ast.parse(text))
     except SyntaxError:
@@ -276,7 +276,7 @@ def is_valid(fault: Fault, text: str) -> bool:
 
 
 def with_fault(fault: Fault, text: str) -> str | None:
-    """Return a source with the fault, at its line or where the same lines stand now; None if they are gone."""
+    """Return the source text with the fault, at its line or at the nearest equal lines; None if these are gone."""
     lines = text.split("\n")
     before = fault.before.split("\n")
     places = [place for place in range(len(lines)) if lines[place : place + len(before)] == before]
@@ -287,7 +287,7 @@ def with_fault(fault: Fault, text: str) -> str | None:
 
 
 def draw(root: Path, folders: list[str], seed: int, number: int) -> list[Fault]:
-    """Return faults in random order, as many in each folder as its lines of code ask for, one per line at most.
+    """Return faults in random order, at most one per line, shared among the folders by their numbers of lines.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def shares(sizes: list[int], number: int) -> list[int]:
 
 
 def watched_lines(root: Path, faults: list[Fault]) -> dict:
-    """Return {file: {line: [numbers of faults]}}: a test that runs a line may notice these faults.
+    """Return {file: {line: [numbers of faults]}}: a test that runs a line may detect these faults.
 
     A fault inside a function has the lines of its statement. A fault outside, which is run at import, has the lines of
     the functions that mention the names assigned there and of all functions of its file. A fault of a compiled
@@ -367,13 +367,13 @@ def watched_lines(root: Path, faults: list[Fault]) -> dict:
 
 
 def text_with_fault(root: Path, fault: Fault) -> str | None:
-    """Return the source of a checkout with the fault, None if its lines are gone."""
+    """Return a source file of a checkout with the fault inserted; None if its lines are gone."""
     path = root / fault.file
     return with_fault(fault, path.read_text("utf-8")) if path.is_file() else None
 
 
 def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
-    """Return {file: lines} whose run may show one fault."""
+    """Return {file: lines}, the lines whose execution may reveal a fault."""
     old = (root / fault.file).read_text("utf-8")
     line = 1 + next(
         place
@@ -414,7 +414,7 @@ def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
 
 @cache
 def package_files(root: Path) -> list[str]:
-    """Return the paths of the package's sources below the root."""
+    """Return the paths of the package's source files relative to the root."""
     return [str(path.relative_to(root)) for path in sorted((root / PACKAGE).rglob("*.py"))]
 
 
@@ -426,13 +426,13 @@ def parse_file(path: Path) -> ast.Module:
 
 @cache
 def function_lines(path: Path) -> set:
-    """Return the lines inside functions."""
+    """Return the numbers of the lines inside functions."""
     functions = [node for node in ast.walk(parse_file(path)) if isinstance(node, ast.FunctionDef)]
     return {line for node in functions for line in range(node.body[0].lineno, node.end_lineno + 1)}
 
 
 def lines_that_mention(path: Path, names: set) -> set:
-    """Return the lines inside functions where one of these names stands."""
+    """Return the numbers of the lines inside functions that contain one of these names."""
     nodes = [
         node for node in ast.walk(parse_file(path)) if isinstance(node, (ast.Name, ast.Attribute))
     ]
@@ -446,9 +446,9 @@ def lines_that_mention(path: Path, names: set) -> set:
 
 
 class Reached:
-    """Append the numbers of faults whose lines this process runs to a file, each once until `clear`.
+    """Trace function that appends the numbers of faults whose lines are run to a file, each once until `clear`.
 
-    A file serves all processes that a test starts.
+    All processes that a test starts share the file.
     """
 
     def __init__(self, watched: dict, log: str):
@@ -457,12 +457,12 @@ class Reached:
         self.seen = set()
 
     def start(self) -> None:
-        """Trace all functions that are called from now on."""
+        """Trace all functions that are called after this."""
         threading.settrace(self.call)
         sys.settrace(self.call)
 
     def clear(self) -> set:
-        """Return the numbers that processes have appended since the last call."""
+        """Return the fault numbers appended since the last call, and empty the file."""
         self.seen.clear()
         path = Path(self.log)
         numbers = {int(word) for word in path.read_text().split()} if path.exists() else set()
@@ -477,6 +477,7 @@ class Reached:
             return None
 
         def line(frame, event, argument):
+            """Record the faults of a line when it is run."""
             numbers = lines.get(frame.f_lineno)
             if numbers and event == "line" and not self.seen.issuperset(numbers):
                 self.seen.update(numbers)
@@ -488,7 +489,7 @@ class Reached:
 
 
 class Plugin:
-    """What a pytest process does that `run` starts: take chosen tests in their order, and record what tests reach."""
+    """Pytest plugin of the processes that `run` starts: it selects and orders tests, and records which lines they run."""
 
     def __init__(self, order: dict):
         self.order = order
@@ -512,20 +513,21 @@ class Plugin:
         items[:] = kept
 
     def pytest_runtest_logstart(self, nodeid, location):
-        """Begin to record a test."""
+        """Start the record of a test."""
         self.failed = False
         self.began = sum(os.times()[:4])
         if self.reached:
             self.reached.clear()
 
     def pytest_runtest_logreport(self, report):
-        """Note a test that does not pass."""
+        """Note whether a test does not pass."""
         self.failed |= not report.passed
 
     def pytest_runtest_logfinish(self, nodeid, location):
-        """Record a test."""
+        """Write the record of a test."""
         if self.reached:
-            seconds = round(sum(os.times()[:4]) - self.began, 3)  # CPU time, with child processes
+            # CPU time, including child processes.
+            seconds = round(sum(os.times()[:4]) - self.began, 3)
             numbers = sorted(self.reached.clear())
             row = {
                 "test": nodeid,
@@ -537,7 +539,7 @@ class Plugin:
 
 
 def read_watched(file: str) -> dict:
-    """Read what `watched_lines` gave, with absolute paths."""
+    """Read the result of `map_lines_to_faults` from a file; its paths are absolute."""
     return {
         path: {int(line): numbers for line, numbers in lines.items()}
         for path, lines in json.loads(Path(file).read_text()).items()
@@ -564,19 +566,19 @@ def pytest_configure(config):
 
 
 def trace_child_process() -> None:
-    """Record what a process reaches that a test starts; called by the `sitecustomize` of the copy."""
+    """Record the lines that run in a child process of a test; called by the `sitecustomize` of the copy."""
     order = json.loads(Path(os.environ["PATCHFEM_FAULT_ORDER"]).read_text())
     Reached(read_watched(order["watched"]), order["log"]).start()
 
 
 def append(path: Path, row: dict) -> None:
-    """Append a row to a file of JSON lines in one write."""
+    """Append a row to a file of JSON lines in a single write."""
     with path.open("a") as file:
         file.write(json.dumps(row) + "\n")
 
 
 def read_rows(path: Path) -> list[dict]:
-    """Read a file of JSON lines; none if there is no file."""
+    """Read a file of JSON lines; return an empty list if there is no file."""
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
@@ -584,7 +586,7 @@ def read_rows(path: Path) -> list[dict]:
 
 
 class Copy:
-    """A copy of the checkout in which tests run, with its own bytecode and folder of compiled code."""
+    """Copy of the checkout in which tests run, with its own bytecode and folder of compiled code."""
 
     def __init__(self, root: Path, work: Path, warm: Path):
         self.tree = work / "tree"
@@ -599,7 +601,7 @@ class Copy:
         )
 
     def write(self, file: str, text: str) -> None:
-        """Write a source with a time of modification that it never had before."""
+        """Write a source file with a modification time that it never had before."""
         path = self.tree / file
         path.write_text(text, "utf-8")
         moment = next(CLOCK)
@@ -608,7 +610,7 @@ class Copy:
     def pytest(
         self, arguments: list[str], order: dict, seconds: float, cache_folder: Path
     ) -> int | None:
-        """Run pytest and return its exit status, None if it took longer than some seconds."""
+        """Run pytest and return its exit status; None if it exceeds the time limit."""
         order_file = self.work / "order.json"
         order_file.write_text(json.dumps(order))
         paths = [self.work / "plugin", self.tree]
@@ -650,7 +652,7 @@ class Copy:
                 shutil.rmtree(base, ignore_errors=True)
 
     def reach(self, test_path: str, watched: dict, record: Path) -> None:
-        """Run tests without a fault and record what they reach."""
+        """Run tests without a fault and record which faults their lines reach."""
         watched_file = self.work / "watched.json"
         watched_file.write_text(
             json.dumps({str(self.tree / file): lines for file, lines in watched.items()})
@@ -665,7 +667,7 @@ class Copy:
         self.pytest([test_path], order, 1e5, self.warm)
 
     def outcome(self, fault: Fault, stages: list[list[str]], seconds: dict) -> str:
-        """Plant a fault, run tests stage by stage until one fails, and say how it ended."""
+        """Insert a fault, run tests stage by stage until one fails, and return the outcome."""
         text = text_with_fault(self.tree, fault)
         if text is None:
             return "gone"
@@ -693,7 +695,7 @@ class Copy:
             shutil.rmtree(cache_folder, ignore_errors=True)
 
     def failed_test(self) -> str:
-        """Return the line of the last output that names the failure."""
+        """Return the line of the last output that names the failed test."""
         lines = (self.work / "output").read_text(errors="replace").splitlines()
         return next(
             (line[:200] for line in lines if line.startswith(("FAILED", "ERROR", "E  "))), ""
@@ -701,7 +703,10 @@ class Copy:
 
 
 def link(source: str, target: str) -> None:
-    """Link a file of compiled code, which is replaced as a whole and never edited; copy it on other file systems."""
+    """Hard-link a file of compiled code, or copy it if the file system has no links.
+
+    Such files are replaced as a whole and never edited.
+    """
     try:
         os.link(source, target)
     except OSError:
@@ -713,9 +718,9 @@ def choose_tests(
 ) -> list[list[str]]:
     """Return the tests for a fault in two stages, the quick tests of its own folder first.
 
-    There are none where no test reaches the fault. The second stage ends with the other tests of
-    the same files, because the first test of a file may have set up, and so reached, what they all
-    ask about.
+    The list is empty if no test reaches the fault. The second stage ends with the other tests of
+    the same files: the first test of a file may have run a shared set-up, so the fault is recorded
+    only for that test.
     """
     own_folder = f"tests/{Path(fault.file).parts[1]}/"
     reaching = [row for row in rows if number in row["reached"]]
@@ -727,6 +732,7 @@ def choose_tests(
     ]
 
     def rank(row: dict) -> tuple:
+        """Sort tests of the fault's own folder first, then by duration."""
         return not row["test"].startswith(own_folder), row["seconds"]
 
     ordered = [*sorted(reaching, key=rank), *sorted(beside, key=rank)]
@@ -743,7 +749,7 @@ def choose_tests(
 
 
 def by_file(tests: list[str]) -> list[str]:
-    """Bring tests of a file together, so that what a file sets up is set up once."""
+    """Return the tests with those of the same file together, so that set-ups are shared."""
     places = {
         file: place
         for place, file in reversed(list(enumerate(test.partition("::")[0] for test in tests)))
@@ -752,7 +758,10 @@ def by_file(tests: list[str]) -> list[str]:
 
 
 def seed_cache(root: Path, warm: Path) -> None:
-    """Link the compiled code and condensed pieces that the user has of this checkout, so that nothing compiles anew."""
+    """Link the user's compiled code and condensed meshes of this checkout into the cache.
+
+    Otherwise all of them would be made again.
+    """
     code = "import pathlib; from patchfem.compiled import cache_folder; print(cache_folder())"
     environment = os.environ | {"PYTHONPATH": str(root)}
     found = subprocess.run(
@@ -769,13 +778,14 @@ def seed_cache(root: Path, warm: Path) -> None:
             without = shutil.ignore_patterns("bytecode", "*.lock")
             with suppress(
                 shutil.Error
-            ):  # another process replaces files meanwhile; they are made again here
+                # Another process may be replacing files; those that are missing are made again here.
+            ):
                 shutil.copytree(part, target, copy_function=link, ignore=without)
             target.chmod(0o700)
 
 
 class Run:
-    """The run of the tests on faults, with its folder of results."""
+    """Run of the tests on faults, with its folder of results."""
 
     def __init__(self, faults: list[Fault], results: Path, options: argparse.Namespace):
         self.faults = faults
@@ -787,7 +797,7 @@ class Run:
         self.tests = []
 
     def start(self) -> None:
-        """Record what the tests reach, then run each fault that has no outcome yet."""
+        """Record which lines the tests run, then run each fault that has no outcome yet."""
         self.results.mkdir(parents=True, exist_ok=True)
         write_faults(self.results / "faults.json", self.faults)
         with (
@@ -809,7 +819,7 @@ class Run:
 
     @contextmanager
     def free_copy(self):
-        """Take a copy of the checkout that no other thread uses."""
+        """Provide a copy of the checkout that no other thread uses."""
         own = self.copies.get()
         try:
             yield own
@@ -817,7 +827,7 @@ class Run:
             self.copies.put(own)
 
     def record(self, path: str) -> None:
-        """Record what the tests of a path reach."""
+        """Record which lines the tests of a path run."""
         with self.free_copy() as own:
             own.reach(path, self.watched, self.results / "tests.jsonl")
         append(self.results / "recorded.jsonl", {"path": path})
@@ -847,7 +857,7 @@ class Run:
 
 
 def test_paths(root: Path, given: list[str], left_out: list[str]) -> list[str]:
-    """Return the test folders and files to record, one process each."""
+    """Return the test folders and files to record, each in its own process."""
     paths = []
     for place in given:
         is_all = place.strip("/") == "tests"
@@ -862,7 +872,7 @@ def test_paths(root: Path, given: list[str], left_out: list[str]) -> list[str]:
 
 
 def print_line(text: str) -> None:
-    """Print a line at once."""
+    """Print a line with the time of day, and flush it."""
     print(time.strftime("%H:%M:%S"), text, flush=True)
 
 
@@ -870,23 +880,23 @@ def print_line(text: str) -> None:
 
 
 def write_faults(path: Path, faults: list[Fault]) -> None:
-    """Write faults that were drawn."""
+    """Write drawn faults to a file."""
     path.write_text(json.dumps([fault._asdict() for fault in faults], indent=1))
 
 
 def read_faults(path: Path) -> list[Fault]:
-    """Read faults that were drawn."""
+    """Read drawn faults from a file."""
     return [Fault(**row) for row in json.loads(path.read_text())]
 
 
 def read_outcomes(results: Path) -> dict:
-    """Return {fault: outcome} of a run, finished or not."""
+    """Return {fault: outcome} of a run, whether finished or not."""
     faults = read_faults(results / "faults.json")
     return {faults[row["number"]]: row["outcome"] for row in read_rows(results / "outcomes.jsonl")}
 
 
 def show(results: Path) -> None:
-    """Print the fraction of caught faults by folder, and each survivor."""
+    """Print the fraction of caught faults by folder, and each fault that was not caught."""
     outcomes = read_outcomes(results)
     by_folder = defaultdict(Counter)
     for fault, outcome in outcomes.items():
@@ -903,7 +913,7 @@ def show(results: Path) -> None:
 
 
 def compare(before: Path, after: Path) -> None:
-    """Print how often the outcome is the same, and each fault that only the first run caught."""
+    """Print how often two runs have the same outcome, and each fault that only the first one caught."""
     first = read_outcomes(before)
     second = read_outcomes(after)
     pairs = {fault: (first[fault], second[fault]) for fault in first if fault in second}
@@ -915,13 +925,13 @@ def compare(before: Path, after: Path) -> None:
 
 
 def print_change(fault: Fault, remark: str) -> None:
-    """Print where a fault is, and its lines before and after."""
+    """Print the position of a fault and its line before and after."""
     print(f"\n{fault.file}:{fault.line} ({fault.kind}), {remark}")
     print(f"- {fault.before.strip()}\n+ {fault.after.strip()}")
 
 
 def main() -> None:
-    """Read the command line."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description="plant random faults and find those that no test catches"
     )

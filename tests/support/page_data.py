@@ -1,4 +1,4 @@
-"""What a page holds besides its words: the data that the browser draws, and the page without the drawing library."""
+"""Contents of an HTML page besides its text: chart data, the page without scripts, and accessibility errors."""
 
 import gzip
 import json
@@ -10,23 +10,23 @@ import numpy as np
 
 
 def data_of(text: str) -> dict:
-    """The data of a page, {} where it draws nothing."""
+    """Return the chart data of a page; {} if it has no charts."""
     found = re.search(r"<script type=text/plain id=data>(.*?)</script>", text, re.S)
     return json.loads(gzip.decompress(b64decode(found[1]))) if found else {}
 
 
 def charts_of(text: str) -> dict:
-    """The charts of a page by title and by the label of the vertical axis."""
+    """Return the charts of a page by title and label of the vertical axis."""
     return {(one["title"], one["y"]["label"]): one for one in data_of(text).get("charts", [])}
 
 
 def own_part(text: str) -> str:
-    """The page without scripts."""
+    """Return the page without scripts."""
     return re.sub(r"<script.*?</script>", "", text, flags=re.S)
 
 
 class _Heard(HTMLParser):
-    """What a page tells a reader who hears it: `lacks`, what has no name there; `levels` of its headings."""
+    """Parser that collects tags without an accessible name in `lacks` and heading levels in `levels`."""
 
     def __init__(self):
         super().__init__()
@@ -36,7 +36,11 @@ class _Heard(HTMLParser):
         self.named = set()
 
     def handle_starttag(self, tag, attrs):
-        """Controls are named by a label around them, in which nothing stands that a label names first, or by theirs."""
+        """Check that an element has its accessible name.
+
+        A form control is named by an enclosing label, whose first control it is, by a label with
+        `for`, or by its own aria-label.
+        """
         of = dict(attrs)
         if tag == "label":
             self.label = of.get("for", "")
@@ -54,15 +58,16 @@ class _Heard(HTMLParser):
             fine = of.get("aria-label") or of.get("id") in self.named - {""} or self.label == ""
         self.lacks += [] if fine else [self.get_starttag_text()]
         if control and self.label == "":
-            self.label = None  # the first control of a label is the one that it names
+            self.label = None  # A label names only its first control.
 
     def handle_endtag(self, tag):
+        """Note the end of a label."""
         if tag == "label":
             self.label = None
 
 
 def unheard(text: str) -> list:
-    """Tags of a page that have no language, name, scope or text in their place, and headings that skip a level."""
+    """Return tags without language, name, scope or alternative text, and headings that skip a level."""
     heard = _Heard()
     heard.feed(own_part(text))
     skips = [
@@ -74,7 +79,7 @@ def unheard(text: str) -> list:
 
 
 def swept_key(name: str, values, unit="1", texts=None, **more) -> dict:
-    """Return a key of a sweep as its page takes it; texts: its values as they were written."""
+    """Return a key of a sweep in the form that its page takes; texts: its values as written."""
     values = np.asarray(values, float)
     texts = texts or [f"{value:g} {unit}" for value in values]
     key = {"name": name, "unit": unit, "values": values, "log": False, "words": False}
@@ -82,13 +87,13 @@ def swept_key(name: str, values, unit="1", texts=None, **more) -> dict:
 
 
 def swept_measure(values, errors=0.0, unit="1", **more) -> dict:
-    """Return a measure of a sweep as its page takes it, with one error or one for each case."""
+    """Return a measure of a sweep in the form that its page takes, with one error for all cases or one each."""
     values = np.asarray(values, float)
     return {"unit": unit, "means": "m", "values": values, "errors": 0 * values + errors} | more
 
 
 def swept_table(keys: list, measures: dict, **more) -> dict:
-    """Return a sweep as its page takes it: every case is steady, unless `more` says otherwise."""
+    """Return a sweep in the form that its page takes; all cases are steady unless `more` says otherwise."""
     table = {"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True}
     table |= {"keys": keys, "measures": measures, "messages": {}, "folders": None}
     return table | {"tolerance": 0.01, "outcome": ["steady"] * len(keys[0]["values"])} | more

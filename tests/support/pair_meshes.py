@@ -1,4 +1,4 @@
-"""Pairs of alike tensor grids as tagged meshes, the way a mesh file holds them."""
+"""Meshes of pairs of equal structured grids with tags, as a mesh file stores them."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from patchfem.mesh.pairs import join_meshes
 
 
 def pair_mesh(grid: TensorGrid) -> dict:
-    """Both pieces of a pair of alike grids as points (2N, 2) [m], quads (t, 4) and edges with their tags.
+    """Return the mesh of a pair of equal grids: points (2N, 2) [m], quads (t, 4), edges, and their tags.
 
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.
     """

@@ -1,4 +1,4 @@
-"""Made traces before and after wear whose shift, tilt and worn depth are known."""
+"""Synthetic traces before and after wear with known shift, tilt and worn depth."""
 
 from typing import NamedTuple
 
@@ -9,13 +9,16 @@ from patchfem.core import frozen_array
 from patchfem.surface import Profile
 
 UM = 1e-6
-# the surface that both traces are cut from: pieces of it scatter as measured traces do
+# Length [m] and number of samples of the surface from which both traces are cut.
 LONG, FINE = (4.096e-3, 2**13)
 
 
 class Pair(NamedTuple):
-    """before, after: Profile; shift [m]: a place at x of the one stands at x + shift of the other; worn (n,) [m] at
-    the samples of `after`; slope [rad] and offset [m] of the one against the other."""
+    """Two traces and their true difference.
+
+    before, after: Profile; shift [m]: a point at x in `before` lies at x + shift in `after`; worn
+    (n,) [m] at the samples of `after`; slope [rad] and offset [m] of `after` relative to `before`.
+    """
 
     before: Profile
     after: Profile
@@ -26,7 +29,7 @@ class Pair(NamedTuple):
 
 
 def surface(seed: int, sigma: float = 6 * UM):
-    """A long trace as a function of x, cubic between its fine samples."""
+    """Return the heights of a long trace as a function of x, a cubic spline through its fine samples."""
     from scipy.interpolate import CubicSpline
 
     long = report_trace(LONG, FINE, seed, sigma)
@@ -41,10 +44,11 @@ def pair(
     length: float = 1e-3,
     shift: float | None = None,
 ) -> Pair:
-    """Two traces over the same place, the peaks of the second worn off down to a level that varies along it.
+    """Return two traces of the same place; the peaks of the second are worn to a level that varies along it.
 
-    share: of the length that is worn; by chance 0.15 to 0.65 where left out. Shift within 25 um, each trace tilted
-    within 10 mrad, offset within 5 um, all by chance; noise [m]: standard deviation in each trace.
+    share: worn fraction of the length, random between 0.15 and 0.65 by default. Shift within 25 um,
+    tilts within 10 mrad and offsets within 5 um are random; noise [m]: standard deviation in each
+    trace.
     """
     random = np.random.default_rng([seed, 1985])
     z = surface(seed)
@@ -78,10 +82,11 @@ KINDS = ("band", "parabola", "groove")
 
 
 def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> Pair:
-    """Two rough traces (0.3 um, correlated over 10 samples of 1 um), the second with a worn track of one kind in it.
+    """Return two rough traces (0.3 um, correlated over 10 samples of 1 um), the second with a worn track.
 
-    band: a flat floor between walls, a tenth to four tenths of the length wide; parabola: as wide; groove: a round
-    scratch 30 um to 120 um wide. Depth 0.4 um to 2 um, place, width and shift (within 80 um) by chance.
+    band: a flat floor between walls, 0.1 to 0.4 of the length wide; parabola: of the same width;
+    groove: a round scratch 30 to 120 um wide. Depth 0.4 to 2 um, position, width and shift (within
+    80 um) are random.
     """
     random = np.random.default_rng([seed, KINDS.index(kind), 1986])
     spare = 100
@@ -96,7 +101,7 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
     width = random.uniform(30, 120) if kind == "groove" else random.uniform(0.1, 0.4) * count
     middle = random.uniform(0.15 * count + width / 2, 0.85 * count - width / 2)
     x = np.arange(float(count))
-    places = x - moved  # of the samples after, in the trace before
+    places = x - moved  # Positions of the samples of `after` in the trace before.
     t = (places - middle) / (width / 2)
     inside = abs(t) <= 1
     shape = {

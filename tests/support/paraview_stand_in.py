@@ -1,6 +1,6 @@
-"""What a script for ParaView asks for, noted down, and its pipeline carried out by VTK's own filters.
+"""Stand-in for ParaView that records what a script calls and runs its pipeline with VTK filters.
 
-Names of proxies and of their properties as ParaView 5.11 has them; anything else is an error.
+Names of proxies and of their properties are those of ParaView 5.11; any other name is an error.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ CALLS = {
 
 
 class Proxy:
-    """A proxy that knows the properties of its kind and notes what is called on it."""
+    """Proxy that accepts the properties of its kind and records its method calls."""
 
     def __init__(self, kind: str, **given):
         self.__dict__.update(kind=kind, called=[])
@@ -46,17 +46,19 @@ class Proxy:
             setattr(self, name, value)
 
     def __setattr__(self, name: str, value) -> None:
+        """Set a property; AssertionError if ParaView has none of this name."""
         assert name in PROPERTIES[self.kind], f"{self.kind} has no property {name}"
         self.__dict__[name] = value
 
     def __getattr__(self, name: str):
+        """Return a method that records its calls."""
         if name not in CALLS.get(self.kind, ()):
             raise AttributeError(f"{self.kind} has no {name}")
         return lambda *words: self.called.append((name, *words))
 
 
 class Simple(types.ModuleType):
-    """`paraview.simple` that notes what is shown and how."""
+    """Stand-in for `paraview.simple` that records what is shown and how."""
 
     def __init__(self):
         super().__init__("paraview.simple")
@@ -71,43 +73,51 @@ class Simple(types.ModuleType):
             setattr(self, kind, lambda registrationName, kind=kind, **given: Proxy(kind, **given))
 
     def GetActiveViewOrCreate(self, kind):
+        """Return the render view."""
         assert kind == "RenderView"
         return self.view
 
     def Show(self, source, view):
+        """Record a source and return its display."""
         self.shown.append((source, Proxy("Display")))
         return self.shown[-1][1]
 
     def ColorBy(self, display, array):
+        """Record the array by which a display is colored."""
         self.coloured[id(display)] = array
 
     def GetColorTransferFunction(self, name):
+        """Return the color table of an array."""
         return self.tables.setdefault(name, Proxy("Table"))
 
     def GetScalarBar(self, table, view):
+        """Return the scalar bar of a color table."""
         return self.bars.setdefault(id(table), Proxy("ScalarBar"))
 
     def GetAnimationScene(self):
+        """Return the animation scene."""
         return self.scene
 
     def ResetCamera(self, view):
+        """Check the view; nothing is drawn."""
         assert view is self.view
 
     Render = ResetCamera
 
     def SaveAnimation(self, path, view, FrameRate):
+        """Record path and frame rate of an animation."""
         self.saved.append((path, FrameRate))
 
 
 def times_and_files(reader: Proxy) -> list:
-    """(Time, file) of the frames of a .pvd."""
+    """Return (time, file) of the frames of a .pvd file."""
     path = Path(reader.FileName)
     sets = ElementTree.parse(path).getroot().iter("DataSet")
     return [(float(one.get("timestep")), path.parent / one.get("file")) for one in sets]
 
 
 def blocks_at(source: Proxy, file: Path) -> list:
-    """The grids that a source gives where its reader reads `file`: (points (n, 3), point data, cell data)."""
+    """Return (points (n, 3), point data, cell data) of each grid that a source produces if its reader reads `file`."""
     last = _filter(source, file)
     last.Update()
     walk = last.GetOutputDataObject(0).NewIterator()
@@ -132,6 +142,7 @@ def blocks_at(source: Proxy, file: Path) -> list:
 
 
 def _filter(source: Proxy, file: Path):
+    """Return the VTK filter of a source, connected to those before it."""
     if source.kind == "PVDReader":
         made = vtkXMLMultiBlockDataReader()
         made.SetFileName(str(file))

@@ -1,4 +1,4 @@
-"""Shared by the contact tests: a pair of alike pieces condensed to its interface."""
+"""Pairs of equal bodies condensed to their interface, for the contact tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from patchfem.mesh import TensorGrid, graded_grid
 from patchfem.mesh.tensor import graded_rows
 
 TITANIUM = (121e9, 0.32)
-CARBIDE = (250e9, 0.24)  # sprayed WC-Co, the project's assumed default
+CARBIDE = (250e9, 0.24)  # Sprayed WC-Co; this is the value that the project assumes.
 LENGTH = WIDTH = 12.7e-3
 HEIGHT = 6.35e-3
 COATING = 152.4e-6
@@ -22,12 +22,12 @@ TILTS = (0.0, 1e-5, 1e-4, 1e-3)
 
 
 def bare(material, plane="strain") -> Layers:
-    """One material throughout."""
+    """Return layers of a single material."""
     return Layers(material, material, plane)
 
 
 def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
-    """Two mirrored pieces: normal and tangential compliance double, their coupling cancels."""
+    """Return the compliance of two mirrored bodies: normal and tangential parts double, the coupling cancels."""
     piece = make_piece(grid.x, grid.depth, grid.coating_rows, layers)
     nn, tt, _ = interface_compliance(piece)
     return Compliance(
@@ -37,20 +37,20 @@ def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Complianc
 
 @cache
 def coated_pair(cells: int) -> Compliance:
-    """The coated pair of the test piece with `cells` columns."""
+    """Return the compliance of the coated pair of the test specimen with `cells` columns."""
     return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING), COATED)
 
 
 @cache
 def bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> Compliance:
-    """Uncoated blocks of the size of the test piece."""
+    """Return the compliance of uncoated blocks of the size of the test specimen."""
     return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells), bare((young, TITANIUM[1]), plane))
 
 
 def refined_middle(
     half: float, fine: float, length: float, height: float, growth: float = 1.05
 ) -> TensorGrid:
-    """Uniform columns of `fine` over |x| <= half, growing outwards to the given length; rows start at `fine`."""
+    """Return a grid with columns of width `fine` in |x| <= half that grow outwards; rows begin with `fine`."""
     count = round(half / fine)
     outer = half + np.cumsum(graded_rows(fine * growth, length / 2 - half, growth))
     right = np.concatenate([np.arange(1, count + 1) * fine, outer])
@@ -59,7 +59,7 @@ def refined_middle(
 
 
 def rough(rng, x, size: float, terms: int = 12):
-    """A random smooth gap of a few waves [m]."""
+    """Return a random smooth gap of a few waves [m]."""
     wave = rng.normal(size=(2, terms)) / np.arange(1, terms + 1)
     phase = np.outer(np.arange(1, terms + 1), np.pi * x / (x[-1] - x[0]))
     return size * (wave[0] @ np.cos(phase) + wave[1] @ np.sin(phase))

@@ -1,7 +1,8 @@
-"""Scenes of all kinds by a seed, each run once as a command, its CPU seconds and peak memory beside those of its plan.
+"""Random scenes of all kinds, each run once as a command: CPU time and peak memory against those of its plan.
 
-A scene is one of `torture.grammar`, with more cycles, finer patches and finer tolerances, so that more than the start
-of the program counts. A scene that the program refuses, or plans at more than MOST seconds, gives way to the next seed.
+A scene comes from `torture.grammar`, with more cycles, finer patches and smaller tolerances, so
+that its cost exceeds that of starting the program. A scene that the program refuses, or plans at
+more than MOST seconds, is replaced by the next seed.
 """
 
 import subprocess
@@ -16,8 +17,8 @@ from torture.trial import Trial
 
 import patchfem as pf
 
-MOST = 60.0  # seconds
-# a process starts with the memory of the one that it is forked from as its peak: a small one stands in between
+MOST = 60.0  # Longest planned CPU time of a scene [s].
+# The peak memory of a new process includes that of its parent, so a small process starts the run.
 SMALL = """\
 import resource, subprocess, sys
 resource.setrlimit(resource.RLIMIT_CPU, (120, 120))
@@ -28,7 +29,7 @@ print(code, used.ru_utime + used.ru_stime, used.ru_maxrss)
 
 
 class Told(NamedTuple):
-    """A scene: its seed, kind and engine, seconds and bytes as planned and as measured."""
+    """Scene with its seed, kind and engine; seconds and bytes as planned and as measured."""
 
     seed: int
     kind: str
@@ -37,13 +38,13 @@ class Told(NamedTuple):
     measured: tuple
 
     def within(self, time: float = 1.5, memory: float = 1.3) -> tuple:
-        """Whether the plan holds in time and in memory, by these factors either way."""
+        """Return whether the plan agrees in time and in memory within these factors."""
         ratios = [a / b for a, b in zip(self.planned, self.measured)]
         return tuple(1 / most <= ratio <= most for ratio, most in zip(ratios, (time, memory)))
 
 
 def text(seed: int) -> str:
-    """The scene of a seed."""
+    """Return the scene of a seed."""
     trial = Trial(np.random.default_rng(seed), None, None, None)
     out = grammar.scene(trial)
     contact = out.get("contact")
@@ -60,7 +61,7 @@ def text(seed: int) -> str:
 
 
 def planned(seed: int):
-    """The plan of a seed, None where it is refused or long."""
+    """Return the plan of a seed; None if it is refused or too long."""
     try:
         found = pf.plan(text(seed))
     except pf.PatchfemError:
@@ -69,10 +70,10 @@ def planned(seed: int):
 
 
 def told(first: int, count: int, folder: Path):
-    """`count` scenes from a seed on, as `Told`; one that ends with a refusal is left out.
+    """Yield `count` scenes, from a first seed on, as `PlannedRun`; refused runs are left out.
 
-    A scene whose plan does not hold is run once more and the smaller numbers are taken: the first time may have
-    compiled code.
+    A scene that disagrees with its plan is run again, and the smaller numbers are taken, because
+    the first run may have compiled code.
     """
     seed = first - 1
     while count:
@@ -94,7 +95,7 @@ def told(first: int, count: int, folder: Path):
 
 
 def _measured(path: Path, out: Path) -> tuple | None:
-    """CPU seconds, 120 at most, and peak memory [bytes] of `patchfem run`; None of a run that is refused."""
+    """Return CPU seconds, at most 120, and peak memory [bytes] of `patchfem run`; None if it is refused."""
     words = [
         sys.executable,
         "-c",

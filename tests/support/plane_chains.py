@@ -1,8 +1,9 @@
-"""Random chains of masses with interfaces that slide in planes, against an integration of their rate equations.
+"""Random chains of masses with interfaces that slide in a plane, against an integration of their rate equations.
 
-Campaign `planes` of `campaigns`. DOP853 integrates the masses and the elongation s of every tangential spring:
-s' = q' while |s| < m or s.q' < 0, else the part of q' normal to s, with each change of state as an event. Nothing of
-the package is used. Seeds below 7000 were used while this was written.
+Campaign `planes` of `campaigns`. DOP853 integrates the masses and the elongation s of every
+tangential spring: s' = q' while |s| < m or s.q' < 0, else the part of q' normal to s, with each
+change of state as an event. Nothing of the package is used. Seeds below 7000 were used in
+development.
 """
 
 from itertools import pairwise
@@ -15,8 +16,8 @@ from scipy.spatial import ConvexHull, distance
 
 import patchfem as pf
 
-SAMPLES = 4000  # samples per cycle at which the integration is read
-# smallest number of steps per cycle: an event and its end between two of them would be missed
+SAMPLES = 4000  # Samples per cycle at which the solution is evaluated.
+# Minimum number of steps per cycle; an event that begins and ends within one step is missed.
 STEPS = 400
 HEAD = "[structure]\nmasses = {masses}\noutput_mass = {seen}\n"
 LINK = '[[structure.{kind}]]\nbetween = {pair}\n{key} = "{value!r} {unit}"\n'
@@ -28,7 +29,7 @@ DRIVE = '[drive]\nkind = "{drive}"\nfrequency = "{frequency!r} Hz"\n{size}\ncycl
 
 
 def chain(seed: int) -> dict:
-    """Return the numbers of a random chain of 1 to 3 nodes, two masses each.
+    """Return the parameters of a random chain of 1 to 3 nodes with two masses each.
 
     Mass 2 k - 1 moves along x, mass 2 k along y.
     """
@@ -86,18 +87,18 @@ def chain(seed: int) -> dict:
 
 
 def row(pair, n: int) -> np.ndarray:
-    """Return the slide of a pair of masses, from 1 with 0 for the base, per motion (n,)."""
+    """Return the row (n,) that gives the relative displacement of two masses, numbered from 1; 0 is the base."""
     unit = np.vstack([np.zeros(n), np.eye(n)])
     return unit[pair[0]] - unit[pair[1]]
 
 
 def matrix(links, n: int) -> np.ndarray:
-    """Return the sum (n, n) of links (pair, value)."""
+    """Return the matrix (n, n) of links (pair, value)."""
     return sum(value * np.outer(row(pair, n), row(pair, n)) for pair, value in links)
 
 
 def dampers_of(springs) -> list:
-    """Return the dampers that belong to springs."""
+    """Return the dampers in parallel with the springs."""
     return [(pair, 2e-4 * k) for pair, k in springs]
 
 
@@ -125,7 +126,8 @@ def text(s: dict) -> str:
 class Motion:
     """Rate equations of a chain.
 
-    y consists of displacements, rates, elongations, and then work and loss of every interface.
+    The state y consists of displacements, velocities, elongations, and the work and loss of every
+    interface.
     """
 
     def __init__(self, s: dict):
@@ -165,9 +167,10 @@ class Motion:
         return out
 
     def event(self, i: int, slips: bool):
-        """Return the event that ends the state of interface i."""
+        """Return the event function that ends the present state of interface i."""
 
         def gap(t, y, *_):
+            """Return the margin to the end of the state."""
             stretch = y[self.at[i]]
             return (
                 stretch @ (self.rows[i] @ y[self.n : 2 * self.n])
@@ -180,7 +183,7 @@ class Motion:
         return gap
 
     def run(self, end: float, first: float, rtol: float) -> tuple:
-        """Return (times, y) at SAMPLES per cycle from `first` [s] to the end."""
+        """Return (times, y) with SAMPLES per cycle from `first` [s] to the end."""
         period = 2 * np.pi / self.omega
         times = np.linspace(first, end, round((end - first) / period * SAMPLES) + 1)
         y = np.zeros(self.size)
@@ -218,7 +221,8 @@ class Motion:
                     slips[i] = not slips[i]
                 if slips[i]:
                     y[self.at[i]] *= self.most[i] / np.linalg.norm(y[self.at[i]])
-        for i, (at, most) in enumerate(zip(self.at, self.most)):  # no event was missed
+        # These checks show that no event was missed.
+        for i, (at, most) in enumerate(zip(self.at, self.most)):
             assert np.linalg.norm(out[:, at], axis=1).max() <= most * (1 + 1e-8)
             lost = out[:, 2 * i + 1 - 2 * len(self.rows)]
             assert np.diff(lost).min() >= -1e-9 * lost[-1] - 1e-12 * self.k[i] * most**2
@@ -231,7 +235,7 @@ def widest(places) -> float:
         return float(np.ptp(places))
     try:
         places = places[ConvexHull(places).vertices]
-    except Exception:  # all positions are on a line
+    except Exception:  # All positions lie on a line.
         places = places[np.lexsort(places.T)[[0, -1]]]
     return float(distance.pdist(places).max())
 

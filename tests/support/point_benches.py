@@ -1,7 +1,7 @@
-"""Random benches of every friction law without a patch, against an integration of the law over the prescribed motion.
+"""Random benches of every friction law without a patch, against an integration of the law along the prescribed motion.
 
-Campaign `point-benches` of `campaigns`. The reference integrates the rate equation of the law (`motion_laws`) by DOP853
-from event to event, and uses nothing of the package.
+Campaign `point-benches` of `campaigns`. The reference integrates the rate equation of the law
+(`motion_laws`) by DOP853 between events, and uses nothing of the package.
 """
 
 from pathlib import Path
@@ -26,16 +26,16 @@ LAWS = (
     "growing",
     "report",
 )
-N_SAMPLES = 20000  # of the last cycle, at which the reference is read
-# of the values that are read from samples; a peak between two of them is missed by less
+N_SAMPLES = 20000  # Samples of the last cycle at which the reference is evaluated.
+# Relative error of measures taken from samples: a peak between two samples differs by less.
 SAMPLING_DOUBT = 1e-6
 SAMPLED = ("friction_force_peak", "secant_stiffness", "equivalent_stiffness")
-# relative error of a step of the two integrations, whose difference is the doubt
+# Relative tolerances of the two integrations, whose difference is the uncertainty.
 TOLERANCES = (1e-11, 1e-12)
 
 
 def draw_bench(seed: int) -> dict:
-    """Draw the numbers of a bench in SI units; the laws take turns."""
+    """Draw the parameters of a bench in SI units; consecutive seeds have different laws."""
     r = np.random.default_rng(seed)
     law = LAWS[seed % len(LAWS)]
     load = draw_log_uniform(r, 20, 2000)
@@ -49,7 +49,7 @@ def draw_bench(seed: int) -> dict:
         "amplitude": amplitude,
         "cycles": int(r.integers(2, 5)),
         "tolerance": float(r.choice([1e-2, 1e-3, 1e-4])),
-        # what the independent program reads besides: one mode that the motion does not move
+        # Keys that the independent program also needs: one mode, which the motion does not affect.
         "several": False,
         "patch": None,
         "drive": "sine",
@@ -64,7 +64,7 @@ def draw_bench(seed: int) -> dict:
 
 
 def write_bench(bench: dict) -> str:
-    """Write the scene of a bench."""
+    """Return the scene of a bench as text."""
     slide = {
         "kind": '"sine"',
         "amplitude": quantity(bench["amplitude"], "m"),
@@ -80,19 +80,22 @@ def write_bench(bench: dict) -> str:
 
 
 class PrescribedMotion(Motion):
-    """The motion A sin(omega t) with a friction law, whose force does not act back on the motion."""
+    """Prescribed motion A sin(omega t) with a friction law whose force does not affect the motion."""
 
     def start(self):
+        """Return the initial state."""
         y = super().start()
         y[1] = self.s["amplitude"] * self.s["seeded"]
         return y
 
     def forces(self, t, y, pull=None):
+        """Return the friction force [N]."""
         law = self.laws[0]
         part = self.parts[0]
         return np.array([law.mode * law.kinetic if law.set_valued else law.force(y[part], y[1], t)])
 
     def slope(self, t, y):
+        """Return the time derivative of the state."""
         law = self.laws[0]
         part = self.parts[0]
         out = np.empty_like(y)
@@ -103,6 +106,7 @@ class PrescribedMotion(Motion):
         return out
 
     def turn(self, t, y, k, g):
+        """Apply an event; a set-valued law reverses its direction."""
         law = self.laws[0]
         if law.set_valued:
             law.mode = -law.mode
@@ -151,7 +155,8 @@ def integrate_bench(bench: dict, rtol: float) -> dict:
         "secant_stiffness": (f[high] - f[low]) / (q[high] - q[low]),
         "equivalent_stiffness": (np.trapezoid(f * turn, t) / np.trapezoid(q * turn, t)).real,
     }
-    if law.set_valued:  # where the motion turns, the force is any between the two friction limits
+    # At a reversal the force may have any value between the two friction limits.
+    if law.set_valued:
         del measures["secant_stiffness"], measures["friction_force_peak"]
     return measures
 

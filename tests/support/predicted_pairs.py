@@ -1,15 +1,18 @@
-"""Made pairs of computed and measured wear with a known coefficient, for `compare --predicted`.
+"""Synthetic pairs of computed and measured wear with a known coefficient, for `compare --predicted`.
 
 This is the campaign "predicted-wear" of `campaigns.py`.
 
-The measured wear is that of `wear_scenes.integrate`, which uses nothing of the package, with the true coefficient. It
-is cut into a rough surface of `known_pairs`, and a stylus measures the surface before and after: each trace has its
-own start, tilt, offset and noise, and its x has another zero than that of the patch, and in half of the pairs the
-opposite direction. The wear varies locally about Archard's law (a stationary process along the trace with mean 1), and
-a quarter of the tracks have pile-up at their ends. The computed wear is a run of the package with another coefficient.
+The measured wear is that of `wear_scenes.integrate`, which uses nothing of the package, with the
+true coefficient. It is subtracted from a rough surface of `known_pairs`, and a stylus measures the
+surface before and after: each trace has its own start, tilt, offset and noise; the zero of its x
+differs from that of the patch, and in half of the pairs its direction is reversed. The wear varies
+locally about Archard's law (a stationary process along the trace with mean 1), and a quarter of the
+tracks have pile-up at their ends. The computed wear is a run of the package with another
+coefficient.
 
-Truth: the coefficient, and the place of the middle of the patch in the second trace. Seeds 1 to 40 served to find
-faults; the score is that of seeds from 641000 on, which were not computed before this file was committed.
+Truth: the coefficient, and the position of the middle of the patch in the second trace. Seeds 1 to
+40 were used in development; the score is that of seeds from 641000 on, which had not been computed
+before this file was committed.
 """
 
 from __future__ import annotations
@@ -31,12 +34,12 @@ import patchfem as pf
 
 KINDS = ("flat", "tilt", "crown", "crown and tilt")
 STYLES = ("self-affine", "turned", "plateau")
-CELLS = 60  # cells of the reference along the patch
-STEPS = 60  # steps of the reference; twice as many change the depth by less than 1e-3 of its mean
+CELLS = 60  # Cells of the reference along the patch.
+STEPS = 60  # Steps of the reference; twice as many change the depth by less than 1e-3 of its mean.
 
 
 class MadePair(NamedTuple):
-    """Scene, coefficient of the run, and two traces with the truth about them.
+    """Scene, coefficient of the run, and two traces with their true properties.
 
     - piece, share: which piece the traces are from, and its part of the wear
     - before, after: x, z (n,) [m] of the traces
@@ -56,12 +59,12 @@ class MadePair(NamedTuple):
 
 
 def draw_number(random, low: float, high: float) -> float:
-    """Draw a number with five digits, evenly on a logarithmic scale."""
+    """Draw a number with five digits from a log-uniform distribution."""
     return float(f"{10 ** random.uniform(np.log10(low), np.log10(high)):.5g}")
 
 
 def draw_scene(seed: int) -> WearScene:
-    """Draw a patch of KINDS[seed % 4] that slides to and fro, and wears by 0.3 to 8 um on average."""
+    """Draw a patch of KINDS[seed % 4] that slides back and forth and wears by 0.3 to 8 um on average."""
     random = np.random.default_rng([seed, 581])
     kind = KINDS[seed % len(KINDS)]
     length = draw_number(random, 2.5e-3, 6e-3)
@@ -83,7 +86,7 @@ def draw_scene(seed: int) -> WearScene:
 
 
 def compute_depth(scene: WearScene, x) -> np.ndarray:
-    """Compute the depth (n,) [m] of both pieces at positions x (n,) [m] along the patch, without the package."""
+    """Return the depth (n,) [m] of both bodies at positions x (n,) [m] along the patch, without the package."""
     half = scene.patch.length / 2
     model = wear_scenes.discretize(scene.patch, (-half, half), CELLS)
     depth = wear_scenes.integrate(model, scene, STEPS).depth
@@ -110,7 +113,7 @@ def draw_pair(seed: int) -> MadePair:
     length = scene.patch.length
     margins = length * random.uniform(0.25, 0.6, 2)
     if random.random() < 0.15:
-        margins[1] = -length * random.uniform(0.05, 0.3)  # the trace ends within the track
+        margins[1] = -length * random.uniform(0.05, 0.3)  # The trace ends inside the track.
     trace_length = length + float(margins.sum())
     edge = 0.06 * trace_length
     x, new = surface(random, trace_length + 2 * edge, STYLES[random.integers(3)])

@@ -1,18 +1,18 @@
-"""Equation 2.17 with [contact.shear] as a plain sum, for random benches and rigs.
+"""Equation 2.17 with [contact.shear] as a direct sum, for random benches and rigs.
 
 Used by the campaigns `printed-benches` and `printed-rigs` of `campaigns`, which count how often the
 errors of a run hold. Rigs begin at rest. From seed 8000 on the pressure may be given by the shape
-of the lower piece, and modes may heave and rock the patch up to lift-off.
+of the lower body, and modes may heave and rock the patch up to lift-off.
 
-The sum is plain NumPy, written from 2.10-2.17 without the compiled lists. Every node of a mesh for
-a tenth of the tolerance keeps every bond of its own path, in strips of 80 bond lengths over the
-steps of a cycle (0.2 at 400, which alone leaves 4e-4 of the friction limit), each with the midpoint
-rule and the fraction of it on either side of u = 0. The pieces are the whole compliance, s_i = q -
-sum_j C_ij F_j(s_j) at the end of each step, solved by Newton's method on all nodes. A mode moves by
-the trapezoidal rule, which adds beta to every C_ij. Nothing averages a force over a step, merges
-bonds, drops modes or reduces points. A bond forms under the pressure at its position, or under the
-load, half way along its part of the step. Heave and rotation press the nodes by the whole normal
-compliance; nodes that would pull are left out, one set after the other.
+The sum is NumPy code, written from 2.10-2.17 without the compiled lists. Every node of a mesh for a
+tenth of the tolerance keeps every bond of its own path, in strips of 80 bond lengths over the steps
+of a cycle (0.2 at 400, which alone has an error of 4e-4 of the friction limit), each with the
+midpoint rule and its fraction on either side of u = 0. The bodies have their full compliance, s_i =
+q - sum_j C_ij F_j(s_j) at the end of each step, solved by Newton's method on all nodes. A mode is
+integrated by the trapezoidal rule, which adds beta to every C_ij. No force is averaged over a step;
+no bonds are merged, no modes dropped and no points reduced. A bond forms under the pressure at its
+position, or under the load, in the middle of its part of the step. Heave and rotation load the
+nodes through the full normal compliance; nodes in tension are removed by an active-set iteration.
 """
 
 from math import gamma, pi
@@ -27,9 +27,10 @@ from patchfem.runs import run as runs
 from patchfem.runs.patch import ladder as patches
 from patchfem.scene import loads
 
-# Largest age of a bond that counts, and half-width of the first bonds [bond lengths].
+# Maximum age of the bonds that are kept, and half-width of the initial bonds [bond lengths].
 MOST, FIRST_WIDE = (25.0, 1e-6)
-FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps per cycle; parts of a step
+# Bond lengths per strip times steps per cycle; maximum number of parts per step.
+FINEST, MOST_PARTS = 80.0, 60
 COMPARED = {
     "bench": (
         "loop_area",
@@ -80,9 +81,9 @@ ROCK = (
 
 
 def scene_of(kind: str, seed: int):
-    """Return a random scene, below or above gross slip.
+    """Return a random scene below or above gross slip.
 
-    Random are reading, order, first bonds, growth, pressure, and stroke or drive.
+    Reading, order, initial bonds, growth, pressure, and amplitude or drive are random.
     """
     draw = np.random.default_rng(seed)
     length = 10 ** draw.uniform(-0.7, 0.5)  # um
@@ -120,7 +121,7 @@ def scene_of(kind: str, seed: int):
             "friction.rest_speed": f"{floor:.4g} m/s",
         }
     motion = MOTION[kind]
-    # The pressure is given by the lower piece, or the load changes by heave or by rocking that
+    # The pressure is given by the lower body, or the load varies by heave or by rocking, which
     # lifts the ends.
     if seed >= 8000:
         what = draw.choice(
@@ -170,7 +171,7 @@ class Bonds:
         self.forming = lambda places, part: np.ones_like(places)
 
     def grown(self, moved, dt):
-        """Return lengths of bonds by 2.10 for points that move by `moved` (m,) [m] in a step dt [s].
+        """Return bond lengths by 2.10 for points that move by `moved` (m,) [m] in a step dt [s].
 
         Returns
         -------
@@ -210,19 +211,19 @@ class Bonds:
         )
         parts = min(parts, MOST_PARTS)
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
-        # fraction of the step from its end to the middle of a part
+        # Fraction of the step between the middle of a part and the end of the step.
         back = 1 - (np.arange(parts)[:, None] + 0.5) / parts
         low = np.vstack([self.low, ends[:-1]])
         high = np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
-        # bonds formed behind the point minus bonds formed ahead of it
+        # Bonds formed behind the point minus bonds formed ahead of it.
         side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)
         when = np.vstack([self.when, path - back * moved])
         hurt = np.vstack([self.hurt, harm - back * moved / middle])
         born = np.vstack([self.born, np.tile(middle, (parts, 1))])
         gone = np.zeros_like(moved) + left
-        # difference of a bond's length from its mature length, by 2.10 from 0
+        # Difference between the mature length and the length of a bond, which grows from 0 by 2.10.
         lag = np.vstack([self.lag * gone, middle * gone**back])
         dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
         age = path - when
@@ -321,10 +322,10 @@ class Pressed:
         self.inverses = {}
 
     def at(self, heave: float, turn: float):
-        """Return nodal forces (m,) [N] and their derivatives by heave and rotation (m, 2).
+        """Return nodal forces (m,) [N] and their derivatives with respect to heave and rotation (m, 2).
 
-        The forces and gaps are >= 0. The active set starts from the last one: nodes that pull leave
-        it, nodes that would overlap join it.
+        The forces and gaps are >= 0. The active set starts from the last one: nodes in tension
+        leave it, nodes that would overlap join it.
         """
         on = self.force > 0
         open_ = self.opening + heave + turn * self.x
@@ -347,7 +348,7 @@ class Pressed:
 
 
 def by_hand(scene, steps: int = 500) -> dict:
-    """Return the measures of a scene by the sum, at `steps` per cycle."""
+    """Return the measures of a scene by the direct sum with `steps` per cycle."""
     model = build(scene)
     patch = patches.solve_with_coarser(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
     f = model.friction
@@ -398,7 +399,7 @@ def by_hand(scene, steps: int = 500) -> dict:
         t = k * dt
         if rig is None:
             free = scene.slide.amplitude * np.sin(omega * t)
-        else:  # average acceleration: z'' = 4 (z - z0)/dt^2 - 4 v0/dt - a0
+        else:  # Newmark's method with average acceleration: z'' = 4 (z - z0)/dt^2 - 4 v0/dt - a0
             z, v, a = state
             push = -modes.base * scene.drive.acceleration * np.sin(omega * t)
             free_z = (
@@ -448,7 +449,7 @@ def by_hand(scene, steps: int = 500) -> dict:
 
 
 def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
-    """Find heave and rotation in equilibrium with the contact forces, by Newton's method.
+    """Find heave and rotation in equilibrium with the contact forces by Newton's method.
 
     Parameters
     ----------
@@ -467,7 +468,7 @@ def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
     tuple
         Nodal forces (m,) [N], and the coordinates (n,) by which they push the modes from `free`.
     """
-    up = rows[1:] / stiff  # change of the coordinates by one newton and one newton metre
+    up = rows[1:] / stiff  # Change of the coordinates per newton and per newton metre.
     place = rows[1:] @ guess
     rest = rows[1:] @ free
     for _ in range(60):
@@ -482,7 +483,7 @@ def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
 
 
 def compare_sum(kind: str, seed: int) -> dict:
-    """Compare a random scene with the sum at two step lengths.
+    """Compare a random scene with the direct sum at two step lengths.
 
     The difference of the two sums is the uncertainty of the reference.
     """

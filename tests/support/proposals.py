@@ -1,6 +1,6 @@
-"""What a refusal proposes, tried: the values that its line names, put in the place it names.
+"""Check of the proposals in error messages: each proposed value is inserted at the key that the message names.
 
-A proposal holds where its mistake is gone, though another may stand in its place.
+A proposal is valid if its mistake disappears, even if another mistake replaces it.
 """
 
 import copy
@@ -26,7 +26,7 @@ PRINTED = {"reading": "stretch", "order": 1}
 
 
 def wrong(seed: int) -> tuple:
-    """(tables, mistakes) of a scene by chance; a mistake in one of two is made on purpose."""
+    """Return (tables, mistakes) of a random scene; every second seed inserts a mistake on purpose."""
     trial = Trial(np.random.default_rng([29, seed]), None, None, None)
     tables = _loose(trial, KINDS[seed % len(KINDS)])
     if seed % 2:
@@ -35,7 +35,7 @@ def wrong(seed: int) -> tuple:
 
 
 def mistakes(tables: dict) -> list:
-    """(key, message) of each mistake of a scene."""
+    """Return (key, message) of each mistake of a scene."""
     try:
         loads(text_of(tables).encode("utf-8", "replace").decode(), "scene.toml")
     except SceneError as error:
@@ -44,8 +44,10 @@ def mistakes(tables: dict) -> list:
 
 
 def tries(tables: dict, key: str, message: str) -> list:
-    """What a message proposes for a mistake at a key, each as {key: value}: None to leave one out, ("", name) to call
-    it so."""
+    """Return the proposals of a message for a mistake at a key, each as {key: value}.
+
+    None stands for a key to leave out, ("", name) for one to rename.
+    """
     out = [{key: literal_eval(found)} for found in SUCH.findall(message)]
     count = (
         len(tables["structure"].get("interface", ()))
@@ -76,7 +78,7 @@ def tries(tables: dict, key: str, message: str) -> list:
 
 
 def put(tables: dict, key: str, value) -> dict | None:
-    """The tables with a value at a key as a message shows it; None where the key has no place."""
+    """Return the tables with a value at a key written as in a message; None if the key cannot exist there."""
     out = at = copy.deepcopy(tables)
     *path, last = re.sub(r"\[(\d+)\]", lambda found: f".{int(found[1]) - 1}", key).split(".")
     for name in path:
@@ -105,7 +107,7 @@ def put(tables: dict, key: str, value) -> dict | None:
 
 
 def vain(tables: dict, found: list) -> list:
-    """(key, message, {key: value}) of those that were tried in vain: the same mistake stands at the same key."""
+    """Return (key, message, {key: value}) of proposals after which the same mistake remains at the same key."""
     out = []
     for key, message in found:
         for sets in tries(tables, key, message):

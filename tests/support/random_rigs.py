@@ -1,8 +1,8 @@
-"""Random rigs of every law, drive and structure, against an independent program or the same one with finer settings.
+"""Random rigs of every law, drive and structure, against an independent program or finer settings of the package.
 
-Campaigns `rigs` and `harmonic` of `campaigns`. `motion_reference` is the independent program. Where it lacks the
-equations of a rig, the reference is the exact engine of patchfem, more cells of the law, more harmonics, or many more
-steps. Only the public names of the package are used.
+Campaigns `rigs` and `harmonic` of `campaigns`. `motion_reference` is the independent program. Where
+it lacks the equations of a rig, the reference is the exact engine of patchfem, more cells of the
+law, more harmonics, or many more steps. Only the public names of the package are used.
 """
 
 import json
@@ -19,13 +19,14 @@ from motion_steady import periodic
 
 import patchfem as pf
 
-FINER = 16  # times the steps of the run, in the run that is the reference
-# times the change at the last halving of the steps is the doubt of the finer run
+FINER = 16  # Ratio of the steps of the reference run to those of the run.
+# Ratio of the uncertainty of the finer run to the change at the last halving of the steps.
 HALVING_FACTOR = 5.0
-MAX_STEPS = 12000  # of DOP853, about six seconds
-ROUGH = (0.04, 1e-10)  # longest step over the shortest period, and relative error of a step
-FINE = (0.025, 1e-12)  # the same, of the second integration
-PATCH_MEASURES = {  # of the pressed patch at rest: their reference would be the same program
+MAX_STEPS = 12000  # Maximum number of steps of DOP853, which take about six seconds.
+# Longest step relative to the shortest period, and relative tolerance of a step.
+ROUGH = (0.04, 1e-10)
+FINE = (0.025, 1e-12)  # The same for the second integration.
+PATCH_MEASURES = {  # Measures of the static patch, whose reference would be the same program.
     "contact_fraction", "contact_half_width", "pressure_peak", "pressure_centre", "approach", "rotation", "moment",
     "normal_stiffness", "tangential_stiffness",
 }  # fmt: skip
@@ -36,7 +37,7 @@ LEFT_OUT = PATCH_MEASURES | {
 
 
 class Truth(NamedTuple):
-    """Reference values and their own uncertainties by name, and the kind of reference."""
+    """Reference values and their uncertainties by name, and the kind of reference."""
 
     values: dict
     doubts: dict
@@ -44,14 +45,14 @@ class Truth(NamedTuple):
 
 
 def has_reference(s: dict) -> bool:
-    """Whether the independent program has the equations of a rig."""
+    """Return whether the independent program has the equations of a rig."""
     if s["law"] == "order" or "load_amplitude" in s or (s["patch"] or {}).get("shear"):
         return False
     return not ((s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"))
 
 
 def compute_truth(s: dict, path: Path, run: dict) -> Truth:
-    """Compute the reference of a rig, whose scene is a file; `run` is what `run_rig` returned."""
+    """Compute the reference of a rig whose scene is a file; `run` is the result of `run_rig`."""
     if has_reference(s):
         try:
             if s.get("method") == "harmonic":
@@ -63,7 +64,7 @@ def compute_truth(s: dict, path: Path, run: dict) -> Truth:
 
 
 def motion_truth(s: dict, run: dict) -> Truth:
-    """Integrate a rig by the independent program; a second, more careful integration shows the doubt of the first."""
+    """Integrate a rig with the independent program; a second, more accurate integration gives the uncertainty."""
     runs = []
     for step, rtol in (ROUGH,) if run["engine"] == "march" else (ROUGH, FINE):
         motion = Motion(s, step)
@@ -73,7 +74,7 @@ def motion_truth(s: dict, run: dict) -> Truth:
 
 
 def steady_truth(s: dict, period: float, kept: int) -> Truth:
-    """Compute a steady motion by the independent program: its periodic state, or a long run that has settled.
+    """Compute a steady motion with the independent program: its periodic state, or the end of a long run.
 
     `period` in seconds; `kept` is the number of cycles over which works are summed.
     """
@@ -103,10 +104,10 @@ def steady_truth(s: dict, period: float, kept: int) -> Truth:
 
 
 def remaining_decay(quarter: dict, half: dict, whole: dict) -> dict:
-    """Estimate what is left of a decay, from the values after a quarter, half and all of a run.
+    """Estimate the remaining transient from the values after a quarter, half and all of a run.
 
-    If the decay over a quarter is r, the ratio of the two changes is r (1 + r), and r^2/(1 - r^2) of the last one is
-    left.
+    If the decay over a quarter is r, the ratio of the two changes is r (1 + r), and r^2/(1 - r^2)
+    of the last change remains.
     """
     out = difference(whole, half)
     early = difference(half, quarter)
@@ -117,7 +118,7 @@ def remaining_decay(quarter: dict, half: dict, whole: dict) -> dict:
 
 
 def finer_truth(s: dict, path: Path, run: dict) -> Truth:
-    """Compute a rig by patchfem itself: exactly where it marched, else with many more steps, cells or harmonics."""
+    """Compute a rig with patchfem itself: exactly if it was marched, else with many more steps, cells or harmonics."""
     tight = {"accuracy.tolerance": f"{s['tolerance'] / 10:g}"}
     if run["map"] == "yields":
         return Truth(run_values(path, tight), {}, "cells")
@@ -129,7 +130,7 @@ def finer_truth(s: dict, path: Path, run: dict) -> Truth:
     if run["engine"] == "march":
         try:
             return Truth(run_values(path, tight | {"accuracy.method": "exact"}), {}, "pieces")
-        except pf.PatchfemError:  # no exact engine has the equations
+        except pf.PatchfemError:  # No exact engine has the equations.
             pass
     steps = run["steps"] or 400
     coarse, fine = (
@@ -147,9 +148,10 @@ def finer_truth(s: dict, path: Path, run: dict) -> Truth:
 
 
 def estimate_doubts(rough: dict, fine: dict | None = None) -> dict:
-    """Estimate the uncertainties of the independent program from one run, or from two of which one is more careful.
+    """Estimate the uncertainties of the independent program from one run, or from two of different accuracy.
 
-    A drift is a difference of means of the motion, so that its uncertainty is a fraction of the amplitude.
+    A drift is a difference of means of the motion, so its uncertainty is a fraction of the
+    amplitude.
     """
     out = {} if fine is None else difference(fine, rough)
     relative = 1e-9 if fine is None else 1e-14
@@ -167,7 +169,7 @@ def run_values(path: Path, sets: dict) -> dict:
 
 
 def difference(fine: dict, coarse: dict) -> dict:
-    """Return the size of the difference for each measure that both runs have."""
+    """Return the absolute difference of each measure that both runs have."""
     return {
         name: Row(name, fine[name], 0.0, 0.0, coarse[name], 0.0).true_error
         for name in fine.keys() & coarse.keys()
@@ -175,7 +177,7 @@ def difference(fine: dict, coarse: dict) -> dict:
 
 
 def run_rig(path: Path) -> dict:
-    """Run a scene by the program; return the numbers of the run, and its measures under "measures"."""
+    """Run a scene with the program; return figures of the run, and its measures under "measures"."""
     begin = process_time()
     try:
         result = pf.run(path)
@@ -198,7 +200,7 @@ def run_rig(path: Path) -> dict:
         "window": numerics["window_cycles"],
         "kept": round(
             float(time[-1] - time[0]) / rig.drive.signal.period
-        ),  # cycles in the result of a steady motion
+        ),  # Number of cycles in the result of a steady motion.
         "measures": result.measures,
     }
 
@@ -229,6 +231,6 @@ def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
 
 
 def compare_harmonic_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict | None:
-    """Compare the rig of a seed if its scene names the harmonic balance, else return None; see `campaigns`."""
+    """Compare the rig of a seed if its scene names harmonic balance, else return None; see `campaigns`."""
     s = spec(seed)
     return compare_spec(s, folder, earlier) if s.get("method") == "harmonic" else None

@@ -1,6 +1,4 @@
-"""Motions of an oscillator under random records, from their lines by its transfer function, and how often the scatter
-that is printed for them holds the closed form.
-"""
+"""Oscillators under random records, computed from spectral lines, to test the scatter stated for random response."""
 
 from types import SimpleNamespace
 
@@ -10,7 +8,7 @@ from vibration_forms import shaken_rms
 from patchfem.response import stationary
 from patchfem.structure.noise import draw_random_record
 
-# frequency [Hz], damping ratio, duration [s]
+# Frequency [Hz], damping ratio, duration [s].
 CASES = ((100.0, 0.02, 10.0), (100.0, 0.005, 30.0), (40.0, 0.05, 20.0))
 NAMES = (
     "relative_displacement_rms",
@@ -18,15 +16,16 @@ NAMES = (
     "response_frequency",
     "response_damping",
 )
-LEVEL = 1.0  # m^2/s^3
+LEVEL = 1.0  # Spectral density of the acceleration [m^2/s^3].
 
 
 def band_of(frequency: float) -> tuple:
+    """Return the frequency band of the excitation [Hz]."""
     return 0.2 * frequency, 3 * frequency
 
 
 def shaken(frequency: float, damping: float, duration: float, seed: int) -> tuple:
-    """(window, drive): the steady motion of an oscillator under a record, whose lines are those of the drive."""
+    """Return (window, drive): the steady motion of an oscillator under a record with the spectral lines of the drive."""
     low, high = band_of(frequency)
     drive = draw_random_record((low, high), (LEVEL, LEVEL), duration, seed, 1 / frequency)
     f = np.arange(drive.time.size // 2 + 1) / drive.duration
@@ -49,7 +48,7 @@ def shaken(frequency: float, damping: float, duration: float, seed: int) -> tupl
 
 
 def held(frequency: float, damping: float, duration: float, seed: int) -> list:
-    """Of each of NAMES (value, half-width) over its truth."""
+    """Return for each of NAMES the value and its half-width, divided by the true value."""
     found = stationary.random_response_measures(*shaken(frequency, damping, duration, seed))
     truth = (
         *shaken_rms(2 * np.pi * frequency, damping, LEVEL, band_of(frequency)),

@@ -1,10 +1,10 @@
-"""Random traces on random pieces, and their stated errors beside meshes that are much finer.
+"""Random traces on random bodies, and their stated errors against much finer meshes.
 
-Campaign `traces` of `campaigns`. A patch is run with nothing pinned and at the default tolerance. The reference is the
-same patch on cells alone, with its own stated errors as doubts: on even cells of a 1588th of the length where a trace
-is fine everywhere, else on graded cells with a tenth of the tolerance. These cells have other compliances than the
-points on which a trace is pressed, another contact algorithm and other edges. Both see the same curve through the
-samples.
+Campaign `traces` of `campaigns`. A patch is run with default settings and tolerance. The reference
+is the same patch on cells alone, whose stated errors are the uncertainties: on uniform cells of
+1/1588 of the length if a trace is fine everywhere, else on graded cells with a tenth of the
+tolerance. These cells have other compliances than the points on which a trace is pressed, another
+contact algorithm and other edges. Both use the same curve through the samples.
 """
 
 from pathlib import Path
@@ -21,10 +21,10 @@ from patchfem.runs import estimate_measures, solve_with_coarser
 from patchfem.runs.patch import fine
 from patchfem.scene import loads
 
-LENGTH, CELLS = 12.7e-3, 1588  # of the interface [m]; of the even mesh beside
+LENGTH, CELLS = 12.7e-3, 1588  # Length of the interface [m]; cells of the uniform reference mesh.
 KINDS = ("corner", "roofs", "punch", "wave", "short wave", "rough", "smooth rough", "crowned wave")
 FINE = ("roofs", "short wave", "rough")
-MODULUS = 6e10  # Pa, about that of a pair of faces
+MODULUS = 6e10  # Typical contact modulus of a pair of bodies [Pa].
 PIECES = (
     'substrate = "steel"\n',
     'substrate = "Ti-8Al-1Mo-1V"\n' + COATING,
@@ -35,7 +35,7 @@ PIECES = (
 
 
 def drawn(seed: int) -> tuple:
-    """(kind, x (n,) [m], z (n,) [m] of the gap, text of the scene without its profile) of a seed."""
+    """Return (kind, x (n,) [m], gap z (n,) [m], text of the scene without its profile) of a seed."""
     draw = np.random.default_rng(seed)
     kind = KINDS[seed % len(KINDS)]
     count = (
@@ -55,7 +55,7 @@ def drawn(seed: int) -> tuple:
 
 
 def _shape(kind: str, x, draw) -> tuple:
-    """Gap (n,) [m] of a kind, and a load [N] that closes some of it."""
+    """Draw a gap (n,) [m] of a kind, and a load [N] that closes part of it."""
     area = LENGTH * 12.7e-3
     half = LENGTH / 2
     place = draw.uniform(-0.4, 0.4) * half
@@ -123,7 +123,7 @@ def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
 
 
 def _beside(kind: str, asked, tolerance: float) -> dict:
-    """Measures of a patch by name from cells alone: even ones of traces that are fine everywhere, else graded ones."""
+    """Return the measures of a patch on cells alone, uniform ones for kinds in FINE, else graded ones."""
     if kind in FINE:
         return estimate_measures(
             *solve_with_coarser(asked.with_mesh(element_size=LENGTH / CELLS), tolerance)

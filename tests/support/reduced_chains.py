@@ -1,7 +1,7 @@
-"""Random chains of masses reduced to two boundary coordinates and a few modes, against runs of all of their matrices.
+"""Random chains of masses reduced to two boundary coordinates and a few modes, against runs with the full matrices.
 
-Campaign `reduced` of `campaigns`. The stated error of the run of all matrices is the doubt of the reference. Seeds
-below 7000 were used while this was written.
+Campaign `reduced` of `campaigns`. The stated error of the full run is the uncertainty of the
+reference. Seeds below 7000 were used in development.
 """
 
 from pathlib import Path
@@ -19,7 +19,8 @@ LAWS = {
     "tanh": 'reference_speed = "{speed!r} m/s"',
     "bouc-wen": 'stiffness = "{stiffness!r} N/m"\nexponent = 1.5',
 }
-SMOOTH = ("iwan", "tanh", "bouc-wen")  # by harmonic balance, the others from event to event
+# Laws solved by harmonic balance; the others are solved by events.
+SMOOTH = ("iwan", "tanh", "bouc-wen")
 REDUCED = """\
 [structure.reduced]
 stiffness = "whole.npz"
@@ -45,7 +46,10 @@ cycles = 60
 
 
 def chain(seed: int) -> dict:
-    """Matrices and numbers of a random chain of 16 to 60 masses that rubs at one and is watched at another."""
+    """Return the matrices and parameters of a random chain of 16 to 60 masses.
+
+    One mass has friction, another is the output.
+    """
     r = np.random.default_rng(seed)
     n = int(r.integers(16, 61))
     k = 1e7 * 10 ** r.uniform(-0.3, 0.3, n)
@@ -60,7 +64,7 @@ def chain(seed: int) -> dict:
     frequency = omega[mode] * r.uniform(0.85, 1.15)
     force = 10 ** r.uniform(0, 2)
     stiff = 1 / np.linalg.inv(K)[rubs, rubs]
-    # a modal force gives a slide of F shape^2/(2 zeta omega^2) at resonance
+    # At resonance, a modal force F gives a displacement of F shape^2/(2 zeta omega^2).
     shape = shapes[:, mode] / np.sqrt(m)
     reach = float(
         force * abs(shape[seen] * shape[rubs]) / (max(alpha / omega[mode], 0.05) * omega[mode] ** 2)
@@ -91,7 +95,7 @@ def chain(seed: int) -> dict:
 
 
 def texts(s: dict) -> tuple:
-    """Scenes of the reduced chain and of all of it, in this order."""
+    """Return the scenes of the reduced and the full chain, in this order."""
     out = []
     exact = "" if s["law"] not in SMOOTH else '[accuracy]\nmethod = "harmonic"\n'
     for whole in (False, True):
@@ -114,7 +118,7 @@ def texts(s: dict) -> tuple:
 
 
 def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
-    """Compare the reduced chain of a seed with the whole one; see `campaigns`."""
+    """Compare the reduced chain of a seed with the full one; see `campaigns`."""
     s = chain(seed)
     line = {"group": f"{s['law']}, {s['drive']}", "engine": s["method"], "rows": []}
     np.savez(

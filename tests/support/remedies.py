@@ -1,7 +1,8 @@
-"""Scenes that are loose by chance, the remedies that a sentence prints, and what a remedy does when it is tried.
+"""Random scenes with poor numerical settings, the remedies that their warnings name, and the effect of a remedy.
 
-`drawn(seed)` is a scene of any kind, law and engine whose numerical settings are pinned too coarse, or whose tolerance
-is too tight for them, so that it warns; `remedies_of` reads the sentences of its run, `tried` follows one.
+`draw_scene(seed)` returns a scene of any kind, law and engine with coarse settings or a tight
+tolerance, so that it warns; `parse_remedies` reads the warnings of its run, and `try_remedy`
+applies one.
 """
 
 import copy
@@ -20,16 +21,19 @@ from patchfem.scene import loads
 from patchfem.scene.scene import SceneError
 
 KINDS = ("patch", "bench", "rig", "masses", "wear", "harmonic", "soft", "linear", "rig", "bench")
-DEAR = 3.0  # planned seconds beyond which a scene is not drawn
-LONG = 15.0  # and beyond which a remedy is not tried
-BETTER = 0.5  # of what it was, at which a bar or a share is better by what any remedy promises
-REFINED = 0.75  # where it promises no more than to refine
-FACTOR = 4  # on a number, up or down, where a sentence names a key without a value
+DEAR = 3.0  # Largest planned time of a scene that is drawn [s].
+LONG = 15.0  # Largest planned time at which a remedy is tried [s].
+BETTER = 0.5  # Ratio of errors below which a remedy counts as effective.
+REFINED = 0.75  # The same ratio if the sentence only proposes to refine.
+FACTOR = 4  # Factor on a number if a sentence names a key without a value.
 
 
 class Remedy(NamedTuple):
-    """One printed remedy: the whole sentence, and the keys to set with their values, None for one to leave out; keys
-    that the sentence names without a value stand in `vague`."""
+    """Remedy named in a message.
+
+    The whole sentence; the keys to set with their values, None for a key to leave out; in `vague`,
+    keys that the sentence names without a value.
+    """
 
     sentence: str
     sets: dict
@@ -37,7 +41,7 @@ class Remedy(NamedTuple):
 
 
 def drawn(seed: int) -> dict:
-    """Tables of the first scene, of those that a seed draws, that is read without a mistake and planned as cheap."""
+    """Return the tables of the first scene of a seed that is valid and planned as cheap."""
     trial = Trial(np.random.default_rng([28, seed]), None, None, None)
     while True:
         tables = _loose(trial, KINDS[seed % len(KINDS)])
@@ -50,7 +54,7 @@ def drawn(seed: int) -> dict:
 
 
 def _loose(trial: Trial, word: str) -> dict:
-    """A scene of chance whose settings are pinned: few steps, harmonics, elements or strips, or a tight tolerance."""
+    """Draw a scene with fixed settings: few steps, harmonics, elements or strips, or a tight tolerance."""
     kind = {
         "wear": trial.draw("bench", "rig"),
         "harmonic": trial.draw("rig", "masses"),
@@ -83,7 +87,8 @@ def _loose(trial: Trial, word: str) -> dict:
     return out
 
 
-# a key of a scene; `reading`, `order` and `initial_bonds` of [friction] are printed without their table
+# Pattern of a key; `reading`, `order` and `initial_bonds` of [friction] are printed without their
+# table.
 KEY = r"(?:(?:accuracy|contact|drive|friction|normal|slide|structure|wear)(?:\.\w+)+|reading|order|initial_bonds)"
 SETS = re.compile(rf'({KEY}) (?:= |<= )("[^"]*"|[\w.+-]*\w)')
 WITHOUT = re.compile(rf"leave out ({KEY})")
@@ -92,7 +97,7 @@ VAGUE = re.compile(rf"(?:raise|lower|loosen|name|make|compare with) ({KEY})(?! b
 
 
 def remedies_of(sentence: str) -> list:
-    """The remedies that a warning or a note prints, each by itself; those of a list joined by `and` are one."""
+    """Return the remedies that a warning or note names; keys joined by `and` belong to one remedy."""
     tail = sentence.rpartition("; ")[2] if "; " in sentence else sentence
     out = []
     if found := INSTEAD.search(tail):
@@ -107,17 +112,19 @@ def remedies_of(sentence: str) -> list:
 
 
 def _whole(key: str) -> str:
+    """Return a key with its table; keys without one belong to [friction]."""
     return key if "." in key else f"friction.{key}"
 
 
 def _value(text: str):
+    """Return the value of a printed number or string."""
     if text.startswith('"'):
         return text[1:-1]
     return int(text) if text.isdigit() else float(text)
 
 
 def changed(tables: dict, sets: dict) -> dict:
-    """The tables with these keys set, or left out where their value is None."""
+    """Return the tables with these keys set, or left out if their value is None."""
     out = copy.deepcopy(tables)
     for key, value in sets.items():
         *path, last = key.split(".")
@@ -132,7 +139,7 @@ def changed(tables: dict, sets: dict) -> dict:
 
 
 def ran(tables: dict):
-    """The Result of a scene of tables; None where it is refused, does not converge or is too dear."""
+    """Return the Result of a scene; None if it is refused, does not converge or is too expensive."""
     try:
         asked = plan(loads(text_of(tables)))
         return run(asked) if asked.seconds < LONG else None
@@ -141,7 +148,7 @@ def ran(tables: dict):
 
 
 def verdict(tables: dict, found, remedy: Remedy) -> str:
-    """What a remedy of a run did when it was tried: `gone`, `better`, `failed`, `refused`, or `dear` where it was not.
+    """Return the effect of a remedy: `gone`, `better`, `failed`, `refused`, or `dear` if it was too expensive to try.
 
     found: Result of the tables.
     """
@@ -162,7 +169,7 @@ def verdict(tables: dict, found, remedy: Remedy) -> str:
 
 
 def _turned(tables: dict, found, key: str, sentence: str):
-    """A number that stands in the scene or was chosen by the run, FACTOR times as large or as small; None without."""
+    """Return a number of the scene or of the run times or over FACTOR; None if there is no number."""
     table, _, last = key.rpartition(".")
     number = tables.get(table, {}).get(last, found.extra.get(last))
     if not isinstance(number, int | float):
@@ -171,6 +178,7 @@ def _turned(tables: dict, found, key: str, sentence: str):
 
 
 def _judged(before, after, remedy: Remedy, sets: dict) -> str:
+    """Return the effect of a remedy from the results before and after it."""
     sentence = remedy.sentence
     if not (names := _named(before, sentence)):
         said = [*after.warnings, *after.extra.get("notes", [])]
@@ -198,7 +206,7 @@ def _judged(before, after, remedy: Remedy, sets: dict) -> str:
 
 
 def _named(found, sentence: str) -> list:
-    """The measures that a sentence on bars names, in its order; none of another sentence."""
+    """Return the measures that a sentence about errors names, in its order; [] for another sentence."""
     if "; the tolerance is " not in sentence:
         return []
     said = sentence.partition("; the tolerance is ")[0]
@@ -207,9 +215,10 @@ def _named(found, sentence: str) -> list:
 
 
 def _over(one, tolerance: float) -> float:
+    """Return the error relative to the permitted error."""
     return one.error / max(tolerance * abs(one.value) + one.floor, 1e-300)
 
 
 def _gist(sentence: str) -> str:
-    """The words of a sentence without its numbers."""
+    """Return a sentence without its numbers."""
     return re.sub(r"[-+]?\d[\d.e+-]*", "#", sentence.partition("; ")[0])

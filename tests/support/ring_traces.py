@@ -1,4 +1,4 @@
-"""Gaussian traces of an isotropic surface whose waves lie in a ring about 80 um, with a self-affine rest."""
+"""Gaussian traces of an isotropic surface with a ring of wavelengths about 80 um and a self-affine part."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ WAVE = 80e-6
 
 
 def density(frequency: np.ndarray, shortest: float = 8e-6) -> np.ndarray:
-    """One-sided density (k,) of a trace at frequencies [1/m], up to a factor: the surface's, integrated over the other
-    direction.
+    """Return the one-sided spectral density (k,) of a trace at frequencies [1/m], up to a factor.
 
-    The surface has 0.8 of a ring exp(-(q - q0)^2 / 2 (q0 / 4)^2) and 0.2 of a rest that is flat below q0 and goes like
-    q^(-3.6) above, each with that share of the mean square.
+    It is that of the surface, integrated over the other direction. A ring exp(-(q - q0)^2 / 2 (q0 /
+    4)^2) has 0.8 of the mean square; the other 0.2 belong to a spectrum that is flat below q0 and
+    falls as q^(-3.6) above.
     """
     q0 = 1 / WAVE
     across = np.linspace(0, 1 / shortest, 2001)
@@ -18,6 +18,7 @@ def density(frequency: np.ndarray, shortest: float = 8e-6) -> np.ndarray:
     for kind in ("ring", "rest"):
 
         def of(q, kind=kind):
+            """Return the density of one part of the surface at wave numbers q [1/m]."""
             value = (
                 np.exp(-(((q - q0) / (0.25 * q0)) ** 2) / 2)
                 if kind == "ring"
@@ -32,7 +33,7 @@ def density(frequency: np.ndarray, shortest: float = 8e-6) -> np.ndarray:
 
 
 def traces(count: int, length: float, step: float, rms: float, seed: int) -> np.ndarray:
-    """Independent traces (count, n) [m], each cut from a period of eight times its length."""
+    """Return independent traces (count, n) [m], each cut from a period of eight times its length."""
     size = round(length / step) + 1
     period = 8 * size
     frequency = np.arange(period // 2 + 1) / (period * step)

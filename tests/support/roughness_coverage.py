@@ -1,8 +1,9 @@
-"""Campaign `roughness`: whether the 90 % intervals of `profile` hold the mean of their surface, Gaussian or not.
+"""Campaign `roughness`: how often the 90 % intervals of `profile` cover the mean of their surface, Gaussian or not.
 
-Each seed makes one trace of 2 mm at 1 um of one kind, reads every parameter of its levelled trace and of its roughness
-at 0.25 mm with its interval, and asks whether the interval holds the mean over OTHERS traces of the same surface, whose
-seeds start at 900 000. Seeds below 5000 are for making the intervals, those from 5000 on are held out.
+Each seed makes one trace of 2 mm at 1 um of one kind, computes every parameter of its levelled
+trace and of its roughness at 0.25 mm with its interval, and checks whether the interval covers the
+mean over OTHERS traces of the same surface, whose seeds start at 900 000. Seeds below 5000 were
+used in developing the intervals, those from 5000 on only to test them.
 """
 
 from collections import defaultdict
@@ -17,7 +18,7 @@ OTHERS, FIRST = 400, 900_000
 
 
 def gaussian(rng, slope: float = 4.0, wave: float = 60e-6, size: int = 0) -> np.ndarray:
-    """Gaussian heights (n,) of unit deviation; the density is flat above `wave` and falls by -slope below it."""
+    """Return Gaussian heights (n,) of unit deviation; the density is flat above `wave` and falls with -slope below it."""
     size = size or round(LENGTH / STEP) + 1
     period = 8 * size
     frequency = np.arange(period // 2 + 1) / (period * STEP)
@@ -29,7 +30,7 @@ def gaussian(rng, slope: float = 4.0, wave: float = 60e-6, size: int = 0) -> np.
 
 
 def pitted(rng) -> np.ndarray:
-    """A fine ground with round pits of 20 um and four deviations at random places, ten in a millimetre."""
+    """Return a fine surface with random round pits of 20 um, four deviations deep, ten per millimetre."""
     z = 0.5 * gaussian(rng)
     x = np.arange(z.size) * STEP
     for at in rng.uniform(0, LENGTH, rng.poisson(10e3 * LENGTH)):
@@ -38,7 +39,7 @@ def pitted(rng) -> np.ndarray:
 
 
 def turned(rng) -> np.ndarray:
-    """Cusps of a turned piece, 100 um apart, with a ground of a tenth of their height."""
+    """Return the cusps of a turned surface, 100 um apart, with roughness of a tenth of their height."""
     x = np.arange(round(LENGTH / STEP) + 1) * STEP
     t = (x / 100e-6 + rng.uniform()) % 1 - 0.5
     return 12 * t * t + 0.3 * gaussian(rng)
@@ -58,7 +59,7 @@ KINDS = {
 
 
 def trace(kind: str, seed: int):
-    """One trace of a kind [Profile], heights of about a micrometre."""
+    """Return a trace of a kind [Profile] with heights of about a micrometre."""
     from patchfem.surface import Profile
 
     z = UM * KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))
@@ -67,7 +68,7 @@ def trace(kind: str, seed: int):
 
 @cache
 def means(kind: str) -> dict:
-    """Mean of every parameter over the others, by name: no interval is worked out."""
+    """Return the mean of every parameter over the other traces, by name, without intervals."""
     from patchfem.surface import BAND, Heights, level
     from patchfem.surface.roughness import rows
     from patchfem.surface.roughness.filter import filter_trace
@@ -95,7 +96,7 @@ def means(kind: str) -> dict:
 
 
 def compare_trace(seed: int, _folder, _earlier) -> dict:
-    """Compare the intervals of a trace with the means over the others; the kinds take turns."""
+    """Compare the intervals of a trace with the means over the others; consecutive seeds have different kinds."""
     from patchfem.surface import make_report
 
     kind = sorted(KINDS)[seed % len(KINDS)]

@@ -1,4 +1,4 @@
-"""Machined surfaces for `scan_pairs`: six finishes, drawn as areal heights of unit deviation."""
+"""Machined surfaces for `scan_pairs`: six finishes, as areal heights of unit deviation."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ class Finish(NamedTuple):
     """Parameters of a finish; lengths in points of the surface grid."""
 
     name: str
-    hurst: float  # of the self-affine part
-    rolloff: float  # wavelength above which the spectrum is flat
-    cutoff: float  # wavelength below which the surface is smooth
-    angle: float  # [rad] of the lay from x
-    crossing: float  # [rad] half the angle between the two lays of honing
-    elongation: float  # of the lay: length along / length across
-    period: float  # feed of turning, radius of the dimples, or distance between deep grooves
+    hurst: float  # Hurst exponent of the self-affine part.
+    rolloff: float  # Wavelength above which the spectrum is flat.
+    cutoff: float  # Wavelength below which the surface is smooth.
+    angle: float  # Angle between the lay and x [rad].
+    crossing: float  # Half the angle between the two lays of honing [rad].
+    elongation: float  # Elongation of the lay: length along it / length across it.
+    period: float  # Feed of turning, radius of the dimples, or distance between deep grooves.
 
 
 def draw_finish(random) -> Finish:
@@ -36,7 +36,7 @@ def draw_finish(random) -> Finish:
 
 
 def draw_surface(random, shape: tuple, finish: Finish) -> np.ndarray:
-    """Draw heights (n, m) of zero mean and unit deviation; two calls give two places of alike surfaces."""
+    """Draw heights (n, m) of zero mean and unit deviation; two calls give two places of similar surfaces."""
     if finish.name == "ground":
         heights = _spectral(random, shape, finish, finish.angle)
     elif finish.name == "honed":
@@ -54,7 +54,7 @@ def draw_surface(random, shape: tuple, finish: Finish) -> np.ndarray:
 
 
 def _spectral(random, shape: tuple, finish: Finish, angle: float | None = None) -> np.ndarray:
-    """Draw Gaussian heights with a self-affine spectrum, stretched along a lay at `angle` if there is one."""
+    """Draw Gaussian heights with a self-affine spectrum, elongated along a lay at `angle` if given."""
     ky = fftfreq(shape[0])[:, None]
     kx = rfftfreq(shape[1])[None, :]
     k = np.hypot(kx, ky)
@@ -84,7 +84,8 @@ def _turned(random, shape: tuple, finish: Finish) -> np.ndarray:
     r = np.hypot(x - distance * np.cos(finish.angle), y - distance * np.sin(finish.angle))
     first = np.floor(r.min() / finish.period)
     turn = r / finish.period - first
-    depths = random.normal(size=int(turn.max()) + 2)  # each turn lies a little higher or lower
+    # Each revolution of the tool is a little higher or lower.
+    depths = random.normal(size=int(turn.max()) + 2)
     cusps = 4 * (np.mod(turn, 1.0) - 0.5) ** 2 + 0.08 * depths[turn.astype(int)]
     return cusps / cusps.std() + random.uniform(0.15, 0.4) * _spectral(random, shape, finish)
 

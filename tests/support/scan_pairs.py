@@ -1,9 +1,10 @@
-"""Areal scans before and after wear with known truth: machined surfaces, fifteen shapes of change, two instruments.
+"""Areal scans before and after wear with known truth: machined surfaces, fifteen kinds of change, two instruments.
 
-Written without knowledge of the method that compares the scans. Both scans sample one surface that is held on a grid
-of half the spacing of the scans; the second scan has its own shift, rotation, tilt, offset, noise, dust and missing
-heights. No scan is bowed and both have the same spacing. All lengths are in metres, positions are (x, y), and the
-frame of the piece is the frame of the scan before. Seeds 1 to 30 served to check the generator.
+Written without knowledge of the method that compares the scans. Both scans sample one surface on a
+grid of half the spacing of the scans; the second scan has its own shift, rotation, tilt, offset,
+noise, dust and missing heights. No scan is bowed and both have the same spacing. All lengths are in
+metres, positions are (x, y), and the frame of the piece is the frame of the scan before. Seeds 1 to
+30 were used to check the generator.
 """
 
 from dataclasses import dataclass, field
@@ -31,21 +32,21 @@ KINDS = (
     "worn tops",
 )
 TRACKS = ("smooth track", "rough track", "pile-up")
-UNKNOWABLE = ("uniform", "wedge", "elsewhere")  # no scan of this region alone can show the wear
+UNKNOWABLE = ("uniform", "wedge", "elsewhere")  # No scan of this region alone can show the wear.
 FALSE_CLAIMS = {
     "pile-up": ("no wear",),
     "deposits": ("worn",),
     "remounted": ("worn", "grew"),
     "exchanged": ("worn",),
 } | dict.fromkeys(UNKNOWABLE, ("worn", "grew", "no wear"))
-OVERSAMPLING = 2  # points of the surface per spacing of the scans, in each direction
-# Surface beyond each edge / longer side of the scan, which the shifted scan may show.
+OVERSAMPLING = 2  # Points of the surface per spacing of the scans, in each direction.
+# Width of the surface beyond each edge relative to the longer side; the shifted scan may cover it.
 MARGIN = 0.22
-MAX_SHIFT = 0.12  # largest shift / side of the scan, in each direction
+MAX_SHIFT = 0.12  # Largest shift relative to the side of the scan, in each direction.
 
 
 class Volumes(NamedTuple):
-    """Noise-free volumes [m^3] and area [m^2] of the region that both scans show.
+    """Noise-free volumes [m^3] and area [m^2] of the region that both scans cover.
 
     `worn` and `grown` are sums over the points of the scan after within the scan before, one pixel area each;
     `worn_inner` and `grown_inner` leave out one row of points along each border of this region.
@@ -84,7 +85,7 @@ class Track(NamedTuple):
     width: float  # between the positions at which the wear begins
     length: float | None  # from tip to tip; None if the track leaves the common region
     ends: tuple | None  # the two tips ((x, y), (x, y))
-    # The flanks run out flat (cosine), so that no scan shows where they begin.
+    # The flanks have zero slope at their ends (cosine), so no scan shows where they begin.
     is_flat_flanked: bool
 
 
@@ -140,7 +141,7 @@ class Pair:
 
 
 class Field(NamedTuple):
-    """Surface grid: positions x, y (n, m) [m], pitch [m], and a box that is inside both scans."""
+    """Surface grid: positions x, y (n, m) [m], pitch [m], and a box that lies inside both scans."""
 
     x: np.ndarray
     y: np.ndarray
@@ -150,7 +151,7 @@ class Field(NamedTuple):
 
 
 def make(seed: int, kind: str | None = None) -> Pair:
-    """Draw the pair of scans of a seed; without `kind` each kind follows in turn."""
+    """Draw the pair of scans of a seed; without `kind`, consecutive seeds have consecutive kinds."""
     kind = KINDS[(seed - 1) % len(KINDS)] if kind is None else kind
     random = np.random.default_rng([seed, 311, KINDS.index(kind)])
     shape = np.array([random.integers(120, 301), random.integers(150, 401)])  # ny, nx
@@ -163,7 +164,7 @@ def make(seed: int, kind: str | None = None) -> Pair:
     new = rms * draw_surface(random, grid.x.shape, finish)
     old, track = apply_wear(kind, random, grid, new, rms)
     other = rms * draw_surface(random, new.shape, finish) if kind == "elsewhere" else old
-    blur = OVERSAMPLING * random.uniform(0.35, 0.6)  # resolution of the instrument
+    blur = OVERSAMPLING * random.uniform(0.35, 0.6)  # Resolution of the instrument [points].
     first, second, worn = (gaussian_filter(heights, blur) for heights in (new, other, old))
     if kind == "exchanged":
         first, second, new, worn = second, first, old, first
@@ -194,7 +195,7 @@ def draw_pose(random, size) -> Pose:
 
 
 def make_field(size, spacing: float, pose: Pose) -> Field:
-    """Return the grid of the surface over both scans, and the box within both of them."""
+    """Return the grid of the surface over both scans, and the box inside both of them."""
     pitch = spacing / OVERSAMPLING
     margin = MARGIN * size.max()
     x = np.arange(-margin, size[0] + margin, pitch)
@@ -229,7 +230,7 @@ def sample(heights, grid: Field, points) -> np.ndarray:
 def measure(
     random, heights, spacing: float, rms: float, noise: float, instrument: str
 ) -> np.ndarray:
-    """Return a scan: heights with noise, tilt, offset, digitisation, dust and missing points."""
+    """Return a scan: heights with noise, tilt, offset, digitization, dust and missing points."""
     ny, nx = heights.shape
     z = heights + noise * draw_noise(random, heights.shape, instrument)
     along = np.linspace(-0.5, 0.5, nx)
@@ -261,7 +262,7 @@ def measure(
 
 
 def draw_noise(random, shape, instrument: str) -> np.ndarray:
-    """Draw noise whose fast part has unit deviation: lines of a stylus, or pixels of a camera."""
+    """Draw noise with a fast part of unit deviation: lines of a stylus, or pixels of a camera."""
     ny, nx = shape
     white = random.normal(size=shape)
     if instrument == "camera":
@@ -282,7 +283,7 @@ def draw_noise(random, shape, instrument: str) -> np.ndarray:
 
 
 def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
-    """Return the worn surface (n, m) [m] and the track; None if there is no track."""
+    """Return the worn surface (n, m) [m], and the track or None."""
     if kind == "exchanged":
         kind = random.choice(["smooth track", "crater", "shallow wear"])
     if kind in TRACKS:
@@ -327,7 +328,7 @@ def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
         level = np.quantile(new, random.uniform(0.3, 0.7))
         tops = np.maximum(new - level, 0) * random.uniform(0.8, 1.0)
         return np.where((np.abs(dx) < half[0]) & (np.abs(dy) < half[1]), new - tops, new), None
-    return new.copy(), None  # remounted or elsewhere
+    return new.copy(), None  # The kinds "remounted" and "elsewhere" have no wear here.
 
 
 def cut(random, grid: Field, new, depth) -> np.ndarray:
@@ -356,7 +357,7 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
     ends = None
     distance = np.abs(across)
     if random.random() < 0.5:
-        # half the length between the centres of the round ends
+        # Half the distance between the centres of the round ends.
         straight = random.uniform(0.15, 0.22) * span.min()
         distance = np.hypot(across, np.maximum(np.abs(along) - straight, 0))
         length = float(2 * (straight + half))
@@ -372,7 +373,8 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
     else:
         old = new - worn
     if kind == "pile-up":
-        ridge = random.uniform(0.3, 0.9)  # width of the ridge / half-width of the track
+        # Width of the ridge relative to the half-width of the track.
+        ridge = random.uniform(0.3, 0.9)
         heights = random.uniform(0.05, 0.4, 2) * depth
         shape = np.sin(np.pi * np.clip((r - 1) / ridge, 0, 1)) ** 2
         old = old + np.where(across > 0, heights[0], heights[1]) * shape
@@ -381,7 +383,7 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
 
 
 def cross_profile(random, profile: str, r) -> np.ndarray:
-    """Return the depth / largest depth at r = distance from the axis / half-width."""
+    """Return the depth relative to the largest depth at r = distance from the axis / half-width."""
     if profile == "parabola":
         return np.maximum(1 - r**2, 0)
     if profile == "vee":
@@ -433,7 +435,7 @@ def draw_lumps(random, grid: Field, rms: float) -> np.ndarray:
 def find_truth(
     kind: str, depth, points, pose: Pose, spacing: float, size, track: Track | None
 ) -> Truth:
-    """Integrate the noise-free depth (ny, nx) [m] over the region that both scans show."""
+    """Integrate the noise-free depth (ny, nx) [m] over the region that both scans cover."""
     beyond = np.stack([points[0], points[1], size[0] - points[0], size[1] - points[1]]).min(axis=0)
     common = beyond >= 0
     inner = beyond >= spacing

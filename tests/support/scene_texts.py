@@ -1,4 +1,4 @@
-"""Blocks of scenes, the small scenes they add up to, and the mistakes found in one, for any test."""
+"""Blocks of scenes, small scenes made of them, and the mistakes in a scene, for all tests."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from patchfem.scene import loads
 from patchfem.scene.scene import SceneError
 
-# keys that a law asks for beside its static friction
+# Keys that a law requires in addition to its static friction.
 KEYS = {
     "coulomb": "",
     "elastic-plastic": 'bond_length = "1 um"',
@@ -20,11 +20,11 @@ KEYS = {
 
 
 def friction_of(law: str) -> str:
-    """The block of a law of friction with a limit of 0.3 of the load."""
+    """Return the table of a friction law with a limit of 0.3 times the load."""
     return f'[friction]\nlaw = "{law}"\nstatic = 0.3\n' + (KEYS[law] + "\n" if KEYS[law] else "")
 
 
-# blocks; one scene is a sum of them
+# Blocks of scenes; a scene is a sum of them.
 POINT = '[normal]\nload = "26 lbf"\n'
 PIECE = '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\n'
 BLOCK = PIECE.replace("6.35 mm", "6 mm") + 'load = "115 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
@@ -55,12 +55,15 @@ slide = 1.0
 KILOGRAM = MODE.replace("0.884 kg", "1 kg")
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 30\n'
 
-IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'  # of `shaken`
+# Keys for `make_shaken_block`.
+IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'
 
 
 def shaken(law: str, acceleration: str = "1 g", cycles: int = 20) -> str:
-    """A block of half a kilogram and 100 Hz that rubs under 100 N by a law, the lines of its keys, shaken at its
-    frequency."""
+    """Return a scene of a block of 0.5 kg and 100 Hz under 100 N, driven at its resonance.
+
+    law: lines with the keys of its friction.
+    """
     return f"""\
 [normal]
 load = "100 N"
@@ -82,7 +85,7 @@ cycles = {cycles}
 """
 
 
-# two masses, an elastic-plastic interface between the first and the base, one between them
+# Two masses, with elastic-plastic interfaces between the first and the base and between both.
 PAIR = """\
 [structure]
 masses = ["1 kg", "0.7 kg"]
@@ -114,7 +117,7 @@ SWEEP = (
     'rate = "80 Hz/s"\n'
 )
 
-# a bolted joint that holds, and the block that shakes it
+# A bolted joint that does not slip, and the block that shakes it.
 JOINT = """\
 [contact]
 length = "20 mm"
@@ -146,7 +149,7 @@ cycles = 20
 """
 )
 
-# a joint whose points slip from its edges on
+# A joint that slips from its edges.
 CROWNED_JOINT = """\
 [contact]
 length = "40 mm"
@@ -162,7 +165,7 @@ law = "coulomb"
 static = 0.2
 """
 
-# whole scenes
+# Complete scenes.
 BENCH = POINT + COULOMB + SLIDE
 SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
 STRUCTURE = MODE + DRIVE
@@ -184,10 +187,12 @@ PATCH = RIG[RIG.index("[contact]") : RIG.index("[friction]")]
 
 
 def line_of(text: str, start: str) -> int:
+    """Return the number of the first line that begins with a text."""
     return next(n for n, line in enumerate(text.splitlines(), 1) if line.startswith(start))
 
 
 def mistakes(text: str, *sets: str) -> list[str]:
+    """Return the mistakes of a scene, which must be refused."""
     with pytest.raises(SceneError) as caught:
         loads(text, "a.toml", sets)
     assert str(caught.value) == "\n".join(caught.value.mistakes)
@@ -195,6 +200,7 @@ def mistakes(text: str, *sets: str) -> list[str]:
 
 
 def only(text: str, *sets: str) -> str:
+    """Return the only mistake of a scene."""
     found = mistakes(text, *sets)
     assert len(found) == 1, found
     return found[0]

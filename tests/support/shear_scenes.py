@@ -1,7 +1,8 @@
 """Random joints, rigs and chains of two masses with [contact.shear], against runs with a far smaller tolerance.
 
-Campaigns `shear-joints`, `shear-rigs` and `shear-chains` of `campaigns`. The finer settings are a tolerance, because
-its mesh is graded to the corners: a uniform mesh of 1600 nodes errs by more in the stiffness than many stated errors.
+Campaigns `shear-joints`, `shear-rigs` and `shear-chains` of `campaigns`. The reference is a smaller
+tolerance, because its mesh is graded towards the edges: a uniform mesh of 1600 nodes has a larger
+error of the stiffness than many stated errors.
 """
 
 import re
@@ -15,8 +16,8 @@ import patchfem as pf
 from patchfem.response.rows import INTERFACE_MEASURES
 from patchfem.scene import Scene, loads
 
-JOINT_TOLERANCE = 1e-6  # of the reference of a joint
-RIG_TOLERANCE = 1e-5  # of the reference of a rig or a chain
+JOINT_TOLERANCE = 1e-6  # Tolerance of the reference of a joint.
+RIG_TOLERANCE = 1e-5  # Tolerance of the reference of a rig or a chain.
 BENCH = (
     "loop_area",
     "friction_force_peak",
@@ -65,7 +66,7 @@ tolerance = 1e-2
 
 
 def _shaped(draw, crowns: tuple, tilts: tuple) -> dict:
-    """A crown, a tilt or neither: sets of a scene; both ranges are powers of ten, of metres and of radians."""
+    """Draw the keys of a crown, a tilt or neither; the ranges are powers of ten of metres and of radians."""
     kind = draw.choice(["crown", "flat", "tilt"])
     if kind == "crown":
         return {"contact.crown.radius": f"{10 ** draw.uniform(*crowns):.3g} m"}
@@ -73,11 +74,12 @@ def _shaped(draw, crowns: tuple, tilts: tuple) -> dict:
 
 
 def _scene(text: str, sets: dict) -> Scene:
+    """Return the scene of a text with keys set."""
     return loads(text, "random.toml", [f"{key}={value}" for key, value in sets.items()])
 
 
 def joint(seed: int) -> tuple:
-    """(text, sets) of a bolted joint slid to and fro, by .02 to 2.5 of the slide at which a stiff one would yield."""
+    """Return (text, keys) of a bolted joint with an amplitude of 0.02 to 2.5 times the gross slip of a rigid joint."""
     draw = np.random.default_rng(seed)
     mu = f"{draw.uniform(0.1, 0.6):.3f}"
     sets = {
@@ -98,7 +100,7 @@ def joint(seed: int) -> tuple:
 
 
 def rig(seed: int) -> tuple:
-    """(text, sets) of the coated pieces on one mode, below and far above its frequency, at .1 to 30 g."""
+    """Return (text, keys) of the coated bodies on one mode, below and far above its frequency, at 0.1 to 30 g."""
     draw = np.random.default_rng(seed)
     mu = f"{draw.uniform(0.1, 0.6):.3f}"
     sets = {
@@ -138,7 +140,7 @@ coefficient = "5 N s/m"
 
 
 def chain(seed: int) -> tuple:
-    """(text, sets) of two masses in a row, each behind a patch of its own, at frequencies about those of both."""
+    """Return (text, keys) of two masses in a row, each on its own patch, at frequencies near their resonances."""
     draw = np.random.default_rng(seed)
     one, two = 10 ** draw.uniform(5, 7, 2)
     pieces, rest = RIG.split("[friction]")
@@ -160,7 +162,7 @@ def chain(seed: int) -> tuple:
 
 
 def compare_scene(text: str, sets: dict, tolerance: float, names) -> dict:
-    """Compare a scene with the same one at a smaller tolerance; see `campaigns`."""
+    """Compare a scene with the same scene at a smaller tolerance; see `campaigns`."""
     begin = process_time()
     result = pf.run(_scene(text, sets))
     line = {"seconds": process_time() - begin, "warnings": list(result.warnings)}

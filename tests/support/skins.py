@@ -1,5 +1,4 @@
-"""A skin between two pieces as a run presses it: the smooth laws as one strip, the linear one as softer
-pieces."""
+"""Asperity layers between two bodies: smooth laws are solved as one strip, the linear law as softer bodies."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -19,7 +18,7 @@ from patchfem.core import Compliance, Interface, Outcome
 
 
 class State(NamedTuple):
-    """A pressed skin: arrays (m,) and numbers as `strips.StripsState` has them of strips, separation its gap."""
+    """Pressed asperity layer: arrays (m,) and scalars as in `strips.StripsState`; `separation` is its gap."""
 
     force: np.ndarray
     pressure: np.ndarray
@@ -35,7 +34,7 @@ class State(NamedTuple):
 
 
 def strips_of(c, x, weight, offsets, asperities=None):
-    """Strips of a compliance that is an array, or that has diagonals of their own."""
+    """Return strips with a compliance given as an array, or as a compliance with separate diagonals."""
     compliance = c if isinstance(c, StripCompliance) else StripCompliance(c)
     layout = strips.StripLayout(x, weight, offsets)
     return strips.StripModel(compliance, layout, asperities)
@@ -44,7 +43,7 @@ def strips_of(c, x, weight, offsets, asperities=None):
 def press_strips(
     c, x, weight, offsets, gap, roll=0.0, load=None, moment=None, asperities=None, **control
 ):
-    """The state of strips under a load and its moments, or by an approach."""
+    """Return the state of strips under a load and its moments, or by an approach."""
     moments = {key: control.pop(key) for key in ("roll_moment", "spring") if key in control}
     loads = strips.HolderLoads(load, moment, **moments)
     return strips.press_strips(
@@ -53,7 +52,7 @@ def press_strips(
 
 
 def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):
-    """The State of two bodies pressed through a skin of any law."""
+    """Return the LayerState of two bodies pressed through an asperity layer of any law."""
     if not isinstance(skin, LinearAsperities):
         one = press_strips(
             c,
@@ -105,16 +104,16 @@ def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotati
 
 
 def longer(skin, factor: float):
-    """The law P(s/factor), `factor` times as long: of peaks with wider heights, and fewer of them."""
+    """Return the law P(s/factor), which belongs to fewer peaks with wider height distribution."""
     if isinstance(skin, ExponentialAsperities):
         return replace(skin, u0=skin.u0 * factor)
     return replace(skin, deviation=skin.deviation * factor, density=skin.density * factor**-1.5)
 
 
 def tangent(c, weight, stiffness) -> float:
-    """Stiffness [N/m] of the whole patch, skin and bodies in series, for one common rigid motion.
+    """Return the stiffness [N/m] of the whole patch, layer and bodies in series, for a common rigid motion.
 
-    stiffness (m,) [Pa/m] of the skin; nodes of no stiffness carry nothing.
+    stiffness (m,) [Pa/m] of the layer; nodes without stiffness carry no load.
     """
     d = weight * stiffness
     live = np.flatnonzero(d > 1e-18 * d.max())

@@ -1,4 +1,4 @@
-"""Random slide histories, and the force of parallel Jenkins elements along them."""
+"""Random displacement histories, and the force of parallel Jenkins elements along them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def elements(group, path):
-    """Resultant [N] at every reversal of parallel elements, each a spring in series with a slider."""
+    """Return the total force [N] of parallel elements, each a spring in series with a slider, at every reversal."""
     settled = np.zeros(group.stiffness.size)
     out = []
     for q in path:
@@ -17,7 +17,7 @@ def elements(group, path):
 
 
 def histories(count, reach, seed=7):
-    """Random paths of 40 reversals, from micro-slip to gross sliding."""
+    """Yield random paths of 40 reversals, from micro-slip to gross sliding."""
     rng = np.random.default_rng(seed)
     for _ in range(count):
         size = reach * 10 ** rng.uniform(-1, 0.3)

@@ -1,4 +1,4 @@
-"""Modes under a smooth law by SciPy's DOP853 between located reversals: rate equations of `motion_laws`."""
+"""Modes under a smooth law by SciPy's DOP853 between located reversals, with the rate equations of `motion_laws`."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 
 class RateForm(NamedTuple):
-    """A law as rate equations: states at the start, rates(y, v, way) of the states, force(y, v, way)."""
+    """Law as rate equations: initial states, rates(y, v, way) of the states, force(y, v, way)."""
 
     start: list
     rates: Callable
@@ -20,10 +20,12 @@ def rate_form(law: motion_laws.Law, start=(0.0,)) -> RateForm:
     """Return the rate equations of a law without a set-valued force."""
 
     def rates(y, v, way):
+        """Return the rates of the states."""
         law.take_branch(y, v, way)
         return law.rate(y, v, 0.0)
 
     def force(y, v, way):
+        """Return the friction force."""
         law.take_branch(y, v, way)
         return law.force(y, v, 0.0)
 
@@ -65,8 +67,11 @@ def tanh(law, load) -> RateForm:
 
 
 def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12):
-    """(coordinates (n, k), forces (k,)) at times (k,) [s], pieces: between reversals of the slide, kinks kink(y) of the
-    law's states and borders of the drive's segments every piece is integrated by itself."""
+    """Return (coordinates (n, k), forces (k,)) at times (k,) [s].
+
+    The integration is restarted at reversals, at zeros of kink(y, v), and at the limits of the
+    drive's segments.
+    """
     begin, rates, force = form
     n = modes.omega.size
     period = drive.period
@@ -83,6 +88,7 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
     forces = np.zeros(len(times))
 
     def slope(t, y, way, edge):
+        """Return the time derivative of the state."""
         z = y[:n]
         v = y[n : 2 * n]
         speed = modes.slide @ v
@@ -108,9 +114,11 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
             way = np.sign(modes.slide @ look.y[n : 2 * n, -1]) or 1.0
 
         def stops(t, y, way, edge):
+            """Return the velocity at the interface, whose zero is a reversal."""
             return modes.slide @ y[n : 2 * n]
 
         def bends(t, y, way, edge):
+            """Return the value of kink, whose zero is a discontinuity of the law."""
             return kink(y[2 * n :], modes.slide @ y[n : 2 * n]) if kink is not None else 1.0
 
         stops.terminal = True
@@ -141,7 +149,8 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
             way = -way
             if n == 1:
                 y[1] = 0.0
-        elif done.t_events[1].size:  # beyond the kink, which would end the next piece at once
+        # A small step past the kink, which would otherwise end the next piece at once.
+        elif done.t_events[1].size:
             step = 1e-9 * period
             y = y + step * np.array(slope(t, y, way, edge))
             t = t + step

@@ -1,9 +1,10 @@
 """Independent solver of static patches, which uses nothing of the package.
 
-The cells are those of order 4 of studies/contact/order_four.py, on separate grids; contact is
-solved by a plain active set. `answer(scene)` grades its columns to the contact edges that it finds,
-and gives the measures by name, for unlike pieces with the coupled tangential stiffness. Pieces are
-rectangles, of which a longer one overhangs; gaps are tilt, crown and step.
+The elements are those of order 4 of studies/contact/order_four.py, on separate grids; contact is
+solved by a simple active-set method. `answer(scene)` grades its columns to the contact edges that
+it finds, and returns the measures by name, for bodies of different materials with the coupled
+tangential stiffness. Bodies are rectangles, of which the longer one overhangs; gaps are tilt, crown
+and step.
 """
 
 from __future__ import annotations
@@ -20,18 +21,16 @@ from study_module import study
 
 cells_of = study("contact/order_four.py")
 ORDER = 4
-# of three laps: cells at an edge over `fine`, at the corners of the pieces over the shorter side, growth, cells across
-# a stretch; corners that stayed at 1/60 were off by up to 40 bars of runs at a tolerance of 1e-5
+# Three refinements: factor on `fine` at contact edges, cell at the corners of the bodies over the
+# shorter side, growth, cells across a contact. With corner cells of 1/60, errors reached 40 times
+# the stated errors at a tolerance of 1e-5.
 LAPS = ((2.5, 1 / 250, 0.6, 16), (1.0, 1 / 1000, 0.5, 24), (0.4, 1 / 4000, 0.4, 36))
 FIRST = (1.0, 1 / 60, 0.6, 16)
 
 
 @dataclass(frozen=True)
 class PieceInterface:
-    """One piece with lengths [m]; layers: (Young's modulus [Pa], Poisson's ratio) of each layer.
-
-    The layers are coating and substrate.
-    """
+    """Body with lengths [m]; layers: (Young's modulus [Pa], Poisson's ratio) of coating and substrate."""
 
     length: float
     height: float
@@ -41,7 +40,7 @@ class PieceInterface:
 
 @dataclass(frozen=True)
 class Scene:
-    """A patch under a load [N] at a prescribed tilt [rad].
+    """Patch under a load [N] at a prescribed tilt [rad].
 
     curvature: of a crown [1/m]; step: (height, position) [m] or None; skin: stiffness of the
     asperities [Pa/m] or None.
@@ -62,7 +61,7 @@ class Scene:
 def spread(points, sizes, begin: float, end: float, growth: float, most: float) -> np.ndarray:
     """Return break points from begin to end with cells of sizes[k] at points[k].
 
-    The cells grow by `growth` per distance, up to `most`.
+    The size of the cells grows by `growth` per distance, up to `most`.
     """
     points = np.asarray(points, float)
     sizes = np.asarray(sizes, float)
@@ -85,7 +84,8 @@ def spread(points, sizes, begin: float, end: float, growth: float, most: float) 
 def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) -> tuple:
     """Return compliances (nn, tt, nt), (m, m) [m2/N], of the common part of the face.
 
-    They are per unit width, at the nodes of the cells of `inner`; nt is the normal motion by shear.
+    They are per unit width, at the nodes of the cells of `inner`; nt is the normal displacement due
+    to shear.
     """
     x = inner
     extra = 0
@@ -128,7 +128,8 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
         node = place[
             iy[:, None] * ORDER + local // (ORDER + 1), ix[:, None] * ORDER + local % (ORDER + 1)
         ]
-        last = node >= count - m  # the nodes of the face; all motions along it come first
+        # Nodes of the face; all tangential displacements are numbered before the normal ones.
+        last = node >= count - m
         dof = np.concatenate(
             [
                 np.where(last, node + count - m, 2 * node),
@@ -157,7 +158,7 @@ def face(body: PieceInterface, plane: str, inner, growth: float, corner: float) 
 
 
 def contact(compliance, gap, load: float, active=None) -> tuple:
-    """Solve the contact by an active set that starts from `active`.
+    """Solve the contact by an active-set method that starts from `active`.
 
     Parameters
     ----------
@@ -195,7 +196,7 @@ def contact(compliance, gap, load: float, active=None) -> tuple:
 
 
 def unloaded_gap(scene: Scene, place) -> np.ndarray:
-    """Return the gap (m,) [m] of the unloaded faces; the corner of a step belongs to the side in contact."""
+    """Return the gap (m,) [m] of the unloaded faces; the edge of a step belongs to the side in contact."""
     gap = place**2 / 2 * scene.curvature + scene.tilt * place
     if scene.step:
         height, at = scene.step
@@ -204,7 +205,7 @@ def unloaded_gap(scene: Scene, place) -> np.ndarray:
 
 
 class Pressed(NamedTuple):
-    """A pressed patch: compliances (m, m) [m2/N] per unit width, places and weights (m,) [m], and the contact.
+    """Pressed patch: compliances (m, m) [m2/N] per unit width, positions and weights (m,) [m], and the contact.
 
     - normal, tangential, cross: sums of both pieces; cross is the normal motion by shear
     - force: nodal forces (m,) per unit width [N/m]
@@ -298,7 +299,7 @@ def measures(scene: Scene, pressed: Pressed) -> dict:
         "moment": force @ place * width,
         "contact_fraction": sum(b - a for a, b, _ in stretches) / scene.length,
         "contact_half_width": (stretches[-1][1] - stretches[0][0]) / 2,
-        # a curve cannot follow a jump
+        # A polynomial cannot follow a jump of the pressure.
         "pressure_peak": float(pressure.max()) if scene.step else peak(place, pressure),
         "pressure_centre": force @ place * width / scene.load,
         "normal_stiffness": own.sum() * width,
@@ -320,7 +321,7 @@ def peak(x, pressure) -> float:
 def edge_of(x, pressure, node: int, side: int, scene: Scene) -> float:
     """Return the position at which the square of the pressure vanishes after the last node.
 
-    At a border or a step it is this position itself.
+    At the end of the patch or at a step it is this position itself.
     """
     if node in (0, x.size - 1):
         return float(x[node])
@@ -346,7 +347,7 @@ def edge_of(x, pressure, node: int, side: int, scene: Scene) -> float:
 def answer(scene: Scene, fine: float = 5e-4, start=()) -> tuple:
     """Return values and their uncertainties by name, from the last of LAPS.
 
-    The uncertainty is the largest of the last change and a third of the change before.
+    The uncertainty is the larger of the last change and a third of the previous change.
     """
     edges = find_edges(scene, start)
     found = []

@@ -1,6 +1,7 @@
-"""Random static patches, as texts of scenes and as what `static_reference` solves.
+"""Random static patches, as texts of scenes and as input of `static_reference`.
 
-The campaigns "static" and "static-fine" of `campaigns.py` compare runs with a tolerance of 1e-2 and of 1e-3.
+The campaigns "static" and "static-fine" of `campaigns.py` compare runs with a tolerance of 1e-2 and
+of 1e-3.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ import patchfem as pf
 
 KINDS = ("plain", "crown", "h1", "step", "ends", "skin")
 MATERIALS = ((121e9, 0.32), (210e9, 0.3), (70e9, 0.34), (250e9, 0.24))
-FINE = 5e-4  # tolerance of the reference
-KNOWN = 3.0  # a reference judges an error if it is known so many times better
+FINE = 5e-4  # Size of the cells at contact edges of the reference, relative to the contact.
+# Smallest ratio of the stated error to the uncertainty of the reference at which a row counts.
+KNOWN = 3.0
 JUDGED = (
     "contact_fraction",
     "contact_half_width",
@@ -33,11 +35,12 @@ JUDGED = (
 
 
 def drawn(seed: int) -> Scene:
-    """The scene of a seed; its kind is KINDS[seed % 6]."""
+    """Return the scene of a seed; its kind is KINDS[seed % 6]."""
     r = np.random.default_rng([seed, 28])
     kind = KINDS[seed % len(KINDS)]
 
     def wide(low, high):
+        """Draw a number with five digits from a log-uniform distribution."""
         return float(f"{10 ** r.uniform(np.log10(low), np.log10(high)):.5g}")
 
     length = wide(5e-3, 5e-2)
@@ -53,7 +56,7 @@ def drawn(seed: int) -> Scene:
     curvature = step = skin = None
     if kind in ("crown", "h1") or (kind in ("step", "skin") and r.random() < 0.5):
         curvature = float(f"{10 ** r.uniform(-1.5, 1):.5g}")
-    if kind == "h1":  # a narrow contact of long pieces, aside of their middle
+    if kind == "h1":  # A narrow contact of long bodies, outside their middle.
         length = wide(2e-2, 6e-2)
         lower = upper = PieceInterface(length, length / 2, 0.0, (MATERIALS[kinds[0]],) * 2)
         tilt = float(f"{length * curvature * r.uniform(-0.2, 0.2):.5g}")
@@ -85,9 +88,10 @@ def drawn(seed: int) -> Scene:
 
 
 def text_of(scene: Scene) -> str:
-    """The scene as the program reads it."""
+    """Return the scene as text."""
 
     def material(young, nu):
+        """Return a material as a table of a scene."""
         return f'{{young = "{young:.9g} Pa", poisson = {nu:.9g}, density = "5000 kg/m^3"}}'
 
     rows = [
@@ -125,10 +129,10 @@ def text_of(scene: Scene) -> str:
 
 
 def solve_reference(scene: Scene, tolerance: float = FINE) -> tuple:
-    """Return the measures of the reference, and their own uncertainties, by name."""
+    """Return the measures of the reference, and their uncertainties, by name."""
     true, doubt = answer(scene, tolerance)
     doubt = {name: float(doubt[name]) for name in JUDGED}
-    # zero by symmetry: known to a fraction of what it is a difference of
+    # The value is zero by symmetry; its uncertainty is a fraction of the terms of its difference.
     doubt["pressure_centre"] = max(doubt["pressure_centre"], 1e-6 * true["contact_half_width"])
     return {name: float(true[name]) for name in JUDGED}, doubt
 
@@ -158,7 +162,7 @@ compare_coarse_patch = partial(compare_patch, tolerance=1e-2)
 
 
 def judged_rows(measures, true: dict, doubt: dict) -> list:
-    """List the rows of measures whose reference is known well enough to judge the error."""
+    """Return the rows of measures whose reference is accurate enough to judge the error."""
     rows = measure_rows(measures, true, doubt)
     return [
         row

@@ -1,16 +1,19 @@
-"""Random rigs with several faces that stick, or could, at one instant: Coulomb's law, against DOP853 with events that
-tries every choice of the faces.
+"""Random rigs with several Coulomb interfaces that may stick at the same time, against DOP853 with events.
 
-Campaign `stick-together` of `campaigns`; seeds are held out from 29 500 000 on.
+Campaign `stick-together` of `campaigns`; seeds from 29 500 000 on were not used in development. The
+reference tries every combination of slip directions.
 
-2 to 4 masses, 2 or 3 interfaces, kinetic over static friction from 1 down to .02. Of four kinds in turn: `mirror`:
-equal masses and couplings, so that all faces stick at once; `twins`: equal interfaces between the same two bodies,
-whose share of the force in stick no equation tells apart; `release` from a displacement at rest and `step` of the base,
-where all faces decide at the start. Several choices can be without a contradiction where kinetic friction is less than
-static: a motion is right where it is that of one of the orders in which the reference tries them. More faces than
-masses stand only where the two frictions are equal: else a motion is one of a continuum. Then it is unique, for its
-acceleration takes the least of a convex function, but the faces' shares of the force are not, and the reference, which
-asks the shares, may choose another motion: a march of impulses (Moreau) decides, to the error of its steps.
+2 to 4 masses, 2 or 3 interfaces, ratio of kinetic to static friction from 1 to 0.02. Consecutive
+seeds have four kinds: `mirror`: equal masses and couplings, so that all interfaces stick at the
+same time; `twins`: equal interfaces between the same two bodies, whose shares of the force in stick
+are not determined; `release` from a displacement at rest and `step` of the base, where all
+interfaces choose stick or slip at the start. Several combinations can be consistent if kinetic
+friction is less than static; a motion is correct if it agrees with one of the orders in which the
+reference tries them. There are more interfaces than masses only if both frictions are equal;
+otherwise there would be a continuum of motions. The motion is then unique, because its acceleration
+minimizes a convex function, but the shares of the force are not, and the reference, which uses the
+shares, may find another motion; in that case Moreau's time stepping decides, within the error of
+its steps.
 """
 
 import signal
@@ -27,20 +30,23 @@ import patchfem as pf
 
 CYCLES = 6
 KINDS, RATIOS = ("mirror", "twins", "release", "step"), (1.0, 0.95, 0.5, 0.2, 0.05, 0.02)
-# which choice the reference takes of several: that of alike faces alike, of the fewest or of the most that slide
+# Order of combinations in the reference: equal interfaces together, or fewest or most slipping
+# interfaces first.
 ORDERS = {
     "mirror": ("together", "fewest", "most"),
     "twins": ("together",),
     "release": ("fewest", "most"),
     "step": ("fewest", "most"),
 }
-SAME, BALANCED = 1e-6, 1e-9  # relative to the largest slide; relative to the energy
-STEPS, NEAR = 3000, 2e-3  # steps of the march that decides for dependent faces, and its own error
-LONGEST = 20  # CPU seconds of a reference
+# Tolerances: difference relative to the largest displacement; energy balance relative to the
+# energy.
+SAME, BALANCED = 1e-6, 1e-9
+STEPS, NEAR = 3000, 2e-3  # Steps of the time stepping for dependent interfaces, and its own error.
+LONGEST = 20  # Time limit of a reference [CPU s].
 
 
 def spec(seed: int) -> dict:
-    """Return the numbers of a rig in SI units.
+    """Return the parameters of a rig in SI units.
 
     `links` are (pair, stiffness [N/m], damping [N s/m]); bodies are numbered from 1, and 0 is the
     base.
@@ -114,7 +120,7 @@ def text(s: dict) -> str:
 
 
 def row(pair, n: int) -> np.ndarray:
-    """Return the row of x_i - x_j of a pair (i, j)."""
+    """Return the row of x_i - x_j for a pair (i, j)."""
     out = np.zeros(n + 1)
     out[pair[0]] += 1
     out[pair[1]] -= 1
@@ -122,7 +128,7 @@ def row(pair, n: int) -> np.ndarray:
 
 
 def matrices(s: dict) -> tuple:
-    """Return mass, stiffness and damping (n, n), and rows of the faces (i, n) of a rig."""
+    """Return mass, stiffness and damping (n, n), and the rows of the interfaces (i, n) of a rig."""
     n = len(s["mass"])
     stiff, damp = (
         sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
@@ -132,9 +138,9 @@ def matrices(s: dict) -> tuple:
 
 
 def marched(s: dict, time, slide) -> float:
-    """Return the largest distance of slides (i, t) [m] from a march of impulses.
+    """Return the largest difference of displacements (i, t) [m] from Moreau's time stepping.
 
-    It is relative to the largest slide; the last of the times (t,) [s] is the end.
+    It is relative to the largest displacement; the last of the times (t,) [s] is the end.
     """
     mass, stiff, damp, faces = matrices(s)
     square, shapes = eigh(stiff, mass)
@@ -165,10 +171,10 @@ def marched(s: dict, time, slide) -> float:
 
 
 def truth(s: dict, end: float, order: str) -> tuple:
-    """Return times (t,) [s] of events and the end, slides (t, i) [m] and signs (t, i).
+    """Return times (t,) [s] of events and the end, displacements (t, i) [m] and directions (t, i).
 
     They are those of the reference, in modes of unit mass. order: as in ORDERS; with `together`,
-    equal faces are one that carries the load of all, and equal bodies are one.
+    equal interfaces are one that carries the total load, and equal bodies are one.
     """
     (mass, stiff, damp, faces), n = matrices(s), len(s["mass"])
     same = np.arange(len(faces))
@@ -214,9 +220,9 @@ def truth(s: dict, end: float, order: str) -> tuple:
 
 
 def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = None) -> dict:
-    """Compare the slides of a rig with the reference at its events; see `campaigns`.
+    """Compare the displacements of a rig with the reference at its events; see `campaigns`.
 
-    Each order of choices is tried until one agrees.
+    Each order of combinations is tried until one agrees.
     """
     s = spec(seed)
     line = {"group": f"{s['kind']}, {s['ratio']}", "engine": "events"}

@@ -1,4 +1,4 @@
-"""A study as a module, and what its docstring contains."""
+"""Load a study as a module, and check the contents of its docstring."""
 
 import importlib.util
 from pathlib import Path
@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[2] / "studies"
 
 
 def study(name):
-    """The module of a study by its path below studies/."""
+    """Return the module of a study, given its path below studies/."""
     path = ROOT / name
     spec = importlib.util.spec_from_file_location(path.stem, path)
     module = importlib.util.module_from_spec(spec)
@@ -18,17 +18,18 @@ def study(name):
 
 
 def study_fixture(name):
-    """Return a fixture that is the module of a study, loaded once for a file of tests."""
+    """Return a fixture that loads a study once for a file of tests."""
 
     @pytest.fixture(scope="module")
     def module():
+        """Return the module of the study."""
         return study(name)
 
     return module
 
 
 def assert_contains(text, *parts):
-    """Require that a text, whose line breaks do not count, contains all parts."""
+    """Assert that a text contains all parts, irrespective of line breaks."""
     text = " ".join(text.split())
     missing = [part for part in parts if part not in text]
     assert not missing, f"{missing} not in: {text}"

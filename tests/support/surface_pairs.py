@@ -1,13 +1,14 @@
 """Campaigns `scan-pairs` and `trace-pairs`: answers of `patchfem compare` on pairs with known truth.
 
-The generators (`scan_pairs`, `known_pairs`) were written by somebody who had not seen the method. Seeds of scans below
-1000 and seeds of traces from 41000 to 41019 served to build it.
+The generators (`scan_pairs`, `known_pairs`) were written by somebody who had not seen the method.
+Seeds of scans below 1000 and seeds of traces from 41000 to 41019 were used to develop it.
 
-A row is an interval of the answer: its middle, its half-width and the true value. The row `false_claims` counts the
-claims that contradict the truth: wear of an unworn surface, growth where nothing grew, waves that changed, less wear
-than was worn, a depth of two places. A row `missed` is 1 if the wear of a pair is not shown. The names end in a word
-where several definitions are scored: `_inner` also accepts the volume without the border of the region, `_median` is
-of 3 x 3 depths, `_flat` of flanks that run out flat.
+A row is an interval of the answer: its middle, its half-width and the true value. The row
+`false_claims` counts the claims that contradict the truth: wear of an unworn surface, growth
+without growth, changed waves that did not change, less wear than there was, a depth of two
+different places. A row `missed` is 1 if the wear of a pair is not reported. Suffixes of names
+distinguish definitions: `_inner` also accepts the volume without the border of the region,
+`_median` is of 3 x 3 depths, `_flat` of flanks that end with zero slope.
 """
 
 import re
@@ -24,28 +25,29 @@ import patchfem
 UNITS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "m": 1.0}
 LIMIT = re.compile(r"from a mean depth of ([\d.e+-]+) (nm|um|mm)")
 CHANGES = ("reduced", "increased", "flatter")
-# 20 times the noise of a height [m]; deeper wear must not be called none
+# 20 times the noise of a height [m]; deeper wear must not be reported as none.
 SHOWN_DEPTH = 0.3e-6
 
 
 class WearTruth(NamedTuple):
-    """What an answer may not contradict."""
+    """True properties that an answer must not contradict."""
 
-    can_show: bool  # whether the pair can show wear
-    grew: bool  # whether growth may be claimed
-    is_changed: bool  # whether the waves may have changed
-    is_elsewhere: bool  # whether the traces or scans are of two places
-    is_hidden: bool  # whether an offset or a tilt explains the wear
+    can_show: bool  # The pair can show wear.
+    grew: bool  # Growth may be claimed.
+    is_changed: bool  # The waves may have changed.
+    is_elsewhere: bool  # The traces or scans are of two different places.
+    is_hidden: bool  # An offset or a tilt explains the wear.
     mean: float  # [m]
     largest: float  # [m]
 
 
 def find_false_claims(answer: dict, worn: WearTruth) -> list:
-    """List the claims of an answer that contradict the truth."""
+    """Return the claims of an answer that contradict the truth."""
     verdict = answer["verdict"].lower()
     text = " ".join((verdict, *answer["sentences"])).lower()
 
     def number(name, key):
+        """Return an entry of a quantity of the answer, or None."""
         return (answer.get(name) or {}).get(key)
 
     limit = LIMIT.search(text)
@@ -65,14 +67,14 @@ def find_false_claims(answer: dict, worn: WearTruth) -> list:
 
 
 def interval_rows(answer: dict, truths: dict) -> list:
-    """List the intervals of an answer whose truth is known; of several true values the next one counts."""
+    """Return the intervals of an answer whose truth is known; of several true values the nearest counts."""
     rows = []
     for name, values in truths.items():
         key = re.sub("_(inner|median|either|flat|tips|straight|effective)$", "", name)
         quantity = answer.get(key)
         if not isinstance(quantity, dict) or None in (quantity.get("low"), quantity.get("high")):
             continue
-        # a mean over the track alone is scored by the entries of the track
+        # A mean over the track alone is scored by the entries of the track.
         if quantity.get("over", "common length") == "common length":
             middle = (quantity["low"] + quantity["high"]) / 2
             true = min(values, key=lambda value, middle=middle: abs(value - middle))
@@ -96,7 +98,7 @@ def make_line(kind: str, files: tuple, units: tuple | None, worn: WearTruth, tru
 
 
 def compare_traces(seed: int, folder: Path, _) -> dict:
-    """Compare the pair of traces of a seed; the kinds take turns."""
+    """Compare the pair of traces of a seed; consecutive seeds have different kinds."""
     kind = known_pairs.KINDS[seed % len(known_pairs.KINDS)]
     pair = known_pairs.pair(kind, seed)
     files = (folder / "before.csv", folder / "after.csv")
@@ -105,7 +107,7 @@ def compare_traces(seed: int, folder: Path, _) -> dict:
         np.savetxt(file, columns, "%.7f", ",", header="x [mm],z [um]", comments="")
     x = pair.after[0]
     is_common = (x + pair.shift >= 0) & (x + pair.shift <= pair.before[0][-1])
-    lost = np.maximum(pair.worn, 0.0)[is_common]  # material that grew is no negative wear
+    lost = np.maximum(pair.worn, 0.0)[is_common]  # Grown material does not count as negative wear.
     can_show = kind in known_pairs.RUBBED
     worn = WearTruth(
         can_show=can_show,
@@ -135,7 +137,7 @@ def compare_scans(seed: int, folder: Path, _) -> dict:
     worn = WearTruth(
         can_show=truth.is_knowable and "worn" not in truth.sentence,
         grew="grew" not in truth.sentence,
-        # a sentence on waves compares noise too, if nothing else differs
+        # A sentence on waves also compares noise, if nothing else differs.
         is_changed=True,
         is_elsewhere=pair.kind == "elsewhere",
         is_hidden=pair.kind in ("uniform", "wedge"),
@@ -148,11 +150,11 @@ def compare_scans(seed: int, folder: Path, _) -> dict:
 
 
 def scan_truths(truth) -> dict:
-    """Return the true values of a pair of scans by name, several where definitions may differ."""
+    """Return the true values of a pair of scans by name, several if definitions differ."""
     volumes = truth.volumes
     depths = truth.depths
     turn = truth.pose.rotation
-    # the interpolation has ripples
+    # Ripples of the interpolation do not count as growth.
     has_grown = volumes.grown > 1e-4 * (volumes.worn + volumes.grown)
     truths = {
         "worn_volume": (volumes.worn,),
@@ -168,7 +170,7 @@ def scan_truths(truth) -> dict:
         return truths
     track = truth.track
     section = truth.section
-    # directions of an axis that differ by half a turn are the same
+    # Directions of an axis that differ by half a turn are equal.
     half_turns = (-np.pi, 0.0, np.pi)
     directions = [track.direction + half_turn for half_turn in half_turns]
     truths |= {

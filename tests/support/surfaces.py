@@ -1,4 +1,4 @@
-"""Files of surfaces written for the tests: X3P in its variants, SDF, .npy, .mat, Dektak exports."""
+"""Surface files for the tests: variants of X3P, SDF, .npy, .mat, exports of Dektak."""
 
 import hashlib
 import io
@@ -13,12 +13,12 @@ TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 
 
 def scan(rows=4, count=6, seed=2) -> np.ndarray:
-    """Heights (rows, count) [m] of some 0.2 um."""
+    """Return heights (rows, count) [m] with a deviation of 0.2 um."""
     return np.random.default_rng(seed).normal(0.0, 2e-7, (rows, count))
 
 
 def zipped(members: dict) -> bytes:
-    """A zip file of {name: bytes}."""
+    """Return a zip file of {name: bytes}."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
         for name, data in members.items():
@@ -27,7 +27,7 @@ def zipped(members: dict) -> bytes:
 
 
 def axis(name: str, kind="I", data="D", increment=None, offset=None) -> str:
-    """One axis of main.xml."""
+    """Return an axis of main.xml."""
     parts = {"AxisType": kind, "DataType": data, "Increment": increment, "Offset": offset}
     inside = "".join(f"<{key}>{value}</{key}>" for key, value in parts.items() if value is not None)
     return f"<{name}>{inside}</{name}>"
@@ -36,7 +36,7 @@ def axis(name: str, kind="I", data="D", increment=None, offset=None) -> str:
 def main_xml(
     axes: str, record3: str, feature="SUR", revision="ISO5436 - 2000", prefix="p:"
 ) -> bytes:
-    """main.xml with these axes and this third record."""
+    """Return main.xml with the given axes and third record."""
     space = f' xmlns:{prefix[:-1]}="{SPACE}"' if prefix else f' xmlns="{SPACE}"'
     return (
         f'<?xml version="1.0" encoding="UTF-8"?>\n<{prefix}ISO5436_2{space}><Record1>'
@@ -47,12 +47,12 @@ def main_xml(
 
 
 def matrix(count: int, rows: int, layers=1) -> str:
-    """The dimensions of a matrix in the third record."""
+    """Return the dimensions of a matrix for the third record."""
     return f"<MatrixDimension><SizeX>{count}</SizeX><SizeY>{rows}</SizeY><SizeZ>{layers}</SizeZ></MatrixDimension>"
 
 
 def link(data: bytes, valid: bytes | None = None, md5=None, name="bindata/data.bin") -> str:
-    """The link to the binary data in the third record."""
+    """Return the link to the binary data for the third record."""
     more = (
         ""
         if valid is None
@@ -70,7 +70,7 @@ def link(data: bytes, valid: bytes | None = None, md5=None, name="bindata/data.b
 def x3p(
     xml: bytes, data: bytes | None = None, valid: bytes | None = None, folder="", checksum=None
 ) -> bytes:
-    """An X3P file of its parts."""
+    """Return an X3P file made of its parts."""
     members = {
         f"{folder}main.xml": xml,
         f"{folder}md5checksum.hex": f"{checksum or hashlib.md5(xml).hexdigest()} *main.xml\n".encode(),
@@ -83,7 +83,7 @@ def x3p(
 
 
 def x3p_of(z, data="D", increment=1.0, offset=0.0, **more) -> bytes:
-    """Heights (m, n) [m] as a binary X3P, stored as (z - offset)/increment."""
+    """Return heights (m, n) [m] as a binary X3P file, stored as (z - offset)/increment."""
     raw = (z - offset) / increment
     raw = (np.rint(np.nan_to_num(raw)) if data in "IL" else raw).astype(TYPES[data]).tobytes()
     valid = None
@@ -99,7 +99,7 @@ def x3p_of(z, data="D", increment=1.0, offset=0.0, **more) -> bytes:
 
 
 def sdf_binary(z) -> bytes:
-    """Heights (m, n) [m] as a binary SDF of numbers of eight bytes in nanometres."""
+    """Return heights (m, n) [m] as a binary SDF file of 8-byte numbers in nanometres."""
     names = b"bISO-1.0", b"tests", b"010120260000", b"010120260000"
     scales = 0.5e-6, 0.75e-6, 1e-9, 0.0
     head = struct.pack("<8s10s12s12sHHddddBBB", *names, z.shape[1], z.shape[0], *scales, 0, 7, 0)
@@ -107,7 +107,7 @@ def sdf_binary(z) -> bytes:
 
 
 def sdf_ascii(z) -> bytes:
-    """Heights (m, n) [m] as an ASCII SDF in micrometres."""
+    """Return heights (m, n) [m] as an ASCII SDF file in micrometres."""
     head = (
         f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = 5e-07\n"
         "Yscale = 7.5e-07\nZscale = 1e-06\nZresolution = -1\nCompression = 0\nDataType = 7\n"
@@ -120,21 +120,21 @@ def sdf_ascii(z) -> bytes:
 
 
 def npy(array) -> bytes:
-    """An array as an .npy file."""
+    """Return an array as an .npy file."""
     out = io.BytesIO()
     np.save(out, array)
     return out.getvalue()
 
 
 def mat(packed=True, **arrays) -> bytes:
-    """Variables as a MATLAB file of version 5."""
+    """Return variables as a MATLAB file of version 5."""
     out = io.BytesIO()
     savemat(out, arrays, do_compression=packed)
     return out.getvalue()
 
 
 def dektak(z, length=50.0, results=True) -> bytes:
-    """Heights (n,) in um over a length in um as a Dektak exports them, x printed to 0.1 um."""
+    """Return heights (n,) [um] over a length [um] as an export of Dektak, with x printed to 0.1 um."""
     x = np.arange(z.size) * length / z.size
     found = (
         "\nAnalytical Results\nFunction,R.Cur Pos,R.Cur Width,M.Cur Pos,M.Cur Width,Result\n"

@@ -1,10 +1,10 @@
-"""Scenes with the cure that a plan proposes, and whether a run misses its tolerance."""
+"""Scenes with the settings that a plan proposes, and whether a run exceeds its tolerance."""
 
 import patchfem as pf
 
 
 def cured(text: str, cure: dict) -> str:
-    """Return a scene with the cure of a forecast: keys set, or left out where the value is None."""
+    """Return a scene with the proposal of a forecast: keys set, or left out if the value is None."""
     lines = text.splitlines()
     for key, value in cure.items():
         table, _, name = key.rpartition(".")
@@ -18,5 +18,5 @@ def cured(text: str, cure: dict) -> str:
 
 
 def misses(text: str) -> bool:
-    """Whether a run of a scene warns that a measure misses its tolerance."""
+    """Return whether a run of a scene warns that a measure exceeds its tolerance."""
     return any("; the tolerance is " in one for one in pf.run(text).warnings)

@@ -1,4 +1,4 @@
-"""Modes under a contact whose load varies: pieces, laws and the energy of the motion."""
+"""Modes under a contact with varying load: bodies, laws and the energy of the motion."""
 
 from functools import cache
 
@@ -27,6 +27,7 @@ LAWS = {
 
 
 def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
+    """Return a modal basis with displacement, heave and pitch at the interface."""
     size = len(frequencies)
     numbers = (np.array(v, float) for v in (slide, slide if base is None else base, slide))
     return ModalBasis(
@@ -40,12 +41,12 @@ def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
     )
 
 
-# slide, heave and pitch in every mode
+# Displacement, heave and pitch in every mode.
 MIXED = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
 
 
 def elastic(m: int = 21, crown: float = 0.0) -> ContactSets:
-    """Springs of 5e7 N/m coupled like those of a half space, pressed by LOAD, flat or crowned."""
+    """Return springs of 5e7 N/m coupled as in a half space and pressed by LOAD, flat or crowned."""
     x = np.linspace(-5e-3, 5e-3, m)
     c = 2e-8 * (np.exp(-np.abs(x[:, None] - x) / 2e-3) * 0.3 + np.eye(m))
     gap = crown * (x / x[-1]) ** 2
@@ -58,10 +59,12 @@ def elastic(m: int = 21, crown: float = 0.0) -> ContactSets:
 
 @cache
 def crowned() -> ContactSets:
+    """Return the crowned contact."""
     return elastic(21, 4e-7)
 
 
 def mechanical(response, basis) -> np.ndarray:
+    """Return kinetic and elastic energy of the motion, the contact and the friction (t,) [J]."""
     motion = (
         0.5
         * basis.mass
@@ -71,6 +74,7 @@ def mechanical(response, basis) -> np.ndarray:
 
 
 def balance(done, basis) -> float:
+    """Check the stored energy of a march and return its energy balance."""
     book = done.ledger
     assert book["stored"] == pytest.approx(
         mechanical(done.response, basis)[-1], rel=1e-9, abs=1e-18
@@ -79,7 +83,7 @@ def balance(done, basis) -> float:
 
 
 def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -> None:
-    """Require that a random march loses energy only, that its balance closes and that no force exceeds mu N."""
+    """Assert that a random march only loses energy, that its energy balances and that no force exceeds mu N."""
     rng = np.random.default_rng(seed)
     n = rng.integers(1, 5)
     basis = modes(
@@ -100,7 +104,7 @@ def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -
     assert balance(done, basis) <= 1e-11
     work, stored, lost, created = response.extra["ledger"]
     assert created[-1] == 0 and (np.diff(lost) >= -1e-12 * peak).all()
-    if shear is not None:  # the work of the holder
+    if shear is not None:  # The displacement of the holder does work in this case.
         assert work[-1] == pytest.approx(stored[-1] + lost[-1], rel=1e-9, abs=1e-12 * peak)
     within = 1e-9 * (lost[-1] + stored[-1]) + 1e-18
     assert done.ledger["friction"] == pytest.approx(lost[-1], abs=within)
@@ -109,7 +113,7 @@ def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -
 
 
 def march_with_lift_off(name: str, shear=None) -> tuple:
-    """Return a march that leaves the contact and lands again without a force in flight, and its balance."""
+    """Return a march that lifts off and lands again, without force while apart, and its energy balance."""
     basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
     drive = SineDrive(30.0, 2 * np.pi * 143)
     start = InitialState([0, 5e-7], [0, 0.0])
@@ -125,7 +129,7 @@ def march_with_lift_off(name: str, shear=None) -> tuple:
 
 
 def check_order_two(name: str, steps: int, within: float, shear=None) -> None:
-    """Require that the error of `MIXED` falls by nearly four when the step is halved, from `steps` a cycle on."""
+    """Assert that halving the step divides the error of `MIXED` by nearly four, from `steps` per cycle on."""
     drive = SineDrive(40.0, 2 * np.pi * 143)
     ends = []
     for factor in (1, 2, 4, 8):

@@ -1,7 +1,7 @@
-"""Exact answers to small problems of Archard's wear under a steady slip.
+"""Closed forms of small problems of Archard's wear under steady slip.
 
-Lengths [m], loads per metre of width [N/m]. `coefficient` kappa [m2/N]: volume worn off both pieces together per load
-and slip path; `path` [m]: slip path so far.
+Lengths [m], loads per metre of width [N/m]. `coefficient` kappa [m2/N]: worn volume of both bodies
+per load and sliding distance; `path` [m]: sliding distance.
 """
 
 import numpy as np
@@ -10,25 +10,28 @@ from patchfem.closed_forms.contact import require_positive
 
 
 def worn_volume(coefficient, load, path):
-    """Volume [m3] worn off both pieces, kappa N s, with the load N [N] (Archard, J. Appl. Phys. 24 (1953) 981)."""
+    """Return the worn volume [m3] of both bodies, kappa N s, with the load N [N] (Archard, J. Appl.
+
+    Phys. 24 (1953) 981).
+    """
     return coefficient * load * path
 
 
 def worn_crown_half_width(coefficient, line_load, path, radius):
-    """Half width [m] of a crown worn far beyond its elastic contact, (3/2 R kappa P s)^(1/3).
+    """Return the half-width [m] of a crown worn far beyond its elastic contact, (3/2 R kappa P s)^(1/3).
 
-    Even pressure wears a parabola of height x^2/(2 radius) flat: 2 a^3/(3 R) = kappa P s per width. The elastic
-    contact is not counted, so the value is approached from below.
+    Uniform pressure flattens a parabola of height x^2/(2 radius): 2 a^3/(3 R) = kappa P s per
+    width. The elastic contact is neglected, so the value is approached from below.
     """
     require_positive(radius=radius)
     return np.cbrt(1.5 * radius * coefficient * line_load * path)
 
 
 def worn_pad_fraction(coefficient, line_load, path, angle, length, stiffness):
-    """Share of a tilted rigid pad in contact after wear, on a foundation of `stiffness` k [Pa/m] at a held angle.
+    """Return the fraction of a tilted rigid pad in contact after wear, on a foundation k [Pa/m] at fixed angle.
 
-    c = sqrt(2 P (1/k + kappa s)/angle) as long as it is shorter than `length`, then 1: the worn depth adds to the
-    compliance of every point.
+    c = sqrt(2 P (1/k + kappa s)/angle) while it is shorter than `length`, then 1: the worn depth
+    adds to the compliance of every point.
     """
     require_positive(angle=angle, length=length, stiffness=stiffness)
     return np.minimum(
@@ -37,9 +40,10 @@ def worn_pad_fraction(coefficient, line_load, path, angle, length, stiffness):
 
 
 def even_wear_pressure(line_load, path, weight):
-    """Pressure (m,) [Pa] of a fully worn-in pad whose points slide different paths (m,) [m]: proportional to 1/path.
+    """Return the pressure (m,) [Pa] of a worn-in pad whose points have different sliding distances (m,) [m].
 
-    weight (m,) [m]: length of each node. Every point wears alike, so pressure times path is the same everywhere.
+    It is proportional to 1/path. weight (m,) [m]: length of each node. All points wear at the same
+    rate, so pressure times path is uniform.
     """
     path = np.asarray(path, float)
     require_positive(path=path)

@@ -1,11 +1,12 @@
-"""Random benches with wear, and an independent integration of Archard's law with which their errors are compared.
+"""Random benches with wear, and an independent integration of Archard's law for comparison.
 
 This is the campaign "wear" of `campaigns.py`.
 
-Truth: dh/ds = coefficient * pressure for the depth h and the slip path s, on the compliance of the cells of order 4 of
-`static_reference`. Nothing of the package is used. Each step is an implicit Euler step: the contact is solved with
-C + diag(coefficient * ds / area). Steps halved twice give Richardson's extrapolation, and a coarser mesh gives the
-uncertainty. The volume has the closed form coefficient * load * path (`wear_forms.worn_volume`).
+Truth: dh/ds = coefficient * pressure for the depth h and the sliding distance s, on the compliance
+of the elements of order 4 of `static_reference`. Nothing of the package is used. Each step is an
+implicit Euler step: the contact is solved with C + diag(coefficient * ds / area). Steps halved
+twice give Richardson's extrapolation, and a coarser mesh gives the uncertainty. The volume has the
+closed form coefficient * load * path (`wear_forms.worn_volume`).
 """
 
 from __future__ import annotations
@@ -22,14 +23,15 @@ from wear_forms import worn_volume
 
 import patchfem as pf
 
-# Cells along the part that is in contact before or after wear; the second mesh gives the truth.
+# Cells along the part in contact before or after wear; the second mesh gives the truth.
 CELLS = (30, 75)
-STEPS = (30, 60, 120)  # implicit Euler steps, each a halving of the one before
-FIRST_STEP = 1e-4  # first of the coarsest steps as a fraction of the path: pressure at a corner wears off at once
+STEPS = (30, 60, 120)  # Numbers of implicit Euler steps; each halves the previous steps.
+# First of the coarsest steps relative to the path; pressure at a corner wears off immediately.
+FIRST_STEP = 1e-4
 
 
 class WearScene(NamedTuple):
-    """A patch that slides to and fro on the whole, in SI units."""
+    """Patch that slides back and forth without partial slip, in SI units."""
 
     patch: reference.Scene
     coefficient: float  # [m^2/N]
@@ -38,12 +40,12 @@ class WearScene(NamedTuple):
 
     @property
     def path(self) -> float:
-        """Slip path [m]."""
+        """Sliding distance [m]."""
         return 4 * self.amplitude * self.cycles
 
 
 class Model(NamedTuple):
-    """Discrete patch: compliances (m, m) [m/N] per unit width, places, weights and gap (m,) [m]."""
+    """Discrete patch: compliances (m, m) [m/N] per unit width, positions, weights and gap (m,) [m]."""
 
     normal: np.ndarray
     tangential: np.ndarray
@@ -68,7 +70,7 @@ def draw(seed: int) -> WearScene:
 
 
 def text_of(scene: WearScene) -> str:
-    """Write the scene as the program reads it."""
+    """Return the scene as text."""
     return static_scenes.text_of(scene.patch) + (
         '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\nfrequency = "10 Hz"\ncycles = 2\n'
         f'amplitude = "{scene.amplitude!r} m"\n[wear]\ncoefficient = "{scene.coefficient!r} m^2/N"\n'
@@ -77,7 +79,7 @@ def text_of(scene: WearScene) -> str:
 
 
 def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
-    """Condense both pieces to an interface with even cells over `span` and larger ones outside it."""
+    """Condense both bodies to an interface with uniform cells over `span` and larger ones outside it."""
     half = patch.length / 2
     size = (span[1] - span[0]) / cells
     corner = min(patch.lower.height, patch.length) / 60
@@ -107,7 +109,7 @@ def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
 
 
 class WornPatch(NamedTuple):
-    """State after wear: depth of both pieces together (m,) [m], nodal forces, approach, nodes in contact."""
+    """State after wear: depth of both bodies together (m,) [m], nodal forces, approach, nodes in contact."""
 
     depth: np.ndarray
     force: np.ndarray
@@ -116,7 +118,7 @@ class WornPatch(NamedTuple):
 
 
 def integrate(model: Model, scene: WearScene, steps: int) -> WornPatch:
-    """Integrate the depth over the path in `steps` steps that grow geometrically."""
+    """Integrate the depth along the sliding distance in `steps` steps that grow geometrically."""
     load = scene.patch.load / scene.patch.width
     edges = (
         np.expm1(np.linspace(0, 1, steps + 1) * np.log1p(1 / FIRST_STEP)) * FIRST_STEP * scene.path
@@ -152,7 +154,7 @@ def wear(model: Model, scene: WearScene, steps: int) -> dict:
         "normal_stiffness": inverse.sum() * patch.width,
         "rotational_stiffness": place[index] @ inverse @ place[index] * patch.width,
     }
-    if index.size == index[-1] - index[0] + 1:  # in contact all along: no gap inside
+    if index.size == index[-1] - index[0] + 1:  # The contact has no gap inside.
         values["contact_fraction"] = (ends[1] - ends[0]) / patch.length
     if model.tangential.size:
         soft = model.tangential[np.ix_(index, index)]
@@ -163,7 +165,7 @@ def wear(model: Model, scene: WearScene, steps: int) -> dict:
 
 
 def contact_span(model: Model, scene: WearScene) -> tuple:
-    """Find the smallest and largest place in contact before and after wear."""
+    """Return the smallest and largest position in contact before and after wear."""
     load = scene.patch.load / scene.patch.width
     rate = scene.coefficient * scene.path / model.weight
     new = reference.contact(model.normal, model.gap, load)[2]
@@ -173,7 +175,7 @@ def contact_span(model: Model, scene: WearScene) -> tuple:
 
 
 def answer(scene: WearScene) -> dict:
-    """Compute the measures after wear: name -> (value, uncertainty)."""
+    """Return the measures after wear: name -> (value, uncertainty)."""
     patch = scene.patch
     half = scene.patch.length / 2
     span = (-half, half)

@@ -1,4 +1,4 @@
-"""Corner singularities of two elastic wedges pressed together without friction, from the eigenfunctions of either."""
+"""Corner singularities of two elastic wedges pressed together without friction, from the eigenfunctions of both."""
 
 from __future__ import annotations
 
@@ -7,19 +7,21 @@ from scipy.optimize import brentq
 
 
 def turning(angle: float, power: float) -> float:
-    """Turn of the loaded face of a wedge of `angle` [rad] under the pressure r^(power - 1), up to a common factor.
+    """Return the rotation of the loaded face of a wedge of `angle` [rad], up to a factor.
 
-    Airy's function r^(power + 1) f(t) with f = (cos, sin)((power + 1) t), (cos, sin)((power - 1) t): no traction on the
-    face t = angle, no shear and unit pressure on t = 0. The motion across that face is the last coefficient (Williams
-    1952).
+    The pressure is r^(power - 1). Airy's function r^(power + 1) f(t) with f = (cos, sin)((power +
+    1) t), (cos, sin)((power - 1) t): no traction on the face t = angle, no shear and unit pressure
+    on t = 0. The displacement normal to that face is the last coefficient (Williams 1952).
     """
     p = power + 1
     m = power - 1
 
     def value(t):
+        """Return the four basis functions at an angle t."""
         return [np.cos(p * t), np.sin(p * t), np.cos(m * t), np.sin(m * t)]
 
     def slope(t):
+        """Return their derivatives."""
         return [-p * np.sin(p * t), p * np.cos(p * t), -m * np.sin(m * t), m * np.cos(m * t)]
 
     return np.linalg.solve(
@@ -28,9 +30,10 @@ def turning(angle: float, power: float) -> float:
 
 
 def falling(one: float, other: float, low: float = 0.4, high: float = 0.95) -> float:
-    """Exponent a of p ~ r^-a where wedges of one material and of these angles [degrees] meet at their corners."""
+    """Return the exponent a of p ~ r^-a if corners of these angles [degrees] of one material meet."""
 
     def turn(power):
+        """Return the sum of the rotations of both faces."""
         return sum(turning(np.deg2rad(angle), power) for angle in (one, other))
 
     return 1 - brentq(turn, low, high)

@@ -1,7 +1,7 @@
-"""Made pairs of every kind that a laboratory brings to `compare`: what wore, what was dust, what the file turned over.
+"""Synthetic pairs of traces of every kind that a laboratory compares: worn, dusty, mirrored, inverted and others.
 
-The surface is a sum of 700 cosines with a power law between a rolled-off long and a shortest wave, so that it is known
-at every place; `pairs` cuts the report's surface instead.
+The surface is a sum of 700 cosines with a power law between a long roll-off and a shortest wave, so
+it is known at every position; `pairs` uses the report's surface instead.
 """
 
 from typing import NamedTuple
@@ -38,8 +38,11 @@ KINDS = (
 
 
 class Kind(NamedTuple):
-    """before, after: Profile; shift [m]; worn, piled (n,) [m]: what is lost and what stands above, at the samples of
-    after; factor: length after over before."""
+    """Two traces and their true difference.
+
+    before, after: Profile; shift [m]; worn, piled (n,) [m]: lost and added material at the samples
+    of after; factor: length after over before.
+    """
 
     before: Profile
     after: Profile
@@ -50,7 +53,7 @@ class Kind(NamedTuple):
 
 
 def surface(random, rms: float, longest: float, shortest: float):
-    """A rough surface as a function of x [m]: rms [m], waves from longest to shortest [m]."""
+    """Return a rough surface as a function of x [m]: rms [m], waves from longest to shortest [m]."""
     count = 700
     wave = np.exp(random.uniform(np.log(1 / (4 * longest)), np.log(1 / shortest), count))
     hurst = random.uniform(0.6, 1.0)
@@ -63,6 +66,7 @@ def surface(random, rms: float, longest: float, shortest: float):
     phase = random.uniform(0, 2 * np.pi, count)
 
     def height(x):
+        """Return the heights [m] at positions x (n,) [m]."""
         out = np.zeros(x.size)
         for a, k, p in zip(size, 2 * np.pi * wave, phase):
             out += a * np.cos(k * x + p)
@@ -72,7 +76,7 @@ def surface(random, rms: float, longest: float, shortest: float):
 
 
 def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
-    """Worn depth [m] at the samples."""
+    """Return the worn depth [m] at the samples."""
     t = x / x[-1]
     depth = random.uniform(1.0, 6.0) * max(rms, 0.3 * UM)
     if kind in ("even", "wedge"):
@@ -120,7 +124,7 @@ def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
 
 
 def made(kind: str, seed: int) -> Kind:
-    """A pair of a kind of `KINDS`: 1 to 4 mm long, 0.2 um to 6 um rough, noise of 5 nm to 40 nm, tilted and moved."""
+    """Return a pair of a kind: 1 to 4 mm long, 0.2 um to 6 um rough, noise of 5 nm to 40 nm, tilted and shifted."""
     random = np.random.default_rng([KINDS.index(kind), seed, 51])
     step = random.choice([0.5, 1.0, 2.0]) * UM if kind != "coarse" else 4 * UM
     length = random.uniform(1.0, 2.5) * 1e-3

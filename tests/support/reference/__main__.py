@@ -1,4 +1,4 @@
-"""Write the generated pages of patchfem/scene anew: python tests/support/reference."""
+"""Write the generated pages of patchfem/scene: python tests/support/reference."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The table of the guide that answers which friction law a joint needs."""
+"""Table of the guide that shows which friction law a joint needs."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ HEAD = ("you know", "you want", "law and its keys", "what it gives, and its limi
 
 
 def text() -> str:
-    """Return the page of the guide with its table of joint laws written anew."""
+    """Return the page of the guide with its table of joint laws generated again."""
     before, _, rest = FILE.read_text("utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
     words = f"{_define('know', KNOWLEDGE)}\n{_define('want', WISHES)}"
@@ -22,7 +22,7 @@ def text() -> str:
 
 
 def _define(question: str, meanings: dict) -> str:
-    """Return an item of a list with the meaning of every answer to a question."""
+    """Return a list item with the meaning of every answer to a question."""
     answers = "; ".join(f"`{word}`: {meaning}" for word, meaning in meanings.items())
     return f"- What you {question}: {answers}."
 
@@ -33,7 +33,7 @@ def _format_words(words: tuple) -> str:
 
 
 def _list_rows() -> list[tuple]:
-    """Return the rows of the table, as texts."""
+    """Return the rows of the table as texts."""
     rows = []
     for row in JOINT_LAWS:
         keys = _format_words(("static", *row.keys))

@@ -1,4 +1,4 @@
-"""The reference of what a scene may say: tables, keys, effects and units."""
+"""Reference of the contents of a scene: tables, keys, effects and units."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,7 +39,7 @@ See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials
 
 
 def text() -> str:
-    """The whole page of patchfem/scene/README.md, from the records that the program reads."""
+    """Return the page patchfem/scene/README.md, made from the records that the program reads."""
     units = [
         (kind, ", ".join(f"`{unit}`" for unit in units), f'`"{EXAMPLE_QUANTITIES[kind]}"`')
         for kind, units in UNIT_FACTORS.items()
@@ -55,13 +55,13 @@ def text() -> str:
 
 
 def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
-    """(header, model) of every table of a scene in order, ("", Tables) first; the header of an array is [[...]].
+    """Yield (header, model) of every table of a scene in order, ("", Tables) first; the header of an array is [[...]].
 
     model: the pydantic class to begin with; at: its header.
     """
     yield (at, model)
     for key, name in attributes_by_key(model).items():
-        # it has the tables of [contact]
+        # An interface has the same tables as [contact].
         if _is_table(model, name) and (model, name) != (Interface, "contact"):
             path = f"{at.strip('[]')}.{key}".strip(".")
             many = get_origin(model.model_fields[name].annotation) is tuple
@@ -69,10 +69,12 @@ def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
 
 
 def _is_table(model: type, name: str) -> bool:
+    """Return whether a field of a model is a table."""
     return find_inner_table(model, name) is not None and not is_table_or_value(model, name)
 
 
 def _keys() -> list:
+    """Return the sections of all tables with their keys."""
     heads = {}
     out = []
     for header, model in tables():
@@ -107,6 +109,7 @@ def _keys() -> list:
 
 
 def _row(model: type, key: str, at: str) -> tuple:
+    """Return the row of a key: name, kind, default, condition and meaning."""
     name = attributes_by_key(model)[key]
     field = model.model_fields[name]
     path = f"{at}.{key}".strip(".")
@@ -123,7 +126,7 @@ def _row(model: type, key: str, at: str) -> tuple:
 
 
 def _needed(model: type, key: str, table: str) -> str:
-    """Condition that makes a key of a table necessary: "with law `tanh`", the values of a selector, or words."""
+    """Return the condition that makes a key necessary: "with law `tanh`", the values of a selector, or a sentence."""
     found = find_key_record(model, key)
     said = [found.required] if found and found.required else []
     for selector, used in NEEDS.items():
@@ -134,6 +137,7 @@ def _needed(model: type, key: str, table: str) -> str:
 
 
 def _kind(model: type, name: str) -> str:
+    """Return the kind of value of a key, with its bounds."""
     annotation = model.model_fields[name].annotation
     types = (annotation, *iterate_annotation_parts(annotation))
     words = [
@@ -154,7 +158,7 @@ def _kind(model: type, name: str) -> str:
 
 
 def _plural(word: str) -> str:
-    """Several of a kind: masses, velocities, lengths."""
+    """Return the plural of a kind: masses, velocities, lengths."""
     return (
         f"{word[:-1]}ies"
         if word.endswith("y")
@@ -165,7 +169,7 @@ def _plural(word: str) -> str:
 
 
 def _limits(model: type, name: str) -> list:
-    """Bounds of a key, as ">= 1"."""
+    """Return the bounds of a key, such as ">= 1"."""
     annotation = model.model_fields[name].annotation
     marks = [
         inner
@@ -187,7 +191,7 @@ def _limits(model: type, name: str) -> list:
 
 
 def bounds() -> Iterator[tuple]:
-    """(dotted key, kind with its bounds) of every key that is a whole number or has an upper bound."""
+    """Yield (dotted key, kind with its bounds) of every key that is a whole number or has an upper bound."""
     for header, model in tables():
         for key, name in attributes_by_key(model).items():
             if _is_table(model, name):
@@ -199,21 +203,21 @@ def bounds() -> Iterator[tuple]:
 
 
 class Equations:
-    """The table of the equations of all effects, inside the page of the theory."""
+    """Table of the equations of all effects, in the page of the theory."""
 
     FILE = FOLDER.parents[1] / "studies" / "site" / "theory.md"
     BEGIN, END = "<!-- effects -->\n", "<!-- end -->"
 
     @classmethod
     def text(cls) -> str:
-        """Return the page of the theory with its table of effects written anew."""
+        """Return the page of the theory with its table of effects generated again."""
         before, _, rest = cls.FILE.read_text("utf-8").partition(cls.BEGIN)
         after = rest.partition(cls.END)[2]
         return f"{before}{cls.BEGIN}\n{effects_table()}\n\n{cls.END}{after}"
 
 
 def effects_table() -> str:
-    """Return the table of all effects: the keys that they need and may have, and their equations."""
+    """Return the table of all effects: required keys, optional keys, and equations."""
     rows = []
     for name, effect in EFFECTS.items():
         selector, _, value = name.partition("=")
@@ -230,7 +234,7 @@ def effects_table() -> str:
 
 
 def grid(head: tuple, rows: list) -> str:
-    """A table of Markdown: its head and rows of texts."""
+    """Return a Markdown table from its head and rows of texts."""
     lines = [
         head,
         ("---",) * len(head),

@@ -1,4 +1,4 @@
-"""The page of limits: what stands together, how large and how many, what the model leaves out."""
+"""Page of limits: permitted combinations, sizes and numbers, and what the models neglect."""
 
 from importlib import import_module
 
@@ -17,7 +17,7 @@ scene. "yes" means that the scene can run. "no" means that the scene is refused 
 names the line, the key and an alternative; `patchfem check SCENE` prints it. The last section says what the models
 neglect.
 """
-SIZES = {  # constant -> what it bounds and how it is written
+SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.toml_text.MAX_BYTES": "bytes of a scene file",
     "scene.lines.MAX_KEY_PARTS": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
@@ -111,7 +111,7 @@ TABLES = (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on
 
 
 def text() -> str:
-    """Return the page of patchfem/scene/LIMITS.md: scenes are put together and checked, nothing is run."""
+    """Return the page patchfem/scene/LIMITS.md; scenes are assembled and checked, but not run."""
     body = []
     for title, columns in TABLES:
         body += [f"## {title}", _compatibility_table(columns)]
@@ -169,6 +169,7 @@ def refusals(columns: tuple) -> dict:
 
 
 def _compatibility_table(columns: tuple) -> str:
+    """Return the table that shows for each law which columns are permitted."""
     rows = refusals(columns)
     return grid(
         ("law", *(column.words for column in columns)),
@@ -180,14 +181,17 @@ def _compatibility_table(columns: tuple) -> str:
 
 
 def _listed(names) -> str:
+    """Return names as an enumeration."""
     return "; ".join(f"*{name}*" for name in names) or "none"
 
 
 def _bounds() -> str:
+    """Return the table of permitted values."""
     return grid(("key", "permitted values"), [(f"`{key}`", said) for key, said in bounds()])
 
 
 def _sizes() -> str:
+    """Return the table of the largest sizes."""
     rows = []
     for name, words in SIZES.items():
         module, _, constant = name.rpartition(".")

@@ -1,4 +1,4 @@
-"""The pages of measures and of materials."""
+"""Pages of measures and of materials."""
 
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
@@ -10,7 +10,7 @@ MADE = "`python tests/support/reference` generates this page from the program's 
 
 
 class Measures:
-    """What a run answers: every measure of `response.rows` and `runs.results.patch_rows`."""
+    """Page of the measures of `response.rows` and `runs.results.patch_rows`."""
 
     FILE = FOLDER / "MEASURES.md"
     HEAD = f"""\
@@ -38,7 +38,7 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
 
     @classmethod
     def text(cls) -> str:
-        """The whole page."""
+        """Return the page."""
         still, moving = (
             [(f"`{one.name}`", one.unit, _floor(one), one.text) for one in rows]
             for rows in (STATIC, MOTION)
@@ -59,7 +59,7 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
 
 
 def _floor(row) -> str:
-    """The floor of a row, and behind it the tolerance times a larger term where that is a floor as well."""
+    """Return the floor of a row, with its relative part if it has one."""
     if row.larger_term is None:
         return f"{row.floor:g}"
     return f"{row.floor:g}; tolerance" + (
@@ -68,7 +68,7 @@ def _floor(row) -> str:
 
 
 class Materials:
-    """The materials that a scene may name."""
+    """Page of the materials that a scene may name."""
 
     FILE = FOLDER / "MATERIALS.md"
     HEAD = f"""\
@@ -88,7 +88,7 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
 
     @classmethod
     def text(cls) -> str:
-        """The whole page."""
+        """Return the page."""
         rows = []
         warm = []
         firm = []

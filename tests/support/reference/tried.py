@@ -1,4 +1,4 @@
-"""What stands together, by asking: scenes are put together from a law and what may stand beside it, and read."""
+"""Permitted combinations, found by checking scenes: each consists of a law and the rest of a scene."""
 
 import re
 from functools import cache
@@ -72,7 +72,7 @@ METHODS = ("auto", "exact", "march", "harmonic")
 
 
 class Beside(NamedTuple):
-    """A heading; the text of a scene without its law, and what is set in it."""
+    """Column of a table of limits: heading, text of a scene without its law, and keys set in it."""
 
     words: str
     text: str
@@ -136,7 +136,7 @@ BENCHES = (
 
 
 def laws() -> dict:
-    """Name of a form of a law -> the keys that a table of it holds."""
+    """Return {name of a form of a law: text of its table}."""
     out = {}
     for law, effect in LAWS.items():
         needs = effect.keys[0].replace("|stiffness", "").split()
@@ -148,7 +148,7 @@ def laws() -> dict:
 
 @cache
 def refused(keys: str, beside: Beside) -> tuple:
-    """Sentences with which a scene is refused, without their places; () where it is read without a mistake."""
+    """Return the sentences with which a scene is refused, without their positions; () if it is valid."""
     if "masses" in beside.text:
         own = 'load = "100 N"\n'
         if "patch" in beside.text:
@@ -169,6 +169,6 @@ def refused(keys: str, beside: Beside) -> tuple:
 
 
 def across(keys: str) -> tuple:
-    """Why a bench of one point with this law does not slide in two directions; () where it does."""
+    """Return why a bench with one point and this law cannot slide in two directions; () if it can."""
     reason = find_lateral_slide_obstacle(loads(POINT + BENCH + f"[friction]\n{keys}").tables())
     return (f"slide.file: {reason}",) if reason else ()

@@ -1,4 +1,4 @@
-"""Attack the installed patchfem with seeded scenes, files, kills and limits; exit code 3 where something gave way.
+"""Test the installed patchfem with seeded scenes, files, kills and limits; exit code 3 if a trial failed.
 
 Example: python tests/support/torture --share 0.001 --campaign grammar
 """
@@ -14,7 +14,7 @@ from torture import driver
 
 
 def main(words=None) -> int:
-    """The program; exit code."""
+    """Run the command line and return the exit code."""
     parser = argparse.ArgumentParser(prog="torture", description=__doc__.splitlines()[0])
     parser.add_argument(
         "--share", type=float, default=0.02, help="of every campaign, above 0 and up to 1"
@@ -35,6 +35,7 @@ def main(words=None) -> int:
         return 4
 
     def say(text: str) -> None:
+        """Print a message to stderr."""
         print(text, file=sys.stderr, flush=True)
 
     from patchfem.__main__ import run_command

@@ -1,4 +1,4 @@
-"""All campaigns: how large each is, what makes its trials, the loop that runs them and the table that sums them up."""
+"""All campaigns: their sizes, the functions of their trials, the loop that runs them and the summary table."""
 
 import gc
 import shutil
@@ -17,7 +17,11 @@ from .trial import Trial, alone, captured, emptied
 
 
 class Campaign(NamedTuple):
-    """size: trials of the whole; made: module and function of one trial; clock: seconds after which one is killed."""
+    """Campaign of trials.
+
+    size: number of trials; made: module and function of a trial; clock: seconds after which a trial
+    is killed.
+    """
 
     size: int
     made: str
@@ -40,7 +44,7 @@ CAMPAIGNS = {
     "memory": Campaign(50, "processes.memory", "limits of memory"),
     "determinism": Campaign(20, "processes.determinism", "runs again, more threads"),
 }
-WARM = (  # scenes that load what most trials need, so that a forked trial finds it
+WARM = (  # Scenes that load the modules of most trials, so that a forked trial already has them.
     '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'
     'moving_mass = "1 kg"\n[[structure.mode]]\nname = "m"\nfrequency = "143 Hz"\ndamping = 0.01\nslide = 1.0\n[drive]\n'
     'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 3\n[accuracy]\ntolerance = 1e-2\n',
@@ -50,7 +54,7 @@ WARM = (  # scenes that load what most trials need, so that a forked trial finds
 
 
 class Row(NamedTuple):
-    """What one campaign came to; faults: (index, what went wrong)."""
+    """Result of a campaign; faults: (index, description)."""
 
     name: str
     tried: int
@@ -59,17 +63,18 @@ class Row(NamedTuple):
 
 
 def random_numbers(name: str, seed: int, index: int) -> np.random.Generator:
-    """Return the random numbers of a trial, which depend on its campaign, seed and index alone."""
+    """Return the random generator of a trial, which depends only on its campaign, seed and index."""
     return np.random.default_rng([seed, index, zlib.crc32(name.encode())])
 
 
 def torture(
     command: Callable, share: float, names: list, seed: int, only: int | None, say: Callable
 ) -> list:
-    """Run campaigns; a Row for each.
+    """Run campaigns and return a row for each.
 
-    command: words -> exit code in this process; share: of every campaign's trials, at least one; names: of campaigns;
-    only: the index of the one trial to run, None for all; say: called with each fault as it is found.
+    command: words -> exit code in this process; share: fraction of the trials of every campaign, at
+    least one trial; names: of campaigns; only: the index of a single trial, None for all; say:
+    called with each fault when it is found.
     """
     out = []
     with tempfile.TemporaryDirectory(prefix="torture") as place:
@@ -93,14 +98,20 @@ def torture(
 
 
 def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> str:
-    """What went wrong in one trial, empty where nothing did. What looks like a hang gets the time that compiling may
-    take, after which the compiled code is kept, and then the usual time once more."""
+    """Return the fault of a trial, empty if there is none.
+
+    An apparent hang is repeated with the time that compilation may take; then the compiled code is
+    cached, and the trial is repeated with the usual time.
+    """
     campaign = CAMPAIGNS[name]
     module, function = campaign.made.split(".")
     work = getattr(import_module(f"{__package__}.{module}"), function)
 
     def attempt(patience: float) -> str:
+        """Run the trial with a factor on its time limits."""
+
         def trial(tell):
+            """Return the trial with its random numbers and folder."""
             return Trial(
                 random_numbers(name, seed, index), emptied(place / name), command, tell, patience
             )
@@ -114,7 +125,7 @@ def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> s
 
 
 def warm(command: Callable, place: Path) -> None:
-    """Import in this process, before any fork, what most trials would import each by itself."""
+    """Import in this process, before any fork, the modules that most trials would import."""
     import h5py  # noqa: F401
 
     for number, text in zip(count(), WARM):
@@ -127,7 +138,7 @@ def warm(command: Callable, place: Path) -> None:
 
 
 def table(rows: list) -> str:
-    """The campaigns as lines: name, tried, failed, seconds."""
+    """Return the campaigns as lines: name, trials, failures, seconds."""
     width = max(len(row.name) for row in rows)
     lines = [f"{'campaign':<{width}}  {'tried':>6}  {'failed':>6}  {'seconds':>8}"]
     lines += [

@@ -1,13 +1,13 @@
-"""Scenes of small cost by the grammar of the scene: every kind of run, table, law, drive and method, as nested dicts.
+"""Cheap random scenes of every kind of run, table, law, drive and method, as nested dicts.
 
-Most of them run as they are; what may not stand together is left to the program to refuse.
+Most of them run; combinations that are not permitted are refused by the program.
 """
 
 from patchfem.effects import LAWS, WAVEFORMS
 
 from .trial import Trial
 
-OF_LAWS = {  # key -> (low, high, unit) of a rig with a motion of some 50 um and 30 N of friction
+OF_LAWS = {  # Key -> (low, high, unit) for a rig with a motion of about 50 um and 30 N of friction.
     "kinetic": (0.1, 0.3, ""),
     "reference_speed": (1e-4, 1e-2, "m/s"),
     "bond_length": (1e-7, 5e-5, "m"),
@@ -36,12 +36,12 @@ SUBSTRATES = (
 
 
 def quantity(trial: Trial, low: float, high: float, unit: str) -> str:
-    """A text such as "0.0012 m" between two sizes."""
+    """Return a quantity as text, such as "0.0012 m", with a log-uniform value."""
     return f"{trial.wide(low, high)!r} {unit}"
 
 
 def scene(trial: Trial, kind: str = "") -> dict:
-    """A scene of a kind, drawn where none is named: patch, bench, rig, masses or linear."""
+    """Return a random scene; kind: patch, bench, rig, masses or linear, drawn if empty."""
     kind = kind or trial.draw(
         "patch", "patch", "bench", "bench", "rig", "rig", "rig", "masses", "linear"
     )
@@ -72,7 +72,7 @@ def scene(trial: Trial, kind: str = "") -> dict:
 
 
 def patch(trial: Trial) -> dict:
-    """[contact] with a few of its tables."""
+    """Return [contact] with some of its tables."""
     length = trial.wide(*LENGTH)
     out = {
         "length": f"{length!r} m",
@@ -119,7 +119,7 @@ def patch(trial: Trial) -> dict:
 
 
 def asperities(trial: Trial) -> dict:
-    """[contact.asperities] with the keys of its law."""
+    """Return [contact.asperities] with the keys of its law."""
     law = trial.draw("linear", "exponential", "hertz")
     keys = {
         "linear": {"normal_stiffness": quantity(trial, 1e11, 1e14, "Pa/m")},
@@ -141,7 +141,7 @@ def asperities(trial: Trial) -> dict:
 
 
 def grooves(trial: Trial) -> dict:
-    """[contact.grooves] or [normal.grooves]."""
+    """Return [contact.grooves] or [normal.grooves]."""
     return {
         "wavelength": quantity(trial, 2e-5, 2e-4, "m"),
         "amplitude": quantity(trial, 1e-7, 1e-5, "m"),
@@ -149,7 +149,7 @@ def grooves(trial: Trial) -> dict:
 
 
 def point(trial: Trial) -> dict:
-    """[normal], its load changing in one of eight."""
+    """Return [normal]; in about one of eight scenes the load varies."""
     load = trial.wide(5, 500)
     out = {"load": f"{load!r} N"}
     if trial.chance(0.12):
@@ -165,7 +165,7 @@ def point(trial: Trial) -> dict:
 
 
 def friction(trial: Trial, spread: bool = False, law: str = "") -> dict:
-    """[friction] or the same keys of an interface: a law, what it needs and some of what it may have."""
+    """Return [friction], or the same keys of an interface: a law with its required and some optional keys."""
     law = law or trial.draw(*LAWS)
     needs, may = (words.replace("|stiffness", "").split() for words in LAWS[law].keys)
     out = {"law": law, "static": round(float(trial.r.uniform(0.3, 0.8)), 3)}
@@ -188,7 +188,7 @@ def friction(trial: Trial, spread: bool = False, law: str = "") -> dict:
 
 
 def slide(trial: Trial) -> dict:
-    """[slide] of any kind but a file."""
+    """Return [slide] of any kind except a file."""
     kind = trial.draw("constant", "sine", "triangle", "dwell")
     reach = {"distance": quantity(trial, 1e-6, 1e-4, "m")}
     speed = {"speed": quantity(trial, 1e-4, 1e-2, "m/s")}
@@ -203,7 +203,7 @@ def slide(trial: Trial) -> dict:
 
 
 def modes(trial: Trial, kind: str = "rig") -> dict:
-    """[structure] of one to three modes."""
+    """Return [structure] with one to three modes."""
     first = trial.wide(40, 300)
     out = []
     for k in range(trial.draw(1, 1, 1, 2, 3)):
@@ -228,7 +228,7 @@ def modes(trial: Trial, kind: str = "rig") -> dict:
 
 
 def masses(trial: Trial) -> dict:
-    """[structure] of two masses with springs, dampers and one or two interfaces."""
+    """Return [structure] with two masses, springs, dampers and one or two interfaces."""
     between = ([1, 0], [2, 1], [2, 0])
     laws = [friction(trial) for _ in range(trial.draw(1, 2))]
     return {
@@ -248,7 +248,7 @@ def masses(trial: Trial) -> dict:
 
 
 def drive(trial: Trial, structure: dict) -> dict:
-    """[drive] with the keys of its waveform; a release gets its start written into the structure."""
+    """Return [drive] with the keys of its waveform; a release also sets the start of the structure."""
     count = len(structure.get("masses", structure.get("mode", ())))
     kind = trial.draw("base", "base", "base", "force", "free")
     if kind == "free":
@@ -293,7 +293,7 @@ def drive(trial: Trial, structure: dict) -> dict:
 
 
 def accuracy(trial: Trial, kind: str) -> dict:
-    """[accuracy]: a coarse tolerance, a method in one of five."""
+    """Return [accuracy]: a coarse tolerance, and a method in one of five scenes."""
     out = {"tolerance": trial.draw(1e-2, 1e-2, 3e-3)}
     if kind in ("rig", "linear", "masses") and trial.chance(0.2):
         out["method"] = trial.draw("exact", "march", "harmonic")

@@ -1,4 +1,4 @@
-"""Files made to harm: what would run code, unpack without end, wait for ever, or write outside its folder."""
+"""Malicious files: they would run code, unpack without end, block forever, or write outside their folder."""
 
 import io
 import json
@@ -15,7 +15,7 @@ from .tables import RIG, RUBS
 from .toml import text_of
 from .trial import Trial, Wrong
 
-MARK = "was-run"  # a file that only executed code makes
+MARK = "was-run"  # File that exists only if code was executed.
 BOMB = (
     b"<?xml version='1.0'?><!DOCTYPE l [<!ENTITY a 'aaaaaaaaaa'>"
     + b"".join(b"<!ENTITY %c '%s'>" % (98 + k, b"&%c;" % (97 + k) * 10) for k in range(9))
@@ -25,14 +25,15 @@ OUTSIDE = b"<?xml version='1.0'?><!DOCTYPE x [<!ENTITY y SYSTEM 'file:///etc/pas
 
 
 class Planted:
-    """What a pickle would call."""
+    """Object whose unpickling would run a command."""
 
     def __reduce__(self):
+        """Return the command that unpickling would run."""
         return os.system, (f"touch {MARK}",)
 
 
 def files(trial: Trial) -> None:
-    """One of the kinds, read by a verb that takes its ending."""
+    """Read a malicious file with a command that accepts its suffix, and check that it did no harm."""
     kind = KINDS[int(trial.r.integers(len(KINDS)))]
     words = kind(trial)
     trial.run(*words, seconds=20.0)
@@ -46,7 +47,7 @@ def files(trial: Trial) -> None:
 
 
 def pickled(trial: Trial) -> list:
-    """A pickle under every ending that a verb reads."""
+    """Make a pickle with any suffix that a command reads."""
     name = trial.draw(
         "x.npy", "x.npz", "x.mat", "x.csv", "x.uff", "x.sdf", "x.x3p", "x.plu", "x.toml", "x.npy"
     )
@@ -60,7 +61,7 @@ def pickled(trial: Trial) -> list:
 
 
 def read_by(trial: Trial, name: str) -> list:
-    """Words of a command that reads a file: as a surface, as records, as a rig, as a scene."""
+    """Return a command that reads a file: as a surface, as records, as a rig, or as a scene."""
     ending = Path(name).suffix
     if ending == ".toml":
         return [trial.draw("check", "plan", "run", "cite"), name]
@@ -103,7 +104,7 @@ def read_by(trial: Trial, name: str) -> list:
 
 
 def zip_bomb(trial: Trial) -> list:
-    """A small archive that unpacks to 620 MB."""
+    """Make a small archive that unpacks to 620 MB."""
     name = trial.draw("x.npz", "x.x3p", "x.npz")
     with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as archive:
         head = io.BytesIO()
@@ -120,7 +121,7 @@ def zip_bomb(trial: Trial) -> list:
 
 
 def zip_slip(trial: Trial) -> list:
-    """An archive whose members lie outside."""
+    """Make an archive whose members lie outside its folder."""
     name = trial.draw("x.x3p", "x.npz")
     with zipfile.ZipFile(name, "w") as archive:
         for one in ("../escaped", "/tmp/escaped", "main.xml", "../../escaped/main.xml"):
@@ -129,7 +130,7 @@ def zip_slip(trial: Trial) -> list:
 
 
 def xml_bomb(trial: Trial) -> list:
-    """Entities of entities, or of a file."""
+    """Make XML with nested entities, or with the entity of a system file."""
     name = trial.draw("x.vtu", "x.x3p")
     text = trial.draw(BOMB, OUTSIDE)
     if name == "x.x3p":
@@ -141,7 +142,7 @@ def xml_bomb(trial: Trial) -> list:
 
 
 def waits(trial: Trial) -> list:
-    """A pipe that nobody writes to, a device that never ends, a folder, a circle of links."""
+    """Make a pipe without a writer, an endless device, a folder, or a circular link."""
     name = "x" + trial.draw(
         ".toml", ".csv", ".npy", ".npz", ".mat", ".uff", ".msh", ".vtu", ".inp", ".x3p"
     )
@@ -156,7 +157,7 @@ def waits(trial: Trial) -> list:
 
 
 def endless(trial: Trial) -> list:
-    """Files with one line, one number or one name of megabytes, and files with holes of gigabytes."""
+    """Make a file with one line, number or name of megabytes, or a sparse file of gigabytes."""
     name = "x" + trial.draw(
         ".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf"
     )
@@ -179,7 +180,7 @@ def endless(trial: Trial) -> list:
 
 
 def heads(trial: Trial) -> list:
-    """Arrays whose head announces what the file cannot hold."""
+    """Make an array whose header states sizes or types that the file does not contain."""
     shape = trial.draw(
         "(1000000000000, 2)",
         "(-1, 2)",
@@ -198,7 +199,7 @@ def heads(trial: Trial) -> list:
 
 
 def folders(trial: Trial) -> list:
-    """A results folder whose files are not what a run wrote."""
+    """Make a results folder whose files were not written by a run."""
     os.mkdir("old")
     told = {
         "patchfem": "9",
@@ -240,8 +241,10 @@ def folders(trial: Trial) -> list:
 
 
 def device(name: str, number: int) -> None:
-    """A device of the working folder's own (3: null, 7: full), for the system's must not be put at risk; a pipe where
-    none can be made."""
+    """Make a device in the working folder (3: null, 7: full), or a pipe if devices are not permitted.
+
+    The devices of the system must not be put at risk.
+    """
     try:
         os.mknod(name, 0o666 | stat.S_IFCHR, os.makedev(1, number))
     except OSError:
@@ -249,7 +252,7 @@ def device(name: str, number: int) -> None:
 
 
 def outputs(trial: Trial) -> list:
-    """A place for the results that is no place for them."""
+    """Write results to a place that is not suitable, and check that no file of others is lost."""
     Path("scene.toml").write_text(
         text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "9 um", "frequency": "1 Hz"}})
     )
@@ -288,7 +291,7 @@ def outputs(trial: Trial) -> list:
 
 
 def escaping(trial: Trial) -> list:
-    """Names out of files and of the command line that lead upwards: cases of a sweep, modes, the words of a header."""
+    """Make files and a command whose names lead out of the folder: cases of a sweep, modes, headers."""
     tables = RIG | {
         "title": "../../escaped",
         "drive": {"kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2", "cycles": 2},

@@ -1,24 +1,24 @@
-"""Random scenes whose books must close: energy in every engine, dissipation of every law, wear as it is worn."""
+"""Random scenes whose energy must balance: in every engine, for the dissipation of every law, and with wear."""
 
 from . import grammar
 from .results import BALANCE
 from .toml import text_of
 from .trial import Trial, Wrong
 
-WORK = 0.05  # of the work, by which the trapezoid of coarse samples may miss the ledger
-CREATED = -1e-12  # of the work that passed, the least that a passive law dissipates
+WORK = 0.05  # Permitted difference of the trapezoidal work of coarse samples, relative to the work.
+CREATED = -1e-12  # Least dissipation of a passive law, relative to the total work.
 ENGINES = ("auto", "auto", "exact", "march", "harmonic")
 
 
 def energy(trial: Trial) -> None:
-    """A rig or a bench of any law and engine: its ledger closes, and no law gives back more than it took."""
+    """Run a rig or bench of any law and engine; its energy must balance, and no law may create energy."""
     kind = trial.draw("rig", "rig", "rig", "bench", "masses", "linear")
     tables = grammar.scene(trial, kind)
     tables.pop("wear", None)
     if kind not in ("bench", "linear"):
         tables["accuracy"]["method"] = trial.draw(*ENGINES)
     found = solved(trial, tables)
-    if found is None:  # mostly an engine that this scene has not
+    if found is None:  # In most cases the scene has no such engine.
         tables["accuracy"]["method"] = "auto"
         found = solved(trial, tables)
     if found is None:
@@ -40,13 +40,13 @@ def energy(trial: Trial) -> None:
         and not found.warnings
     ):
         raise Wrong(f"{found.outcome.value} with a work check of {work.value:.3g} and no warning")
-    if found.outcome.value != "not_converged":  # marked as not to be used
+    # Results without convergence are marked as unusable.
+    if found.outcome.value != "not_converged":
         passive(found, tables)
 
 
 def passive(found, tables: dict) -> None:
-    """Wrong where the friction of a law that cannot create energy gave some back over the whole run, or over a cycle
-    of a periodic motion."""
+    """Raise TrialFailure if a passive law created energy over the run, or over a cycle of a periodic motion."""
     laws = (
         [tables["friction"]]
         if "friction" in tables
@@ -72,8 +72,10 @@ def passive(found, tables: dict) -> None:
 
 
 def solved(trial: Trial, tables: dict, most: float = 3.0, valid: bool = False):
-    """The Result of a scene, None where it is refused, found no end or is announced as longer than `most` seconds;
-    valid: Wrong where it is refused."""
+    """Return the Result of a scene; None if it is refused, does not converge or is planned above `most` seconds.
+
+    valid: raise TrialFailure if it is refused.
+    """
     from patchfem.api import NotConverged, PatchfemError, load, plan, run
 
     text = text_of(tables)

@@ -1,4 +1,4 @@
-"""Commands in processes of their own: the same run again with more threads, and runs with little memory."""
+"""Commands in their own processes: repeated runs with more threads, and runs with little memory."""
 
 import hashlib
 import json
@@ -17,7 +17,7 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_
 
 
 def print_of(folder: Path) -> str:
-    """Hash of every number of a run but its seconds."""
+    """Return a hash of every number of a run except its computing times."""
     out = hashlib.sha256()
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
     out.update(
@@ -32,7 +32,7 @@ def print_of(folder: Path) -> str:
 
 
 def determinism(trial: Trial) -> None:
-    """One scene in fresh processes: by itself, again, and with more threads; every bit is the same."""
+    """Run a scene in new processes, twice and with more threads; all results must be bit-identical."""
     for _ in range(8):
         (trial.folder / "scene.toml").write_text(text_of(grammar.scene(trial)), "utf-8")
         seconds = trial.announced("scene.toml")
@@ -55,7 +55,7 @@ def determinism(trial: Trial) -> None:
 
 
 def memory(trial: Trial) -> None:
-    """A run of any scene under a limit of its address space."""
+    """Run a random scene with limited address space."""
     tables = grammar.scene(trial)
     tables["accuracy"]["steps_per_cycle"] = int(trial.wide(100, 1e6))
     (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")

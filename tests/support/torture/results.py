@@ -1,4 +1,4 @@
-"""What a run left on the disk, judged: whole, finite, and no claim that its own books deny."""
+"""Checks of the files of a run: they are complete and finite, and no claim contradicts the energy balance."""
 
 from pathlib import Path
 
@@ -6,13 +6,17 @@ import numpy as np
 
 from .trial import Trial, Wrong, strict
 
-BALANCE = 1e-8  # share of the work beyond which no run may end as settled
-# a border of the drive has no slide, a level may lack a measure: marked as missing
+BALANCE = 1e-8  # Largest energy balance, relative to the work, of a run that ends as steady.
+# An event of the drive has no displacement, and a level may lack a measure; both are marked as
+# missing.
 MISSING = ("event_slide", "level_")
 
 
 def whole(folder: Path) -> dict:
-    """The summary of a results folder; Wrong where a file lacks, a number is not finite or a claim cannot be true."""
+    """Return the summary of a results folder.
+
+    Raises TrialFailure if a file is missing, a number is not finite or a claim cannot be true.
+    """
     if not (folder / "summary.json").is_file():
         raise Wrong(f"no {folder.name}/summary.json")
     summary = strict((folder / "summary.json").read_text("utf-8"))
@@ -21,7 +25,7 @@ def whole(folder: Path) -> dict:
             raise Wrong(f"{name} is null without a reason")
     finite(folder / "result.nc")
     books = summary["measures"].get("energy_balance", {"value": None})
-    # a series of harmonics says how much it leaves out
+    # For harmonic balance the error states the truncated part.
     closes = max(BALANCE, books.get("error") or 0.0)
     if (
         books["value"] is not None
@@ -37,10 +41,11 @@ def whole(folder: Path) -> dict:
 
 
 def finite(path: Path) -> None:
-    """Wrong for a netCDF file with a number that is not finite."""
+    """Raise TrialFailure if a netCDF file contains a number that is not finite."""
     import h5py
 
     def look(name, item):
+        """Check one dataset of the file."""
         if not isinstance(item, h5py.Dataset) or item.dtype.kind != "f" or name.startswith(MISSING):
             return
         if item.size and not np.isfinite(item[()]).all():
@@ -55,7 +60,7 @@ def finite(path: Path) -> None:
 
 
 def left_over(folder: Path) -> None:
-    """Wrong for anything unfinished that a command left beside its results."""
+    """Raise TrialFailure if a command left unfinished files beside its results."""
     rest = [
         one.name
         for one in folder.iterdir()
@@ -66,8 +71,11 @@ def left_over(folder: Path) -> None:
 
 
 def ran(trial: Trial, file, *words, most: float = 3.0) -> dict | None:
-    """Check, plan and run a scene, judged against one another; the summary, None where it was refused, ended without
-    results (exit 3 or 4) or is announced to take more than `most` seconds."""
+    """Check, plan and run a scene, compare the outcomes, and return the summary.
+
+    None if it is refused, ends without results (exit code 3 or 4) or is planned above `most`
+    seconds.
+    """
     checked = trial.run("check", file, *words)
     seconds = trial.announced(file, *words)
     if checked.code == 0 and seconds is None:

@@ -1,4 +1,4 @@
-"""Scenes that are wrong by grammar, and scenes that are wrong by bytes: checked, planned and, where cheap, run."""
+"""Scenes with wrong keys or values, and scenes with wrong bytes: checked, planned and, if cheap, run."""
 
 import copy
 
@@ -97,7 +97,7 @@ BROKEN = (
 
 
 def by_grammar(trial: Trial) -> None:
-    """A scene of chance with none to four keys of it put wrong."""
+    """Run a random scene with none to four wrong keys."""
     tables = grammar.scene(trial)
     for _ in range(trial.draw(0, 0, 1, 1, 1, 2, 4)):
         mutate(trial, tables)
@@ -105,7 +105,7 @@ def by_grammar(trial: Trial) -> None:
 
 
 def by_bytes(trial: Trial) -> None:
-    """A scene of chance whose bytes are cut, flipped, doubled or mixed with broken ones."""
+    """Run a random scene whose bytes are cut, flipped, doubled or mixed with invalid ones."""
     text = bytearray(text_of(grammar.scene(trial)).encode())
     for _ in range(trial.draw(1, 1, 2, 5, 20)):
         damage(trial, text)
@@ -113,13 +113,13 @@ def by_bytes(trial: Trial) -> None:
 
 
 def written(trial: Trial, text: bytes) -> str:
-    """The name of a scene file with these bytes."""
+    """Write a scene file and return its name."""
     (trial.folder / "scene.toml").write_bytes(text)
     return "scene.toml"
 
 
 def damage(trial: Trial, text: bytearray) -> None:
-    """One wound of a text or of a binary file, in place."""
+    """Apply one random damage to a text or binary file, in place."""
     at = int(trial.r.integers(len(text) + 1))
     to = min(len(text), at + int(trial.wide(1, 200)))
     how = trial.draw("flip", "cut", "double", "insert", "end", "broken", "digit", "line")
@@ -148,7 +148,7 @@ def damage(trial: Trial, text: bytearray) -> None:
 
 
 def mutate(trial: Trial, tables: dict) -> None:
-    """One mistake in a scene, in place."""
+    """Apply one random mistake to a scene, in place."""
     there = places(tables)
     path = trial.draw(*there)
     how = trial.draw(
@@ -184,7 +184,7 @@ def mutate(trial: Trial, tables: dict) -> None:
 
 
 def _add(trial: Trial, tables: dict) -> None:
-    """A key of the schema that the scene has not, with a value of its kind."""
+    """Add a key of the schema that the scene does not have, with a value of its kind."""
     path, kind, model = trial.draw(*known())
     for step, key in enumerate(path[:-1]):
         if isinstance(tables, dict):
@@ -198,7 +198,7 @@ def _add(trial: Trial, tables: dict) -> None:
 
 
 def of_kind(trial: Trial, kind: str | None):
-    """A value for a key: a quantity of its kind over thirty decades, else a number or a word."""
+    """Return a value for a key: a quantity of its kind over thirty decades, else a number or a word."""
     from patchfem.scene import UNIT_FACTORS
 
     if kind is None:
@@ -217,7 +217,7 @@ def of_kind(trial: Trial, kind: str | None):
 
 
 def anything(trial: Trial, value):
-    """Another value in place of one: an odd number, an odd text, a number with an odd unit."""
+    """Return another value: an unusual number or text, or a number with an unusual unit."""
     if isinstance(value, list) and value and trial.chance(0.5):
         return (
             value * trial.draw(0, 2, 30)
@@ -234,7 +234,7 @@ def anything(trial: Trial, value):
 
 
 def scaled(trial: Trial, value):
-    """The same value, larger or smaller by up to twelve decades; what is no number becomes something else."""
+    """Return the value times up to twelve decades; a value that is no number is replaced."""
     factor = trial.wide(1e-3, 1e3) ** trial.draw(1, 1, 1, 4) * trial.draw(1, 1, 1, 1, -1)
     if isinstance(value, str):
         number, blank, unit = value.partition(" ")

@@ -1,10 +1,11 @@
-"""Files of numbers with wrong cells, heads and bytes: traces, signals, paths, rows, loops and universal files.
+"""Number files with wrong cells, headers and bytes: traces, signals, paths, rows, loops and universal files.
 
-A wound that leaves no meaning (a word for a number, no unit, no rows, time that goes back) must be refused.
+Damage that leaves no meaning (a word for a number, no unit, no rows, decreasing time) must be
+refused.
 """
 
 import numpy as np
-import pyuff  # here, before any fork, as the next: each trial by itself would wait for them
+import pyuff  # These are imported before any fork, so that not every trial has to import them.
 import scipy.optimize  # noqa: F401
 
 from .results import ran
@@ -63,7 +64,7 @@ ODD = (
 
 
 def numbers(trial: Trial, kind: str) -> list:
-    """Rows of a valid table of a kind, as lists of texts."""
+    """Return the rows of a valid table of a kind as lists of texts."""
     count = int(trial.r.integers(12, 60))
     step = trial.r.uniform(0.5, 1.5, count) if trial.chance(0.5) else np.ones(count)
     rough = np.cumsum(trial.r.normal(size=count))
@@ -90,7 +91,7 @@ def numbers(trial: Trial, kind: str) -> list:
 
 
 def csv(trial: Trial, kind: str) -> tuple:
-    """(bytes of a table with wounds, whether it must be refused)."""
+    """Return the bytes of a damaged table, and whether it must be refused."""
     rows = numbers(trial, kind)
     head = HEADS[kind]
     bad = False
@@ -153,7 +154,7 @@ def csv(trial: Trial, kind: str) -> tuple:
 
 
 def wounded(trial: Trial, data: bytes) -> bytes:
-    """The same with a few wounds of its bytes."""
+    """Return a copy of the data with some damaged bytes."""
     out = bytearray(data)
     for _ in range(trial.draw(1, 1, 2, 5)):
         damage(trial, out)
@@ -161,7 +162,7 @@ def wounded(trial: Trial, data: bytes) -> bytes:
 
 
 def of_scene(trial: Trial, tables: dict, name: str, data: bytes, bad: bool) -> None:
-    """Check, plan and run a scene that reads a file; Wrong where a bad file passes."""
+    """Check, plan and run a scene that reads a file; TrialFailure if an invalid file is accepted."""
     (trial.folder / name).write_bytes(data)
     (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")
     if ran(trial, "scene.toml") is not None and bad:
@@ -169,7 +170,7 @@ def of_scene(trial: Trial, tables: dict, name: str, data: bytes, bad: bool) -> N
 
 
 def profiles(trial: Trial) -> None:
-    """Traces in text, by themselves, against each other, or pressed."""
+    """Read traces alone, compare them, or press them."""
     data, bad = csv(trial, "trace")
     (trial.folder / "trace.csv").write_bytes(data)
     answered(
@@ -210,7 +211,7 @@ def profiles(trial: Trial) -> None:
 
 
 def answered(trial: Trial, bad: bool, *words) -> None:
-    """A command whose stdout is JSON; Wrong where a bad file passes."""
+    """Run a command whose output is JSON; TrialFailure if an invalid file is accepted."""
     ended = trial.run(*words)
     if ended.code == 0:
         if bad:
@@ -219,7 +220,7 @@ def answered(trial: Trial, bad: bool, *words) -> None:
 
 
 def signals(trial: Trial) -> None:
-    """A recorded base motion of a rig."""
+    """Run a rig with a recorded base motion."""
     data, bad = csv(trial, "signal")
     of_scene(
         trial,
@@ -231,19 +232,19 @@ def signals(trial: Trial) -> None:
 
 
 def paths(trial: Trial) -> None:
-    """A recorded slide of a bench."""
+    """Run a bench with a recorded displacement."""
     data, bad = csv(trial, "path")
     of_scene(trial, RUBS | {"slide": {"kind": "file", "file": "p.csv"}}, "p.csv", data, bad)
 
 
 def rows(trial: Trial) -> None:
-    """Measured rows beside a rig's results."""
+    """Run a rig with measured rows."""
     data, bad = csv(trial, "rows")
     of_scene(trial, RIG | {"drive": BASE, "measured": {"file": "t.csv"}}, "t.csv", data, bad)
 
 
 def loops(trial: Trial) -> None:
-    """A friction loop to which a bench is fitted, or which is imported."""
+    """Fit a bench to a friction loop, or import the loop."""
     data, bad = csv(trial, "loop")
     (trial.folder / "loop.csv").write_bytes(data)
     if trial.chance(0.7):
@@ -270,7 +271,7 @@ def loops(trial: Trial) -> None:
 
 
 def universal(trial: Trial) -> None:
-    """Records of a universal file, imported."""
+    """Import records of a universal file."""
     time = np.arange(64) / 500
     one = {
         "type": 58,

@@ -1,4 +1,4 @@
-"""Scenes as nested dicts: written as TOML, taken apart into places, and the keys that the schema knows."""
+"""Scenes as nested dicts: conversion to TOML, paths of keys, and all keys of the schema."""
 
 from functools import cache
 
@@ -7,11 +7,12 @@ from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_
 
 
 def text_of(tables: dict) -> str:
-    """The scene as TOML: values first, tables after them, lists of dicts as arrays of tables."""
+    """Return the scene as TOML: values first, then tables; lists of dicts are arrays of tables."""
     return "".join(_lines(tables, ""))
 
 
 def _lines(table: dict, at: str):
+    """Yield the lines of a table and of its subtables."""
     for key, value in table.items():
         if not _is_table(value):
             yield f"{word(key)} = {value_of(value)}\n"
@@ -27,13 +28,14 @@ def _lines(table: dict, at: str):
 
 
 def _is_table(value) -> bool:
+    """Return whether a value is a table or an array of tables."""
     return isinstance(value, dict) or (
         isinstance(value, list) and bool(value) and all(isinstance(v, dict) for v in value)
     )
 
 
 def word(key: str) -> str:
-    """A key as TOML writes it, quoted where it must be."""
+    """Return a key as TOML, with quotes if necessary."""
     return (
         key
         if key and all(c.isascii() and (c.isalnum() or c in "_-") for c in key)
@@ -42,7 +44,7 @@ def word(key: str) -> str:
 
 
 def value_of(value) -> str:
-    """A value as TOML writes it; what is `Raw` stands as it is."""
+    """Return a value as TOML; a `Raw` is not changed."""
     if isinstance(value, Raw):
         return str(value)
     if isinstance(value, bool):
@@ -59,15 +61,16 @@ def value_of(value) -> str:
 
 
 def _letter(c: str) -> str:
+    """Return a character of a TOML string, escaped if necessary."""
     return f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else "\\" + c if c in '"\\' else c
 
 
 class Raw(str):
-    """A text that stands in the scene as it is, without quotes."""
+    """Text that is written into the scene without quotes."""
 
 
 def places(table: dict, at: tuple = ()) -> list:
-    """The path of every key and table below, as tuples of keys and numbers."""
+    """Return the path of every key and table as tuples of keys and numbers."""
     out = []
     for key, value in table.items() if isinstance(table, dict) else enumerate(table):
         out.append((*at, key))
@@ -79,7 +82,7 @@ def places(table: dict, at: tuple = ()) -> list:
 
 
 def parent(tables: dict, path: tuple):
-    """The table or list that holds the last key of a path."""
+    """Return the table or list that contains the last key of a path."""
     for key in path[:-1]:
         tables = tables[key]
     return tables
@@ -87,11 +90,12 @@ def parent(tables: dict, path: tuple):
 
 @cache
 def known() -> tuple:
-    """(path, kind of quantity or None, model of the table or None) of every key of a scene, arrays at place 0."""
+    """Return (path, kind of quantity or None, model of the table or None) of every key of a scene, arrays at index 0."""
     return tuple(_known(Tables, ()))
 
 
 def _known(model, at: tuple):
+    """Yield the keys of a model and of the tables in it."""
     for key, name in attributes_by_key(model).items():
         inner = find_inner_table(model, name)
         many = inner is not None and "tuple" in str(model.model_fields[name].annotation)

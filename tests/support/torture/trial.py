@@ -1,4 +1,4 @@
-"""One trial: commands run and judged in a process of their own, so that no crash, hang or leak reaches the next one."""
+"""Trial: commands are run and checked in a separate process, so that no crash, hang or leak affects the next trial."""
 
 import contextlib
 import io
@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 CODES = (0, 2, 3, 4, 130)
-PATIENCE = 10.0  # [s] of CPU beyond what was announced
-LONGEST = 2000  # characters of a line that a person still reads
+PATIENCE = 10.0  # CPU time permitted beyond the plan [s].
+LONGEST = 2000  # Longest line that a person can still read [characters].
 RAW = re.compile(
     r"Traceback \(most recent|internal fault|\b\w*Warning: |warnings\.warn\(|HDF5-DIAG|Segmentation fault"
 )
@@ -26,11 +26,11 @@ CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 
 
 class Wrong(Exception):
-    """What the program did that it must never do."""
+    """Raised if the program does something that it must never do."""
 
 
 class Ended(NamedTuple):
-    """How a command ended: exit code (below zero: the signal that ended it), stdout, stderr."""
+    """Result of a command: exit code (negative: the signal that ended it), stdout, stderr."""
 
     code: int
     out: str
@@ -38,10 +38,11 @@ class Ended(NamedTuple):
 
 
 class Trial:
-    """What a campaign's trial is given: its numbers at random, its folder, and commands that are judged as they end.
+    """Trial of a campaign: random numbers, a working folder, and commands that are checked when they end.
 
-    r: random numbers of this trial alone; folder: empty, the working folder; command: words -> exit code, in this
-    process; tell: called with what is being done, so that a crash can be named; patience: factor on every limit.
+    r: random generator of this trial; folder: the empty working folder; command: words -> exit
+    code, in this process; tell: called with the current action, so that a crash can be named;
+    patience: factor on every limit.
     """
 
     def __init__(
@@ -59,7 +60,10 @@ class Trial:
         self.patience = patience
 
     def run(self, *words, seconds: float = 0.0) -> Ended:
-        """A command in this process, judged; seconds: what it announced. More CPU than that and PATIENCE ends it."""
+        """Run a command in this process and check how it ends.
+
+        It is stopped PATIENCE after the planned `seconds` of CPU time.
+        """
         words = [str(word) for word in words]
         self.tell("patchfem " + " ".join(words))
         self.limit(seconds + PATIENCE)
@@ -68,12 +72,15 @@ class Trial:
         return ended
 
     def limit(self, seconds: float) -> None:
-        """End this process after so many seconds of CPU, or twenty times as many on the clock; 0: never."""
+        """End this process after some seconds of CPU time, or twenty times as many of elapsed time; 0: never."""
         signal.setitimer(signal.ITIMER_PROF, seconds * self.patience)
         signal.setitimer(signal.ITIMER_REAL, 20 * seconds * self.patience)
 
     def spawn(self, *words, seconds: float = 120.0, allowed=CODES, **options) -> Ended:
-        """A command in a fresh interpreter, judged; options: those of subprocess.run (env is added to this one's)."""
+        """Run a command in a new interpreter and check its end.
+
+        options: those of subprocess.run (env is added to that of this process).
+        """
         words = [str(word) for word in words]
         self.tell("patchfem " + " ".join(words))
         options["env"] = {**os.environ, **options.get("env", {})}
@@ -91,30 +98,30 @@ class Trial:
         return judged(ended, allowed)
 
     def announced(self, file, *words) -> float | None:
-        """Seconds that `plan` announces for a scene; None where it is refused."""
+        """Return the seconds that `plan` estimates for a scene; None if it is refused."""
         ended = self.run("plan", file, "--json", *words)
         return float(strict(ended.out)["seconds"]) if ended.code == 0 else None
 
     def draw(self, *choices):
-        """One of the choices at random, as it is."""
+        """Return one of the choices at random."""
         return choices[int(self.r.integers(len(choices)))]
 
     def chance(self, share: float) -> bool:
-        """True in this share of all draws."""
+        """Return True with the probability `share`."""
         return bool(self.r.random() < share)
 
     def wide(self, low: float, high: float) -> float:
-        """A number between low and high > 0 whose logarithm is evenly spread, to four digits."""
+        """Return a log-uniform number between low and high > 0 with four digits."""
         return float(f"{math.exp(self.r.uniform(math.log(low), math.log(high))):.4g}")
 
 
 def process(*words) -> list:
-    """The command line that runs these words in a fresh interpreter."""
+    """Return the command line that runs these words in a new interpreter."""
     return [sys.executable, "-m", "patchfem", *map(str, words)]
 
 
 def captured(command: Callable, words: list) -> Ended:
-    """A command with both streams kept, also what libraries write past Python."""
+    """Run a command and capture both streams, including output that bypasses Python."""
     kept = [os.dup(1), os.dup(2)]
     with open("/dev/null", "rb") as nothing, contextlib.ExitStack() as stack:
         files = [
@@ -155,6 +162,7 @@ def captured(command: Callable, words: list) -> Ended:
 
 
 def _code(command: Callable, words: list) -> int:
+    """Run a command and return its exit code; 1 for an exception."""
     try:
         return command(words)
     except SystemExit as end:
@@ -167,7 +175,7 @@ def _code(command: Callable, words: list) -> int:
 
 
 def judged(ended: Ended, allowed=CODES) -> Ended:
-    """The same; Wrong for a code, a stream or a lack of words that no command may end with."""
+    """Return the result; TrialFailure for a code, a stream or a missing message that no command may end with."""
     lines = [line for line in ended.err.splitlines() if line.strip()]
     last = lines[-1][:300] if lines else "no word on stderr"
     if ended.code not in allowed:
@@ -185,7 +193,8 @@ def judged(ended: Ended, allowed=CODES) -> Ended:
             )
     if (
         longest := max(map(len, lines), default=0)
-    ) > LONGEST:  # stdout may hold a title or JSON of any length
+        # The limit holds for stderr only; stdout may contain a title or JSON of any length.
+    ) > LONGEST:
         raise Wrong(f"a line of {longest} characters: {last}")
     if ended.code in (2, 3, 4, 130) and not any(len(line) > 12 for line in lines):
         raise Wrong(f"exit code {ended.code} without a helpful line: {last}")
@@ -193,9 +202,10 @@ def judged(ended: Ended, allowed=CODES) -> Ended:
 
 
 def strict(text: str) -> dict:
-    """JSON without NaN and infinity; Wrong for text that is not."""
+    """Return parsed JSON; TrialFailure if it is invalid or contains NaN or infinity."""
 
     def refuse(name):
+        """Raise TrialFailure for NaN or infinity."""
         raise Wrong(f"{name} in JSON")
 
     try:
@@ -205,10 +215,10 @@ def strict(text: str) -> dict:
 
 
 def alone(work: Callable, trial: Callable, clock: float) -> str:
-    """Run `work(trial)` in a forked process; what went wrong, empty where nothing did.
+    """Run `work(trial)` in a forked process and return the fault, empty if there is none.
 
-    work: the campaign's trial; trial: tell -> Trial, made in the child; clock: seconds after which the child is killed
-    whatever its timers say.
+    work: function of the campaign; trial: tell -> Trial, called in the child; clock: seconds after
+    which the child is killed.
     """
     reading, writing = os.pipe()
     child = os.fork()
@@ -218,7 +228,7 @@ def alone(work: Callable, trial: Callable, clock: float) -> str:
     os.close(writing)
     said = _heard(child, reading, clock)
     with contextlib.suppress(ProcessLookupError, PermissionError):
-        os.killpg(child, signal.SIGKILL)  # what the trial started and left
+        os.killpg(child, signal.SIGKILL)  # The processes that the trial started are ended too.
     _, status = os.waitpid(child, 0)
     doing = next((line[1:] for line in reversed(said) if line.startswith(">")), "")
     if said and said[-1].startswith("="):
@@ -234,9 +244,10 @@ def alone(work: Callable, trial: Callable, clock: float) -> str:
 
 
 def _child(work: Callable, trial: Callable, writing: int) -> None:
-    """The forked side: never returns."""
+    """Run the trial in the forked process, which never returns."""
 
     def tell(text: str, mark: str = ">") -> None:
+        """Write a message to the parent process."""
         os.write(writing, (mark + " ".join(text.split())[:3000] + "\n").encode("utf-8", "replace"))
 
     try:
@@ -264,7 +275,7 @@ def _child(work: Callable, trial: Callable, writing: int) -> None:
 
 
 def _heard(child: int, reading: int, clock: float) -> list:
-    """Lines of the child until it closes its end; the child is killed when the clock runs out."""
+    """Return the lines of the child until it closes its end; the child is killed after `clock` seconds."""
     import select
     from time import monotonic
 
@@ -277,7 +288,7 @@ def _heard(child: int, reading: int, clock: float) -> list:
             break
         text += part
         if text.rpartition(b"\n")[0].rpartition(b"\n")[2].startswith(b"=") and text.endswith(b"\n"):
-            break  # what the trial started may hold the pipe open
+            break  # A process that the trial started may keep the pipe open.
     if not ready:
         os.kill(child, signal.SIGKILL)
     os.close(reading)
@@ -285,7 +296,7 @@ def _heard(child: int, reading: int, clock: float) -> list:
 
 
 def emptied(folder: Path) -> Path:
-    """The folder, there and empty."""
+    """Make a folder empty, or create it."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     return folder

@@ -1,4 +1,4 @@
-"""Command lines by grammar: every verb with options and values that fit, and with some that do not."""
+"""Random command lines: every command with valid options and values, and with some invalid ones."""
 
 from . import grammar
 from .scenes import NUMBERS, TEXTS
@@ -77,7 +77,7 @@ LENGTHS = ("0.25 mm", "0 mm", "-1 mm", "1e9 m", "1e-30 m", "mm", "nan mm", "5", 
 
 
 def lines(trial: Trial) -> None:
-    """One command line, its files beside it."""
+    """Run one random command line, with its files in the folder."""
     for name, tables in SCENES.items():
         (trial.folder / name).write_text(text_of(tables), "utf-8")
     for name, kind in (
@@ -92,13 +92,14 @@ def lines(trial: Trial) -> None:
     for _ in range(trial.draw(0, 0, 0, 1, 2)):
         at = 1 + int(trial.r.integers(len(words)))
         words[at:at] = [trial.draw(*ODD)()] if trial.chance(0.5) else [anything(trial)]
-    if "demo" in words or "torture" in words:  # these take their time as they should
+    # These commands are slow by design, so they get an invalid option.
+    if "demo" in words or "torture" in words:
         words = words[:1] + [word for word in words[1:] if word.startswith("--")] + ["--nothing"]
     trial.run(*words, seconds=30.0)
 
 
 def anything(trial: Trial) -> str:
-    """A word of no meaning."""
+    """Return a word without meaning."""
     return str(
         trial.draw(
             *TEXTS,
@@ -135,7 +136,7 @@ ODD = (
 
 
 def file(trial: Trial) -> str:
-    """A scene, mostly."""
+    """Return the name of a file, in most cases of a scene."""
     return trial.draw(
         "patch.toml",
         "bench.toml",
@@ -149,12 +150,12 @@ def file(trial: Trial) -> str:
 
 
 def key(trial: Trial) -> str:
-    """A key of a scene, or nearly."""
+    """Return a key of a scene, or nearly one."""
     return trial.draw(*KEYS) if trial.chance(0.8) else ".".join(map(str, trial.draw(*known())[0]))
 
 
 def sets(trial: Trial) -> list:
-    """None to two --set."""
+    """Return none to two options --set."""
     out = []
     for _ in range(trial.draw(0, 0, 1, 2)):
         value = trial.draw(
@@ -182,7 +183,7 @@ def sets(trial: Trial) -> list:
 
 
 def over(trial: Trial) -> list:
-    """One or two --over."""
+    """Return one or two options --over."""
     out = []
     for _ in range(trial.draw(1, 1, 2)):
         out += ["--over", f"{key(trial)}={trial.draw(*RANGES)}"]
@@ -190,7 +191,7 @@ def over(trial: Trial) -> list:
 
 
 def profile(t: Trial) -> list:
-    """Words of the verb profile."""
+    """Return the words of the command profile."""
     options = (
         ["b.csv"],
         ["--cutoff", t.draw(*LENGTHS)],
@@ -206,7 +207,7 @@ def profile(t: Trial) -> list:
 
 
 def fit(t: Trial) -> list:
-    """Words of the verb fit."""
+    """Return the words of the command fit."""
     span = t.draw("0.1..0.6", "0.6..0.1", "1 N..2 N", "x", "", "..", "0..0", "nan..1")
     return [
         t.draw("bench.toml", "patch.toml", "nowhere.toml", "rig.toml"),
@@ -227,7 +228,7 @@ def fit(t: Trial) -> list:
 
 
 def imported(t: Trial) -> list:
-    """Words of the verb import."""
+    """Return the words of the command import."""
     how = t.draw(
         [],
         ["--map", t.draw("force=force", "x", "=", "force=1:+x [N]", "time=t [s]")],
