@@ -55,7 +55,7 @@ from .list_sum_kernels import (
 )
 from .point_kernels import bond_mean, grow
 
-# two Gauss points per strip then sum growing bonds to 1e-6 (test_exact_direct_of_growing_bonds_is_the_sum_by_hand)
+# two Gauss points per strip then sum growing bonds to 1e-6 (test_exact_direct_growing_bonds_equal_hand_sum)
 MAX_STRIP_GROWTH = 0.5  # largest growth J in a strip of growing bonds
 # largest number of strips into which growth alone divides an increment, as J has no bound after a long rest
 MAX_GROWTH_STRIPS = 16

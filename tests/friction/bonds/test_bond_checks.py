@@ -1,6 +1,7 @@
-"""The printed consequences of 2.8-2.21, each number known from a closed form or a second computation.
+"""Numerical consequences of equations 2.8 to 2.21 of the report, compared with closed forms or a second computation.
 
-Lengths in eps_0, forces in mu_s N. Path steps are exact for these laws, so few and uneven steps must do.
+Lengths are in bond lengths eps_0, forces in mu_s N. Path steps are exact for these laws, so that a
+few uneven steps suffice.
 """
 
 import numpy as np
@@ -13,25 +14,27 @@ from hypothesis import strategies as st
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 from patchfem.friction.bonds.parameters import grow, growth_exponents
 
-ONE = upper_pressure([1.0])
-UNEVEN = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])
+UNIT_PRESSURE = upper_pressure([1.0])
+UNEVEN_PATH = np.array([0.0, 0.02, 0.5, 0.7, 1.0, 1.9, 2.0, 3.3, 4.0])
 
 
-def bonds(order=1.0, reading="stretch", initial=1.0, **more):
-    return Bonds(1.0, 1.0, order, reading, initial=initial, **more)
+def unit_bonds(order=1.0, reading="stretch", initial=1.0, **parameters):
+    """Return a bond law with unit friction limit and unit bond length."""
+    return Bonds(1.0, 1.0, order, reading, initial=initial, **parameters)
 
 
-def laws(order, reading, initial):
-    law = bonds(order, reading, initial)
-    both = [Quadrature(law, tail=0.0)]
-    return [*both, FirstOrderBonds(law)] if reading == "stretch" and order == 1 else both
+def make_engines(order, reading, initial):
+    """Return the NumPy engines that can sum the bonds of a law."""
+    law = unit_bonds(order, reading, initial)
+    engines = [Quadrature(law, tail=0.0)]
+    return [*engines, FirstOrderBonds(law)] if reading == "stretch" and order == 1 else engines
 
 
 # ---- from rest
 
 
 @pytest.mark.parametrize(
-    "order, reading, initial, want",
+    "order, reading, initial, expected",
     [
         (0, "report", 0, [0.393469, 0.632121, 0.864665, 0.981684]),
         (1, "report", 1, [0.393469, 0.632121, 0.864665, 0.981684]),
@@ -43,43 +46,47 @@ def laws(order, reading, initial):
         (-0.5, "report", 0, [0.682689, 0.842701, 0.954500, 0.995322]),
     ],
 )
-def test_exact_virgin_force(order, reading, initial, want):
-    for law in laws(order, reading, initial):
+def test_exact_virgin_force_agrees_with_closed_form(order, reading, initial, expected):
+    """The friction force of a first loading agrees with the closed form, for both directions of sliding."""
+    for law in make_engines(order, reading, initial):
         for sign in (1, -1):
-            run = walk(law, sign * UNEVEN, ONE)
+            run = walk(law, sign * UNEVEN_PATH, UNIT_PRESSURE)
             force = np.append(0.0, sign * run.traction[:, 0])
-            assert np.interp([0.5, 1, 2, 4], UNEVEN, force) == pytest.approx(want, abs=1e-6)
-            assert force == pytest.approx(virgin_force(UNEVEN, 1.0, order, initial), abs=1e-8)
+            assert np.interp([0.5, 1, 2, 4], UNEVEN_PATH, force) == pytest.approx(
+                expected, abs=1e-6
+            )
+            assert force == pytest.approx(virgin_force(UNEVEN_PATH, 1.0, order, initial), abs=1e-8)
 
 
 # ---- reversal
 
 
 @pytest.mark.parametrize(
-    "order, reading, want",
+    "order, reading, expected",
     [
         (0, "report", [0.637462, 0, -0.5, -0.729329, -0.995042]),
         (1, "stretch", [0.809675, 0.414214, 0, -0.264241, -0.900426]),
     ],
 )
-def test_exact_reversal_after_a_long_slide(order, reading, want):
+def test_exact_reversal_force_after_long_sliding(order, reading, expected):
+    """The force after a reversal from steady sliding agrees with the closed form within 1e-12."""
     back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
     path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
-    for law in laws(order, reading, 1.0 if reading == "stretch" else 0.0):
-        force = pulled(law, path, ONE).traction[-5:, 0]
-        assert force == pytest.approx(want, abs=1e-6)
+    for law in make_engines(order, reading, 1.0 if reading == "stretch" else 0.0):
+        force = pulled(law, path, UNIT_PRESSURE).traction[-5:, 0]
+        assert force == pytest.approx(expected, abs=1e-6)
         assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=1e-12)
 
 
 # ---- growth of the bond length
 
 
-def test_exact_healing_integrals():
-    """Through a linear reversal with a_s/deceleration = 0.3, v_1/v_h = 100; one step from -0.3 to 0.7."""
-    law = bonds(rest_growth=0.3, slip_growth=1e30, rest_speed=0.01)
-    rest, slide = growth_exponents(law, 1.0, -1.0, 0.0, 2.0)
-    assert slide == 0 and np.exp(-rest) == pytest.approx(0.03462767, abs=1e-8)
-    rest, slide = growth_exponents(law, -0.3, 0.7, 0.2, 1.0)
+def test_exact_growth_exponents_during_linear_reversal():
+    """The growth exponents of a bond agree with the integral over a velocity that changes linearly from -0.3 to 0.7."""
+    law = unit_bonds(rest_growth=0.3, slip_growth=1e30, rest_speed=0.01)
+    rest, slip = growth_exponents(law, 1.0, -1.0, 0.0, 2.0)
+    assert slip == 0 and np.exp(-rest) == pytest.approx(0.03462767, abs=1e-8)
+    rest, slip = growth_exponents(law, -0.3, 0.7, 0.2, 1.0)
     assert rest == pytest.approx(2.89490779, abs=1e-8)
     times = np.linspace(0, 1, 1_000_001)
     middle = (times[1:] + times[:-1]) / 2
@@ -96,20 +103,24 @@ def test_exact_healing_integrals():
     st.floats(1e-4, 1),
     st.floats(0.05, 1),
 )
-def test_always_growth_at_constant_speed_may_be_split(
-    speed, time, parts, ratio, rest, slip, floor, start
+def test_always_growth_is_independent_of_substeps(
+    speed, time, n_substeps, ratio, rest_growth, slip_growth, rest_speed, initial_length
 ):
-    law = bonds(ratio=ratio, rest_growth=rest, slip_growth=slip, rest_speed=floor)
-    whole = grow(law, start, speed, speed, speed * time, time)
-    eps = start
-    for _ in range(parts):
-        eps = grow(law, eps, speed, speed, speed * time / parts, time / parts)
-    assert eps == pytest.approx(whole, rel=1e-12)
-    assert min(start, ratio) * (1 - 1e-12) <= whole <= 1 + 1e-12
+    """Bond growth at constant speed is the same in one step and in several substeps, and stays between its bounds."""
+    law = unit_bonds(
+        ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth, rest_speed=rest_speed
+    )
+    single_step = grow(law, initial_length, speed, speed, speed * time, time)
+    length = initial_length
+    for _ in range(n_substeps):
+        length = grow(law, length, speed, speed, speed * time / n_substeps, time / n_substeps)
+    assert length == pytest.approx(single_step, rel=1e-12)
+    assert min(initial_length, ratio) * (1 - 1e-12) <= single_step <= 1 + 1e-12
 
 
-def test_exact_steady_bond_length_is_2_11():
-    law = bonds(ratio=0.7, rest_growth=0.4, slip_growth=0.1, rest_speed=1e-6)
+def test_exact_steady_bond_length_agrees_with_equation():
+    """The bond length at constant speed converges to the steady value of equation 2.11."""
+    law = unit_bonds(ratio=0.7, rest_growth=0.4, slip_growth=0.1, rest_speed=1e-6)
     for speed in (0.02, 0.2, 2.0):
         eps = grow(law, 1.0, speed, speed, 1e3, 1e3 / speed)
         assert eps == pytest.approx((1 + 0.7 * speed**2 / 0.04) / (1 + speed**2 / 0.04), rel=1e-13)

@@ -1,4 +1,4 @@
-"""Breakaway: bonds that stretch over a share of their length without damage."""
+"""Breakaway: bonds that stretch by a fraction of their length without damage."""
 
 import friction_forms
 import numpy as np
@@ -10,42 +10,46 @@ from patchfem.dynamics import points_model
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
-ONE = upper_pressure([1.0])
+UNIT_PRESSURE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 0.01}
 
 
-def bonds(share, order=1.0, **more):
-    return Bonds(1.0, 1.0, order, breakaway=share, **more)
+def breakaway_bonds(fraction, order=1.0, **parameters):
+    """Return a bond law with unit friction limit and length whose breakaway fraction is given."""
+    return Bonds(1.0, 1.0, order, breakaway=fraction, **parameters)
 
 
 @pytest.mark.share(3, 6, 8, 13)
-@pytest.mark.parametrize("share", [0.0, 0.2, 0.7, 0.999])
+@pytest.mark.parametrize("fraction", [0.0, 0.2, 0.7, 0.999])
 @pytest.mark.parametrize("amplitude", [0.1, 0.9, 1.5, 8.0])
-def test_exact_loop_with_breakaway(share, amplitude):
+def test_exact_breakaway_loop_agrees_with_closed_form(fraction, amplitude):
+    """Loop area and reversal force agree with the closed form; the area vanishes if the bonds stay elastic."""
     path = triangle(amplitude, 80, 7)
-    run = walk(FirstOrderBonds(bonds(share)), path, ONE)
+    run = walk(FirstOrderBonds(breakaway_bonds(fraction)), path, UNIT_PRESSURE)
     work = run.mean[-14:, 0] @ np.diff(path)[-14:]
-    area, end = friction_forms.stretch_loop(amplitude, 1.0, 1.0, share)
-    if amplitude > share:  # below it the loop is a line about the first stroke's mean
+    area, end = friction_forms.stretch_loop(amplitude, 1.0, 1.0, fraction)
+    if amplitude > fraction:  # below it the loop is a line about the mean of the first stroke
         assert (work, -run.traction[-1, 0]) == pytest.approx((area, end), abs=1e-11)
     else:
         assert work == pytest.approx(0.0, abs=1e-14)
 
 
 @pytest.mark.parametrize("engine", [FirstOrderBonds, lambda law: Quadrature(law, 0.0)])
-def test_exact_breakaway_of_the_whole_length_is_elastic_plastic(engine):
+def test_exact_full_breakaway_equals_elastic_plastic(engine):
+    """Bonds whose breakaway fraction tends to one have the forces of an elastic-plastic element."""
     path = random_walk(3, 60, 0.6)
-    soft = walk(engine(bonds(1 - 1e-13)), path, ONE)
-    hard = walk(ElasticPlastic(1.0, 1.0), path, ONE)
-    assert soft.traction == pytest.approx(hard.traction, abs=1e-11)
-    assert soft.mean == pytest.approx(hard.mean, abs=1e-11)
+    bond_run = walk(engine(breakaway_bonds(1 - 1e-13)), path, UNIT_PRESSURE)
+    elastic_plastic_run = walk(ElasticPlastic(1.0, 1.0), path, UNIT_PRESSURE)
+    assert bond_run.traction == pytest.approx(elastic_plastic_run.traction, abs=1e-11)
+    assert bond_run.mean == pytest.approx(elastic_plastic_run.mean, abs=1e-11)
 
 
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize("growth", [{}, GROWTH])
-@pytest.mark.parametrize("share", [0.1, 0.6])
-def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):
-    law = bonds(share, initial=0.7, **growth)
+@pytest.mark.parametrize("fraction", [0.1, 0.6])
+def test_exact_breakaway_recursion_equals_sum_over_bonds(fraction, growth):
+    """The recursion with breakaway has the forces and energies of the sum over all bonds within 1e-11."""
+    law = breakaway_bonds(fraction, initial=0.7, **growth)
     path = random_walk(5, 150, 0.5)
     a, b = (
         walk(engine, path, upper_pressure([1.0, 0.3]))
@@ -56,12 +60,13 @@ def test_exact_recursion_with_breakaway_is_the_sum_over_bonds(share, growth):
 
 
 @pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
-    law = bonds(0.35, initial=0.6, **growth)
+def test_exact_compiled_breakaway_points_equal_recursion(growth):
+    """The compiled contact elements with breakaway have the forces and energies of the NumPy recursion within 1e-12."""
+    law = breakaway_bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
     forces, energies, bad, _ = follow(points_model(law, [1.0], [1.0]), path, 1.0)
     assert bad == 0
-    run = walk(FirstOrderBonds(law), path, ONE)
+    run = walk(FirstOrderBonds(law), path, UNIT_PRESSURE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
     assert energies[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)
@@ -69,7 +74,7 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
 
 
 @pytest.mark.parametrize(
-    "share, low, high",
+    "fraction, low, high",
     [
         (0.0, 0.4, 0.6),
         (0.0, 0.2, 0.8),
@@ -81,16 +86,19 @@ def test_exact_compiled_points_with_breakaway_are_the_recursion(growth):
         (0.3, -0.5, 0.5),
     ],
 )
-def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
-    """0 from the second cycle on where the dither stays within the elastic range, the closed form elsewhere."""
-    ends = slides(FirstOrderBonds(bonds(share)), (high, low), (1.0, 1.0), 8)
-    wanted = friction_forms.dither_drift(low, high, share)
-    assert np.diff(ends) == pytest.approx(wanted, abs=1e-9)
-    assert (wanted == 0) == (high - low <= 2 * share + 1e-15 or low == -high)
+def test_exact_drift_per_cycle_under_force_dither(fraction, low, high):
+    """The drift per cycle of a force that alternates about a mean agrees with the closed form from the second cycle.
+
+    It vanishes if the alternating part stays within the elastic range.
+    """
+    ends = slides(FirstOrderBonds(breakaway_bonds(fraction)), (high, low), (1.0, 1.0), 8)
+    expected = friction_forms.dither_drift(low, high, fraction)
+    assert np.diff(ends) == pytest.approx(expected, abs=1e-9)
+    assert (expected == 0) == (high - low <= 2 * fraction + 1e-15 or low == -high)
 
 
-def worst_loss(seed, points, count):
-    """Least dissipation over stored energy and work of `points` random paths under one slide."""
+def min_dissipation_on_random_paths(seed, points, count):
+    """Return the smallest dissipation, relative to energy and work, of points on random paths."""
     rng = np.random.default_rng(seed)
     growth = (
         {
@@ -136,5 +144,6 @@ def worst_loss(seed, points, count):
     return worst
 
 
-def test_always_breakaway_and_a_changing_load_are_passive_on_400_paths():
-    assert min(worst_loss(seed, 20, 40) for seed in range(20)) >= -1e-12
+def test_always_breakaway_with_varying_load_is_passive():
+    """Bonds with breakaway under a varying load never create energy on 400 random paths."""
+    assert min(min_dissipation_on_random_paths(seed, 20, 40) for seed in range(20)) >= -1e-12

@@ -1,4 +1,4 @@
-"""The compiled engines of 2.17: direct, truncated, merged; against the NumPy sum, sums by hand and mpmath."""
+"""Compiled bond lists of equation 2.17 (direct, truncated, merged) against the NumPy sum, hand sums and mpmath."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from scipy.special import gammainc
 
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
 
-ONE = upper_pressure([1.0])
+UNIT_PRESSURE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
 
 
@@ -25,77 +25,87 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 
 @pytest.mark.parametrize("order", [0.0, 1.0, 2.0, -0.5, 1.7])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
-def test_exact_direct_of_the_printed_law_is_the_quadrature(order, initial):
-    """Closed strips, exact for p = 0, 1, 2; other orders from the table of P, 7e-9 off at most."""
+def test_exact_direct_printed_law_equals_numpy_sum(order, initial):
+    """The direct list of the printed law has the forces of the NumPy sum within 1e-12, or 2e-8 for tabulated orders."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = np.concatenate(
         [random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])]
     )
-    got = follow_list(law, path)
-    run = pulled(Quadrature(law, tail=0.0), path, ONE)
-    within = 1e-12 if order in (0, 1, 2) else 2e-8
-    assert got.after == pytest.approx(run.traction[:, 0], abs=within)
-    assert got.ahead == pytest.approx(got.after, abs=within)
+    compiled = follow_list(law, path)
+    reference = pulled(Quadrature(law, tail=0.0), path, UNIT_PRESSURE)
+    tolerance = 1e-12 if order in (0, 1, 2) else 2e-8
+    assert compiled.after == pytest.approx(reference.traction[:, 0], abs=tolerance)
+    assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
 
 @pytest.mark.share(0, 3, 6, 8, 11)
 @pytest.mark.parametrize(
-    "order, within", [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)]
+    "order, tolerance",
+    [(0.0, 2e-6), (0.5, 1e-4), (0.25, 2e-4), (1.5, 2e-5), (2.0, 2e-5), (3.0, 1e-5)],
 )
 @pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_direct_of_the_stretch_reading_is_the_quadrature(order, within, growth):
-    """Reversals where u = 0 falls inside a strip: order 0 was 5e-2 off there before strips were split."""
+def test_exact_direct_stretch_law_equals_numpy_sum(order, tolerance, growth):
+    """The direct list of the stretch law agrees with the NumPy sum where the stretch of a bond vanishes inside a strip.
+
+    Forces of order 0 were wrong by 5e-2 there before strips were split.
+    """
     law = Bonds(1.0, 1.0, order, "stretch", **growth)
     path = np.concatenate([triangle(1.5, 3, 13), [-1.43, -0.77, 4.0, 3.3, 3.9]])
-    got = follow_list(law, path, 0.4)
-    run = pulled(Quadrature(law, tail=0.0), path, ONE, 0.4)
-    assert got.after == pytest.approx(run.traction[:, 0], abs=within)
-    assert got.ahead == pytest.approx(got.after, abs=within)
+    compiled = follow_list(law, path, 0.4)
+    reference = pulled(Quadrature(law, tail=0.0), path, UNIT_PRESSURE, 0.4)
+    assert compiled.after == pytest.approx(reference.traction[:, 0], abs=tolerance)
+    assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
 
 @pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_direct_of_stretch_order_one_is_the_recursion(growth):
-    """Every bond kept against three states: forces, means, energies to rounding."""
+def test_exact_direct_stretch_law_equals_recursion(growth):
+    """The list of every bond has the forces, means and energies of the recursion with three states to rounding."""
     law = Bonds(1.0, 1.0, initial=0.4, **growth)
     path = np.concatenate(
         [random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])]
     )
-    got = follow_list(law, path, 0.4)
-    run = walk(FirstOrderBonds(law), path, ONE, 0.4)
-    assert got.after == pytest.approx(run.traction[:, 0], abs=1e-12)
-    assert got.mean == pytest.approx(run.mean[:, 0], abs=1e-12)
-    assert got.stored == pytest.approx(run.stored[:, 0], abs=1e-11)
+    compiled = follow_list(law, path, 0.4)
+    recursion = walk(FirstOrderBonds(law), path, UNIT_PRESSURE, 0.4)
+    assert compiled.after == pytest.approx(recursion.traction[:, 0], abs=1e-12)
+    assert compiled.mean == pytest.approx(recursion.mean[:, 0], abs=1e-12)
+    assert compiled.stored == pytest.approx(recursion.stored[:, 0], abs=1e-11)
 
 
-@pytest.mark.parametrize("order, within", [(-0.5, 1e-4), (0.0, 1e-5), (1.0, 1e-5), (2.0, 1e-5)])
+@pytest.mark.parametrize("order, tolerance", [(-0.5, 1e-4), (0.0, 1e-5), (1.0, 1e-5), (2.0, 1e-5)])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
-def test_exact_direct_of_growing_bonds_is_the_sum_by_hand(order, within, initial):
+def test_exact_direct_growing_bonds_equal_hand_sum(order, tolerance, initial):
+    """The direct list of growing bonds agrees with a sum over the bonds by hand."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial, **GROWTH)
     path = random_walk(3, 60, 0.3)
-    got = follow_list(law, path, 0.4)
+    compiled = follow_list(law, path, 0.4)
     for k in (5, 20, 40, 60):
-        assert got.after[k - 1] == pytest.approx(
-            sum_by_hand(law, path[: k + 1], ONE, 0.4)[0], abs=within
+        assert compiled.after[k - 1] == pytest.approx(
+            sum_by_hand(law, path[: k + 1], UNIT_PRESSURE, 0.4)[0], abs=tolerance
         )
-    assert got.ahead == pytest.approx(got.after, abs=within)
+    assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("order", [-0.5, -0.9])
-def test_exact_young_growing_bonds_of_negative_order_are_the_sum_by_hand(order):
-    """A young bond's length is proportional to its path, so its force is smooth: a rule made for the power of the path
-    was 7e-5 to 2e-4 off here and only of first order in the step."""
+def test_exact_young_growing_bonds_equal_hand_sum(order):
+    """Forces of growing bonds of negative order agree with a sum by hand within 2e-6.
+
+    The length of a young bond is proportional to its path, so its force is smooth; a quadrature
+    made for a power of the path was wrong by up to 2e-4.
+    """
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
     path = 1.5 * np.sin(2 * np.pi * np.arange(276) / 200)
     dt = 2 * np.pi / 200
-    after = follow_list(law, path, dt).after
+    forces = follow_list(law, path, dt).after
     for k in (30, 75, 140, 190, 275):
-        assert after[k - 1] == pytest.approx(sum_by_hand(law, path[: k + 1], ONE, dt)[0], abs=2e-6)
+        assert forces[k - 1] == pytest.approx(
+            sum_by_hand(law, path[: k + 1], UNIT_PRESSURE, dt)[0], abs=2e-6
+        )
 
 
-@pytest.mark.parametrize("order, within", [(-0.9, 1e-4), (-0.5, 1e-5), (0.5, 5e-8)])
-def test_exact_bonds_of_fractional_order_that_grew_at_rest(order, within):
-    """Full-grown bonds at R = 0, where R^p has no bound or no slope, sum to P(p + 1, R/eps_0)."""
+@pytest.mark.parametrize("order, tolerance", [(-0.9, 1e-4), (-0.5, 1e-5), (0.5, 5e-8)])
+def test_exact_fractional_order_bonds_grown_at_rest(order, tolerance):
+    """The force of bonds that reached their full length at rest is the incomplete gamma function P(p + 1, R/eps_0)."""
     law = Bonds(
         1.0,
         1.0,
@@ -108,12 +118,12 @@ def test_exact_bonds_of_fractional_order_that_grew_at_rest(order, within):
         initial=0.0,
     )
     path = np.append(np.linspace(0, 0.2, 11), 0.2)
-    after = follow_list(law, path, np.append(np.full(10, 0.4), 1e4)).after
-    assert after[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=within)
+    forces = follow_list(law, path, np.append(np.full(10, 0.4), 1e4)).after
+    assert forces[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=tolerance)
 
 
-def test_exact_long_rests_of_growing_bonds_stay_finite():
-    """10^6 e-folds of growth in one rest: scaled lengths are moved before they overflow; all bonds full-grown then."""
+def test_exact_long_rest_of_growing_bonds_stays_finite():
+    """A rest of 10^6 growth times gives the force of bonds of full length, without overflow."""
     law = Bonds(
         1.0,
         1.0,
@@ -125,11 +135,11 @@ def test_exact_long_rests_of_growing_bonds_stay_finite():
         rest_speed=1e-2,
         initial=0.0,
     )
-    full = Bonds(1.0, 1.0, 1.0, "report", initial=0.0)
+    full_length_law = Bonds(1.0, 1.0, 1.0, "report", initial=0.0)
     path = np.array([0.0, 0.1, 0.2, 0.2])
-    got = follow_list(law, path, [0.1, 0.1, 1e4]).after[-1]
-    want = follow_list(full, path).after[-1]
-    assert got == pytest.approx(want, abs=1e-6)
+    force = follow_list(law, path, [0.1, 0.1, 1e4]).after[-1]
+    expected = follow_list(full_length_law, path).after[-1]
+    assert force == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -147,14 +157,15 @@ def test_exact_long_rests_of_growing_bonds_stay_finite():
         ("report", 2.0, GROWTH),
     ],
 )
-def test_exact_stored_energy_is_the_sum_by_hand(reading, order, growth):
+def test_exact_stored_energy_equals_hand_sum(reading, order, growth):
+    """The stored energy of the list agrees with a sum over the bonds by hand."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = random_walk(4, 30, 0.4)
-    got = follow_list(law, path, 0.4)
+    compiled = follow_list(law, path, 0.4)
     for k in (3, 17, 30):
-        within = 1e-3 if order < 0 else 3e-5
-        assert got.stored[k - 1] == pytest.approx(
-            energy_by_hand(law, path[: k + 1], 0.4), abs=within
+        tolerance = 1e-3 if order < 0 else 3e-5
+        assert compiled.stored[k - 1] == pytest.approx(
+            energy_by_hand(law, path[: k + 1], 0.4), abs=tolerance
         )
 
 
@@ -162,34 +173,35 @@ def test_exact_stored_energy_is_the_sum_by_hand(reading, order, growth):
 @pytest.mark.parametrize(
     "reading, order", [("report", 0.0), ("report", 1.0), ("stretch", 2.0), ("stretch", 0.5)]
 )
-def test_exact_mean_is_the_integral_of_the_force(reading, order):
-    """Work of a step = integral of the force over it: short steps by Simpson, long ones on doubling panels."""
+def test_exact_step_mean_equals_force_integral(reading, order):
+    """The mean force of short and long steps agrees with the integral of the force over the step."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0)
-    lead = np.array([0.0, 1.3, 0.9])
+    start_path = np.array([0.0, 1.3, 0.9])
     for dq in (0.02, -0.05, 0.37, -3.0, 60.0):
-        got = follow_list(law, np.append(lead, lead[-1] + dq)).mean[-1]
-        fine = np.linspace(0, 1, 4001)[1:] ** 3
-        path = np.concatenate([lead, lead[-1] + dq * fine])
+        mean = follow_list(law, np.append(start_path, start_path[-1] + dq)).mean[-1]
+        fractions = np.linspace(0, 1, 4001)[1:] ** 3
+        path = np.concatenate([start_path, start_path[-1] + dq * fractions])
         force = follow_list(law, path).after
-        dense = np.concatenate([force[1:2], force[2:]])
-        want = np.trapezoid(dense, np.append(0.0, fine))
-        assert got == pytest.approx(want, abs=2e-3 if abs(dq) > 1 else 3e-4)
+        forces = np.concatenate([force[1:2], force[2:]])
+        expected = np.trapezoid(forces, np.append(0.0, fractions))
+        assert mean == pytest.approx(expected, abs=2e-3 if abs(dq) > 1 else 3e-4)
 
 
 @pytest.mark.parametrize(
-    "reading, order, within",
+    "reading, order, tolerance",
     [("report", -0.5, 2e-3), ("report", 0.0, 1e-6), ("stretch", 2.0, 1e-5)],
 )
-def test_exact_a_step_of_a_million_bond_lengths(reading, order, within):
-    """One nanometre bonds: the force is the friction limit, and only strips within the cut-off are made."""
+def test_exact_force_after_step_of_million_bond_lengths(reading, order, tolerance):
+    """The force after a step of a million bond lengths is the friction limit, with strips only within the cut-off."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0)
-    got = follow_list(law, np.array([0.0, 1e6, 1e6 + 0.05]), tail=1e-9)
-    assert got.after == pytest.approx([1.0, 1.0], abs=within)
-    assert got.mean[0] == pytest.approx(1.0, abs=1e-4)
-    assert got.status[STATUS.max_strips] <= 4 * 30 + 2
+    result = follow_list(law, np.array([0.0, 1e6, 1e6 + 0.05]), tail=1e-9)
+    assert result.after == pytest.approx([1.0, 1.0], abs=tolerance)
+    assert result.mean[0] == pytest.approx(1.0, abs=1e-4)
+    assert result.status[STATUS.max_strips] <= 4 * 30 + 2
 
 
-def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
+def test_exact_strips_of_tiny_growing_bonds_are_limited():
+    """Steps of a million bond lengths of growing bonds keep at most 300 strips and count the strips left out."""
     law = Bonds(
         1.0,
         1.0,
@@ -201,11 +213,11 @@ def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
         rest_speed=1.0,
         initial=0.0,
     )
-    got = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
+    result = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
     assert (
-        np.isfinite(got.after).all()
-        and got.status[STATUS.max_strips] <= 300
-        and got.status[STATUS.n_extra] >= 4e6
+        np.isfinite(result.after).all()
+        and result.status[STATUS.max_strips] <= 300
+        and result.status[STATUS.n_extra] >= 4e6
     )
 
 
@@ -215,16 +227,17 @@ def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
 @pytest.mark.parametrize(
     "reading, order, growth", [("report", 1.0, {}), ("report", 0.0, GROWTH), ("stretch", 2.0, {})]
 )
-def test_always_truncation_loses_less_than_its_tail(reading, order, growth):
+def test_always_truncation_error_is_below_tail(reading, order, growth):
+    """The truncated list differs from the full list by at most its tail, and has fewer strips."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = random_walk(9, 300, 0.6)
-    whole = follow_list(law, path, 0.5)
+    full = follow_list(law, path, 0.5)
     for tail in (1e-2, 1e-5):
-        cut = follow_list(law, path, 0.5, tail=tail)
-        assert np.abs(cut.after - whole.after).max() <= tail
+        truncated = follow_list(law, path, 0.5, tail=tail)
+        assert np.abs(truncated.after - full.after).max() <= tail
         assert (
-            cut.status[STATUS.end] - cut.status[STATUS.head]
-            < whole.status[STATUS.end] - whole.status[STATUS.head]
+            truncated.status[STATUS.end] - truncated.status[STATUS.head]
+            < full.status[STATUS.end] - full.status[STATUS.head]
         )
 
 
@@ -234,18 +247,18 @@ def test_always_truncation_loses_less_than_its_tail(reading, order, growth):
 @pytest.mark.parametrize(
     "reading, order, growth", [("stretch", 2.0, {}), ("stretch", 0.5, {}), ("report", 1.0, GROWTH)]
 )
-def test_order_of_the_merge_width_is_two(reading, order, growth):
-    """Triangle of 3 bond lengths: the error falls with the square of the width, the list with its inverse."""
+def test_order_of_merge_width_is_two(reading, order, growth):
+    """The error of merging falls with the square of the merge width, while the number of strips grows."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = np.concatenate([triangle(3.0, 3, 200), [-3.0]])
-    whole = follow_list(law, path, 0.05)
+    full = follow_list(law, path, 0.05)
     errors = []
-    held = []
+    n_strips = []
     for merge in (0.01, 0.1):
-        got = follow_list(law, path, 0.05, merge)
-        errors.append(np.abs(got.after - whole.after).max())
-        held.append(got.status[STATUS.max_strips])
+        merged = follow_list(law, path, 0.05, merge)
+        errors.append(np.abs(merged.after - full.after).max())
+        n_strips.append(merged.status[STATUS.max_strips])
     assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
-    # the age of growing bonds caps wide merges
+    # the age of growing bonds limits wide merges
     assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)
-    assert held[1] < held[0] < 500 < whole.status[STATUS.max_strips]
+    assert n_strips[1] < n_strips[0] < 500 < full.status[STATUS.max_strips]

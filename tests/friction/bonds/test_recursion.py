@@ -1,4 +1,4 @@
-"""The bond state against the sum over all bonds: same path, same pressure on either piece, same energies."""
+"""The recursion of the bond state compared with the sum over all bonds, for pressure on either piece."""
 
 import numpy as np
 import pytest
@@ -13,14 +13,16 @@ GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed
 X = np.linspace(-3, 3, 7)
 
 
-def pressures(name):
+def make_pressure(name):
+    """Return the pressure as a function of the displacement, on the upper or the lower piece."""
     if name == "upper":
         return upper_pressure(1 + 0.5 * np.cos(X))
     return lower_pressure(X, 7.0, 1.5 if name == "lower" else 0.2)
 
 
 @st.composite
-def growths(draw):
+def growth_parameters(draw):
+    """Draw growth parameters of the bonds, or none."""
     if draw(st.booleans()):
         return {}
     return {
@@ -38,42 +40,51 @@ def growths(draw):
 @pytest.mark.parametrize("piece", ["upper", "lower", "lower with bare places"])
 @pytest.mark.parametrize("growth", GROWTH)
 @pytest.mark.parametrize("seed", [1, 2, 3])
-def test_exact_recursion_is_the_sum_over_bonds(piece, growth, seed):
+def test_exact_recursion_equals_sum_over_bonds(piece, growth, seed):
+    """The recursion has the tractions, means and energies of the sum over all bonds within 1e-10."""
     rng = np.random.default_rng(seed)
     steps = rng.normal(0, 1, 120) * 10.0 ** rng.uniform(-3, 0.7, 120)
     steps[rng.integers(0, 120, 10)] = 0.0
     path = np.concatenate([[0], np.cumsum(steps)])
     times = rng.uniform(0.01, 1, 120)
     law = Bonds(0.4, 1.0, initial=0.8, **growth)
-    fast = walk(FirstOrderBonds(law), path, pressures(piece), times)
-    slow = walk(Quadrature(law, tail=0.0), path, pressures(piece), times)
+    recursion = walk(FirstOrderBonds(law), path, make_pressure(piece), times)
+    quadrature = walk(Quadrature(law, tail=0.0), path, make_pressure(piece), times)
     if piece == "lower with bare places":
-        lost = np.diff((np.array([pressures(piece)(q) for q in path]) <= 0).astype(int), axis=0)
-        assert (lost > 0).sum() > 20  # the pattern must break bonds for the test to mean anything
-    assert np.abs(fast.traction - slow.traction).max() <= 1e-10
-    assert np.abs(fast.mean - slow.mean).max() <= 1e-10
-    assert np.abs(fast.stored - slow.stored).max() <= 1e-10
-    assert np.abs(fast.dissipated - slow.dissipated).max() <= 1e-10
+        contact_changes = np.diff(
+            (np.array([make_pressure(piece)(q) for q in path]) <= 0).astype(int), axis=0
+        )
+        assert (
+            contact_changes > 0
+        ).sum() > 20  # the test is only meaningful if contact is lost often
+    assert np.abs(recursion.traction - quadrature.traction).max() <= 1e-10
+    assert np.abs(recursion.mean - quadrature.mean).max() <= 1e-10
+    assert np.abs(recursion.stored - quadrature.stored).max() <= 1e-10
+    assert np.abs(recursion.dissipated - quadrature.dissipated).max() <= 1e-10
 
 
-def test_exact_step_mean_is_the_average_along_the_step():
-    """Means of whole steps against Gauss points on partial steps whose bonds are summed by hand."""
+def test_exact_step_mean_equals_average_along_step():
+    """The mean traction of a step agrees with Gauss quadrature over partial steps whose bonds are summed by hand."""
     law = Bonds(1.0, 1.0)
     path = np.array([0.0, 0.8, -0.5, 0.1, 2.0])
-    run = walk(FirstOrderBonds(law), path, pressures("upper"), 0.5)
+    run = walk(FirstOrderBonds(law), path, make_pressure("upper"), 0.5)
     y, w = np.polynomial.legendre.leggauss(10)
     for k in range(1, 5):
         dq = path[k] - path[k - 1]
         parts = [
             sum_by_hand(
-                law, np.append(path[:k], path[k - 1] + dq * (1 + a) / 2), pressures("upper"), 0.5
+                law,
+                np.append(path[:k], path[k - 1] + dq * (1 + a) / 2),
+                make_pressure("upper"),
+                0.5,
             )
             for a in y
         ]
         assert run.mean[k - 1] == pytest.approx(w / 2 @ np.array(parts), abs=1e-10)
 
 
-def test_exact_slope_is_the_derivative_of_the_mean():
+def test_exact_slope_equals_derivative_of_mean():
+    """The slope returned with the mean force agrees with its central difference."""
     bonds = np.array([[0.7, 0.2], [0.4, -0.1], [0.5, 0.3]])
     sigma = np.array([1.0, 0.6])
     for dq in (-3.0, -0.4, -0.02, 0.01, 0.2, 1.5):
@@ -88,11 +99,12 @@ def test_exact_slope_is_the_derivative_of_the_mean():
 # ---- passivity
 
 
-@given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growths())
-def test_always_the_sum_over_bonds_gives_no_energy_away(steps, growth):
+@given(st.lists(st.floats(-3, 3), min_size=1, max_size=15), growth_parameters())
+def test_always_sum_over_bonds_is_passive(steps, growth):
+    """Dissipated and stored energy of the sum over bonds are never negative."""
     law = Quadrature(Bonds(1.0, 1.0, **growth), tail=0.0)
     path = np.concatenate([[0], np.cumsum(steps)])
-    run = walk(law, path, pressures("lower with bare places"), 0.3)
+    run = walk(law, path, make_pressure("lower with bare places"), 0.3)
     total = max(np.abs(run.mean * np.diff(path)[:, None]).sum(), 1e-3)
     assert run.dissipated.min() >= -1e-12 * total and run.stored.min() >= 0
 
@@ -100,13 +112,16 @@ def test_always_the_sum_over_bonds_gives_no_energy_away(steps, growth):
 @pytest.mark.share(1, 3)
 @pytest.mark.parametrize("order", [0.0, 0.5, 2.0])
 @pytest.mark.parametrize("growth", GROWTH)
-def test_always_other_orders_of_the_stretch_give_no_energy_on_a_closed_path(order, growth):
-    """Work over the whole path from rest is storage + loss >= 0 for every p >= 0 (fine steps, Gauss strips)."""
+def test_always_stretch_law_of_any_order_is_passive(order, growth):
+    """The work from rest along a closed path is never negative, for stretch laws of order p >= 0."""
     rng = np.random.default_rng(3)
     for _ in range(3):
-        turns = rng.uniform(-1, 1, 8) * 10.0 ** rng.uniform(-1.5, 0.3)
+        reversals = rng.uniform(-1, 1, 8) * 10.0 ** rng.uniform(-1.5, 0.3)
         path = np.concatenate(
-            [np.linspace(a, b, 8)[:-1] for a, b in zip(np.append(0, turns), np.append(turns, 0))]
+            [
+                np.linspace(a, b, 8)[:-1]
+                for a, b in zip(np.append(0, reversals), np.append(reversals, 0))
+            ]
         )
         run = walk(
             Quadrature(Bonds(1.0, 1.0, order, initial=0.0, **growth), tail=0.0),
@@ -122,38 +137,40 @@ def test_always_other_orders_of_the_stretch_give_no_energy_on_a_closed_path(orde
 
 
 @pytest.mark.parametrize("growth", GROWTH)
-def test_exact_huge_steps_end_in_steady_sliding(growth):
+def test_exact_huge_steps_reach_steady_sliding(growth):
+    """A step of a million bond lengths reaches the friction limit of steady sliding without overflow."""
     law = Bonds(0.3, 1.0, **growth)
-    for maker in (FirstOrderBonds, Quadrature):
+    for engine in (FirstOrderBonds, Quadrature):
         run = walk(
-            maker(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), pressures("upper"), 1.0
+            engine(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), make_pressure("upper"), 1.0
         )
         assert np.isfinite(
             np.concatenate([run.mean, run.traction, run.dissipated, run.stored])
         ).all()
-        sigma = pressures("upper")(0)
-        share = 0.5 if growth else 1.0
-        assert run.traction[0] == pytest.approx(0.3 * share * sigma, rel=1e-4)
-        assert run.traction[1] == pytest.approx(-0.3 * share * sigma, rel=1e-4)
-        assert run.mean[1] == pytest.approx(-0.3 * share * sigma, rel=1e-4)
-        assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-12)  # a step of no length
+        sigma = make_pressure("upper")(0)
+        length_ratio = 0.5 if growth else 1.0
+        assert run.traction[0] == pytest.approx(0.3 * length_ratio * sigma, rel=1e-4)
+        assert run.traction[1] == pytest.approx(-0.3 * length_ratio * sigma, rel=1e-4)
+        assert run.mean[1] == pytest.approx(-0.3 * length_ratio * sigma, rel=1e-4)
+        assert run.traction[2] == pytest.approx(run.traction[1], rel=1e-12)  # step of zero length
 
 
-def test_exact_steps_of_no_length_and_no_time_change_nothing():
+def test_exact_zero_steps_do_not_change_state():
+    """A step of zero length and zero duration changes neither traction nor energy."""
     law = Bonds(0.3, 1.0, **GROWTH[1])
-    for maker in (FirstOrderBonds, Quadrature):
+    for engine in (FirstOrderBonds, Quadrature):
         path = np.array([0, 0.4, 0.4, 0.4, 0.9])
         times = np.array([0.5, 0.0, 0.0, 0.5])
-        run = walk(maker(law), path, pressures("upper"), times)
-        short = walk(maker(law), path[[0, 1, 4]], pressures("upper"), times[[0, 3]])
-        assert run.traction[-1] == pytest.approx(short.traction[-1], abs=1e-14)
+        run = walk(engine(law), path, make_pressure("upper"), times)
+        shortened = walk(engine(law), path[[0, 1, 4]], make_pressure("upper"), times[[0, 3]])
+        assert run.traction[-1] == pytest.approx(shortened.traction[-1], abs=1e-14)
         assert (
             run.mean[1] == pytest.approx(run.traction[0], abs=1e-14) and not run.dissipated[1].any()
         )
 
 
-def test_exact_pressure_changes_leave_old_bonds_as_they_were():
-    """Loading and unloading at rest move no force; only a bare place loses it."""
+def test_exact_load_change_at_rest_preserves_traction():
+    """A change of pressure at rest keeps the traction; lost contact removes it and dissipates the stored energy."""
     law = FirstOrderBonds(Bonds(0.3, 1.0))
     state = law.step(law.start(np.ones(1)), 0.5, np.ones(1), np.ones(1), 1.0).state
     for s0, s1 in ((1.0, 3.0), (3.0, 0.2)):

@@ -1,4 +1,4 @@
-"""The spread of bonds across the path (2.15): the factor of a pad, and scenes with it."""
+"""Spread of the bonds across the sliding direction (equation 2.15): the factor of a pad, and scenes with spread."""
 
 import numpy as np
 import pytest
@@ -11,13 +11,13 @@ from patchfem.runs.bench import bench
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
-LONGER = NONLOCAL.replace("1 um", "2 um")
+NONLOCAL_2UM = NONLOCAL.replace("1 um", "2 um")
 SPREAD = ["friction.spread=4 mm"]
 
 
 @pytest.mark.parametrize("width", [0.05, 0.7, 1.0, 4.0])
-def test_exact_factor_is_the_double_integral_of_the_weight(width):
-    """(1/b) of the weight between all pairs of points on the pad, by two-dimensional quadrature (kink-free halves)."""
+def test_exact_spread_factor_equals_double_integral(width):
+    """The spread factor of a pad equals the double integral of the Gaussian weight over its width."""
     total, _ = dblquad(
         lambda y, y1: np.exp(-((y - y1) ** 2) / 2) / np.sqrt(2 * np.pi),
         0,
@@ -31,75 +31,93 @@ def test_exact_factor_is_the_double_integral_of_the_weight(width):
 
 
 @pytest.mark.parametrize("law", ["", 'reading = "report"\n', "order = 2\n"])
-def test_exact_every_force_of_a_bench_shrinks_by_the_factor(law):
-    """12.7 mm of contact.width and the same normal.width give the same factor; kinetic keeps its ratio."""
-    share = carried_fraction(12.7e-3, 4e-3)
+def test_exact_bench_forces_scale_with_spread_factor(law):
+    """Every force and the loop area of a bench with spread are those without spread times the factor.
+
+    The widths `contact.width` and `normal.width` give the same factor.
+    """
+    factor = carried_fraction(12.7e-3, 4e-3)
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
     for text in (point, SMALL_PATCH):
-        whole, less = (
-            bench.run(build(loads(text + LONGER + law + TRIANGLE, sets=sets)), patch_of(text), 80)
+        full, reduced = (
+            bench.run(
+                build(loads(text + NONLOCAL_2UM + law + TRIANGLE, sets=sets)),
+                solve_bench_patch(text),
+                80,
+            )
             for sets in ([], SPREAD)
         )
-        assert less.force == pytest.approx(
-            share * whole.force, rel=1e-12, abs=1e-12 * np.abs(whole.force).max()
+        assert reduced.force == pytest.approx(
+            factor * full.force, rel=1e-12, abs=1e-12 * np.abs(full.force).max()
         )
-        assert less.values["loop_area"] == pytest.approx(
-            share * whole.values["loop_area"], rel=1e-12
+        assert reduced.values["loop_area"] == pytest.approx(
+            factor * full.values["loop_area"], rel=1e-12
         )
-        assert less.slip == pytest.approx(whole.slip, rel=1e-9, abs=1e-18)
+        assert reduced.slip == pytest.approx(full.slip, rel=1e-9, abs=1e-18)
 
 
-def patch_of(text):
+def solve_bench_patch(text):
+    """Return the solved patch of a scene, or None for a single point."""
     if text != SMALL_PATCH:
         return None
     from patchfem.runs import solve_with_coarser
 
-    return solve_with_coarser(build(loads(SMALL_PATCH + LONGER + TRIANGLE)).patch, 1e-3, False)[0]
+    return solve_with_coarser(
+        build(loads(SMALL_PATCH + NONLOCAL_2UM + TRIANGLE)).patch, 1e-3, False
+    )[0]
 
 
-def test_exact_strips_share_the_whole_width():
-    sets = ["contact.strips.count=4"]
-    one, four = (
-        build(loads(SMALL_PATCH + LONGER + TRIANGLE, sets=SPREAD + more)).friction
-        for more in ([], sets)
+def test_exact_strips_use_spread_of_full_width():
+    """A contact in four strips has the spread factor of the full width."""
+    strip_sets = ["contact.strips.count=4"]
+    single_strip, four_strips = (
+        build(loads(SMALL_PATCH + NONLOCAL_2UM + TRIANGLE, sets=SPREAD + extra_sets)).friction
+        for extra_sets in ([], strip_sets)
     )
     assert (
-        one.static == four.static == pytest.approx(0.3 * carried_fraction(12.7e-3, 4e-3), rel=1e-15)
+        single_strip.static
+        == four_strips.static
+        == pytest.approx(0.3 * carried_fraction(12.7e-3, 4e-3), rel=1e-15)
     )
 
 
-@pytest.mark.parametrize("more", ["", SHEAR])
-def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
-    share = carried_fraction(12.7e-3, 4e-3)
-    text = SMALL_PATCH + more + LONGER + SHORT
-    one, two = (
+@pytest.mark.parametrize("extra_tables", ["", SHEAR])
+def test_exact_rig_with_spread_equals_reduced_friction(extra_tables):
+    """A rig with spread has the measures of a rig whose friction coefficient is reduced by the factor."""
+    factor = carried_fraction(12.7e-3, 4e-3)
+    text = SMALL_PATCH + extra_tables + NONLOCAL_2UM + SHORT
+    with_spread, with_less_friction = (
         run(
             plan(loads(text, sets=[*sets, "accuracy.steps_per_cycle=400"])), estimate=False
         ).measures
-        for sets in (SPREAD, [f"friction.static={0.3 * share!r}"])
+        for sets in (SPREAD, [f"friction.static={0.3 * factor!r}"])
     )
-    assert {k: m.value for k, m in one.items()} == {k: m.value for k, m in two.items()}
-    assert plan(loads(text, sets=SPREAD)).groups["share_of_the_spread"] == share
+    assert {k: m.value for k, m in with_spread.items()} == {
+        k: m.value for k, m in with_less_friction.items()
+    }
+    assert plan(loads(text, sets=SPREAD)).groups["share_of_the_spread"] == factor
     assert "share_of_the_spread" not in plan(loads(text)).groups
     assert plan(loads(text, sets=SPREAD)).groups["D"] == pytest.approx(
-        share * plan(loads(text)).groups["D"]
+        factor * plan(loads(text)).groups["D"]
     )
 
 
-def test_refuses_spread_without_a_width_and_for_laws_without_bonds():
+def test_refuses_spread_without_width_or_bonds():
+    """Spread is refused if the width is missing or the law has no bonds."""
     with pytest.raises(SceneError, match=r"normal.width: missing.*friction.spread needs this key"):
-        loads(POINT + LONGER + TRIANGLE, sets=SPREAD)
+        loads(POINT + NONLOCAL_2UM + TRIANGLE, sets=SPREAD)
     for law in ("coulomb", "tanh", "elastic-plastic"):
         with pytest.raises(
             SceneError, match=f"friction.spread: law '{law}' has no spread"
         ) as caught:
             loads(
-                SMALL_PATCH + LONGER + TRIANGLE,
+                SMALL_PATCH + NONLOCAL_2UM + TRIANGLE,
                 sets=[*SPREAD, f"friction.law={law}", "friction.reference_speed=1 mm/s"],
             )
         assert len(caught.value.mistakes) == 1
 
 
-def test_exact_a_width_without_spread_is_remarked():
-    scene = loads(POINT + LONGER + TRIANGLE, sets=["normal.width=1 mm"])
+def test_exact_unused_width_is_reported():
+    """A width without spread gives a remark that it is not used."""
+    scene = loads(POINT + NONLOCAL_2UM + TRIANGLE, sets=["normal.width=1 mm"])
     assert scene.remarks == ["normal.width has no meaning without friction.spread and is not used"]

@@ -1,4 +1,4 @@
-"""The Bouc-Wen law: limit, slope and closed loops, and one law in every run."""
+"""The Bouc-Wen law: limit, stiffness and closed loops."""
 
 import numpy as np
 import pytest
@@ -13,68 +13,74 @@ LAW = 'law = "bouc-wen"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\n'
 LIMIT, EPS = 0.31 * LOAD, 0.31 * LOAD / 1.3e7
 
 
-def law_of(exponent, shape):
+def law_keys(exponent, shape):
+    """Return the scene keys of a Bouc-Wen law."""
     return LAW + f"exponent = {exponent}\nshape = {shape}\n"
 
 
-def integrated(slide, exponent, shape):
-    """z along straight legs of the slide, from the equation."""
+def integrate_law(slide, exponent, shape):
+    """Return the variable z along straight legs of the displacement, integrated from the rate equation."""
     z = [0.0]
     for dq in np.diff(slide):
 
-        def rate(_, y, v=dq):
+        def rate_of_z(_, y, v=dq):
             return v / EPS * (1 - np.abs(y) ** exponent * (shape * np.sign(v * y) + 1 - shape))
 
-        z.append(solve_ivp(rate, (0, 1), z[-1:], method="DOP853", rtol=1e-12, atol=1e-14).y[0, -1])
+        z.append(
+            solve_ivp(rate_of_z, (0, 1), z[-1:], method="DOP853", rtol=1e-12, atol=1e-14).y[0, -1]
+        )
     return np.array(z)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
-def test_exact_closed_loops(exponent):
-    """s = 1/2 unloads on the elastic line and loads as 1 - e^-x or tanh x: the symmetric loop in closed form."""
+def test_exact_symmetric_loop_agrees_with_closed_form(exponent):
+    """The symmetric loop of shape 1/2 agrees with its closed form: linear unloading, loading as 1 - exp(-x) or tanh x."""
     amplitude = 3e-6
     time = np.arange(12001) / 1e5
-    found = bench_along(law_of(exponent, 0.5), time, amplitude * np.sin(2 * np.pi * 100 * time))
-    rise = (lambda x: -np.expm1(-x)) if exponent == 1 else np.tanh
-    top = brentq(lambda z: rise(2 * amplitude / EPS - z) - z, 0.0, 1.0, xtol=1e-15)
-    x = 2 * amplitude / EPS - top
-    half = LIMIT * EPS * (-(top**2) / 2 + (x - top if exponent == 1 else np.log(np.cosh(x))))
-    assert found.force[-751] == pytest.approx(LIMIT * top, rel=1e-9)
-    assert found.ledger[0, -1] - found.ledger[0, -1001] == pytest.approx(2 * half, rel=1e-9)
+    result = bench_along(law_keys(exponent, 0.5), time, amplitude * np.sin(2 * np.pi * 100 * time))
+    loading_curve = (lambda x: -np.expm1(-x)) if exponent == 1 else np.tanh
+    z_peak = brentq(lambda z: loading_curve(2 * amplitude / EPS - z) - z, 0.0, 1.0, xtol=1e-15)
+    x = 2 * amplitude / EPS - z_peak
+    half_area = (
+        LIMIT * EPS * (-(z_peak**2) / 2 + (x - z_peak if exponent == 1 else np.log(np.cosh(x))))
+    )
+    assert result.force[-751] == pytest.approx(LIMIT * z_peak, rel=1e-9)
+    assert result.ledger[0, -1] - result.ledger[0, -1001] == pytest.approx(2 * half_area, rel=1e-9)
 
 
 @pytest.mark.share(0, 3)
 @pytest.mark.parametrize("exponent, shape", [(1.0, 0.5), (2.0, 0.8), (1.5, 0.2), (4.0, 1.0)])
-def test_exact_a_bench_loop_is_the_equation(exponent, shape):
+def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape):
+    """Force and stored energy on the bench agree with the integrated rate equation, and the energy balance closes."""
     time, slide = shrinking(60)
-    found = bench_along(law_of(exponent, shape), time, slide)
-    z = integrated(slide, exponent, shape)
-    assert np.abs(found.force - LIMIT * z).max() <= 1e-6 * LIMIT
-    work, stored, dissipated, created = found.ledger
+    result = bench_along(law_keys(exponent, shape), time, slide)
+    z = integrate_law(slide, exponent, shape)
+    assert np.abs(result.force - LIMIT * z).max() <= 1e-6 * LIMIT
+    work, stored, dissipated, created = result.ledger
     assert stored == pytest.approx(LIMIT * EPS * z**2 / 2, abs=1e-9 * LIMIT * EPS)
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1] - created[-1], rel=1e-12)
     assert created[-1] == 0 if shape >= 0.5 else created[-1] > 1e-3 * dissipated[-1]
 
 
 @pytest.mark.parametrize("exponent, shape", [(0.3, 0.5), (1.0, 1.0), (1.5, 0.2), (4.0, 0.7)])
-def test_exact_steady_loops_are_the_equation(exponent, shape):
-    """Force at the turns and area of the loop that strokes of the law settle to, from half a length to 40 of them."""
+def test_exact_steady_loop_agrees_with_rate_equation(exponent, shape):
+    """The peak force and the area of steady loops agree with the rate equation, for amplitudes of 0.5 to 40 lengths."""
     keys = Friction.model_construct(static=0.31, stiffness=1.3e7, exponent=exponent, shape=shape)
     slides = np.array([[0.5, 3.0], [12.0, 40.0]]) * EPS
-    tip, area = loop_from_keys(keys, LOAD, slides)
-    for u, force, loss in zip(slides.flat, tip.flat, area.flat):
+    peak_forces, areas = loop_from_keys(keys, LOAD, slides)
+    for u, force, loss in zip(slides.flat, peak_forces.flat, areas.flat):
 
-        def stroke(z, u=u):
-            """(z, its integral over the slide [m]) after a slide of 2 u from z."""
+        def integrate_stroke(z, u=u):
+            """Return z and its integral over the displacement [m] after a displacement of 2 u from z."""
 
-            def rate(x, y):
+            def rate_of_z(x, y):
                 return [
                     (1 - np.abs(y[0]) ** exponent * (shape * np.sign(y[0]) + 1 - shape)) / EPS,
                     y[0],
                 ]
 
             return solve_ivp(
-                rate,
+                rate_of_z,
                 (0, 2 * u),
                 [z, 0.0],
                 method="DOP853",
@@ -83,15 +89,18 @@ def test_exact_steady_loops_are_the_equation(exponent, shape):
                 max_step=0.5 * EPS,
             ).y[:, -1]
 
-        end = brentq(lambda z: stroke(-z)[0] - z, 0.0, 1.0, xtol=1e-13)
-        assert force == pytest.approx(LIMIT * end, rel=1e-7)
-        assert loss == pytest.approx(2 * LIMIT * stroke(-end)[1], rel=1e-7)
+        z_peak = brentq(lambda z: integrate_stroke(-z)[0] - z, 0.0, 1.0, xtol=1e-13)
+        assert force == pytest.approx(LIMIT * z_peak, rel=1e-7)
+        assert loss == pytest.approx(2 * LIMIT * integrate_stroke(-z_peak)[1], rel=1e-7)
 
 
-def test_exact_one_and_one_is_the_stretch_reading():
+def test_exact_exponent_and_shape_one_equal_bond_law():
+    """A Bouc-Wen law with exponent 1 and shape 1 has the forces of the stretch form of the bond law."""
     time, slide = shrinking()
     bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{EPS!r} m"\n'
-    a = bench_along(law_of(1.0, 1.0), time, slide)
-    b = bench_along(bonds, time, slide)
-    assert a.force == pytest.approx(b.force, abs=1e-10 * LIMIT)
-    assert a.ledger[0] == pytest.approx(b.ledger[0], abs=1e-10 * a.ledger[0, -1])
+    bouc_wen = bench_along(law_keys(1.0, 1.0), time, slide)
+    bond_law = bench_along(bonds, time, slide)
+    assert bouc_wen.force == pytest.approx(bond_law.force, abs=1e-10 * LIMIT)
+    assert bouc_wen.ledger[0] == pytest.approx(
+        bond_law.ledger[0], abs=1e-10 * bouc_wen.ledger[0, -1]
+    )

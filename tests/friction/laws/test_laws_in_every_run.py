@@ -1,4 +1,4 @@
-"""One law in every engine: time integration against harmonic balance, two alike interfaces, and the fit to a loop."""
+"""Each law in each engine: time integration against harmonic balance, two equal interfaces, and the fit to a loop."""
 
 import numpy as np
 import pytest
@@ -16,21 +16,23 @@ BONDS = 'law = "nonlocal"\nstatic = 0.3\nbond_length = "10 um"\n'
 DAMPED = LUGRE + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 
 
-@pytest.mark.share(0)  # each other law is a loop to compile
+@pytest.mark.share(0)  # each further law needs a time loop of its own, which takes long to compile
 @pytest.mark.parametrize(
     "law",
     [IWAN, BOUC_WEN.format(1.0, 0.5), BOUC_WEN.format(2.5, 0.5), DAHL, DAMPED],
     ids=["iwan", "bouc-wen 1", "bouc-wen 2.5", "dahl", "lugre"],
 )
-def test_exact_a_march_settles_on_the_harmonic_balance(law):
-    """The measures of the two engines differ by no more than their stated errors."""
+def test_exact_march_agrees_with_harmonic_balance(law):
+    """The measures of a march and of the harmonic balance differ by no more than their stated errors."""
     marched = rig(law)
     steady = rig(law, "accuracy.method=harmonic")
     assert marched.outcome.value == "steady"
     for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
-        a = marched.measures[name]
-        b = steady.measures[name]
-        assert abs(a.value - b.value) <= a.error + b.error + 1e-3 * abs(b.value), name
+        marched_measure = marched.measures[name]
+        steady_measure = steady.measures[name]
+        assert abs(
+            marched_measure.value - steady_measure.value
+        ) <= marched_measure.error + steady_measure.error + 1e-3 * abs(steady_measure.value), name
     assert marched.measures["energy_balance"].value < 1e-9
     assert (
         marched.measures["energy_created"].value
@@ -39,44 +41,51 @@ def test_exact_a_march_settles_on_the_harmonic_balance(law):
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("more", ["", "breakaway = 0.2\n", "initial_bonds = 0.0\n"])
-def test_exact_bonds_released_from_a_displaced_start_slip_as_in_the_smooth_engine(more):
-    """Slip is the relative displacement less the stretch of the bonds, which is zero at the start."""
-    smooth = released(BONDS + more)
-    marched = released(BONDS + more, "accuracy.method=march")
+@pytest.mark.parametrize("extra_keys", ["", "breakaway = 0.2\n", "initial_bonds = 0.0\n"])
+def test_exact_released_bonds_agree_in_both_engines(extra_keys):
+    """Displacement and slip after a release agree between the march and the smooth engine within 5 nm.
+
+    Slip is the relative displacement less the stretch of the bonds, which is zero at the start.
+    """
+    smooth = released(BONDS + extra_keys)
+    marched = released(BONDS + extra_keys, "accuracy.method=march")
     for run in (smooth, marched):
         assert run.slide[0] == run.slip[0] == 60e-6
-        # the stretch that the slip leaves is that of the bonds
+        # displacement and slip differ by the stretch of the bonds
         assert np.abs(run.slide - run.slip).max() <= 10e-6
     for name in ("slide", "slip"):
-        other = np.interp(smooth.time, marched.time, getattr(marched, name))
-        assert getattr(smooth, name) == pytest.approx(other, abs=5e-9), name
+        interpolated = np.interp(smooth.time, marched.time, getattr(marched, name))
+        assert getattr(smooth, name) == pytest.approx(interpolated, abs=5e-9), name
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize(
     "law", [IWAN, BOUC_WEN.format(2.0, 0.7), DAMPED], ids=["iwan", "bouc-wen", "lugre"]
 )
-def test_exact_two_alike_interfaces_move_alike(law, monkeypatch):
+def test_exact_two_equal_interfaces_move_equally(law, monkeypatch):
+    """Two equal interfaces have the relative displacement of a single interface."""
     if law == IWAN:
         share_one_loop(monkeypatch)
-    both = masses(law, 2)
-    slides = both.response.extra["slides"]
-    alone = masses(law, 1).response.slide
+    two_masses = masses(law, 2)
+    slides = two_masses.response.extra["slides"]
+    single_slide = masses(law, 1).response.slide
     assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
-    assert slides[:, 0] == pytest.approx(alone, abs=1e-7 * np.abs(alone).max())
+    assert slides[:, 0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
 
 
 @pytest.mark.slow
-def test_exact_two_alike_interfaces_move_alike_without_compilation():
-    both, alone, peaks = plain_masses(BOUC_WEN.format(2.0, 0.7))
-    assert both[0] == pytest.approx(both[1], abs=1e-12 * np.abs(both).max())
-    assert both[0] == pytest.approx(alone, abs=1e-7 * np.abs(alone).max())
-    assert np.abs(alone).max() > 3 * 31 / 1.3e7 and max(peaks) > 0.9 * 31  # the interface slips
+def test_exact_uncompiled_equal_interfaces_move_equally():
+    """Two equal interfaces move as a single interface when the kernels run as Python."""
+    slides, single_slide, peaks = plain_masses(BOUC_WEN.format(2.0, 0.7))
+    assert slides[0] == pytest.approx(slides[1], abs=1e-12 * np.abs(slides).max())
+    assert slides[0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
+    assert (
+        np.abs(single_slide).max() > 3 * 31 / 1.3e7 and max(peaks) > 0.9 * 31
+    )  # the interface slips
 
 
 @pytest.mark.parametrize(
-    "law, start, free, values",
+    "law, initial_values, free_parameters, values",
     [
         (
             IWAN,
@@ -99,15 +108,18 @@ def test_exact_two_alike_interfaces_move_alike_without_compilation():
     ],
     ids=["iwan", "bouc-wen", "lugre"],
 )
-def test_exact_a_fit_finds_the_parameters_of_a_loop(tmp_path, law, start, free, values):
+def test_exact_fit_recovers_parameters_of_loop(
+    tmp_path, law, initial_values, free_parameters, values
+):
+    """A fit to a loop computed with known parameters recovers them within 1e-5."""
     time, slide = shrinking(60)
     force = bench_along(law, time, slide).force
     guess = law
-    for value, other in start.items():
-        guess = guess.replace(value, other)
-    assert fitted(tmp_path, guess, (time, slide, force), free).keys.fit.values == pytest.approx(
-        values, rel=1e-5
-    )
+    for value, initial_value in initial_values.items():
+        guess = guess.replace(value, initial_value)
+    assert fitted(
+        tmp_path, guess, (time, slide, force), free_parameters
+    ).keys.fit.values == pytest.approx(values, rel=1e-5)
 
 
 TANH = 'law = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'
@@ -133,7 +145,8 @@ def without_key(scene: str, key: str) -> str:
         (TANH, "reference_speed"),
     ],
 )
-def test_refuses_a_law_without_a_key_that_it_needs(law, keys):
+def test_refuses_law_without_required_key(law, keys):
+    """A law without one of its required keys is refused."""
     for key in keys.split():
         assert f"friction.{key}: missing" in only(without_key(rig_scene(law), key))
 
@@ -154,22 +167,26 @@ def test_refuses_a_law_without_a_key_that_it_needs(law, keys):
         (DAMPED, "viscous=-1 N s/m", "friction.viscous"),
     ],
 )
-def test_refuses_a_value_outside_the_range_of_a_law(law, change, message):
+def test_refuses_law_parameter_out_of_range(law, change, message):
+    """A parameter outside the range of its law is refused with the name of the key or the reason."""
     assert message in only(rig_scene(law), f"friction.{change}")
 
 
 @pytest.mark.parametrize("law", [IWAN, POWER, DAHL, TANH])
-def test_refuses_a_law_with_partial_slip(law):
+def test_refuses_partial_slip_for_hysteretic_laws(law):
+    """The laws without partial slip are refused with `contact.shear`."""
     scene = COATED + "[contact.shear]\n[friction]\n" + law + MODE + DRIVE
     assert "with [contact.shear]" in only(scene)
 
 
 @pytest.mark.parametrize("law", [IWAN, POWER, DAMPED])
-def test_refuses_a_law_under_a_varying_load(law):
+def test_refuses_varying_load_for_hysteretic_laws(law):
+    """The laws with memory are refused with a varying load on a rig."""
     sets = ("normal.amplitude=1 N", "normal.frequency=3 Hz")
     assert "with normal.amplitude" in mistakes(rig_scene(law), *sets)[0]
 
 
-def test_exact_keys_left_out_have_their_defaults():
+def test_exact_missing_keys_have_defaults():
+    """A missing exponent is 1, and a missing kinetic coefficient is the static coefficient."""
     assert load(without_key(rig_scene(POWER), "exponent")).friction.exponent == 1
     assert load(rig_scene(DAHL)).friction.kinetic == 0.31

@@ -1,4 +1,4 @@
-"""The LuGre law: Stribeck curve, Dahl's loop, the equation itself, and one law in every run."""
+"""The LuGre law: Stribeck curve, Dahl's loop, and the rate equation."""
 
 import numpy as np
 import pytest
@@ -14,73 +14,79 @@ LAW = DAHL + "kinetic = 0.22\n"
 DAMPED = LAW + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 
 
-def limit(v):
+def stribeck_limit(v):
+    """Return the steady friction force at a velocity (Stribeck curve)."""
     return KINETIC + (STATIC - KINETIC) * np.exp(-((v / SPEED) ** 2))
 
 
-def rates(z, v, micro=0.0, viscous=0.0):
-    """(z', F) of the equations."""
-    rate = v - STIFFNESS * np.abs(v) * z / limit(v)
-    return rate, STIFFNESS * z + micro * rate + viscous * v
+def rate_and_force(z, v, micro_damping=0.0, viscous=0.0):
+    """Return the rate of the bristle deflection and the friction force."""
+    rate = v - STIFFNESS * np.abs(v) * z / stribeck_limit(v)
+    return rate, STIFFNESS * z + micro_damping * rate + viscous * v
 
 
 @pytest.mark.parametrize("speed", [1e-5, 1e-3, 2e-3, 5e-3, 0.1])
-def test_exact_steady_slides_have_the_stribeck_curve(speed):
+def test_exact_steady_sliding_follows_stribeck_curve(speed):
+    """The force in steady sliding is the Stribeck curve plus the viscous force, in both directions."""
     time = np.linspace(0.0, 1e-3 / speed, 201)
-    for way in (1.0, -1.0):
-        found = bench_along(DAMPED, time, way * speed * time)
-        assert found.force[-1] == pytest.approx(way * (limit(speed) + 300 * speed), rel=1e-12)
+    for direction in (1.0, -1.0):
+        result = bench_along(DAMPED, time, direction * speed * time)
+        assert result.force[-1] == pytest.approx(
+            direction * (stribeck_limit(speed) + 300 * speed), rel=1e-12
+        )
 
 
-def test_exact_dahl_is_the_stretch_reading():
-    """Without weakening and damping z relaxes over mu N/stiffness whatever the speed: eq. 2.17 with p = 1."""
+def test_exact_dahl_law_equals_bond_law():
+    """Without weakening and damping the law equals the stretch form of the bond law of order one."""
     time, slide = shrinking()
     bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{STATIC / STIFFNESS!r} m"\n'
-    a = bench_along(DAHL, time, slide)
-    b = bench_along(bonds, time, slide)
-    assert a.force == pytest.approx(b.force, abs=1e-10 * STATIC)
-    top = np.abs(a.slide).max() * STIFFNESS / STATIC
-    assert a.force.max() == pytest.approx(STATIC * -np.expm1(-top), rel=2e-2)  # first loading
+    dahl = bench_along(DAHL, time, slide)
+    bond_law = bench_along(bonds, time, slide)
+    assert dahl.force == pytest.approx(bond_law.force, abs=1e-10 * STATIC)
+    max_ratio = np.abs(dahl.slide).max() * STIFFNESS / STATIC
+    assert dahl.force.max() == pytest.approx(
+        STATIC * -np.expm1(-max_ratio), rel=2e-2
+    )  # first loading
 
 
-def test_exact_straight_legs_are_the_equations():
-    """At coarse steps: the stretch after every leg and the work over it, by an integration of order eight."""
+def test_exact_bench_steps_agree_with_rate_equation():
+    """Stored energy and work of each coarse bench step agree with an integration of order eight."""
     time, slide = shrinking(40)
-    found = bench_along(DAMPED, time, slide)
+    result = bench_along(DAMPED, time, slide)
     z = 0.0
     for k, (dq, dt) in enumerate(zip(np.diff(slide), np.diff(time))):
         v = dq / dt
 
         def rate(_, y, v=v):
-            change, force = rates(y[0], v, 900, 300)
+            change, force = rate_and_force(y[0], v, 900, 300)
             return change, force * v
 
         z, work = solve_ivp(rate, (0, dt), [z, 0.0], method="DOP853", rtol=1e-12, atol=1e-18).y[
             :, -1
         ]
-        assert found.ledger[1, k + 1] == pytest.approx(
+        assert result.ledger[1, k + 1] == pytest.approx(
             STIFFNESS * z**2 / 2, abs=1e-10 * STATIC**2 / STIFFNESS
         )
-        assert found.ledger[0, k + 1] - found.ledger[0, k] == pytest.approx(
+        assert result.ledger[0, k + 1] - result.ledger[0, k] == pytest.approx(
             work, abs=1e-10 * STATIC * 1e-6
         )
-    work, stored, dissipated, created = found.ledger
+    work, stored, dissipated, created = result.ledger
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1], rel=1e-12) and not created.any()
 
 
-def test_exact_rate_equation_and_its_derivatives():
-    """Of the kernel that the engines integrate in time, run as Python: the equations, and their central differences."""
+def test_exact_kernel_rate_equation_and_derivatives():
+    """The kernel returns the rate equation and its derivatives, which agree with central differences."""
     kernels = load_uncompiled("patchfem.friction.laws.lugre_kernels")
     law = LuGre(0.31, 0.22, STIFFNESS / LOAD, SPEED, 900 / LOAD, 300 / LOAD)
     numbers = law.element(LOAD).numbers
 
     def force(z, v):
-        return rates(z, v, 900, 300)[1]
+        return rate_and_force(z, v, 900, 300)[1]
 
     for z, v in ((1e-6, 1e-3), (-2e-6, 3e-3), (5e-7, -2e-3), (-1e-6, -1e-2)):
-        found = kernels.rate_equation(numbers, z, v, np.sign(v))
+        result = kernels.rate_equation(numbers, z, v, np.sign(v))
         by_stretch = (force(z + 1e-9, v) - force(z - 1e-9, v)) / 2e-9
         by_velocity = (force(z, v + 1e-7) - force(z, v - 1e-7)) / 2e-7
-        assert found[0] == pytest.approx(force(z, v), rel=1e-12)
-        assert found[1] * v == pytest.approx(rates(z, v)[0], rel=1e-12)
-        assert found[2:] == pytest.approx((by_stretch, by_velocity), rel=1e-6)
+        assert result[0] == pytest.approx(force(z, v), rel=1e-12)
+        assert result[1] * v == pytest.approx(rate_and_force(z, v)[0], rel=1e-12)
+        assert result[2:] == pytest.approx((by_stretch, by_velocity), rel=1e-6)

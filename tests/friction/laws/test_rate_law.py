@@ -1,4 +1,4 @@
-"""The rate law 2.4, F = mu N tanh(v/v_0): alone on the bench and under the modes of a rig."""
+"""The rate law of equation 2.4, F = mu N tanh(v/v_0), on the bench and under the modes of a rig."""
 
 import numpy as np
 import pytest
@@ -19,16 +19,18 @@ RIG = (
 )
 
 
-def found(text):
+def run_text(text):
+    """Return the result of a scene text."""
     return run(plan(text))
 
 
 # ---- the bench
 
 
-def test_exact_force_at_a_constant_speed():
+def test_exact_force_at_constant_speed():
+    """The friction ratio at constant speed equals mu tanh(v/v_0)."""
     for speed in (1e-4, 1e-3, 5e-3):
-        result = found(
+        result = run_text(
             LAW.format(1e-3)
             + f'[slide]\nkind = "constant"\nspeed = "{speed} m/s"\ndistance = "10 um"\n'
         )
@@ -38,22 +40,22 @@ def test_exact_force_at_a_constant_speed():
 
 
 @pytest.mark.parametrize("speed", [1e-4, 1e-2])
-def test_order_loop_of_a_sine_is_two(speed):
-    """Area int F v dt = 4 mu N A int_0^(pi/2) tanh(A w cos(p)/v_0) cos(p) dp."""
-    reach = 10e-6 * OMEGA
-    near = max(0.0, np.pi / 2 - speed / reach)  # where the speed falls to v_0
-    exact = (
+def test_order_of_sine_loop_area_is_two(speed):
+    """The loop area of sinusoidal motion converges with order two to the integral of the force, within the stated error."""
+    max_speed = 10e-6 * OMEGA
+    angle_of_v0 = max(0.0, np.pi / 2 - speed / max_speed)  # phase at which the speed falls to v_0
+    expected = (
         4
         * LIMIT
         * 10e-6
         * sum(
             quad(
-                lambda p: np.tanh(reach * np.cos(p) / speed) * np.cos(p),
-                *part,
+                lambda p: np.tanh(max_speed * np.cos(p) / speed) * np.cos(p),
+                *limits,
                 epsabs=0,
                 epsrel=1e-12,
             )[0]
-            for part in ((0, near), (near, np.pi / 2))
+            for limits in ((0, angle_of_v0), (angle_of_v0, np.pi / 2))
         )
     )
     errors = []
@@ -62,20 +64,21 @@ def test_order_loop_of_a_sine_is_two(speed):
             LAW.format(speed)
             + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
         )
-        result = found(text + f"[accuracy]\nsteps_per_cycle = {steps}\n")
+        result = run_text(text + f"[accuracy]\nsteps_per_cycle = {steps}\n")
         area = result.measures["loop_area"]
-        errors.append(abs(area.value / exact - 1))
+        errors.append(abs(area.value / expected - 1))
         assert (
-            abs(area.value - exact) <= area.error
+            abs(area.value - expected) <= area.error
             and result.measures["energy_balance"].value <= 1e-12
         )
     assert errors[-1] <= 2e-5
-    # at 1e-4 m/s the reversal is shorter than a step and the error, 5e-6, is not yet in its order
+    # at 1e-4 m/s the reversal is shorter than a step, so the error of 5e-6 is not yet asymptotic
     if speed > 1e-3:
         assert 1.8 <= np.log2(errors[0] / errors[-1]) / 2 <= 2.2
 
 
-def test_always_a_jump_in_no_time_and_rest_are_answered():
+def test_always_jump_and_rest_give_defined_traction():
+    """A displacement in zero time gives the friction limit, and rest gives zero traction."""
     law = TanhLaw(0.3, 1e-3)
     sigma = np.array([2.0, 5.0])
     jump = law.step(law.start(sigma), -1e-6, sigma, sigma, 0.0)
@@ -86,8 +89,8 @@ def test_always_a_jump_in_no_time_and_rest_are_answered():
 # ---- the rig
 
 
-def reference(speed, level, cycles, tolerance=1e-10):
-    """Half peak-to-peak over the last two cycles, by scipy from the equation of motion alone."""
+def reference_amplitude(speed, level, cycles, tolerance=1e-10):
+    """Return half the peak-to-peak displacement of the last two cycles, by scipy from the equation of motion."""
 
     def rate(t, y):
         force = LIMIT * np.tanh(y[1] / speed)
@@ -104,26 +107,27 @@ def reference(speed, level, cycles, tolerance=1e-10):
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("speed, level", [(1e-2, 49.03), (1e-3, 49.03), (1e-3, 20.0)])
-def test_order_the_march_is_the_differential_equation(speed, level):
-    exact = reference(speed, level, 20)
+def test_order_of_march_to_reference_solution(speed, level):
+    """The amplitude of the march converges to the reference solution of the equation of motion."""
+    expected = reference_amplitude(speed, level, 20)
     errors = []
     for steps in (400, 800, 1600):
-        result = found(RIG.format(speed, level, 20, steps))
-        value = result.measures["relative_displacement_amplitude"]
-        errors.append(abs(value.value / exact - 1))
+        result = run_text(RIG.format(speed, level, 20, steps))
+        amplitude = result.measures["relative_displacement_amplitude"]
+        errors.append(abs(amplitude.value / expected - 1))
         assert result.measures["energy_balance"].value <= 1e-8
         assert result.outcome in (Outcome.STEADY, Outcome.TRANSIENT)
     assert errors[-1] <= 2e-4 and errors[-1] < errors[0] / 8
 
 
-def test_exact_below_the_limit_it_is_a_damper_that_never_holds():
-    """At a hundredth of the limit F = (mu N/v_0) v: the amplitude of the linear oscillator, and never `stuck`."""
+def test_exact_weak_drive_acts_as_viscous_damper():
+    """At a hundredth of the friction limit the law acts as a viscous damper that never sticks."""
     speed = 1e-1
     level = 0.01 * LIMIT / MASS
-    result = found(RIG.format(speed, level, 40, 800))
-    damper = LIMIT / speed + 0.006 * OMEGA * MASS
+    result = run_text(RIG.format(speed, level, 40, 800))
+    damping = LIMIT / speed + 0.006 * OMEGA * MASS
     assert result.measures["relative_displacement_amplitude"].value == pytest.approx(
-        MASS * level / (damper * OMEGA), rel=3e-4
+        MASS * level / (damping * OMEGA), rel=3e-4
     )
     assert result.outcome is Outcome.STEADY
     assert any("never sticks" in text and "54.9 mm/s" in text for text in result.extra["notes"])
