@@ -18,6 +18,7 @@ from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
 from patchfem.export.fits.files import fitted_scene_text
 from patchfem.export.fits.text import format_fitted
+from patchfem.formatting import format_quantity
 from patchfem.inputs import read_loop
 from patchfem.runs.bench import bench
 from patchfem.scene import load, loads, read_ranges
@@ -368,7 +369,7 @@ def test_always_doubtful_records_are_named(tmp_path):
         for text in (
             "rows are correlated",
             "the force in the first row is",
-            "slide.amplitude is 1.2e-05 m",
+            "for a run of the fitted scene set slide.amplitude",
         )
     ] == [True] * 3
 
@@ -438,7 +439,13 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
     ran = bench.run(build(scene), None, 400)
     written = read_loop(tmp_path / "out/fit.csv")
     at = [np.argmin(np.abs(ran.time - t)) for t in written.time]
-    assert ran.force[at] == pytest.approx(np.array(written.labels["fitted"], float), abs=1e-9)
+    fitted = np.array(written.labels["fitted"], float)
+    assert ran.force[at] == pytest.approx(fitted, abs=1e-9)
+    measured, model = (
+        format_quantity(np.trapezoid(force, written.displacement), "J", 4)
+        for force in (written.reading, fitted)
+    )
+    assert f"work over the record   {measured} measured, {model} fitted" in page
 
 
 def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):

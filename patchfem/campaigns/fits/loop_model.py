@@ -227,5 +227,6 @@ class BenchModel:
         if abs(slide.amplitude - amplitude) > AMPLITUDE_TOL * amplitude:
             self.notes.append(
                 f"slide.amplitude is {slide.amplitude:.4g} m, but the amplitude of the measured "
-                f"displacement is {amplitude:.4g} m; the model follows the measured displacement"
+                f"displacement is {amplitude:.4g} m; the fit follows the measured displacement; for a run "
+                "of the fitted scene set slide.amplitude"
             )

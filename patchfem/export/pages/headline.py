@@ -1,6 +1,6 @@
 """Summary of a sweep: limits of its key, range of its main measure, missed tolerances."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -196,6 +196,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         settled,
         ranked.asked_first(MAIN_MEASURES, table),
         _cases_within_floor(measures, tolerance),
+        where=None if table.get("drawn") else where,
     )
     unsettled = _unsettled_sentence(values, outcome)
     first_measure = table.get("first", "")
@@ -349,6 +350,8 @@ def span_sentence(
     settled: np.ndarray,
     names: Sequence = MAIN_MEASURES,
     within_floor: Mapping = EMPTY,
+    *,
+    where: Callable | None = None,
 ) -> str:
     """State the range of the first measure that any case has, and the errors of its values.
 
@@ -364,6 +367,8 @@ def span_sentence(
     within_floor : mapping
         {name: (`tolerance_misses.is_within_by_floor`, the floor as text)} of measures that meet the tolerance
         by their floor.
+    where : callable, optional
+        Number of a case -> its swept values as text, which both ends of the range get.
 
     Returns
     -------
@@ -384,6 +389,10 @@ def span_sentence(
         low, high = format_pair(name, values.min(), values.max(), unit, 4)
         range_text = f"is {high}"
         if low != high:
+            if where is not None:
+                cases = np.flatnonzero(is_included)
+                low += f" ({where(cases[values.argmin()])})"
+                high += f" ({where(cases[values.argmax()])})"
             range_text = f"ranges from {low} to {high}"
         elif is_included.sum() > 1:  # a single case has no range
             range_text = f"is {high} throughout"

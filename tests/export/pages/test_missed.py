@@ -144,7 +144,8 @@ def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
     table = swept_table(keys, {"loop_area": loop | {"means": ""}}, outcome=["done"] * 2)
     table["tolerance"] = 1e-3
     assert summarise_sweep(table).said.span == (
-        "Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, the floor of this measure."
+        "Loop area ranges from 0.16 nJ (slide.amplitude 0.1 um) to 1 mJ (slide.amplitude 1 um), with errors of at most "
+        "0.01 % or 0.1 nJ, the floor of this measure."
     )
 
 
