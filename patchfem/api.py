@@ -1481,9 +1481,11 @@ class Plots:
 
     def accuracy(self, ax: Axes | None = None) -> Axes:
         """Plot the worst error of the motion against CPU seconds, also of fewer and of more time steps."""
-        reason = (
-            self._explain_missing_motion() or "the number of time steps does not limit its accuracy"
+        no_steps = (
+            "the number of time steps does not limit its accuracy; a rig takes time steps with "
+            'accuracy.method = "march"'
         )
+        reason = self._explain_missing_motion() or no_steps
         return self._draw_first_chart(ax, ("accuracy",), reason)
 
     def stress(self, ax: Axes | None = None) -> Axes:

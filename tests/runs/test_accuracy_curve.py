@@ -124,3 +124,7 @@ def test_refuses_curve_if_steps_do_not_limit_accuracy(scene):
     assert compute_accuracy_curve(result) is None
     with pytest.raises(pf.PatchfemError, match=r"plot\.accuracy: nothing to draw"):
         result.plot.accuracy()
+
+
+def test_scene_of_guide_has_picture_of_accuracy():
+    assert pf.run(pf.new("rig"), **MARCH).plot.accuracy()
