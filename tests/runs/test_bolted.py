@@ -70,21 +70,25 @@ def test_exact_two_stuck_modes_return_free_modes():
     rows = free.interfaces
     k = 1e7
     square, shapes = np.linalg.eigh(np.diag(free.omega**2) + k * rows.T @ rows / free.mass)
-    f = (np.sqrt(square) / (2 * np.pi)).tolist()
+    frequencies = (np.sqrt(square) / (2 * np.pi)).tolist()
     slide = (rows[0] @ shapes).tolist()
     output = (free.output @ shapes).tolist()
     base = (free.base @ shapes).tolist()
     stuck = (
-        MODES % (STUCK, f[0], slide[0], output[0])
+        MODES % (STUCK, frequencies[0], slide[0], output[0])
         + f"base = {base[0]!r}\n"
-        + (SECOND % (f[1], slide[1], output[1])).replace("base = 0.0", f"base = {base[1]!r}")
+        + (SECOND % (frequencies[1], slide[1], output[1])).replace(
+            "base = 0.0", f"base = {base[1]!r}"
+        )
     )
     modes = pf.build(tail + stuck).rig.modes
     assert modes.omega == pytest.approx(free.omega, rel=1e-10)
     for name in ("slide", "output", "base"):
         assert np.abs(getattr(modes, name)) == pytest.approx(np.abs(getattr(free, name)), rel=1e-9)
     modes_of_plan = pf.plan(tail + stuck).as_json()["modes"]
-    assert [mode["stuck_frequency"] for mode in modes_of_plan] == pytest.approx(f, rel=1e-10)
+    assert [mode["stuck_frequency"] for mode in modes_of_plan] == pytest.approx(
+        frequencies, rel=1e-10
+    )
 
 
 def test_exact_matrices_with_stuck_joints_return_free_modes(tmp_path):

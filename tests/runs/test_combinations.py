@@ -150,8 +150,10 @@ def check_and_run(text: str, sets: list) -> str:
 
 
 def assert_combinations_run(name: str, law: str, every: int) -> None:
-    """Assert that every n-th combination of a law with effects and engines runs or is refused with
-    a key and a remedy."""
+    """Assert that a part of the combinations of a law with effects and engines runs, or is refused with a key and a remedy.
+
+    Of the combinations, one in `every` is tried.
+    """
     text, law_table, effects, engines = RUNS[name]
     law_keys = [
         f"law={law}",

@@ -93,15 +93,19 @@ def test_exact_damping_does_not_depend_on_mode_scale(law, method):
         "loop_area",
         "relative_displacement_amplitude",
     ):
-        a, b, c = (result.measures[name] for result in (unscaled, doubled, scaled))
-        assert b.value == pytest.approx(a.value, rel=1e-13, abs=0), name
+        base_measure, doubled_measure, scaled_measure = (
+            result.measures[name] for result in (unscaled, doubled, scaled)
+        )
+        assert doubled_measure.value == pytest.approx(base_measure.value, rel=1e-13, abs=0), name
         abs_tol = (
             2e-8 * 3.6 / unscaled.measures["relative_displacement_amplitude"].value
             if (law, method, name) == ("tanh", "auto", "equivalent_stiffness")
             else 1e-12
         )
         rel_tol = 4e-7 if (law, method) == ("tanh", "auto") else 1e-7
-        assert c.value == pytest.approx(a.value, rel=rel_tol, abs=abs_tol), name
+        assert scaled_measure.value == pytest.approx(
+            base_measure.value, rel=rel_tol, abs=abs_tol
+        ), name
     assert scaled.measures["equivalent_damping"].value == pytest.approx(
         damping_from_loop_area(scaled), rel=2e-3
     )

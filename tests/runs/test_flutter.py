@@ -53,14 +53,14 @@ def test_exact_flutter_amplitude_separates_decay_and_growth(ratio, outcome):
     the closed form within 1e-9."""
     result = pf.run(pf.load(format_scene(start=ratio * FLUTTER_AMPLITUDE)))
     assert result.outcome == outcome
-    flutter = result.measures["flutter_amplitude"]
+    flutter_amplitude = result.measures["flutter_amplitude"]
     assert (
-        flutter.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=1e-9)
-        and flutter.error <= 1e-8 * flutter.value
+        flutter_amplitude.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=1e-9)
+        and flutter_amplitude.error <= 1e-8 * flutter_amplitude.value
     )
     if outcome != "stuck":
         swing = result.measures["relative_displacement_amplitude"].value
-        assert (swing < flutter.value) == (ratio < 1)
+        assert (swing < flutter_amplitude.value) == (ratio < 1)
     assert "10.08" not in "".join(result.notes) and "decays to rest" in result.notes[-1]
 
 
@@ -91,13 +91,16 @@ def test_exact_flutter_amplitude_of_weakening_law(ratio, grows):
     """
     result = pf.run(WEAKENING_SCENE, **{"drive.displacement": ratio * 12.88e-3})
     final_amplitude = result.measures["relative_displacement_amplitude"].value
-    flutter = result.measures["flutter_amplitude"]
+    flutter_amplitude = result.measures["flutter_amplitude"]
     assert (
-        flutter.value == pytest.approx(12.88e-3, rel=1e-3) and flutter.error < 1e-3 * flutter.value
+        flutter_amplitude.value == pytest.approx(12.88e-3, rel=1e-3)
+        and flutter_amplitude.error < 1e-3 * flutter_amplitude.value
     )
     assert any("smaller motions could not be followed" in note for note in result.notes)
     assert (
-        final_amplitude > 1.03 * flutter.value if grows else final_amplitude < 0.97 * flutter.value
+        final_amplitude > 1.03 * flutter_amplitude.value
+        if grows
+        else final_amplitude < 0.97 * flutter_amplitude.value
     )
 
 
@@ -115,14 +118,14 @@ def test_exact_flutter_amplitude_with_two_modes():
         for frequency in (400, 0)
     )
     result = pf.run(pf.load(two_modes))
-    flutter = result.measures["flutter_amplitude"]
+    flutter_amplitude = result.measures["flutter_amplitude"]
     assert (
-        flutter.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=0.1)
-        and 0 < flutter.error < 1e-6 * flutter.value
+        flutter_amplitude.value == pytest.approx(1e-3 * FLUTTER_AMPLITUDE, rel=0.1)
+        and 0 < flutter_amplitude.error < 1e-6 * flutter_amplitude.value
     )
     assert "a free oscillation of smaller amplitude decays, and" in result.notes[-1]
-    flutter = pf.run(pf.load(with_rigid_mode)).measures["flutter_amplitude"]
-    assert flutter.value is None and "a mode of 0 Hz" in flutter.reason
+    flutter_amplitude = pf.run(pf.load(with_rigid_mode)).measures["flutter_amplitude"]
+    assert flutter_amplitude.value is None and "a mode of 0 Hz" in flutter_amplitude.reason
 
 
 @pytest.mark.filterwarnings("error")
@@ -168,8 +171,8 @@ def test_always_missing_flutter_amplitude_has_reason():
         start=0.01,
         cycles=3,
     )
-    flutter = pf.run(pf.load(small_release)).measures["flutter_amplitude"]
-    assert flutter.value is None and flutter.reason
+    flutter_amplitude = pf.run(pf.load(small_release)).measures["flutter_amplitude"]
+    assert flutter_amplitude.value is None and flutter_amplitude.reason
 
 
 def test_exact_case_with_negative_damping_runs_alone():

@@ -140,13 +140,13 @@ def test_exact_amplitude_above_resonance_threshold():
     assert amplitude_with_two_stops(0.8) == pytest.approx(0.299431041748427515, abs=1e-13)
     d = pi / 4 + 1e-3
     expected = amplitude_with_two_stops(d)
-    condition = (amplitude_with_two_stops(d * (1 + 1e-6)) / expected - 1) / 1e-6
-    assert 5 < abs(condition) < 1e3
+    condition_number = (amplitude_with_two_stops(d * (1 + 1e-6)) / expected - 1) / 1e-6
+    assert 5 < abs(condition_number) < 1e3
     text = format_rig("static = 0.3", format_base_drive(30.0 / d, 1500), 0.0)
     result = run_text(text)
     assert result.outcome == "steady"
     assert measure_value(result) * OMEGA**2 / (30.0 / d) == pytest.approx(
-        expected, rel=1e-12 * abs(condition)
+        expected, rel=1e-12 * abs(condition_number)
     )
     assert_energy_balance(result, 1e-10)
     harmonic = run_text(text, "accuracy.method=harmonic")

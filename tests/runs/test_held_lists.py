@@ -1,5 +1,4 @@
-"""Blocks that stick under the law of the report: their list of bonds grows by a strip per step, in
-plan and run."""
+"""Blocks that stick under the law of the report: each step adds a group of bonds (a strip) to the list, in plan and run."""
 
 import re
 from time import process_time

@@ -214,18 +214,18 @@ def integrate_chain(model, cycles: int, steps: int) -> tuple:
     total = np.zeros(2)
     for n in range(cycles * steps):
         previous = total
-        rate = velocity
+        velocity_at_step = velocity
         # The velocity at the step is the mean of those half a step before and after it.
         for _ in range(3):
             force = (
                 -SPRING * rows.T @ rows @ displacement
-                - DAMPER * rows.T @ rows @ rate
+                - DAMPER * rows.T @ rows @ velocity_at_step
                 - rows.T @ total
             )
             next_velocity = velocity + h * (force / MASS - peak * np.sin(omega * n * h)) * (
                 0.5 if n == 0 else 1.0
             )
-            rate = (velocity + next_velocity) / 2 if n else np.zeros(2)
+            velocity_at_step = (velocity + next_velocity) / 2 if n else np.zeros(2)
         velocity = next_velocity
         displacement = displacement + h * velocity
         increments = rows @ velocity * h

@@ -1,4 +1,4 @@
-"""Benches whose last loop is not the steady one, compared with longer benches and closed forms."""
+"""Benches whose last friction loop is not steady agree with longer benches and with closed forms."""
 
 import pytest
 

@@ -98,14 +98,16 @@ def test_exact_normal_stiffness_is_derivative_of_load(law, strips):
     tables = TILT.format(2e-5) + SKINS[law] + strips
     _, patch_values = solve_patch(tables)
     step = 3e-9 if law == "linear" else 1e-13
-    loads_ = []
+    loads_around = []
     for sign in (-1, 1):
-        closing = f'[contact.approach]\ndistance = "{patch_values["approach"] + sign * step!r} m"\n'
-        loads_.append(
-            solve_patch(tables + closing, keys='element_size = "0.127 mm"')[1]["normal_load"]
+        approach_table = (
+            f'[contact.approach]\ndistance = "{patch_values["approach"] + sign * step!r} m"\n'
         )
-    assert np.mean(loads_) == pytest.approx(LOAD, rel=2e-3 if law == "linear" else 1e-6)
-    assert np.diff(loads_)[0] / (2 * step) == pytest.approx(
+        loads_around.append(
+            solve_patch(tables + approach_table, keys='element_size = "0.127 mm"')[1]["normal_load"]
+        )
+    assert np.mean(loads_around) == pytest.approx(LOAD, rel=2e-3 if law == "linear" else 1e-6)
+    assert np.diff(loads_around)[0] / (2 * step) == pytest.approx(
         patch_values["normal_stiffness"], rel=5e-4 if law == "linear" else 1e-4
     )
 

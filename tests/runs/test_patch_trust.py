@@ -34,7 +34,7 @@ def test_always_peak_at_loaded_step_has_no_value():
 
 
 def test_always_peak_at_step_behind_skin_has_value():
-    """A skin yields under high pressure, so that the same step has a finite pressure peak."""
+    """A compliant skin limits the pressure at the edge of the same step, so that the peak has a value and an error."""
     skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
     result = pf.run(STEP + skin)
     assert result.measures["pressure_peak"].value > 0

@@ -1,5 +1,4 @@
-"""Scenes with elastic-plastic elements: exact solution from yield event to yield event against the
-march; engine choice."""
+"""Scenes with elastic-plastic elements: the exact engine, which steps between yield events, agrees with the march."""
 
 from __future__ import annotations
 

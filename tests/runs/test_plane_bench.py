@@ -133,8 +133,8 @@ def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_
         L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER_BONDS, "accuracy.steps_per_cycle=50"
     )
     assert any(
-        "0.189 of the width" in w or "0.19 of the width" in w
-        for w in run(long_path, estimate=False).warnings
+        "0.189 of the width" in warning or "0.19 of the width" in warning
+        for warning in run(long_path, estimate=False).warnings
     )
 
 

@@ -1,5 +1,4 @@
-"""Self-checks of a run: faults planted in the program lead to the outcome not_converged; correct
-runs raise none."""
+"""Self-checks of a run: faults planted in the program lead to the outcome not_converged; correct runs pass all checks."""
 
 from dataclasses import replace
 

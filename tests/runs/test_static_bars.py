@@ -65,7 +65,8 @@ def test_exact_rigid_pad_at_step_has_uniform_pressure():
     uniform_pressure = 2000 / (8.35e-3 * 12.7e-3)
     measures_ = run.measures
     references = {
-        "pressure_peak": uniform_pressure,  # The deformation of the pieces changes this by 1e-5.
+        # The deformation of the pieces changes the pressure by 1e-5.
+        "pressure_peak": uniform_pressure,
         "contact_fraction": 8.35 / 12.7,
         "contact_half_width": 4.175e-3,
         "moment": -2000 * 2.175e-3,

@@ -31,7 +31,7 @@ RUNS = {
 
 
 def format_both_ways(text: str) -> tuple:
-    """Return the scene with the stiffness and with the equivalent bond length."""
+    """Return the scene with the stiffness, and the same scene with the equivalent bond length."""
     stiffness_key = f'stiffness = "{STIFFNESS} N/m"\n'
     length_key = 'bond_length = "{!r} m"\n'
     if "%s" in text:

@@ -24,7 +24,8 @@ def run_text(text, *sets, estimate=False):
     return run(loads(text, "a.toml", sets), estimate=estimate)
 
 
-@pytest.mark.share(0, 2)  # The Coulomb and tanh cases would each compile a loop.
+# The Coulomb and tanh cases would each compile a time loop that no other test needs.
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize(
     "law",
     [

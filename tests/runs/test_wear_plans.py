@@ -1,4 +1,4 @@
-"""Wear steps that a plan estimates before the run."""
+"""A plan estimates the number of wear steps before the run."""
 
 import pytest
 

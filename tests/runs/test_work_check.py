@@ -1,5 +1,4 @@
-"""The work check of rigs: the trapezoidal rule on the samples against the integrated friction work,
-in every engine."""
+"""Work check of rigs: the trapezoidal rule on the samples agrees with the integrated friction work, in every engine."""
 
 import re
 

@@ -142,11 +142,11 @@ def test_refuses_marched_cases_in_batches(kind):
 @pytest.mark.parametrize("name", OUTCOMES)
 def test_exact_batch_outcomes_agree_with_single_runs(name):
     """A batch gives the outcome of a single run, whether a motion grows, settles, beats, is steady or sticks."""
-    pairs, outcome, estimated = OUTCOMES[name]
+    pairs, outcome, has_steady_estimate = OUTCOMES[name]
     model = build(replace_in_rig(*pairs))
     results = assert_equal_to_single_run(model)
     assert batches.choose_batch(model) is not None and results.outcome[0] == outcome
-    assert ("relative_displacement_amplitude_steady" in results.values) == estimated
+    assert ("relative_displacement_amplitude_steady" in results.values) == has_steady_estimate
     assert bool(results.warnings) == (name == "remarked on")
 
 
