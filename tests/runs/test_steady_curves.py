@@ -49,7 +49,12 @@ def test_exact_curve_without_friction_agrees_with_closed_form(second_mode):
     base = {"structure.mode.axial.base": "0.9"} if second_mode else {}
     curve = run_curve(MODE + second_mode + SWEEP.replace('to = "150 Hz"', 'to = "126 Hz"'), **base)
     modes = (
-        {"rows": (1.0, 0.0), "own": (143.0, 990.0), "zeta": (0.003, 0.01), "base": (0.9, 0.1)}
+        {
+            "rows": (1.0, 0.0),
+            "frequencies": (143.0, 990.0),
+            "zeta": (0.003, 0.01),
+            "base": (0.9, 0.1),
+        }
         if second_mode
         else {}
     )
