@@ -1,4 +1,4 @@
-"""One run for all export tests."""
+"""Results of one run, shared by the tests of exports."""
 
 import pytest
 from command_line import cli
@@ -6,8 +6,8 @@ from exported import CROWNED
 
 
 @pytest.fixture(scope="session")
-def bench(tmp_path_factory):
-    """The results folder of a crowned, coated pair that slips."""
+def bench_folder(tmp_path_factory):
+    """Return the results folder of a crowned, coated pair that slips."""
     base = tmp_path_factory.mktemp("bench")
     (base / "bench.toml").write_text(CROWNED, "utf-8")
     answer = cli("run", base / "bench.toml", "-o", base / "out", "-q")

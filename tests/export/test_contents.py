@@ -1,4 +1,4 @@
-"""Contents of a file as an xarray.Dataset."""
+"""Contents of a netCDF file, compared with an xarray.Dataset."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,11 @@ from patchfem.core import Missing
 from patchfem.export import netcdf
 
 
-def test_exact_a_large_file_is_made_on_the_disk_with_the_same_contents(tmp_path):
-    """And one that finds no room there leaves nothing."""
+def test_exact_large_file_has_same_contents(tmp_path):
+    """A file that is too large for memory is written on disk with the same contents.
+
+    Without disk space no file remains.
+    """
     count = netcdf.MAX_VALUES_IN_MEMORY + 1
     outcomes = np.array(["steady", "stuck"], object)
     data = netcdf.Contents(

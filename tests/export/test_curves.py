@@ -1,4 +1,4 @@
-"""Pictures and tables of curves and levels: what they say, that their lines are what was computed, and the file."""
+"""Charts, tables and files of response curves and drive levels agree with the computed values."""
 
 import re
 
@@ -57,25 +57,27 @@ cycles = 100
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory):
-    """scene text -> (folder of its results, dataset), each once."""
+def run_results(tmp_path_factory):
+    """Return a function from a scene to its results folder and dataset; each scene runs once."""
     base = tmp_path_factory.mktemp("curves")
-    kept = {}
+    results = {}
 
-    def of(text):
-        if text not in kept:
-            path = base / f"scene{len(kept)}.toml"
+    def run_scene(text):
+        """Return the results folder and the dataset of a scene."""
+        if text not in results:
+            path = base / f"scene{len(results)}.toml"
             path.write_text(text, "utf-8")
             answer = cli("run", path, "-o", base / path.stem, "-q")
             assert answer.code == 0, answer.err
             with xr.open_dataset(base / path.stem / "result.nc") as data:
-                kept[text] = base / path.stem, data.load()
-        return kept[text]
+                results[text] = base / path.stem, data.load()
+        return results[text]
 
-    return of
+    return run_scene
 
 
-def test_exact_spans_of_a_curve():
+def test_exact_regime_sections_of_folded_curve():
+    """A folded curve has a stable, an unstable and again a stable section."""
     assert charts.regime_stretches(FOLDED) == [
         ("stable", 0, 4),
         ("unstable", 4, 7),
@@ -83,7 +85,8 @@ def test_exact_spans_of_a_curve():
     ]
 
 
-def test_exact_a_picture_of_a_folded_curve():
+def test_exact_chart_of_folded_curve():
+    """The chart of a folded curve names its stable and unstable parts and its folds; drawing is reproducible."""
     text = pictures.draw_charts(charts.curve_charts(FOLDED))
     for word in (
         "stable",
@@ -94,30 +97,32 @@ def test_exact_a_picture_of_a_folded_curve():
     ):
         assert f">{word}<" in text, word
     assert "stroke-dasharray" in text and pictures.draw_charts(charts.curve_charts(FOLDED)) == text
-    said = charts.curve_caption(FOLDED)
-    assert "9 points" in said
-    assert "stable, unstable" in said
-    assert "2 folds" in said
-    assert "drive frequency" in said
+    caption = charts.curve_caption(FOLDED)
+    assert "9 points" in caption
+    assert "stable, unstable" in caption
+    assert "2 folds" in caption
+    assert "drive frequency" in caption
 
 
-def test_exact_a_curve_over_the_level_with_no_bounded_motion_at_its_end():
-    found = {
+def test_exact_chart_of_unbounded_level_curve():
+    """The chart of a curve over the drive level states that the motion is not bounded at its end."""
+    curve = {
         "frequency": np.full(4, 10.0),
         "level": 9.80665 * np.arange(1.0, 5),
         "amplitude": np.array([1e-6, 2e-6, 3e-6, np.nan]),
         "regime": np.array(["stuck", "2 stops", "sliding", "unbounded"]),
         "multiplier": np.zeros(4),
     }
-    assert charts.curve_axis(found)[0] == pytest.approx([1, 2, 3, 4]) and charts.curve_axis(found)[
+    assert charts.curve_axis(curve)[0] == pytest.approx([1, 2, 3, 4]) and charts.curve_axis(curve)[
         1:
     ] == ("drive level", "g")
     assert "no bounded motion" in charts.curve_caption(
-        found
-    ) and ">unbounded<" in pictures.draw_charts(charts.curve_charts(found))
+        curve
+    ) and ">unbounded<" in pictures.draw_charts(charts.curve_charts(curve))
 
 
-def test_exact_the_regime_in_words():
+def test_exact_regime_sentence_states_stability():
+    """The sentence about the regime states from the Floquet multiplier whether a disturbance decays."""
     assert charts.regime_sentence(None) == ""
     assert "decays" in charts.regime_sentence({"regime": "2 stops", "multiplier": 0.2})
     assert "grows or persists" in charts.regime_sentence({"regime": "unstable", "multiplier": 1.2})
@@ -127,7 +132,8 @@ def test_exact_the_regime_in_words():
     )
 
 
-def test_exact_a_curve_in_the_file():
+def test_exact_curve_is_stored_in_netcdf():
+    """A curve is stored in netCDF with its regimes, folds and units."""
     data = netcdf.add_curve(netcdf.Contents(), FOLDED).to_xarray()
     names = data.curve_regime.attrs["flag_meanings"].split()
     assert [names[k] for k in data.curve_regime.values] == FOLDED["regime"].tolist()
@@ -140,9 +146,12 @@ def test_exact_a_curve_in_the_file():
 
 
 @pytest.mark.slow
-def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
-    """Of three motions at one frequency the measures are of the largest, which the curve found."""
-    folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))
+def test_exact_folded_curve_peak_agrees_with_backbone(run_results):
+    """At the peak of a stiffening oscillator the curve agrees with the backbone omega^2 + 3/4 (k3/m) x^2 within 0.5 %.
+
+    The page has the same folds, and the measures are those of the largest motion.
+    """
+    folder, data = run_results(STIFFENED + SWEEP.format(140, 180, 2))
     page = (folder / "report.html").read_text()
     marks = charts_of(page)["Steady motion at the output", "half the peak-to-peak motion"]["marks"]
     assert [mark["x"] for mark in marks if mark["name"] == "fold"] == pytest.approx(
@@ -151,29 +160,31 @@ def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     assert {mark["dash"] for mark in marks if mark["name"] == "unstable"} == {
         "dashed"
     } and data.curve_fold.size == 2
-    top = float(data.curve_amplitude.max())
-    assert np.abs(data.relative_displacement).max() == pytest.approx(top, rel=2e-3)
-    # backbone: omega^2 + 3/4 (k3/m) x^2 where the largest motion is
-    at = float(data.curve_frequency[int(np.argmax(data.curve_amplitude.values))])
-    assert at == pytest.approx(
-        np.sqrt(143**2 + 0.75 * 1e11 / 0.884 * top**2 / (2 * np.pi) ** 2), rel=5e-3
+    peak = float(data.curve_amplitude.max())
+    assert np.abs(data.relative_displacement).max() == pytest.approx(peak, rel=2e-3)
+    # the backbone is omega^2 + 3/4 (k3/m) x^2 at the largest motion
+    peak_frequency = float(data.curve_frequency[int(np.argmax(data.curve_amplitude.values))])
+    assert peak_frequency == pytest.approx(
+        np.sqrt(143**2 + 0.75 * 1e11 / 0.884 * peak**2 / (2 * np.pi) ** 2), rel=5e-3
     )
     names = np.array(data.curve_regime.attrs["flag_meanings"].split())[data.curve_regime.values]
     first, last = np.sort(data.curve_fold.values)
-    inside = names == "unstable"
-    assert inside.any() and np.all(
-        (data.curve_frequency.values[inside] > first - 0.5)
-        & (data.curve_frequency.values[inside] < last + 0.5)
+    unstable = names == "unstable"
+    assert unstable.any() and np.all(
+        (data.curve_frequency.values[unstable] > first - 0.5)
+        & (data.curve_frequency.values[unstable] < last + 0.5)
     )
-    assert np.all(data.curve_multiplier.values[inside] > 1)
-    assert np.all(data.curve_multiplier.values[~inside] <= 1 + 1e-6)
+    assert np.all(data.curve_multiplier.values[unstable] > 1)
+    assert np.all(data.curve_multiplier.values[~unstable] <= 1 + 1e-6)
 
 
 @pytest.mark.slow
-def test_exact_levels_on_the_page(written):
-    """A row per level in its order, stuck below 4 g, and an arrow per step between levels that move: the axis is
-    logarithmic."""
-    folder, data = written(LEVELS)
+def test_exact_page_lists_levels_in_order(run_results):
+    """The page lists the drive levels in the order of the test, stuck below 4 g.
+
+    An arrow connects each two successive levels that move.
+    """
+    folder, data = run_results(LEVELS)
     page = (folder / "report.html").read_text()
     rows = re.findall(
         r"<tr><td class=n>(\d)</td><td class=n>(\d) g</td>(.*?)<td>(\w+)</td></tr>", page
@@ -192,7 +203,8 @@ def test_exact_levels_on_the_page(written):
     assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))
 
 
-def test_exact_the_arrows_of_the_levels_point_along_the_test():
+def test_exact_level_arrows_follow_test_order():
+    """The arrows between drive levels point in the order of the test."""
     rows = [
         {"drive": d, "stuck": d < 2, "values": {"relative_displacement_amplitude": a}, "errors": {}}
         for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
@@ -204,7 +216,8 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test():
     assert upwards == [(True, True), (True, True), (False, False)]
 
 
-def test_exact_a_page_without_curve_or_levels_has_neither():
+def test_exact_page_without_curve_has_no_curve_section():
+    """A page of a run without a curve and levels has no sections about them, and states the computing time."""
     summary = {
         "patchfem": "0",
         "title": "",
@@ -225,8 +238,8 @@ def test_exact_a_page_without_curve_or_levels_has_neither():
     assert "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
 
 
-def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarithm():
-    """Microslip of 2 nm beside 40 um of slip, and a level that does not move at all: the first two are drawn."""
+def test_exact_levels_over_three_decades_are_logarithmic():
+    """Levels with amplitudes of 2 nm and 40 um have a logarithmic axis; a level without motion is not drawn."""
     rows = [
         {
             "drive": d,
@@ -237,16 +250,18 @@ def test_exact_levels_over_more_than_three_decades_are_drawn_over_their_logarith
         }
         for d, a in ((1.0, 0.0), (2.0, 2e-9), (3.0, 4e-5), (2.0, 1e-8))
     ]
-    (found,) = charts.levels_chart(rows)
-    dots = [one for one in found["marks"] if one["kind"] == "dots"]
-    arrows = [one["y"] for one in found["marks"] if one["kind"] == "arrow"]
-    assert found["y"]["log"] and [list(one["x"]) for one in dots] == [[2.0, 3.0, 2.0]]
+    (chart,) = charts.levels_chart(rows)
+    dots = [mark for mark in chart["marks"] if mark["kind"] == "dots"]
+    arrows = [mark["y"] for mark in chart["marks"] if mark["kind"] == "arrow"]
+    assert chart["y"]["log"] and [list(mark["x"]) for mark in dots] == [[2.0, 3.0, 2.0]]
     assert np.ravel(arrows) == pytest.approx([2e-3, 40.0, 40.0, 1e-2]) and dots[0][
         "floor"
     ] == pytest.approx(2e-4)
-    few = [row for row in rows if row["values"]["relative_displacement_amplitude"] in (0.0, 4e-5)]
-    assert not charts.levels_chart(few)[0]["y"]["log"]
-    for some, scale in ((rows, "log"), (few, "linear")):
+    few_rows = [
+        row for row in rows if row["values"]["relative_displacement_amplitude"] in (0.0, 4e-5)
+    ]
+    assert not charts.levels_chart(few_rows)[0]["y"]["log"]
+    for chosen, scale in ((rows, "log"), (few_rows, "linear")):
         axes = Figure().subplots()
-        pictures.draw_charts(charts.levels_chart(some), axes_to_use=axes)
+        pictures.draw_charts(charts.levels_chart(chosen), axes_to_use=axes)
         assert axes.get_yscale() == scale

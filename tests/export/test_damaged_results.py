@@ -1,4 +1,4 @@
-"""Results folders that were damaged or made by others: code 2 with the file and what is wrong, no word of Python's."""
+"""Damaged results folders are refused with code 2 and a message that names the file."""
 
 import json
 import shutil
@@ -22,131 +22,140 @@ OTHER = {
     "none": np.full(5, np.nan),
 }
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
-SHARE = 571  # one of so many is always tried
+SHARE = 571  # Interval of the damages that are tested in a quick run.
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """Folders of a run with fields, of another, and of a sweep."""
-    place = tmp_path_factory.mktemp("made")
-    (place / "a.toml").write_text(COATED + COULOMB + SLIDE)
-    (place / "b.toml").write_text(BENCH)
-    assert cli("run", place / "a.toml", "-o", place / "a", "-q", "--no-page").code == 0
-    assert cli("run", place / "b.toml", "-o", place / "b", "-q", "--no-page").code == 0
+def results_folders(tmp_path_factory):
+    """Return a folder with the results of a patch, of a bench and of a sweep."""
+    folder = tmp_path_factory.mktemp("made")
+    (folder / "a.toml").write_text(COATED + COULOMB + SLIDE)
+    (folder / "b.toml").write_text(BENCH)
+    assert cli("run", folder / "a.toml", "-o", folder / "a", "-q", "--no-page").code == 0
+    assert cli("run", folder / "b.toml", "-o", folder / "b", "-q", "--no-page").code == 0
     assert (
         cli(
             "sweep",
-            place / "b.toml",
+            folder / "b.toml",
             "--over",
             "friction.static=0.2,0.3,0.4",
             "-o",
-            place / "s",
+            folder / "s",
             "-q",
         ).code
         == 0
     )
-    return place
+    return folder
 
 
-def datasets(path: Path) -> list:
-    found = []
+def dataset_names(path: Path) -> list:
+    """Return the names of the arrays of an HDF5 file."""
+    names = []
     with h5py.File(path, "r") as file:
         file.visititems(
             lambda name, one: (
-                found.append(name) if isinstance(one, h5py.Dataset) and one.ndim else None
+                names.append(name) if isinstance(one, h5py.Dataset) and one.ndim else None
             )
         )
-    return found
+    return names
 
 
-def swapped(path: Path, name: str, what: str) -> None:
+def damage_dataset(path: Path, name: str, damage: str) -> None:
+    """Remove or replace a dataset of an HDF5 file."""
     with h5py.File(path, "r+") as file:
-        old = file[name][()] if what in ("cut", "beyond") else None
+        old = file[name][()] if damage in ("cut", "beyond") else None
         del file[name]
-        if what == "ring":
+        if damage == "ring":
             file[name] = h5py.SoftLink(f"/{name}")
-        elif what == "cut":
+        elif damage == "cut":
             file[name] = old[:-1]
-        elif what == "beyond":
+        elif damage == "beyond":
             file[name] = old * 1e7 if old.dtype.kind == "f" else old[::-1]
-        elif what != "gone":
-            file[name] = OTHER[what]
+        elif damage != "gone":
+            file[name] = OTHER[damage]
 
 
-def damages(made: Path) -> list:
-    """(folder, file, name of a dataset, what stands in its place) of everything that is tried."""
-    out = []
+def list_damages(made: Path) -> list:
+    """Return (folder, file, dataset, damage) of all damages that are tested."""
+    entries = []
     for folder, file in ("a", "result.nc"), ("a", "fields.vtkhdf"), ("s", "sweep.nc"):
-        for name in datasets(made / folder / file):
+        for name in dataset_names(made / folder / file):
             if not name.startswith("VTKHDF/Steps/") and "FieldData" not in name:
-                out += [
-                    (folder, file, name, what) for what in ("gone", "ring", "cut", "beyond", *OTHER)
+                entries += [
+                    (folder, file, name, damage)
+                    for damage in ("gone", "ring", "cut", "beyond", *OTHER)
                 ]
-    return out
+    return entries
 
 
-def judged(place: Path, folder: Path) -> list:
-    """What is wrong with what the program says of a damaged folder: another code than 2 or 0, or words of Python's."""
-    other = place / "b" if folder.name == "a" else folder
-    asked = [("report", folder, other, "-o", place / "p.html")]
+def find_faulty_answers(parent: Path, folder: Path) -> list:
+    """Return the answers to a damaged folder with a code other than 0 and 2, a Python warning or no file name."""
+    second_folder = parent / "b" if folder.name == "a" else folder
+    commands = [("report", folder, second_folder, "-o", parent / "p.html")]
     if folder.name == "a":
-        asked += [
-            ("export", folder, "-o", place / "h.csv"),
-            ("view", folder, "-o", place / "v.svg"),
-            ("export", folder, "-o", place / "play.html"),
+        commands += [
+            ("export", folder, "-o", parent / "h.csv"),
+            ("view", folder, "-o", parent / "v.svg"),
+            ("export", folder, "-o", parent / "play.html"),
         ]
-    out = []
-    for words in asked:
-        with warnings.catch_warnings(record=True) as raw:
+    faults = []
+    for command in commands:
+        with warnings.catch_warnings(record=True) as raised:
             warnings.simplefilter("always")
-            answer = cli(*words)
+            answer = cli(*command)
         if (
             answer.code not in (0, 2)
             or "Warning" in answer.err
             or "internal fault" in answer.err
-            or raw
+            or raised
         ):
-            out.append(
+            faults.append(
                 (
-                    words[0],
+                    command[0],
                     answer.code,
                     answer.err.strip()[-160:],
-                    [str(one.message)[:60] for one in raw][:2],
+                    [str(warning.message)[:60] for warning in raised][:2],
                 )
             )
         elif answer.code == 2 and folder.name not in answer.err:
-            out.append((words[0], "names no file", answer.err.strip()[-160:]))
-    return out
+            faults.append((command[0], "names no file", answer.err.strip()[-160:]))
+    return faults
 
 
 @pytest.mark.parametrize(
-    "share", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["share", "all"]
+    "is_sample", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["share", "all"]
 )
-def test_always_arrays_of_another_shape_are_refused_in_words(made, tmp_path, share):
-    wrong = []
-    tried = damages(made)
-    shutil.copytree(made / "b", tmp_path / "b")
-    for number, (folder, file, name, what) in enumerate(tried):
-        if share and number % SHARE:
+def test_always_damaged_arrays_are_refused_with_message(results_folders, tmp_path, is_sample):
+    """Results with missing, shortened or replaced arrays are refused with a message that names the file."""
+    faults = []
+    entries = list_damages(results_folders)
+    shutil.copytree(results_folders / "b", tmp_path / "b")
+    for number, (folder, file, name, damage) in enumerate(entries):
+        if is_sample and number % SHARE:
             continue
         shutil.rmtree(tmp_path / folder, ignore_errors=True)
-        shutil.copytree(made / folder, tmp_path / folder)
-        swapped(tmp_path / folder / file, name, what)
-        wrong += [(file, name, what, *one) for one in judged(tmp_path, tmp_path / folder)]
-    assert len(tried) > 300 and not wrong, "\n".join(map(str, wrong[:40]))
+        shutil.copytree(results_folders / folder, tmp_path / folder)
+        damage_dataset(tmp_path / folder / file, name, damage)
+        faults += [
+            (file, name, damage, *fault)
+            for fault in find_faulty_answers(tmp_path, tmp_path / folder)
+        ]
+    assert len(entries) > 300 and not faults, "\n".join(map(str, faults[:40]))
 
 
-def summary_of(folder: Path, change) -> None:
+def change_summary(folder: Path, change) -> None:
+    """Apply a change to the summary.json of a folder."""
     data = json.loads((folder / "summary.json").read_text())
     change(data)
     (folder / "summary.json").write_text(json.dumps(data))
 
 
 @pytest.mark.parametrize("value", [10**400, 1e308, "a", [], None])
-def test_refuses_a_summary_with_other_than_numbers(made, tmp_path, value):
+def test_refuses_summary_with_invalid_value(results_folders, tmp_path, value):
+    """A summary whose value is no number is refused with its file; 1e308 and null are accepted."""
     for name in "a", "b":
-        shutil.copytree(made / name, tmp_path / name)
-    summary_of(tmp_path / "a", lambda data: data["measures"]["normal_load"].update(value=value))
+        shutil.copytree(results_folders / name, tmp_path / name)
+    change_summary(tmp_path / "a", lambda data: data["measures"]["normal_load"].update(value=value))
     answer = cli("report", tmp_path / "a", tmp_path / "b", "-o", tmp_path / "p.html")
     assert answer.code == (0 if value in (1e308, None) else 2), answer
     assert (
@@ -156,7 +165,8 @@ def test_refuses_a_summary_with_other_than_numbers(made, tmp_path, value):
     )
 
 
-def lines(folder: Path, change) -> None:
+def change_table_lines(folder: Path, change) -> None:
+    """Apply a change to the lines of sweep.csv."""
     path = folder / "sweep.csv"
     path.write_text("\n".join(change(path.read_text().splitlines())) + "\n")
 
@@ -174,9 +184,10 @@ def lines(folder: Path, change) -> None:
     ],
     ids=["short", "header", "empty", "one_less", "no_outcome", "long", "one_more"],
 )
-def test_refuses_a_table_of_a_sweep_that_is_not_whole(made, tmp_path, change):
-    shutil.copytree(made / "s", tmp_path / "s")
-    lines(tmp_path / "s", change)
+def test_refuses_incomplete_sweep_table(results_folders, tmp_path, change):
+    """A sweep whose table has missing, repeated or malformed rows is refused."""
+    shutil.copytree(results_folders / "s", tmp_path / "s")
+    change_table_lines(tmp_path / "s", change)
     answer = cli("report", tmp_path / "s", "-o", tmp_path / "p.html")
     assert answer.code == 2 and "the sweep in this folder cannot be read" in answer.err, answer
 
@@ -192,8 +203,9 @@ def test_refuses_a_table_of_a_sweep_that_is_not_whole(made, tmp_path, change):
         ("source", 5),
     ],
 )
-def test_refuses_a_sweep_whose_attributes_are_none(made, tmp_path, name, value):
-    shutil.copytree(made / "s", tmp_path / "s")
+def test_refuses_sweep_with_invalid_attributes(results_folders, tmp_path, name, value):
+    """A sweep whose sweep.nc has invalid attributes is refused without a traceback."""
+    shutil.copytree(results_folders / "s", tmp_path / "s")
     with h5py.File(tmp_path / "s" / "sweep.nc", "r+") as file:
         file.attrs[name] = value
     answer = cli("report", tmp_path / "s", "-o", tmp_path / "p.html")

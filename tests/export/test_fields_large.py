@@ -1,4 +1,4 @@
-"""A large series of fields: packed and rounded as it says, written frame after frame, whole up to a kill."""
+"""Large series of fields: rounding errors as stated, frames written one by one, and files after a kill."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ vtkhdf._rounding_function = lambda *of: counted(inner(*of))
 """
 
 
-def killed(write: str, calls: int, folder) -> None:
-    """Write a series in a process that is killed after so many arrays of frames."""
+def run_until_killed(write: str, calls: int, folder) -> None:
+    """Write a series in a process that is killed after a number of arrays."""
     paths = [path for path in sys.path if "tests" in path]
     done = subprocess.run(
         [sys.executable, "-c", KILLED.format(paths=paths, calls=calls, write=write)],
@@ -56,8 +56,8 @@ def killed(write: str, calls: int, folder) -> None:
     assert done.returncode == -signal.SIGKILL
 
 
-def by_vtk(path):
-    """The grids of every block in every frame that VTK finds in a file."""
+def read_frames_with_vtk(path):
+    """Yield the grids of all blocks of each frame as VTK reads them."""
     reader = vtkHDFReader()
     reader.SetFileName(str(path))
     reader.UpdateInformation()
@@ -68,10 +68,12 @@ def by_vtk(path):
 
 
 @pytest.fixture(scope="module")
-def rubbing(tmp_path_factory):
-    """A tilted pair of some 21 000 cells under a shear that reverses: the run, the blocks of its fields, their packed
-    file, and the seconds of a CPU that both took beside those of zlib alone with the stress as it came, least of
-    three."""
+def large_series(tmp_path_factory):
+    """Return a sheared pair of 21 000 cells, its blocks, their file and the CPU seconds.
+
+    The seconds are those of writing the fields and of compressing the stress with zlib alone, the
+    minimum of three runs.
+    """
     folder = tmp_path_factory.mktemp("rubbing")
     scene = folder / "scene.toml"
     scene.write_text(
@@ -110,26 +112,30 @@ def rubbing(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rubbing):
-    """In energy norm rounding changes the stress by at most a quarter of its estimated error, in every frame."""
-    result, blocks, path, _ = rubbing
+def test_always_rounding_is_below_discretisation_error(large_series):
+    """In energy norm, rounding changes the stress by at most a quarter of its estimated error, in every frame.
+
+    All values agree with the unrounded ones within the stated rounding error.
+    """
+    result, blocks, path, _ = large_series
     piece = result.patch.pair.piece
     cells = get_cells(piece)
     area = np.concatenate([rule.weight.sum(axis=0) for rule in make_points(cells, "gauss")])
     lam, mu = np.array(
-        [lame(*one, "strain") for one in (piece.layers.substrate, piece.layers.coating)]
+        [lame(*material, "strain") for material in (piece.layers.substrate, piece.layers.coating)]
     )[cells.is_coating.astype(int)].T
     with h5py.File(path) as file:
-        said = {
+        rounding_errors = {
             (side, name): array.attrs["rounding_error"]
             for side in ("lower", "upper")
             for kind in ("PointData", "CellData")
             for name, array in file[f"VTKHDF/{side}/{kind}"].items()
             if "rounding_error" in array.attrs
         }
-    assert {name for _, name in said} == {"displacement", "stress", "von_mises"}
+    assert {name for _, name in rounding_errors} == {"displacement", "stress", "von_mises"}
 
-    def energy(stress):
+    def strain_energy(stress):
+        """Return the strain energy of stresses given per cell, of shape (n, 6)."""
         xx = stress[:, 0]
         yy = stress[:, 1]
         xy = stress[:, 3]
@@ -137,84 +143,96 @@ def test_always_packing_errs_as_little_as_it_says_and_less_than_the_elements(rub
             area * (xx**2 + yy**2 + 2 * xy**2 - lam / (2 * (lam + mu)) * (xx + yy) ** 2) / (2 * mu)
         ).sum()
 
-    for number, grids in enumerate(by_vtk(path)):
+    for number, grids in enumerate(read_frames_with_vtk(path)):
         total = 0.0
         for side in ("lower", "upper"):
-            given = blocks[side].cell_data
-            whole = energy(given["stress"][number].astype(float))
-            change = grids[side].cell_data["stress"].astype(float) - given["stress"][number]
-            # the share of a cell is that of the error of both pieces, whose energies are alike to a few percent
-            error = 2 * whole * (given["stress_error"][number].astype(float) ** 2).sum()
-            assert 0 < energy(change) < 0.26**2 * error
+            cell_data = blocks[side].cell_data
+            whole = strain_energy(cell_data["stress"][number].astype(float))
+            change = grids[side].cell_data["stress"].astype(float) - cell_data["stress"][number]
+            # the error of a cell is relative to both pieces, whose energies agree within a few per
+            # cent
+            error = 2 * whole * (cell_data["stress_error"][number].astype(float) ** 2).sum()
+            assert 0 < strain_energy(change) < 0.26**2 * error
             total += error
-            for (where, name), most in said.items():
-                theirs = (
-                    blocks[where].point_data if name == "displacement" else blocks[where].cell_data
+            for (side_name, name), max_error in rounding_errors.items():
+                expected = (
+                    blocks[side_name].point_data
+                    if name == "displacement"
+                    else blocks[side_name].cell_data
                 )
-                read = grids[where].point_data if name == "displacement" else grids[where].cell_data
-                assert abs(read[name].astype(float) - theirs[name][number]).max() <= most
+                read = (
+                    grids[side_name].point_data
+                    if name == "displacement"
+                    else grids[side_name].cell_data
+                )
+                assert abs(read[name].astype(float) - expected[name][number]).max() <= max_error
     assert number == 8 and total > 0
 
 
 @pytest.fixture
-def always_large(monkeypatch):
-    """Every series is written as a large one."""
+def framewise_writing(monkeypatch):
+    """Write every series frame by frame, as large ones."""
     monkeypatch.setattr(vtkhdf, "MIN_FRAMEWISE_BYTES", 0)
 
 
 @pytest.mark.usefixtures("always_large")
-def test_exact_a_large_series_holds_every_frame_rounded_as_it_says(tmp_path):
-    given = write_small(tmp_path / "out", 5)
-    for number, grids in enumerate(by_vtk(tmp_path / "out" / NAME)):
-        for name, block in given.blocks.items():
-            for data, theirs in (
+def test_exact_large_series_has_rounded_frames(tmp_path):
+    """A series written frame by frame contains every frame, rounded to the stated number of bits."""
+    small = write_small(tmp_path / "out", 5)
+    for number, grids in enumerate(read_frames_with_vtk(tmp_path / "out" / NAME)):
+        for name, block in small.blocks.items():
+            for data, written in (
                 (grids[name].point_data, block.point_data),
                 (grids[name].cell_data, block.cell_data),
             ):
-                for array, values in theirs.items():
-                    wanted = at(values, number)
-                    if wanted.dtype == np.float32:
-                        wanted = round_to_bits(wanted, vtkhdf.BITS.get(array, vtkhdf.MOST_BITS))
-                    assert np.array_equal(data[array], wanted), array
+                for array, values in written.items():
+                    expected = at(values, number)
+                    if expected.dtype == np.float32:
+                        expected = round_to_bits(expected, vtkhdf.BITS.get(array, vtkhdf.MOST_BITS))
+                    assert np.array_equal(data[array], expected), array
     assert number == 4
     with Series(tmp_path / "out") as series:
-        assert np.array_equal(series.times, given.times) and len(series) == 5
+        assert np.array_equal(series.times, small.times) and len(series) == 5
         bits = series.root["upper/CellData/stress"].attrs["significant_bits"]
         assert np.array_equal(
             series.frame(3).blocks["upper"].cell_data["stress"],
-            round_to_bits(given.blocks["upper"].cell_data["stress"][3], bits),
+            round_to_bits(small.blocks["upper"].cell_data["stress"][3], bits),
         )
 
 
-def test_always_a_killed_writer_leaves_its_whole_frames_and_no_file_of_the_name(tmp_path):
-    killed("write_small(Path('out'), 6)", 47, tmp_path)
-    [left] = (tmp_path / "out").iterdir()
-    assert is_partial_name(left.name)
-    assert left.name.startswith(".fields.")
-    assert left.suffix == ".vtkhdf"
-    with h5py.File(left) as file:
+def test_always_killed_writer_leaves_complete_frames(tmp_path):
+    """A killed writer leaves a partial file with all complete frames, and no file of the final name."""
+    run_until_killed("write_small(Path('out'), 6)", 47, tmp_path)
+    [partial] = (tmp_path / "out").iterdir()
+    assert is_partial_name(partial.name)
+    assert partial.name.startswith(".fields.")
+    assert partial.suffix == ".vtkhdf"
+    with h5py.File(partial) as file:
         count = int(file["VTKHDF/Steps"].attrs["NSteps"])
-        packed = [
-            one
+        chunked = [
+            array
             for block in ("lower", "upper", "interface")
             for kind in ("PointData", "CellData")
-            for one in file[f"VTKHDF/{block}/{kind}"].values()
-            if one.chunks
+            for array in file[f"VTKHDF/{block}/{kind}"].values()
+            if array.chunks
         ]
-        # the frame before the one that was cut off stands behind them
-        assert count == 47 // len(packed) - 1 > 0
-    given = write_small(tmp_path / "whole", 6)
-    for number, grids in enumerate(by_vtk(left)):
-        wanted = round_to_bits(
-            given.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS
+        # the file ends with the frame before the interrupted one
+        assert count == 47 // len(chunked) - 1 > 0
+    whole = write_small(tmp_path / "whole", 6)
+    for number, grids in enumerate(read_frames_with_vtk(partial)):
+        expected = round_to_bits(
+            whole.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS
         )
-        assert np.array_equal(grids["upper"].cell_data["von_mises"], wanted)
+        assert np.array_equal(grids["upper"].cell_data["von_mises"], expected)
     assert number == count - 1
 
 
 @pytest.mark.usefixtures("always_large")
-def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path):
-    """zlib and a mesh in every frame made it 2.4 times as large; every number is that of the fields."""
+def test_always_exported_series_is_compact(tmp_path):
+    """An exported series takes at most 1.15 times the space of the fields file, with equal numbers.
+
+    With a mesh in every frame it took 2.4 times as much.
+    """
     piece = waves(12, 90, 60)
     line = waves(12, 90, 1)
     piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
@@ -227,7 +245,7 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path):
         tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps)
     )
     export_fields(tmp_path, tmp_path / "out.pvd")
-    size = sum(one.stat().st_size for one in (tmp_path / "out_frames").iterdir())
+    size = sum(path.stat().st_size for path in (tmp_path / "out_frames").iterdir())
     assert size < 1.15 * (tmp_path / NAME).stat().st_size, (size, (tmp_path / NAME).stat().st_size)
     with Series(tmp_path) as series:
         frame = series.frame(7)
@@ -240,7 +258,8 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path):
 
 
 @pytest.mark.parametrize("power", [-30, -3, 0, 12])
-def test_exact_rounding_to_a_step_is_to_the_nearest_multiple(power):
+def test_exact_rounding_to_step_is_to_nearest_multiple(power):
+    """Values are rounded to the nearest multiple of a power of two; zeros, infinities and NaN are unchanged."""
     step = 2.0**power
     values = (
         np.random.default_rng(power + 30).normal(size=6000)
@@ -248,9 +267,9 @@ def test_exact_rounding_to_a_step_is_to_the_nearest_multiple(power):
         * 10.0 ** np.arange(-3, 9).repeat(500)
     )
     values = values.astype(np.float32)
-    found = round_to_step(values, step)
-    whole = found.astype(float) / step
-    assert found.dtype == np.float32 and np.array_equal(whole, np.round(whole))
-    assert (abs(found.astype(float) - values) <= step / 2).all() and (found != values).any()
-    odd = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 3e38], np.float32)
-    assert np.array_equal(round_to_step(odd, step), odd, equal_nan=True)
+    rounded = round_to_step(values, step)
+    multiples = rounded.astype(float) / step
+    assert rounded.dtype == np.float32 and np.array_equal(multiples, np.round(multiples))
+    assert (abs(rounded.astype(float) - values) <= step / 2).all() and (rounded != values).any()
+    special = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 3e38], np.float32)
+    assert np.array_equal(round_to_step(special, step), special, equal_nan=True)

@@ -1,4 +1,4 @@
-"""fields.vtkhdf back in and out as .pvd, .vtu and .csv, read by VTK, pyvista, meshio and csv to the last bit."""
+"""Exports of fields.vtkhdf as .pvd, .vtu and .csv agree to the last bit when read by VTK, PyVista and meshio."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ from patchfem.export.results import FILES
 ON_THE_INTERFACE = {"normal_stress", "gap", "status", "normal_bond_lower", "normal_bond_upper"}
 
 
-def through_vtk(path):
+def read_grid_with_vtk(path):
+    """Return the unstructured grid of a .vtu file as VTK reads it."""
     reader = vtkXMLUnstructuredGridReader()
     reader.SetFileName(str(path))
     reader.Update()
@@ -40,105 +41,113 @@ def through_vtk(path):
     return reader.GetOutput()
 
 
-def same_block(grid, block, number: int) -> None:
-    """A block of pyvista or VTK is the one that was written, and has no other arrays."""
+def assert_block_equal(grid, block, number: int) -> None:
+    """Assert that a grid of PyVista or VTK equals the written block and has no other arrays."""
     grid = pyvista.wrap(grid)
     assert np.array_equal(grid.points, block.points)
     assert np.array_equal(grid.cell_connectivity, block.connectivity) and np.array_equal(
         grid.celltypes, block.types
     )
-    for data, theirs in ((grid.point_data, block.point_data), (grid.cell_data, block.cell_data)):
-        assert set(data.keys()) == theirs.keys()
-        for name, values in theirs.items():
-            wanted = at(values, number)
-            assert data[name].dtype == wanted.dtype
-            assert np.array_equal(data[name], wanted, equal_nan=wanted.dtype.kind == "f"), name
+    for data, expected_arrays in (
+        (grid.point_data, block.point_data),
+        (grid.cell_data, block.cell_data),
+    ):
+        assert set(data.keys()) == expected_arrays.keys()
+        for name, values in expected_arrays.items():
+            expected = at(values, number)
+            assert data[name].dtype == expected.dtype
+            assert np.array_equal(data[name], expected, equal_nan=expected.dtype.kind == "f"), name
 
 
-def joined(given, number: int) -> tuple:
-    """Points, connectivity, point data and cell data of the written blocks as one mesh, put together here anew."""
-    points = np.concatenate([one.points for one in given.blocks.values()])
+def join_blocks(small, number: int) -> tuple:
+    """Return points, connectivity, point data and cell data of the written blocks as one mesh."""
+    points = np.concatenate([block.points for block in small.blocks.values()])
     nodes = np.concatenate(
         [
-            given.blocks["lower"].connectivity,
-            12 + given.blocks["upper"].connectivity,
-            24 + given.blocks["interface"].connectivity,
+            small.blocks["lower"].connectivity,
+            12 + small.blocks["upper"].connectivity,
+            24 + small.blocks["interface"].connectivity,
         ]
     )
-    at_points = {
+    point_data = {
         "displacement": np.concatenate(
-            [one.point_data["displacement"][number] for one in given.blocks.values()]
+            [block.point_data["displacement"][number] for block in small.blocks.values()]
         )
     }
     for name in ON_THE_INTERFACE:
-        values = given.blocks["interface"].point_data[name][number]
-        at_points[name] = np.concatenate(
+        values = small.blocks["interface"].point_data[name][number]
+        point_data[name] = np.concatenate(
             [np.full(24, -1 if name == "status" else np.nan, values.dtype), values]
         )
-    in_cells = {"part": np.repeat(np.array([0, 1, 2], np.int8), [7, 7, 3])}
+    cell_data = {"part": np.repeat(np.array([0, 1, 2], np.int8), [7, 7, 3])}
     for name in ("stress", "von_mises", "stress_error", "material"):
         values = np.concatenate(
-            [at(given.blocks[side].cell_data[name], number) for side in ("lower", "upper")]
+            [at(small.blocks[side].cell_data[name], number) for side in ("lower", "upper")]
         )
-        in_cells[name] = np.concatenate(
+        cell_data[name] = np.concatenate(
             [
                 values,
                 np.full((3, *values.shape[1:]), -1 if name == "material" else np.nan, values.dtype),
             ]
         )
-    return points, nodes, at_points, in_cells
+    return points, nodes, point_data, cell_data
 
 
-def test_exact_blocks_hold_what_the_pieces_gave(tmp_path):
-    given = write_small(tmp_path / "out", 4)
-    assert tuple(given.blocks) == NAMES
-    for side, one in zip(("lower", "upper"), given.pair):
-        block = given.blocks[side]
+def test_exact_blocks_have_values_of_pieces(tmp_path):
+    """The blocks of a file have the points, displacements, stresses, materials and bond stresses of the pieces."""
+    small = write_small(tmp_path / "out", 4)
+    assert tuple(small.blocks) == NAMES
+    for side, piece in zip(("lower", "upper"), small.pair):
+        block = small.blocks[side]
         assert not ON_THE_INTERFACE & {*block.point_data, *block.cell_data}
-        assert np.array_equal(block.points[:, :2], one["points"]) and not block.points[:, 2].any()
+        assert np.array_equal(block.points[:, :2], piece["points"]) and not block.points[:, 2].any()
         assert np.array_equal(
-            block.point_data["displacement"][..., :2], one["displacement"].astype(np.float32)
+            block.point_data["displacement"][..., :2], piece["displacement"].astype(np.float32)
         )
-        assert np.array_equal(block.cell_data["stress"][..., :4], one["stress"].astype(np.float32))
-        assert np.array_equal(block.cell_data["material"][0], one["material"])
         assert np.array_equal(
-            given.blocks["interface"].point_data[f"normal_bond_{side}"],
-            one["bond"]["normal_bond"].astype(np.float32),
+            block.cell_data["stress"][..., :4], piece["stress"].astype(np.float32)
         )
-    line = given.blocks["interface"]
-    assert np.array_equal(line.points[:, 0], given.pair[0]["points"][given.pair[0]["interface"], 0])
+        assert np.array_equal(block.cell_data["material"][0], piece["material"])
+        assert np.array_equal(
+            small.blocks["interface"].point_data[f"normal_bond_{side}"],
+            piece["bond"]["normal_bond"].astype(np.float32),
+        )
+    line = small.blocks["interface"]
+    assert np.array_equal(line.points[:, 0], small.pair[0]["points"][small.pair[0]["interface"], 0])
     assert np.array_equal(line.connectivity, [0, 1, 1, 2, 2, 3])
     assert np.array_equal(
-        line.point_data["displacement"], given.blocks["lower"].point_data["displacement"][:, ::3]
+        line.point_data["displacement"], small.blocks["lower"].point_data["displacement"][:, ::3]
     )
-    for name, values in given.interface.items():
+    for name, values in small.interface.items():
         assert np.array_equal(line.point_data[name], values.astype(line.point_data[name].dtype))
 
 
-def test_exact_vtk_reads_three_named_blocks_at_every_time(tmp_path, capfd):
-    given = write_small(tmp_path / "out", 4)
+def test_exact_vtk_reads_three_named_blocks(tmp_path, capfd):
+    """VTK reads three named blocks with equal arrays at every time, and prints no error."""
+    small = write_small(tmp_path / "out", 4)
     reader = vtkHDFReader()
     reader.SetFileName(str(tmp_path / "out" / NAME))
     reader.UpdateInformation()
     for number in (0, 3, 1):
-        reader.UpdateTimeStep(given.times[number])
-        out = reader.GetOutputDataObject(0)
+        reader.UpdateTimeStep(small.times[number])
+        grids = reader.GetOutputDataObject(0)
         assert [
-            out.GetMetaData(k).Get(vtkCompositeDataSet.NAME())
-            for k in range(out.GetNumberOfBlocks())
+            grids.GetMetaData(k).Get(vtkCompositeDataSet.NAME())
+            for k in range(grids.GetNumberOfBlocks())
         ] == list(NAMES)
         for k, name in enumerate(NAMES):
-            same_block(out.GetBlock(k), given.blocks[name], number)
+            assert_block_equal(grids.GetBlock(k), small.blocks[name], number)
     assert reader.GetNumberOfSteps() == 4 and not capfd.readouterr().err
 
 
-def test_exact_units_and_codes_stand_in_the_file(tmp_path):
+def test_exact_file_states_units_and_codes(tmp_path):
+    """The file states the unit of every array and the meanings of the codes."""
     write_small(tmp_path / "out")
     with h5py.File(tmp_path / "out" / NAME) as file:
         for block in NAMES:
             group = file["VTKHDF"][block]
             arrays = {**group["PointData"], **group["CellData"]}
-            assert {name: one.attrs["units"] for name, one in arrays.items()} == {
+            assert {name: array.attrs["units"] for name, array in arrays.items()} == {
                 name: UNITS[name] for name in arrays
             }
             for name in {*arrays} & {*CODES}:
@@ -156,40 +165,50 @@ def test_exact_units_and_codes_stand_in_the_file(tmp_path):
 
 
 @pytest.mark.parametrize("number", [None, 0, 1])
-def test_exact_vtu_is_read_by_vtk_and_by_meshio(tmp_path, number):
-    given = write_small(tmp_path / "out")
-    words = ["export", tmp_path / "out", "-o", tmp_path / "one.vtu"] + (
+def test_exact_vtu_agrees_in_vtk_and_meshio(tmp_path, number):
+    """A .vtu export has equal points, arrays, units and codes when read by VTK and by meshio."""
+    small = write_small(tmp_path / "out")
+    arguments = ["export", tmp_path / "out", "-o", tmp_path / "one.vtu"] + (
         [] if number is None else ["--frame", number]
     )
-    assert cli(*words).code == 0
+    assert cli(*arguments).code == 0
     frame = 2 if number is None else number
-    grid = through_vtk(tmp_path / "one.vtu")
+    grid = read_grid_with_vtk(tmp_path / "one.vtu")
     mesh = meshio.read(tmp_path / "one.vtu")
-    points, nodes, at_points, in_cells = joined(given, frame)
+    points, nodes, at_points, in_cells = join_blocks(small, frame)
     assert np.array_equal(vtk_to_numpy(grid.GetPoints().GetData()), points) and np.array_equal(
         mesh.points, points
     )
     assert np.array_equal(vtk_to_numpy(grid.GetCells().GetConnectivityArray()), nodes)
     assert np.array_equal(np.concatenate([block.data.ravel() for block in mesh.cells]), nodes)
-    assert vtk_to_numpy(grid.GetFieldData().GetArray("TimeValue")) == given.times[frame]
-    for data, theirs, other in (
+    assert vtk_to_numpy(grid.GetFieldData().GetArray("TimeValue")) == small.times[frame]
+    for data, expected_arrays, meshio_arrays in (
         (grid.GetPointData(), at_points, mesh.point_data),
         (grid.GetCellData(), in_cells, mesh.cell_data),
     ):
-        assert data.GetNumberOfArrays() == len(theirs) and other.keys() == theirs.keys()
-        for name, wanted in theirs.items():
+        assert (
+            data.GetNumberOfArrays() == len(expected_arrays)
+            and meshio_arrays.keys() == expected_arrays.keys()
+        )
+        for name, expected in expected_arrays.items():
             array = data.GetArray(name)
             read = vtk_to_numpy(array)
-            again = other[name]
-            again = np.concatenate(again) if isinstance(again, list) else again
-            assert read.dtype == again.dtype == wanted.dtype
-            assert np.array_equal(read, wanted, equal_nan=wanted.dtype.kind == "f"), name
-            assert np.array_equal(again, wanted, equal_nan=wanted.dtype.kind == "f"), name
+            meshio_values = meshio_arrays[name]
+            meshio_values = (
+                np.concatenate(meshio_values) if isinstance(meshio_values, list) else meshio_values
+            )
+            assert read.dtype == meshio_values.dtype == expected.dtype
+            assert np.array_equal(read, expected, equal_nan=expected.dtype.kind == "f"), name
+            assert np.array_equal(meshio_values, expected, equal_nan=expected.dtype.kind == "f"), (
+                name
+            )
             assert (
                 array.GetInformation().Get(vtkDataArray.UNITS_LABEL())
                 == (UNITS | {"part": "1"})[name]
             )
-    said = {f"unit of {name}: {unit}": 1.0 for name, unit in (UNITS | {"part": "1"}).items()} | {
+    expected_fields = {
+        f"unit of {name}: {unit}": 1.0 for name, unit in (UNITS | {"part": "1"}).items()
+    } | {
         f"code of {name}: {meaning}": code
         for name, codes in CODES.items()
         for code, meaning in codes.items()
@@ -198,32 +217,36 @@ def test_exact_vtu_is_read_by_vtk_and_by_meshio(tmp_path, number):
     assert {
         field.GetArrayName(k): field.GetArray(k).GetTuple1(0)
         for k in range(field.GetNumberOfArrays())
-    } == said | {"TimeValue": given.times[frame]}
+    } == expected_fields | {"TimeValue": small.times[frame]}
 
 
-def test_exact_pvd_is_read_by_pyvista_as_named_blocks(tmp_path):
-    given = write_small(tmp_path / "out", 12)
-    out = tmp_path / "out" / "fields.pvd"
-    assert cli("export", tmp_path / "out", "-o", out).code == 0
-    reader = pyvista.PVDReader(str(out))
-    assert reader.time_values == list(given.times)
+def test_exact_pvd_agrees_in_pyvista(tmp_path):
+    """A .pvd export has the same times and blocks when read by PyVista.
+
+    A shorter series written afterwards leaves no older frames.
+    """
+    small = write_small(tmp_path / "out", 12)
+    pvd_file = tmp_path / "out" / "fields.pvd"
+    assert cli("export", tmp_path / "out", "-o", pvd_file).code == 0
+    reader = pyvista.PVDReader(str(pvd_file))
+    assert reader.time_values == list(small.times)
     for number in range(12):
         reader.set_active_time_point(number)
         blocks = reader.read()[0]
         assert blocks.keys() == list(NAMES)
         for name in NAMES:
-            same_block(blocks[name], given.blocks[name], number)
+            assert_block_equal(blocks[name], small.blocks[name], number)
             assert ("unit of gap: m" in blocks[name].field_data) == (name == "interface")
     mesh = meshio.read(tmp_path / "out" / "fields_frames" / "frame_0011_interface.vtu")
-    assert np.array_equal(mesh.point_data["gap"], given.blocks["interface"].point_data["gap"][11])
+    assert np.array_equal(mesh.point_data["gap"], small.blocks["interface"].point_data["gap"][11])
     assert (
         {path.name for path in (tmp_path / "out").iterdir()}
         == {NAME, "fields.pvd", "fields_frames"}
         <= set(FILES)
     )
     (tmp_path / "out" / "fields_frames" / "frame_0007.vtu").write_text("of an earlier version")
-    write_small(tmp_path / "out", 2)  # a shorter series leaves no frames of the longer one
-    assert cli("export", tmp_path / "out", "-o", out).code == 0
+    write_small(tmp_path / "out", 2)  # a shorter series replaces all frames of the longer one
+    assert cli("export", tmp_path / "out", "-o", pvd_file).code == 0
     assert sorted(path.name for path in (tmp_path / "out" / "fields_frames").iterdir()) == sorted(
         f"frame_000{number}{end}"
         for number in (0, 1)
@@ -231,23 +254,25 @@ def test_exact_pvd_is_read_by_pyvista_as_named_blocks(tmp_path):
     )
 
 
-def test_exact_csv_holds_the_interface_to_the_last_bit(tmp_path):
-    given = write_small(tmp_path / "out")
+def test_exact_csv_has_interface_values(tmp_path):
+    """A .csv export has the values of the interface to the last bit, with their units."""
+    small = write_small(tmp_path / "out")
     assert cli("export", tmp_path / "out", "-o", tmp_path / "rows.csv", "--frame", 1).code == 0
     with open(tmp_path / "rows.csv", newline="", encoding="utf-8") as file:
-        head, *rows = csv.reader(file)
-    columns = dict(zip(head, zip(*rows)))
-    line = given.blocks["interface"]
+        header, *rows = csv.reader(file)
+    columns = dict(zip(header, zip(*rows)))
+    line = small.blocks["interface"]
     assert np.array_equal(np.array(columns.pop("x [m]"), float), line.points[:, 0])
     for name, values in line.point_data.items():
-        wanted = at(values, 1)
-        for k, axis in enumerate(("_x", "_y", "_z") if wanted.ndim > 1 else ("",)):
-            read = np.array(columns.pop(f"{name}{axis} [{UNITS[name]}]")).astype(wanted.dtype)
-            assert np.array_equal(read, wanted[:, k] if axis else wanted)
+        expected = at(values, 1)
+        for k, axis in enumerate(("_x", "_y", "_z") if expected.ndim > 1 else ("",)):
+            read = np.array(columns.pop(f"{name}{axis} [{UNITS[name]}]")).astype(expected.dtype)
+            assert np.array_equal(read, expected[:, k] if axis else expected)
     assert not columns
 
 
-def test_exact_vtkhdf_is_copied_and_not_onto_itself(tmp_path):
+def test_exact_vtkhdf_export_is_a_copy(tmp_path):
+    """A .vtkhdf export is a copy of the fields file; a copy onto itself is refused."""
     write_small(tmp_path / "out")
     assert cli("export", tmp_path / "out", "-o", tmp_path / "copy.vtkhdf").code == 0
     assert (tmp_path / "copy.vtkhdf").read_bytes() == (tmp_path / "out" / NAME).read_bytes()
@@ -255,7 +280,7 @@ def test_exact_vtkhdf_is_copied_and_not_onto_itself(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words, code, says",
+    "arguments, code, message",
     [
         (["-o", "a.mat"], 4, "neither result.nc"),
         (["-o", "a.uff"], 4, "neither result.nc"),
@@ -269,16 +294,17 @@ def test_exact_vtkhdf_is_copied_and_not_onto_itself(tmp_path):
         (["-o", "nowhere/x/a.bmp"], 2, ".pvd, .vtu, .csv"),
     ],
 )
-def test_refuses_exports_by_name(tmp_path, monkeypatch, words, code, says):
+def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code, message):
+    """An unsupported file type, an invalid frame or a place that is not a folder is refused, and no file is written."""
     write_small(tmp_path / "out")
     monkeypatch.chdir(tmp_path)
-    answer = cli("export", "out", *words)
-    assert answer.code == code and says in answer.err and "internal fault" not in answer.err
+    answer = cli("export", "out", *arguments)
+    assert answer.code == code and message in answer.err and "internal fault" not in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
 @pytest.mark.parametrize(
-    "name, made",
+    "name, created",
     [
         ("a.vtu", {"a.vtu"}),
         ("fields.pvd", {"fields.pvd", "fields_frames"}),
@@ -286,16 +312,16 @@ def test_refuses_exports_by_name(tmp_path, monkeypatch, words, code, says):
         ("a.vtkhdf", {"a.vtkhdf"}),
     ],
 )
-def test_always_the_folder_of_an_export_is_made(tmp_path, name, made):
-    """`export tp -o tp_pvd/fields.pvd`, as the answer of a run suggests it, once named fields_frames that could not be
-    written."""
+def test_always_export_creates_missing_folder(tmp_path, name, created):
+    """An export creates its missing folders, as for `export tp -o tp_pvd/fields.pvd`."""
     write_small(tmp_path / "out")
     answer = cli("export", tmp_path / "out", "-o", tmp_path / "new" / "one" / name)
     assert answer.code == 0, answer.err
-    assert {one.name for one in (tmp_path / "new" / "one").iterdir()} == made
+    assert {path.name for path in (tmp_path / "new" / "one").iterdir()} == created
 
 
-def test_refuses_folders_without_fields_and_spoilt_files(tmp_path):
+def test_refuses_missing_or_damaged_fields(tmp_path):
+    """A missing folder, a run without fields, a damaged file and a folder with other files are refused."""
     with pytest.raises(Missing, match="no such results folder"):
         export_fields(tmp_path / "nowhere", tmp_path / "a.vtu")
     with pytest.raises(Missing, match=r"only a run with \[contact\]"):
@@ -311,24 +337,25 @@ def test_refuses_folders_without_fields_and_spoilt_files(tmp_path):
     assert (tmp_path / "a_frames" / "mine.txt").read_text() == "kept"
 
 
-def test_exact_bond_line_of_a_run_carries_load_and_friction_in_every_frame(bench):
-    with Series(bench) as series:
+def test_exact_bond_stresses_carry_load_and_friction(bench_folder):
+    """In every frame the integral of the bond stresses equals that of the contact stresses within 1e-6 of the load."""
+    with Series(bench_folder) as series:
         for number in range(len(series)):
             frame = series.frame(number)
             line = frame.interface()
             x = frame.points[line, 0]
-            share = np.convolve(np.diff(x), [0.5, 0.5])
-            size = 1e-6 * share @ frame.point_data["normal_stress"][line]
+            lengths = np.convolve(np.diff(x), [0.5, 0.5])
+            tolerance = 1e-6 * lengths @ frame.point_data["normal_stress"][line]
             for side in ("lower", "upper"):
-                for inside, outside in (
+                for bond_name, stress_name in (
                     ("normal_bond", "normal_stress"),
                     ("shear_bond", "shear_stress"),
                 ):
-                    top, bond = (
-                        share @ frame.point_data[name][line].astype(float)
-                        for name in (outside, f"{inside}_{side}")
+                    contact_force, bond_force = (
+                        lengths @ frame.point_data[name][line].astype(float)
+                        for name in (stress_name, f"{bond_name}_{side}")
                     )
-                    assert bond == pytest.approx(top, abs=size)
+                    assert bond_force == pytest.approx(contact_force, abs=tolerance)
         assert np.abs(frame.point_data["shear_stress"][line]).max() > 0
         assert series.units["stress_error"] == "1" and series.units["shear_bond_upper"] == "Pa"
         error = frame.cell_data["stress_error"]
@@ -338,32 +365,37 @@ def test_exact_bond_line_of_a_run_carries_load_and_friction_in_every_frame(bench
         assert "strain energy of the difference" in meaning and "not a bound" in meaning
 
 
-def test_always_every_number_of_a_block_is_finite(bench):
-    """So a colouring by any array shows that array, and nothing of the colour of NaN."""
-    with Series(bench) as series:
+def test_always_block_arrays_are_finite(bench_folder):
+    """All arrays of the blocks are finite, so that a figure has no cells in the colour of NaN."""
+    with Series(bench_folder) as series:
         for number in (0, len(series) - 1):
-            for one in series.frame(number).blocks.values():
-                for name, values in (one.point_data | one.cell_data).items():
+            for block in series.frame(number).blocks.values():
+                for name, values in (block.point_data | block.cell_data).items():
                     assert np.isfinite(values).all() and (
                         name not in CODES or set(np.unique(values)) <= {*CODES[name]}
                     )
 
 
-def test_exact_a_run_says_where_its_fields_are_and_how_an_older_paraview_opens_them(tmp_path):
+def test_exact_run_prints_place_of_fields(tmp_path):
+    """A run prints the file of its fields and the command that exports them for an older ParaView."""
     (tmp_path / "point.toml").write_text(BENCH, "utf-8")
     (tmp_path / "pair.toml").write_text(CROWNED, "utf-8")
     assert "fields" not in cli("run", tmp_path / "point.toml", "-o", tmp_path / "point").out
     answer = cli("run", tmp_path / "pair.toml", "-o", tmp_path / "my pair")
-    said = answer.out.splitlines()[-1]
-    assert said.startswith(f"fields: {tmp_path / 'my pair' / NAME} ") and "ParaView 5.13" in said
-    command = shlex.split(said.split("`")[1])
+    last_line = answer.out.splitlines()[-1]
+    assert (
+        last_line.startswith(f"fields: {tmp_path / 'my pair' / NAME} ")
+        and "ParaView 5.13" in last_line
+    )
+    command = shlex.split(last_line.split("`")[1])
     assert command[0] == "patchfem" and cli(*command[1:]).code == 0
     assert pyvista.PVDReader(str(tmp_path / "my pair" / "fields.pvd")).read()[0].keys() == list(
         NAMES
     )
 
 
-def test_refuses_the_single_mesh_of_an_older_version(tmp_path):
+def test_refuses_fields_of_older_version(tmp_path):
+    """A fields file with the single mesh of an older version is refused."""
     write_small(tmp_path / "out")
     with h5py.File(tmp_path / "out" / NAME, "r+") as file:
         file["VTKHDF"].attrs["Type"] = np.bytes_("UnstructuredGrid")
@@ -371,27 +403,29 @@ def test_refuses_the_single_mesh_of_an_older_version(tmp_path):
         Series(tmp_path / "out")
 
 
-def test_refuses_a_run_without_contact(tmp_path):
+def test_refuses_field_export_without_contact(tmp_path):
+    """Export and view of fields are refused for a run without [contact]."""
     (tmp_path / "point.toml").write_text(BENCH, "utf-8")
     assert cli("run", tmp_path / "point.toml", "-o", tmp_path / "out", "-q").code == 0
-    for words in (
+    for arguments in (
         ("export", tmp_path / "out", "-o", tmp_path / "a.pvd"),
         ("view", tmp_path / "out"),
     ):
-        answer = cli(*words)
+        answer = cli(*arguments)
         assert answer.code == 4 and "only a run with [contact]" in answer.err
 
 
-def test_always_export_needs_neither_pyvista_nor_meshio_nor_elements(bench, tmp_path):
+def test_always_export_imports_no_heavy_packages(bench_folder, tmp_path):
+    """Export and view import none of PyVista, meshio, scikit-fem, Numba and VTK."""
     code = (
         "import json, sys; from patchfem.__main__ import main\n"
         "for verb, end in ('export', 'pvd'), ('view', 'svg'):\n"
         "    try:\n        main([verb, sys.argv[1], '-o', sys.argv[2] + end])\n"
         "    except SystemExit as ended:\n        assert not ended.code\nprint(json.dumps(sorted(sys.modules)))"
     )
-    command = [sys.executable, "-c", code, str(bench), str(tmp_path / "a.")]
+    command = [sys.executable, "-c", code, str(bench_folder), str(tmp_path / "a.")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 0 and {one.suffix for one in tmp_path.iterdir()} >= {
+    assert done.returncode == 0 and {path.suffix for path in tmp_path.iterdir()} >= {
         ".pvd",
         ".svg",
     }, done.stderr

@@ -1,4 +1,4 @@
-"""Films of the last cycle: every frame there, one scale for all, the slide not magnified with the rest; refusals."""
+"""Animations of the last cycle: all frames with one scale of colours and magnification; refused options."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from patchfem.export.drawing.flat import STYLE, Picture
 from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
 WIDE, HIGH = 1200, 680
-TITLE = 180  # rows of the titles, of which one names the folder
+TITLE = 180  # Height of the titles, one of which names the folder [px].
 RECORDER = """\
 #!{python}
 import sys
@@ -29,21 +29,21 @@ sys.exit({code})
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory):
-    """The pressed state and three frames of random fields long after it."""
+def small_folder(tmp_path_factory):
+    """Return the folder of a pressed state and, long after it, three frames of random fields."""
     folder = tmp_path_factory.mktemp("film") / "<b>out"
     write_small(folder, 4, times=[0.0, 7.0, 7.1, 7.2])
     return folder
 
 
-def pixels(series, film, number) -> np.ndarray:
-    """(height, width, 3) of a frame that is drawn by itself."""
+def frame_pixels(series, settings, number) -> np.ndarray:
+    """Return the pixels (height, width, 3) of a single frame."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     frame = series.frame(number)
     with matplotlib.rc_context(STYLE):
         picture = Picture(
-            frame, f"out, {frame.time:.6g} s", film.panels(frame), FRAME_SIZE, film.reach
+            frame, f"out, {frame.time:.6g} s", settings.panels(frame), FRAME_SIZE, settings.reach
         )
         canvas = FigureCanvasAgg(picture.figure)
         picture.figure.set_dpi(DPI)
@@ -52,17 +52,18 @@ def pixels(series, film, number) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def drawn(small):
-    """(Film, pictures) of the small series, each frame drawn by itself."""
-    with Series(small) as series:
-        film = make_film_settings(series)
-        return film, [pixels(series, film, number) for number in film.numbers]
+def drawn_frames(small_folder):
+    """Return the settings of the small series and the pixels of each of its frames."""
+    with Series(small_folder) as series:
+        settings = make_film_settings(series)
+        return settings, [frame_pixels(series, settings, number) for number in settings.numbers]
 
 
-def test_exact_the_last_cycle_is_without_the_pressed_state():
+def test_exact_last_cycle_excludes_pressed_state():
+    """The frames of the last cycle are consecutive and exclude the pressed state long before them."""
     cycle = 0.007 * np.arange(1, 17) / 16
     assert last_consecutive_frames(np.array([0.0, *(1.39 + cycle)])) == tuple(range(1, 17))
-    # a bench's: as even as steps allow
+    # the frames of a bench are as evenly spaced as its steps allow
     assert last_consecutive_frames(np.cumsum([0, 4, 6, 6, 4, 4, 6])) == tuple(range(7))
     assert last_consecutive_frames(np.array([0.0, 1.0, 2.0, 3.0 + MIN_STEP_RATIO])) == (3,)
     assert last_consecutive_frames(np.array([0.0])) == (0,) and last_consecutive_frames(
@@ -70,116 +71,136 @@ def test_exact_the_last_cycle_is_without_the_pressed_state():
     ) == (0, 1)
 
 
-def test_exact_one_scale_holds_every_frame_and_the_pieces_stay_in_the_window(small):
-    with Series(small) as series:
-        film = make_film_settings(series)
-        frames = [series.frame(number) for number in film.numbers]
+def test_exact_frames_share_scale_and_window(small_folder):
+    """All frames have one scale, window and magnification, which contain all stresses and positions."""
+    with Series(small_folder) as series:
+        settings = make_film_settings(series)
+        frames = [series.frame(number) for number in settings.numbers]
     line = frames[0].interface()
     stress = [frame.point_data["normal_stress"][line] for frame in frames]
-    assert film.reach == (np.min(stress), np.max(stress))
+    assert settings.reach == (np.min(stress), np.max(stress))
     for panels, window, top in zip(
-        zip(*map(film.panels, frames)), film.windows, film.tops, strict=True
+        zip(*map(settings.panels, frames)), settings.windows, settings.tops, strict=True
     ):
-        places = []
+        positions = []
         for panel, frame in zip(panels, frames):
-            assert (panel.window, panel.top, panel.aside) == (window, top, film.aside)
+            assert (panel.window, panel.top, panel.aside) == (window, top, settings.aside)
             assert panel.factor == panels[0].factor
             cells = np.repeat(panel.cells, np.diff(frame.offsets))
-            places.append(panel.places[np.unique(frame.connectivity[cells])])
-        (left, bottom), (right, high) = np.min(places, axis=(0, 1)), np.max(places, axis=(0, 1))
-        assert (left, right, bottom, high) == tuple(window)
+            positions.append(panel.places[np.unique(frame.connectivity[cells])])
+        (left, bottom), (right, top_edge) = (
+            np.min(positions, axis=(0, 1)),
+            np.max(positions, axis=(0, 1)),
+        )
+        assert (left, right, bottom, top_edge) == tuple(window)
 
 
-def test_exact_the_range_of_colours_is_the_same_in_every_frame(small):
-    with Series(small) as series:
-        film = make_film_settings(series)
-        first = series.frame(film.numbers[0])
-        picture = Picture(first, "", film.panels(first), FRAME_SIZE, film.reach)
+def test_exact_colour_range_is_constant(small_folder):
+    """The range of colours is the same in every frame, and the colours show its stresses."""
+    with Series(small_folder) as series:
+        settings = make_film_settings(series)
+        first_frame = series.frame(settings.numbers[0])
+        picture = Picture(first_frame, "", settings.panels(first_frame), FRAME_SIZE, settings.reach)
         assert len(picture.bodies[0].cells) == 2  # triangles and quadrilaterals
-        for number in film.numbers:
+        for number in settings.numbers:
             frame = series.frame(number)
-            picture.show(frame, "", film.panels(frame))
-            for bodies, top in zip(picture.bodies, film.tops):
-                for mine, _, cells in bodies.cells:
+            picture.show(frame, "", settings.panels(frame))
+            for bodies, top in zip(picture.bodies, settings.tops):
+                for indices, _, cells in bodies.cells:
                     assert cells.get_clim() == (0, top * bodies.scale)
                     assert np.array_equal(
-                        cells.get_array(), frame.cell_data["von_mises"][mine] * bodies.scale
+                        cells.get_array(), frame.cell_data["von_mises"][indices] * bodies.scale
                     )
 
 
-def test_exact_gif_has_every_frame_and_its_colours(small, drawn, tmp_path):
-    film, pictures = drawn
-    answer = cli("view", small, "-o", tmp_path / "a.gif")
+def test_exact_gif_frames_agree_with_pictures(small_folder, drawn_frames, tmp_path):
+    """The frames of a .gif agree with the single pictures within the 256 colours of the format."""
+    settings, pictures = drawn_frames
+    answer = cli("view", small_folder, "-o", tmp_path / "a.gif")
     assert answer.code == 0 and "3 frames, 7 s to 7.2 s" in answer.out, answer.err
     with Image.open(tmp_path / "a.gif") as gif:
-        assert (gif.n_frames, gif.size, gif.info["loop"]) == (len(film.numbers), (WIDE, HIGH), 0)
+        assert (gif.n_frames, gif.size, gif.info["loop"]) == (
+            len(settings.numbers),
+            (WIDE, HIGH),
+            0,
+        )
         frames = []
         for k in range(gif.n_frames):
             gif.seek(k)
             frames.append(np.array(gif.convert("RGB")).astype(int))
-    still = [
+    constant_columns = [
         x
         for x in range(480, 640)
-        if all(np.array_equal(one[TITLE:, x], pictures[0][TITLE:, x]) for one in pictures)
+        if all(np.array_equal(frame[TITLE:, x], pictures[0][TITLE:, x]) for frame in pictures)
     ]
-    bar = max(still, key=lambda x: len(np.unique(pictures[0][:, x], axis=0)))
-    assert len(np.unique(frames[0][:, bar], axis=0)) > 50  # the bar of colours of the whole
-    for one, picture in zip(frames, pictures, strict=True):
-        assert np.array_equal(one[TITLE:, bar], frames[0][TITLE:, bar])
-        off = np.abs(one - picture)[TITLE:]  # 256 colours stand for all
-        assert off.mean() < 0.5 and np.percentile(off, 99) < 8  # but softened edges of lines
-        assert (np.abs(one - pictures[0])[TITLE:].mean() > 1) == (picture is not pictures[0])
+    colour_bar = max(constant_columns, key=lambda x: len(np.unique(pictures[0][:, x], axis=0)))
+    assert (
+        len(np.unique(frames[0][:, colour_bar], axis=0)) > 50
+    )  # the colour bar that all frames share
+    for frame, picture in zip(frames, pictures, strict=True):
+        assert np.array_equal(frame[TITLE:, colour_bar], frames[0][TITLE:, colour_bar])
+        difference = np.abs(frame - picture)[
+            TITLE:
+        ]  # differences arise from the reduction to 256 colours
+        # the remaining pixels are smoothed edges of lines
+        assert difference.mean() < 0.5 and np.percentile(difference, 99) < 8
+        assert (np.abs(frame - pictures[0])[TITLE:].mean() > 1) == (picture is not pictures[0])
     assert [path.name for path in tmp_path.iterdir()] == ["a.gif"]
 
 
-def recorder(folder, monkeypatch, code: int):
+def install_fake_ffmpeg(folder, monkeypatch, code: int):
+    """Put a program named ffmpeg on the path that records its arguments and input, and ends with a code."""
     program = folder / "ffmpeg"
     program.write_text(RECORDER.format(python=sys.executable, code=code))
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", str(folder))
 
 
-def test_exact_mp4_gives_every_frame_to_ffmpeg(small, drawn, tmp_path, monkeypatch):
+def test_exact_ffmpeg_receives_all_frames(small_folder, drawn_frames, tmp_path, monkeypatch):
+    """For an .mp4 every frame is passed to ffmpeg unchanged."""
     (tmp_path / "bin").mkdir()
-    recorder(tmp_path / "bin", monkeypatch, 0)
-    answer = cli("view", small, "-o", tmp_path / "a.mp4")
+    install_fake_ffmpeg(tmp_path / "bin", monkeypatch, 0)
+    answer = cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 0, answer.err
-    words, data = (tmp_path / "a.mp4").read_bytes().split(b"\n", 1)
-    assert f"-s {WIDE}x{HIGH} ".encode() in words and WIDE % 2 == HIGH % 2 == 0
-    read = np.frombuffer(data, np.uint8).reshape(-1, HIGH, WIDE, 4)[..., :3].astype(int)
-    assert len(read) == len(drawn[1])
-    for frame, picture in zip(read, drawn[1]):
+    arguments, data = (tmp_path / "a.mp4").read_bytes().split(b"\n", 1)
+    assert f"-s {WIDE}x{HIGH} ".encode() in arguments and WIDE % 2 == HIGH % 2 == 0
+    received = np.frombuffer(data, np.uint8).reshape(-1, HIGH, WIDE, 4)[..., :3].astype(int)
+    assert len(received) == len(drawn_frames[1])
+    for frame, picture in zip(received, drawn_frames[1]):
         assert np.array_equal(frame[TITLE:], picture[TITLE:])
 
 
-def test_refuses_mp4_that_ffmpeg_cannot_write_and_leaves_nothing(small, tmp_path, monkeypatch):
+def test_refuses_mp4_that_ffmpeg_cannot_write(small_folder, tmp_path, monkeypatch):
+    """If ffmpeg fails, its message is printed and no file remains."""
     (tmp_path / "bin").mkdir()
-    recorder(tmp_path / "bin", monkeypatch, 1)
-    answer = cli("view", small, "-o", tmp_path / "a.mp4")
+    install_fake_ffmpeg(tmp_path / "bin", monkeypatch, 1)
+    answer = cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 4 and "the codec is missing" in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
 
 
-def test_refuses_mp4_without_ffmpeg_before_anything_is_drawn(small, tmp_path, monkeypatch):
+def test_refuses_mp4_without_ffmpeg(small_folder, tmp_path, monkeypatch):
+    """Without ffmpeg an .mp4 is refused before a frame is drawn."""
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    answer = cli("view", small, "-o", tmp_path / "a.mp4")
+    answer = cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 4 and "pip install imageio-ffmpeg" in answer.err
     assert not list(tmp_path.iterdir())
 
 
-def test_refuses_a_film_without_fields_of_one_frame_or_of_a_named_one(small, tmp_path):
+def test_refuses_animation_without_motion(small_folder, tmp_path):
+    """An animation of a run without fields, of a single frame or with the option --frame is refused."""
     (tmp_path / "lumped").mkdir()
     answer = cli("view", tmp_path / "lumped", "-o", tmp_path / "a.gif")
     assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
     write_small(tmp_path / "still", 1)
     answer = cli("view", tmp_path / "still", "-o", tmp_path / "a.gif")
     assert answer.code == 2 and "no motion to show" in answer.err and "-o FILE.png" in answer.err
-    answer = cli("view", small, "-o", tmp_path / "a.gif", "--frame", "1")
+    answer = cli("view", small_folder, "-o", tmp_path / "a.gif", "--frame", "1")
     assert answer.code == 2 and "--frame" in answer.err
-    for more in (("--frame", "1"), ("--magnify", "2")):
-        answer = cli("view", small, "-o", tmp_path / "a.html", *more)
+    for options in (("--frame", "1"), ("--magnify", "2")):
+        answer = cli("view", small_folder, "-o", tmp_path / "a.html", *options)
         assert answer.code == 2 and "sliders for frame and magnification" in answer.err
-    answer = cli("view", small, "-o", tmp_path / "still" / "fields.vtkhdf" / "a.gif")
+    answer = cli("view", small_folder, "-o", tmp_path / "still" / "fields.vtkhdf" / "a.gif")
     assert answer.code == 4 and "cannot be written (Not a directory)" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lumped", "still"]

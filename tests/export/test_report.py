@@ -1,4 +1,4 @@
-"""The report page: one file that stands alone, says what the run was, and rounds and scales its numbers truly."""
+"""Report page of a run: one self-contained file with the verdict first, and correct numbers and units."""
 
 import pickle
 import re
@@ -25,12 +25,13 @@ from patchfem.response import TABLE as MOTION
 PERIOD, MIL = 1 / 143, 25.4e-6
 
 
-def measure(value, unit, error=None):
+def make_measure(value, unit, error=None):
+    """Return a measure with a value, a unit and an error."""
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
-def base(kind, outcome, effects, measures, title="a title") -> RunData:
-    """What every page is made of; the rest is added per kind."""
+def make_run_data(kind, outcome, effects, measures, title="a title") -> RunData:
+    """Return the data that the page of every kind of run needs."""
     rows = [{"effect": name, "equations": "a < b & c", "seconds": 0.1} for name in effects]
     summary = {
         "patchfem": "0",
@@ -48,20 +49,20 @@ def base(kind, outcome, effects, measures, title="a title") -> RunData:
     return RunData(scene, Verdict(summary, Outcome(outcome).sentence), {"python": "3"})
 
 
-def patch(load=1.0, frames=1, effects=("contact",)) -> RunData:
-    """A Hertzian pressure over a tenth of 10 mm, and a stress that fades with depth."""
+def make_patch_data(load=1.0, frames=1, effects=("contact",)) -> RunData:
+    """Return the data of a patch with a Hertzian pressure over a tenth of 10 mm and a stress that decays with depth."""
     x = np.linspace(-5e-3, 5e-3, 201)
     depth = np.linspace(0, 5e-3, 21)
     sigma = load * 5e7 * np.sqrt(np.maximum(0, 1 - (x / 0.5e-3) ** 2))
-    data = base(
+    data = make_run_data(
         "patch",
         "done" if load else "no_contact",
         effects,
         {
-            "contact_fraction": measure(0.1 * load, "1", 0.005),
-            "pressure_peak": measure(5e7 * load, "Pa", 2e4),
-            "moment": measure(3.2e-16, "N m", 4.1e-16),
-            "contact_half_width": measure(5e-4 * load, "m", 1e-6),
+            "contact_fraction": make_measure(0.1 * load, "1", 0.005),
+            "pressure_peak": make_measure(5e7 * load, "Pa", 2e4),
+            "moment": make_measure(3.2e-16, "N m", 4.1e-16),
+            "contact_half_width": make_measure(5e-4 * load, "m", 1e-6),
         },
     )
     fields = {"time": np.arange(frames) * 1e-3, "normal_stress": np.tile(sigma, (frames, 1))}
@@ -78,25 +79,30 @@ def patch(load=1.0, frames=1, effects=("contact",)) -> RunData:
     return replace(data, patch=PressedPatch(x, fields=fields, bodies=bodies))
 
 
-def rig(
+def make_rig_data(
     cycles=60.0, title="a title", effects=("contact", "contact.coating", "structure")
 ) -> RunData:
-    """A settled sine over `cycles`, its reversals alone before the last three cycles, over a patch, with a table."""
-    keep = min(cycles, 3.0)
-    late = np.linspace((cycles - keep) * PERIOD, cycles * PERIOD, round(keep * 400) + 1)
-    early = (np.arange(0, 2 * (cycles - keep)) / 2 + 0.25) * PERIOD
-    time = np.concatenate([early, late])
-    wave = {t.size: np.sin(2 * np.pi * t / PERIOD) for t in (late, time)}
-    whole = 1.4808e-5 * wave[time.size]
-    end = wave[late.size]
-    data = patch(frames=5, effects=effects)
+    """Return the data of a rig in steady state over a patch, with a table of measured responses.
+
+    Before the last three cycles only the reversals are stored.
+    """
+    n_full_cycles = min(cycles, 3.0)
+    last_times = np.linspace(
+        (cycles - n_full_cycles) * PERIOD, cycles * PERIOD, round(n_full_cycles * 400) + 1
+    )
+    reversal_times = (np.arange(0, 2 * (cycles - n_full_cycles)) / 2 + 0.25) * PERIOD
+    time = np.concatenate([reversal_times, last_times])
+    wave = {t.size: np.sin(2 * np.pi * t / PERIOD) for t in (last_times, time)}
+    displacement = 1.4808e-5 * wave[time.size]
+    last_wave = wave[last_times.size]
+    data = make_patch_data(frames=5, effects=effects)
     summary = data.verdict.summary
     summary |= {"kind": "rig", "outcome": "steady", "title": title}
     summary["measures"] |= {
-        "relative_displacement_amplitude": measure(1.48081e-5, "m", 4.1e-8),
-        "absolute_acceleration_peak": measure(5.2 * G_N, "m s-2", 0.1),
-        "loop_area": measure(1.96e-3, "J", 5.8e-6),
-        "slip_start_phase": measure(2.89849, "rad", 1.6),
+        "relative_displacement_amplitude": make_measure(1.48081e-5, "m", 4.1e-8),
+        "absolute_acceleration_peak": make_measure(5.2 * G_N, "m s-2", 0.1),
+        "loop_area": make_measure(1.96e-3, "J", 5.8e-6),
+        "slip_start_phase": make_measure(2.89849, "rad", 1.6),
     }
     rows = [
         SimpleNamespace(
@@ -107,17 +113,17 @@ def rig(
         ),
     ]
     motion = Motion(
-        history={"time": time, "displacement": whole, "force": 30 * wave[time.size]},
+        history={"time": time, "displacement": displacement, "force": 30 * wave[time.size]},
         window={
-            "time": late,
-            "displacement": 1.4808e-5 * end,
-            "acceleration": 50 * end,
-            "base": 49 * end,
+            "time": last_times,
+            "displacement": 1.4808e-5 * last_wave,
+            "acceleration": 50 * last_wave,
+            "base": 49 * last_wave,
         },
         loop={
-            "slide": 1.4808e-5 * end,
-            "force": 30 * np.cos(2 * np.pi * late / PERIOD),
-            "time": late,
+            "slide": 1.4808e-5 * last_wave,
+            "force": 30 * np.cos(2 * np.pi * last_times / PERIOD),
+            "time": last_times,
         },
         period=PERIOD,
     )
@@ -129,13 +135,16 @@ def rig(
     )
 
 
-def bench() -> RunData:
-    """Two cycles of a slide at one point."""
-    data = base(
+def make_bench_data() -> RunData:
+    """Return the data of a point contact under two cycles of a slide."""
+    data = make_run_data(
         "bench",
         "done",
         ("normal", "friction.law=coulomb"),
-        {"friction_ratio_peak": measure(0.3, "1", 1e-6), "loop_area": measure(1e-3, "J", 1e-9)},
+        {
+            "friction_ratio_peak": make_measure(0.3, "1", 1e-6),
+            "loop_area": make_measure(1e-3, "J", 1e-9),
+        },
     )
     time = np.linspace(0, 0.02, 401)
     slide = 1e-5 * np.sin(200 * np.pi * time)
@@ -148,21 +157,22 @@ def bench() -> RunData:
 
 
 PAGES = {
-    "patch": patch,
-    "no contact": lambda: patch(load=0.0),
-    "rig": rig,
-    "short": lambda: rig(0.3),
-    "bench": bench,
+    "patch": make_patch_data,
+    "no contact": lambda: make_patch_data(load=0.0),
+    "rig": make_rig_data,
+    "short": lambda: make_rig_data(0.3),
+    "bench": make_bench_data,
 }
 
 
 @pytest.fixture(scope="module")
-def pages():
+def run_pages():
+    """Return the data and the page of each entry of PAGES, by name."""
     return {name: (data := make(), report.page_html(data)) for name, make in PAGES.items()}
 
 
-class Parsed(HTMLParser):
-    """Ids, references, tags and the first cell of each table row."""
+class PageParser(HTMLParser):
+    """Parser that collects the ids, links, tags and table cells of a page."""
 
     def __init__(self, text):
         super().__init__()
@@ -173,6 +183,7 @@ class Parsed(HTMLParser):
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
+        """Collect the tag, its id and its links."""
         self.tags.append(tag)
         for name, value in attributes:
             if name == "id":
@@ -181,65 +192,73 @@ class Parsed(HTMLParser):
                 self.links.append(value)
 
     def handle_data(self, text):
+        """Collect the text of a table cell."""
         if self.tags[-1:] == ["td"]:
             self.cells.append(text)
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_always_a_page_can_be_heard(name, pages):
-    assert unheard(pages[name][1]) == []
+def test_always_page_is_accessible_to_screen_readers(name, run_pages):
+    """The pages of all kinds of runs have the labels and headings that screen readers need."""
+    assert unheard(run_pages[name][1]) == []
 
 
-def captions(page) -> str:
+def join_captions(page) -> str:
+    """Return the text of all captions of a page."""
     return " ".join(re.findall(r"<figcaption>(.*?)</figcaption>", page))
 
 
-def spoken(page) -> str:
-    """The verdict as it is read."""
+def verdict_text(page) -> str:
+    """Return the verdict of a page without markup."""
     return re.sub(r"<[^>]+>", "", re.search(r"<p class=verdict>(.*?)</p>", page)[1])
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_always_one_file_that_fetches_nothing(pages, name):
-    text = pages[name][1]
-    words = own_part(text)
-    seen = Parsed(words)
-    assert not {"link", "iframe", "img", "object", "metadata"} & set(seen.tags)
-    assert all(link.startswith("#") or link in dict(report.RESULT_FILES) for link in seen.links)
-    assert "http" not in words and "@import" not in words and "url(" not in words
+def test_always_page_is_self_contained(run_pages, name):
+    """The page is one file below 3 MB without external resources; its links point to the page or to result files."""
+    text = run_pages[name][1]
+    content = own_part(text)
+    parsed = PageParser(content)
+    assert not {"link", "iframe", "img", "object", "metadata"} & set(parsed.tags)
+    assert all(link.startswith("#") or link in dict(report.RESULT_FILES) for link in parsed.links)
+    assert "http" not in content and "@import" not in content and "url(" not in content
     assert not re.search(r"<script[^>]* src", text) and len(text.encode()) < 3e6
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_always_ids_are_unique_and_references_meet_one(pages, name):
-    text = pages[name][1]
-    seen = Parsed(own_part(text))
-    assert len(seen.ids) == len(set(seen.ids))
-    wanted = {link[1:] for link in seen.links if link.startswith("#")}
-    wanted |= {chart["anchor"] for chart in data_of(text).get("charts", [])}
-    assert wanted and wanted <= set(seen.ids)
+def test_always_ids_are_unique_and_links_resolve(run_pages, name):
+    """The ids of a page are unique, and each internal link and chart has its element."""
+    text = run_pages[name][1]
+    parsed = PageParser(own_part(text))
+    assert len(parsed.ids) == len(set(parsed.ids))
+    anchors = {link[1:] for link in parsed.links if link.startswith("#")}
+    anchors |= {chart["anchor"] for chart in data_of(text).get("charts", [])}
+    assert anchors and anchors <= set(parsed.ids)
 
 
-def test_exact_the_pictures_hold_the_numbers_of_the_run(pages):
-    data, text = pages["rig"]
-    found = charts_of(text)
-    loop = found["Friction loop", "friction force"]["marks"][0]
+def test_exact_charts_agree_with_run(run_pages):
+    """The charts contain the loop, the history and the pressure of the run in customary units, within 1e-5."""
+    data, text = run_pages["rig"]
+    chart_by_title = charts_of(text)
+    loop = chart_by_title["Friction loop", "friction force"]["marks"][0]
     np.testing.assert_allclose(loop["x"], data.motion.loop["slide"] * 1e6, rtol=1e-8)
     np.testing.assert_allclose(loop["y"], data.motion.loop["force"], rtol=1e-8)
-    whole = found["Whole run", "displacement"]
-    band, late = whole["marks"]
+    history = chart_by_title["Whole run", "displacement"]
+    band, last_line = history["marks"]
     assert band["kind"] == "band" and max(band["high"]) == pytest.approx(14.808, rel=1e-6)
-    assert late["x"][-1] == pytest.approx(
-        60 * PERIOD * 1e3 if whole["x"]["unit"] == "ms" else 60 * PERIOD
+    assert last_line["x"][-1] == pytest.approx(
+        60 * PERIOD * 1e3 if history["x"]["unit"] == "ms" else 60 * PERIOD
     )
-    pressure = found["Pressure on the interface", "normal stress"]
+    pressure = chart_by_title["Pressure on the interface", "normal stress"]
     x = np.array(pressure["marks"][1]["x"])
     sigma = np.array(pressure["marks"][1]["y"])
     assert pressure["x"]["unit"] == "um" and pressure["y"]["unit"] == "MPa"
     np.testing.assert_allclose(sigma, 50 * np.sqrt(np.maximum(0, 1 - (x / 500) ** 2)), atol=1e-5)
-    # the part in contact
+    # the axis covers the part in contact
     assert -700 < pressure["x"]["range"][0] < -500 and 500 < pressure["x"]["range"][1] < 700
-    assert [mark["name"] for mark in found["Acceleration at 143 Hz", "acceleration"]["marks"]] == [
+    assert [
+        mark["name"] for mark in chart_by_title["Acceleration at 143 Hz", "acceleration"]["marks"]
+    ] == [
         "unstable in the test",
         "measured",
         "computed",
@@ -247,12 +266,15 @@ def test_exact_the_pictures_hold_the_numbers_of_the_run(pages):
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_always_the_verdict_first_and_every_measure_listed(pages, name):
-    data, text = pages[name]
-    at = text.index("<p class=verdict>")
-    assert all(tag not in text[:at] for tag in ("<figure", "<table", "<h2"))
-    assert spoken(text).startswith(f"{data.verdict.summary['outcome']}: {data.verdict.sentence}")
-    assert set(data.verdict.summary["measures"]) <= set(Parsed(text).cells)
+def test_always_page_begins_with_verdict(run_pages, name):
+    """The page begins with the verdict, before figures and tables, and lists every measure."""
+    data, text = run_pages[name]
+    start = text.index("<p class=verdict>")
+    assert all(tag not in text[:start] for tag in ("<figure", "<table", "<h2"))
+    assert verdict_text(text).startswith(
+        f"{data.verdict.summary['outcome']}: {data.verdict.sentence}"
+    )
+    assert set(data.verdict.summary["measures"]) <= set(PageParser(text).cells)
 
 
 @pytest.mark.parametrize(
@@ -265,56 +287,77 @@ def test_always_the_verdict_first_and_every_measure_listed(pages, name):
         ("`a\nb`", "`a\nb`"),
     ],
 )
-def test_exact_a_sentence_on_a_page_has_its_quoted_words_as_code(text, html):
+def test_exact_backquoted_words_become_code(text, html):
+    """Words in backquotes become code elements on a page, and all other text is escaped."""
     assert sentence_html(text) == html
 
 
-def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
-    """Notes, warnings, captions and meanings of measures; a scene or a command is shown as it is written."""
+def test_always_page_shows_no_backquotes(run_pages):
+    """Notes, warnings, captions and meanings of measures show no backquotes.
+
+    Scenes and commands are shown as written.
+    """
     key = "`structure.travel`"
-    stick = MOTION["stick_fraction"].text
-    assert "`slip_amplitude`" in stick
-    data = base("rig", "steady", ["friction"], {"stick_fraction": measure(0.5, "1", 0.01)})
+    meaning = MOTION["stick_fraction"].text
+    assert "`slip_amplitude`" in meaning
+    data = make_run_data(
+        "rig", "steady", ["friction"], {"stick_fraction": make_measure(0.5, "1", 0.01)}
+    )
     data.verdict.summary["notes"] = [f"raise {key}"]
     data.verdict.summary["warnings"] = [f"lower {key}"]
-    data.verdict.means["stick_fraction"] = stick
+    data.verdict.means["stick_fraction"] = meaning
     text = report.page_html(data)
     assert text.count("<code>structure.travel</code>") == 2
     assert "as in <code>slip_amplitude</code>" in text
-    for whole in (text, *(page for _, page in pages.values())):
-        said = re.sub(r"(?s)<(script|style|pre)\b.*?</\1>", "", whole)
-        assert "`" not in said
+    for whole in (text, *(page for _, page in run_pages.values())):
+        visible = re.sub(r"(?s)<(script|style|pre)\b.*?</\1>", "", whole)
+        assert "`" not in visible
 
 
-def test_always_captions_speak_of_what_the_run_has(pages):
-    words = {name: captions(text) for name, (_, text) in pages.items()}
-    assert "shear" not in words["patch"]
-    assert "cycle" not in words["patch"]
-    assert "coating" not in words["patch"]
-    assert "with their coatings" in words["rig"] and "4 instants of the last cycle" in words["rig"]
-    assert "over the last 3 cycles" in words["rig"] and "only reversals were kept" in words["rig"]
-    assert "instants of the run" in words["short"] and "last cycle" not in words["short"]
-    assert "whole run" in words["bench"] and "cycle" not in words["bench"]
-    coated = captions(report.page_html(patch(effects=("contact", "contact.coating"))))
+def test_always_captions_match_run(run_pages):
+    """The captions name coatings, cycles and shear only if the run has them."""
+    captions_by_name = {name: join_captions(text) for name, (_, text) in run_pages.items()}
+    assert "shear" not in captions_by_name["patch"]
+    assert "cycle" not in captions_by_name["patch"]
+    assert "coating" not in captions_by_name["patch"]
+    assert (
+        "with their coatings" in captions_by_name["rig"]
+        and "4 instants of the last cycle" in captions_by_name["rig"]
+    )
+    assert (
+        "over the last 3 cycles" in captions_by_name["rig"]
+        and "only reversals were kept" in captions_by_name["rig"]
+    )
+    assert (
+        "instants of the run" in captions_by_name["short"]
+        and "last cycle" not in captions_by_name["short"]
+    )
+    assert "whole run" in captions_by_name["bench"] and "cycle" not in captions_by_name["bench"]
+    coated = join_captions(
+        report.page_html(make_patch_data(effects=("contact", "contact.coating")))
+    )
     assert "with their coatings under the load." in coated
 
 
-def test_always_no_picture_where_nothing_touches(pages):
-    data, text = deepcopy(pages["no contact"])
-    assert "<script" not in text and spoken(text) == f"no_contact: {data.verdict.sentence}"
+def test_always_page_without_contact_has_no_charts(run_pages):
+    """The page of a patch without contact has no charts and states its verdict once."""
+    data, text = deepcopy(run_pages["no contact"])
+    assert "<script" not in text and verdict_text(text) == f"no_contact: {data.verdict.sentence}"
     data.verdict.summary["warnings"] = [data.verdict.sentence, "another one"]
     assert report.page_html(data).count(data.verdict.sentence) == 1
 
 
-def test_always_a_part_of_a_cycle_claims_nothing_per_cycle(pages):
-    assert "1.9600 ± 0.0058 mJ dissipated per cycle" in spoken(pages["rig"][1])
-    assert "per cycle" not in spoken(pages["short"][1]) and "In 0.3 of a cycle" in spoken(
-        pages["short"][1]
-    )
+def test_always_incomplete_cycle_has_no_values_per_cycle(run_pages):
+    """The verdict of less than one cycle states no dissipation per cycle."""
+    assert "1.9600 ± 0.0058 mJ dissipated per cycle" in verdict_text(run_pages["rig"][1])
+    assert "per cycle" not in verdict_text(
+        run_pages["short"][1]
+    ) and "In 0.3 of a cycle" in verdict_text(run_pages["short"][1])
 
 
-def test_always_the_heading_is_the_title_or_the_file():
-    data = rig(title="")
+def test_always_heading_is_title_or_file_name():
+    """The heading of a page is the title of the scene, else the name of its file."""
+    data = make_rig_data(title="")
     assert "<h1>scene-file</h1>" in report.page_html(data)
     data = replace(data, source=replace(data.source, name=""))
     assert "<h1>patchfem run</h1>" in report.page_html(data)
@@ -322,7 +365,8 @@ def test_always_the_heading_is_the_title_or_the_file():
 
 
 @pytest.mark.parametrize("name", ["rig", "bench"])
-def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
+def test_exact_page_is_reproducible(tmp_path, name):
+    """The same data give the same page to the last byte, also in another process."""
     data = PAGES[name]()
     (tmp_path / "data").write_bytes(pickle.dumps(data))
     code = (
@@ -345,8 +389,8 @@ def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
         ("relative_displacement_amplitude", 1.48081e-5, "m", 1.9e-8, "0.58300 mil"),
         ("slip_start_phase", 2.898, "rad", 0.0012, ""),
         ("rotation", 1e-4, "rad", 1e-16, "0.005729578 deg"),
-        ("pressure_centre", 3.4e-18, "m", 4.5e-18, ""),  # zero within its error
-        ("drift_per_cycle", 8.1e-22, "m", 1e-25, ""),  # smaller than any unit
+        ("pressure_centre", 3.4e-18, "m", 4.5e-18, ""),  # the value is zero within its error
+        ("drift_per_cycle", 8.1e-22, "m", 1e-25, ""),  # the value is smaller than any unit shows
         ("approach", 0.0, "m", 0.0, ""),
         ("pressure_peak", 7.9044e6, "Pa", 4.5e5, "1.146 ksi"),
         ("contact_fraction", 0.2225, "1", 0.005, ""),
@@ -355,23 +399,30 @@ def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
         ("energy_balance", 1e-13, "1", 0.0, ""),
     ],
 )
-def test_exact_units_follow_the_size(name, value, unit, error, text):
-    assert sentences.format_imperial(name, measure(value, unit, error)) == text
+def test_exact_imperial_units_follow_magnitude(name, value, unit, error, text):
+    """Values are given in imperial units of suitable size, or not at all if they are zero within their error."""
+    assert sentences.format_imperial(name, make_measure(value, unit, error)) == text
 
 
-def test_exact_the_band_joins_the_reversals_of_each_cycle():
+def test_exact_envelope_joins_reversals_of_cycles():
+    """The envelope of a history joins the reversals of each cycle, with gaps at cycles that are missing."""
     number = np.arange(20)
     time = (number / 2 + 0.25) * PERIOD
     high = 1 + number // 2
-    gone = (number // 2 != 3) & (number // 2 != 4)
-    middle, low, top = charts.cycle_envelope(time[gone], ((-1.0) ** number * high)[gone], PERIOD)
-    assert middle == pytest.approx((np.arange(10) + 0.5) * PERIOD)
+    is_stored = (number // 2 != 3) & (number // 2 != 4)
+    centres, low, top = charts.cycle_envelope(
+        time[is_stored], ((-1.0) ** number * high)[is_stored], PERIOD
+    )
+    assert centres == pytest.approx((np.arange(10) + 0.5) * PERIOD)
     assert np.isnan(low[3:5]).all() and np.isnan(top[3:5]).all()
-    kept = np.array([0, 1, 2, 5, 6, 7, 8, 9])
-    assert np.array_equal(top[kept], kept + 1) and np.array_equal(low[kept], -kept - 1.0)
+    present = np.array([0, 1, 2, 5, 6, 7, 8, 9])
+    assert np.array_equal(top[present], present + 1) and np.array_equal(
+        low[present], -present - 1.0
+    )
 
 
-def test_exact_a_run_gives_the_page_what_it_reads(tmp_path):
+def test_exact_page_of_linear_rig_shows_motion_only(tmp_path):
+    """The page of a rig without friction shows charts of its motion only."""
     (tmp_path / "swing.toml").write_text(
         """\
 [structure]
@@ -389,11 +440,12 @@ cycles = 20
 """,
         "utf-8",
     )
-    with pytest.raises(SystemExit) as end:
+    with pytest.raises(SystemExit) as exit_info:
         main(["run", str(tmp_path / "swing.toml"), "-o", str(tmp_path / "out"), "-q"])
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert not end.value.code and "<h1>swing</h1>" in text
-    assert "friction" not in captions(text)  # no contact, no friction: the motion alone
+    assert not exit_info.value.code and "<h1>swing</h1>" in text
+    # without contact and friction the page shows only the motion
+    assert "friction" not in join_captions(text)
     assert [title for title, _ in charts_of(text)] == [
         "Whole run",
         "Last 2 cycles",
@@ -402,7 +454,7 @@ cycles = 20
 
 
 @pytest.mark.parametrize(
-    "cell, said",
+    "cell, place",
     [
         ((0, 0), "where the face of the coating meets the end"),
         ((5, 0), ""),
@@ -410,18 +462,24 @@ cycles = 20
         ((-1, -1), "where the held far face ends"),
     ],
 )
-def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, said):
-    """Beside a coating a corner showed 6.7 to 8.3 MPa on finer meshes of one pressed pair, without a word."""
-    data = patch()
+def test_exact_caption_names_stress_singularity(cell, place):
+    """The caption states that the largest stress lies at a corner where the exact stress is unbounded.
+
+    At the corner of a coating, finer meshes of one pressed pair gave 6.7 to 8.3 MPa.
+    """
+    data = make_patch_data()
     data.patch.bodies["mises"][1][cell] = 1e9
     caption = report.find_picture("bodies", data).caption
     assert "largest stress in a cell is 1 GPa" in caption and (
-        said in caption if said else "bound" not in caption
+        place in caption if place else "bound" not in caption
     )
 
 
-def test_exact_a_fraction_that_is_extrapolated_is_told_from_the_places_of_the_finest_mesh():
-    """59.2 % from x = -1.724 to 1.724 of 6 mm were two answers, as these ends give 57.5 %."""
+def test_exact_contact_range_and_extrapolated_fraction():
+    """If the extrapolated contact fraction differs from that of the finest mesh, the sentence states both.
+
+    Otherwise 59.2 % would contradict the range of -1.724 to 1.724 mm, which is 57.5 %.
+    """
     contact = {"from": -3e-3, "to": 3e-3, "stretches": [[-1.724e-3, 1.724e-3]]}
     assert sentences.describe_contact(contact, 0.592) == (
         ", from x = -1.724 to 1.724 mm on the finest mesh (57.5 %; the fraction "

@@ -1,4 +1,4 @@
-"""result.nc is the file that xarray would write; the page comes last and nothing that stops it harms the results."""
+"""The file result.nc equals that of xarray, and a failure of the page never damages the results."""
 
 import io
 import json
@@ -21,22 +21,27 @@ WHOLE = {"summary.json", "result.nc", "scene.resolved.toml"}
 
 
 @pytest.fixture
-def scene(tmp_path):
+def scene_file(tmp_path):
+    """Return the file of a bench."""
     path = tmp_path / "scene.toml"
     path.write_text(BENCH, "utf-8")
     return path
 
 
-def some_contents() -> netcdf.Contents:
-    """One of each: floats, whole numbers of every size, texts, two dimensions, none, no rows, places beside a row."""
-    rng = np.random.default_rng(5)
+def make_contents() -> netcdf.Contents:
+    """Return contents with floats, integers, texts, two dimensions, a scalar and an empty array."""
+    generator = np.random.default_rng(5)
     variables = {
-        "force": ("time", rng.normal(size=300), {"units": "N", "total_count": 7, "share": 0.25}),
-        "modal": (("time", "mode"), rng.normal(size=(300, 2)), {"units": "m"}),
-        "stress": (("frame", "x"), rng.normal(size=(3, 40)), {"units": "Pa"}),
+        "force": (
+            "time",
+            generator.normal(size=300),
+            {"units": "N", "total_count": 7, "share": 0.25},
+        ),
+        "modal": (("time", "mode"), generator.normal(size=(300, 2)), {"units": "m"}),
+        "stress": (("frame", "x"), generator.normal(size=(3, 40)), {"units": "Pa"}),
         "status": (
             ("frame", "x"),
-            rng.integers(0, 3, (3, 40)).astype(np.int8),
+            generator.integers(0, 3, (3, 40)).astype(np.int8),
             {"flag_values": np.array([0, 1, 2], np.int8), "flag_meanings": "open stick slip"},
         ),
         "interface": ("event", np.arange(5, dtype=np.int32), {"units": "1"}),
@@ -55,48 +60,55 @@ def some_contents() -> netcdf.Contents:
     )
 
 
-def test_exact_the_file_is_the_one_that_xarray_writes(tmp_path):
-    data = some_contents()
+def test_exact_netcdf_file_equals_that_of_xarray(tmp_path):
+    """The file has the same values, types, attributes and encodings as the file that xarray writes."""
+    data = make_contents()
     netcdf.write_netcdf(data, tmp_path / "ours.nc")
     data.to_xarray().to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
     with (
-        xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf") as ours,
-        xr.open_dataset(tmp_path / "theirs.nc", engine="h5netcdf") as theirs,
+        xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf") as written,
+        xr.open_dataset(tmp_path / "theirs.nc", engine="h5netcdf") as expected,
     ):
-        xr.testing.assert_identical(ours, theirs)
-        xr.testing.assert_identical(ours, data.to_xarray())
-        for name in theirs.variables:
-            assert ours[name].dtype == theirs[name].dtype, name
+        xr.testing.assert_identical(written, expected)
+        xr.testing.assert_identical(written, data.to_xarray())
+        for name in expected.variables:
+            assert written[name].dtype == expected[name].dtype, name
             for key in ("_FillValue", "coordinates", "dtype"):
-                assert str(ours[name].encoding.get(key)) == str(theirs[name].encoding.get(key)), (
+                assert str(written[name].encoding.get(key)) == str(
+                    expected[name].encoding.get(key)
+                ), (
                     name,
                     key,
                 )
-        assert all(ours[name].encoding["complevel"] == 1 for name in ("force", "modal", "status"))
+        assert all(
+            written[name].encoding["complevel"] == 1 for name in ("force", "modal", "status")
+        )
     assert not list(tmp_path.glob("*.partial"))
 
 
-def test_exact_without_a_page(scene, tmp_path):
-    answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
+def test_exact_run_without_page_writes_all_results(scene_file, tmp_path):
+    """With --no-page a run writes all results except report.html."""
+    answer = cli("run", scene_file, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and "without report.html" in answer.out
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
-    said = cli("run", scene, "-o", tmp_path / "out", "--no-page", "--json")
-    assert json.loads(said.out)["outcome"] == "done" and not said.err
+    answer_json = cli("run", scene_file, "-o", tmp_path / "out", "--no-page", "--json")
+    assert json.loads(answer_json.out)["outcome"] == "done" and not answer_json.err
 
 
-def test_exact_the_page_replaces_no_result(scene, tmp_path):
-    assert cli("run", scene, "-o", tmp_path / "out").code == 0
+def test_exact_page_is_added_to_results(scene_file, tmp_path):
+    """The page is added to the results and lists all measures; a later run without a page removes it."""
+    assert cli("run", scene_file, "-o", tmp_path / "out").code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE | {"report.html"}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.endswith("</html>\n") and all(name in page for name in summary["measures"])
-    # no page of an older run stays behind
-    assert cli("run", scene, "-o", tmp_path / "out", "--no-page").code == 0
+    # the page of an earlier run is removed
+    assert cli("run", scene_file, "-o", tmp_path / "out", "--no-page").code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 
 class ActingStream(io.StringIO):
-    """A stdout that calls a function once, after the line that names the results folder is printed."""
+    """Standard output that calls a function once, after the line that names the results folder is printed."""
 
     def __init__(self, act):
         super().__init__()
@@ -104,7 +116,7 @@ class ActingStream(io.StringIO):
         self.has_acted = False
 
     def write(self, text: str) -> int:
-        """Write the text; then act if the results are named."""
+        """Write the text, then call the function if the results folder was named."""
         count = super().write(text)
         if "results: " in self.getvalue() and not self.has_acted:
             self.has_acted = True
@@ -112,27 +124,30 @@ class ActingStream(io.StringIO):
         return count
 
 
-def run_acting(scene, out, act) -> CommandResult:
-    """Run a scene on the command line; `act` is called between the results and the page."""
-    stream = ActingStream(act)
+def run_with_action(scene, out, action) -> CommandResult:
+    """Run a scene on the command line and call a function between the results and the page."""
+    stream = ActingStream(action)
     answer = cli("run", scene, "-o", out, stdout=stream)
     assert stream.has_acted
     return answer
 
 
 def check_results_without_page(out) -> None:
-    """Check that the results are complete and no part of a page is left."""
+    """Check that the results are complete and no part of a page remains."""
     assert {path.name for path in out.iterdir()} == WHOLE
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
 
 
-def test_always_an_interrupt_before_the_page_leaves_complete_results(scene, tmp_path):
-    # a process in the background may have inherited that it ignores the signal
+def test_always_interrupt_before_page_leaves_results(scene_file, tmp_path):
+    # a background process may have inherited that the signal is ignored
+    """An interrupt while the page is drawn leaves complete results and ends with code 130."""
     inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        answer = run_acting(scene, tmp_path / "out", lambda: signal.raise_signal(signal.SIGINT))
+        answer = run_with_action(
+            scene_file, tmp_path / "out", lambda: signal.raise_signal(signal.SIGINT)
+        )
     finally:
         signal.signal(signal.SIGINT, inherited)
     assert answer.code == 130 and "interrupted while the page was drawn" in answer.err
@@ -140,54 +155,59 @@ def test_always_an_interrupt_before_the_page_leaves_complete_results(scene, tmp_
     check_results_without_page(tmp_path / "out")
 
 
-def test_always_a_page_for_which_memory_is_short_leaves_complete_results(
-    scene, tmp_path, monkeypatch
-):
+def test_always_page_without_memory_leaves_results(scene_file, tmp_path, monkeypatch):
+    """If memory is exhausted while the page is drawn, the results are complete and the code is 4."""
+
     def exhaust_memory(*_):
+        """Raise MemoryError."""
         raise MemoryError
 
     monkeypatch.setattr(report, "run_page", exhaust_memory)
-    answer = cli("run", scene, "-o", tmp_path / "out")
+    answer = cli("run", scene_file, "-o", tmp_path / "out")
     assert answer.code == 4 and "out of memory" in answer.err
     assert "results: " in answer.out and "are complete except for" in answer.err
     check_results_without_page(tmp_path / "out")
 
 
-def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path):
-    """The results have some 20 kB, the page has more than 200 kB."""
+def test_exact_full_disk_leaves_no_partial_page(scene_file, tmp_path):
+    """If the disk is full, no part of a page remains; the results take 20 kB and the page more than 200 kB."""
     with limited(200_000):
-        answer = cli("run", scene, "-o", tmp_path / "out")
+        answer = cli("run", scene_file, "-o", tmp_path / "out")
     assert answer.code == 4 and "complete except for the page" in answer.err
     assert "report.html" in answer.err
     check_results_without_page(tmp_path / "out")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
 
 
-def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path):
+def test_refuses_page_in_results_of_another_run(scene_file, tmp_path):
+    """A page is not written into a folder that another run has replaced in the meantime."""
     out = tmp_path / "out"
 
     def replace_results():
+        """Move the results away and write those of another run in their place."""
         os.replace(out, tmp_path / "first")
-        assert cli("run", scene, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
+        assert cli("run", scene_file, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
 
-    answer = run_acting(scene, out, replace_results)
+    answer = run_with_action(scene_file, out, replace_results)
     assert answer.code == 4 and "replaced by another run" in answer.err
     for folder in (out, tmp_path / "first"):
         assert {path.name for path in folder.iterdir()} == WHOLE
 
 
-def test_refuses_a_page_for_a_folder_that_is_gone(scene, tmp_path):
-    out = tmp_path / "out"
-    written = results_folder.run_into(plan(scene), out)
-    os.replace(out, tmp_path / "moved")
+def test_refuses_page_for_moved_folder(scene_file, tmp_path):
+    """A page is refused for a folder that was moved, and is written to its new place."""
+    folder = tmp_path / "out"
+    run = results_folder.run_into(plan(scene_file), folder)
+    os.replace(folder, tmp_path / "moved")
     with pytest.raises(Missing, match="replaced by another run"):
-        results_folder.write_run_page(written, out)
+        results_folder.write_run_page(run, folder)
     # The page follows the folder, not its name.
-    results_folder.write_run_page(written, tmp_path / "moved")
+    results_folder.write_run_page(run, tmp_path / "moved")
     assert (tmp_path / "moved" / "report.html").is_file()
 
 
-def test_exact_the_page_of_a_patch_shows_the_pieces(tmp_path):
+def test_exact_page_of_patch_shows_both_pieces(tmp_path):
+    """The page of a patch has three figures, one of them of both pieces with their coatings."""
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     assert cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")

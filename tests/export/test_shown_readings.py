@@ -1,4 +1,4 @@
-"""The reading of the accelerometer on the page of a run, and the rules of its keys."""
+"""Reading of an accelerometer on the page of a run, and the rules of its keys."""
 
 import numpy as np
 import pytest
@@ -27,60 +27,67 @@ acceleration_gain = 1.5
 """
 
 
-def scene_of(tmp_path, *sets):
-    head = "frequency [Hz],input [g],acceleration [g],displacement [mil]\n"
-    (tmp_path / "rows.csv").write_text(f"{head}143,1,10,5\n", "utf-8")
+def load_scene(tmp_path, *settings):
+    """Return the scene of an oscillator with a measured row and the given settings."""
+    header = "frequency [Hz],input [g],acceleration [g],displacement [mil]\n"
+    (tmp_path / "rows.csv").write_text(f"{header}143,1,10,5\n", "utf-8")
     (tmp_path / "scene.toml").write_text(LINEAR, "utf-8")
-    return load(tmp_path / "scene.toml", sets)
+    return load(tmp_path / "scene.toml", settings)
 
 
-def test_exact_a_sine_reads_as_its_effective_value(tmp_path):
-    """A sine's rms is its peak over the root of two, beside the measured row and nowhere else."""
-    plain, read = (run(scene_of(tmp_path, *sets)) for sets in ((), ("measured.reading=rms",)))
-    assert (
-        read.measures["absolute_acceleration_peak"].value
-        == plain.measures["absolute_acceleration_peak"].value
+def test_exact_rms_reading_of_sine(tmp_path):
+    """The rms reading of a sine is its peak over sqrt(2), only in the row of the measured data."""
+    peak_run, rms_run = (
+        run(load_scene(tmp_path, *sets)) for sets in ((), ("measured.reading=rms",))
     )
-    data = collect_run_data(read).measured
+    assert (
+        rms_run.measures["absolute_acceleration_peak"].value
+        == peak_run.measures["absolute_acceleration_peak"].value
+    )
+    data = collect_run_data(rms_run).measured
     assert data.share == pytest.approx(np.sqrt(0.5), rel=1e-5)
-    assert collect_run_data(plain).measured.share == 1
-    peak = plain.measures["absolute_acceleration_peak"].value / 9.80665
-    assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in run_page(read, {})
-    assert f"{1.5 * peak:.3g} g" in run_page(plain, {})
+    assert collect_run_data(peak_run).measured.share == 1
+    peak = peak_run.measures["absolute_acceleration_peak"].value / 9.80665
+    assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in run_page(rms_run, {})
+    assert f"{1.5 * peak:.3g} g" in run_page(peak_run, {})
 
 
-def test_exact_the_gauge_has_a_factor_of_its_own(tmp_path):
-    found = run(scene_of(tmp_path, "measured.displacement_gain=0.8"))
-    seen = found.measures["relative_displacement_amplitude"].value / 25.4e-6
-    assert f"<td>{0.8 * seen:.3g} mil</td>" in run_page(found, {}).replace(" class=n", "")
-    assert "(computed displacement multiplied by the reading factor 0.8)" in run_page(found, {})
+def test_exact_displacement_gauge_has_own_factor(tmp_path):
+    """The displacement in the measured row is multiplied by its own factor, as the page states."""
+    result = run(load_scene(tmp_path, "measured.displacement_gain=0.8"))
+    displacement = result.measures["relative_displacement_amplitude"].value / 25.4e-6
+    assert f"<td>{0.8 * displacement:.3g} mil</td>" in run_page(result, {}).replace(" class=n", "")
+    assert "(computed displacement multiplied by the reading factor 0.8)" in run_page(result, {})
 
 
-def test_a_reading_is_an_effect_beside_its_rows(tmp_path):
-    named = scene_of(tmp_path, "measured.reading=fundamental").effect_names()
-    assert named[-2:] == ["measured", "measured.reading=fundamental"]
-    assert scene_of(tmp_path).effect_names()[-1] == "measured"
+def test_exact_reading_is_listed_as_effect(tmp_path):
+    """The reading is listed as an effect after the measured data."""
+    effects = load_scene(tmp_path, "measured.reading=fundamental").effect_names()
+    assert effects[-2:] == ["measured", "measured.reading=fundamental"]
+    assert load_scene(tmp_path).effect_names()[-1] == "measured"
 
 
 @pytest.mark.parametrize(
-    "sets, said",
+    "settings, message",
     [
         (("measured.reading=lowpass",), "measured.reading_cutoff: missing"),
         (("measured.reading=mean",), "one of peak, fundamental, rms, lowpass"),
     ],
 )
-def test_refuses_a_reading_that_is_none_or_lacks_its_cutoff(tmp_path, sets, said):
+def test_refuses_unknown_reading_or_missing_cutoff(tmp_path, settings, message):
+    """An unknown reading, or a low-pass reading without a cutoff, is refused with its key."""
     with pytest.raises(SceneError) as caught:
-        scene_of(tmp_path, *sets)
-    assert said in str(caught.value)
+        load_scene(tmp_path, *settings)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
-    "sets, said",
+    "settings, message",
     [
         (("measured.reading_cutoff=600 Hz",), "has no meaning for reading 'peak'"),
         (("measured.reading=rms", "drive.waveform=step"), "has a meaning only under a sine drive"),
     ],
 )
-def test_a_reading_without_meaning_is_remarked(tmp_path, sets, said):
-    assert any(said in remark for remark in scene_of(tmp_path, *sets).remarks)
+def test_always_ineffective_reading_key_has_remark(tmp_path, settings, message):
+    """A key of the reading that has no effect leads to a remark."""
+    assert any(message in remark for remark in load_scene(tmp_path, *settings).remarks)

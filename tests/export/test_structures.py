@@ -1,4 +1,4 @@
-"""The structure of a scene written for other programs: read back it is the rig, its elements give its friction."""
+"""Exports of the structure of a scene: read again they give the same rig, and their elements the same friction."""
 
 from pathlib import Path
 
@@ -16,8 +16,8 @@ WAVE = 'amplitude = "3 N"\nfrequency = "70 Hz"\n'
 RUB = POINT + PLASTIC + STRUCTURE
 
 
-def written(folder, text: str, ending: str):
-    """(Model, path of the export) of a scene."""
+def export_structure(folder, text: str, ending: str):
+    """Return the model of a scene and the path of its export."""
     (folder / "rig.toml").write_text(text)
     answer = cli("export", folder / "rig.toml", "-o", folder / f"rig{ending}")
     assert answer.code == 0 and "friction element" in answer.out, answer.err
@@ -35,15 +35,20 @@ def written(folder, text: str, ending: str):
     ],
     ids=["base", "force"],
 )
-def test_exact_an_exported_structure_is_read_back_as_the_same_rig(tmp_path, text, ending):
-    """By structure.file, to 1e-12: frequency, damping, share of the drive, slide and output; and it runs alike."""
-    model, path = written(tmp_path, text, ending)
-    head, tail = text.split("[structure]")
-    again = head + f'[structure]\nfile = "{path.name}"\n[drive]' + tail.split("[drive]")[1]
-    (tmp_path / "again.toml").write_text(again)
-    one = model.rig.modes
-    two = build(pf.load(tmp_path / "again.toml")).rig.modes
-    scale = np.sqrt(one.mass)  # modes of a file have 1 kg
+def test_exact_exported_structure_gives_same_rig(tmp_path, text, ending):
+    """An exported structure, read by structure.file, gives the same modes and drive within 1e-12.
+
+    Its run has the same measures within 1e-9.
+    """
+    model, path = export_structure(tmp_path, text, ending)
+    start, rest_of_scene = text.split("[structure]")
+    scene_text = (
+        start + f'[structure]\nfile = "{path.name}"\n[drive]' + rest_of_scene.split("[drive]")[1]
+    )
+    (tmp_path / "again.toml").write_text(scene_text)
+    modes = model.rig.modes
+    read_modes = build(pf.load(tmp_path / "again.toml")).rig.modes
+    scale = np.sqrt(modes.mass)  # modes of a file have a mass of 1 kg
     for name, factor in (
         ("omega", 1.0),
         ("zeta", 1.0),
@@ -51,10 +56,10 @@ def test_exact_an_exported_structure_is_read_back_as_the_same_rig(tmp_path, text
         ("output", 1 / scale),
     ):
         np.testing.assert_allclose(
-            getattr(two, name), factor * getattr(one, name), rtol=1e-12, err_msg=name
+            getattr(read_modes, name), factor * getattr(modes, name), rtol=1e-12, err_msg=name
         )
-    share = scale if '"base"' in text else 1 / scale
-    np.testing.assert_allclose(two.base, share * one.base, rtol=1e-12)
+    drive_factor = scale if '"base"' in text else 1 / scale
+    np.testing.assert_allclose(read_modes.base, drive_factor * modes.base, rtol=1e-12)
     before, after = (pf.run(tmp_path / f"{name}.toml") for name in ("rig", "again"))
     for name in ("relative_displacement_amplitude", "loop_area"):
         np.testing.assert_allclose(
@@ -62,24 +67,24 @@ def test_exact_an_exported_structure_is_read_back_as_the_same_rig(tmp_path, text
         )
 
 
-def loop_of(stiffness, limit, slide):
-    """Force (k,) of parallel elements that stretch and slip along a slide (k,), from a rest without force."""
+def element_force(stiffness, limit, slide):
+    """Return the force (k,) of parallel Jenkins elements along a slide (k,), from a force-free start."""
     stretch = np.zeros(len(limit))
-    out = []
-    last = 0.0
+    forces = []
+    previous = 0.0
     for x in slide:
-        stretch = np.clip(stretch + stiffness * (x - last), -limit, limit)
-        out.append(stretch.sum())
-        last = x
-    return np.array(out)
+        stretch = np.clip(stretch + stiffness * (x - previous), -limit, limit)
+        forces.append(stretch.sum())
+        previous = x
+    return np.array(forces)
 
 
 @pytest.mark.parametrize("law", ["elastic-plastic", "iwan"])
-def test_exact_exported_elements_give_the_friction_of_a_bench(tmp_path, law):
-    """A triangle over the elements, element by element, against the bench of the same law and load."""
-    _, path = written(tmp_path, POINT + friction_of(law) + STRUCTURE, ".npz")
+def test_exact_exported_elements_agree_with_bench(tmp_path, law):
+    """Under a triangular slide the force of the exported elements agrees with the bench of the law within 0.2 %."""
+    _, path = export_structure(tmp_path, POINT + friction_of(law) + STRUCTURE, ".npz")
     with np.load(path) as file:
-        found = {name: file[name] for name in file.files}
+        exported = {name: file[name] for name in file.files}
     text = (
         POINT
         + friction_of(law)
@@ -87,33 +92,43 @@ def test_exact_exported_elements_give_the_friction_of_a_bench(tmp_path, law):
     )
     loop = pf.run(text)
     response = loop.response
-    force = loop_of(found["stiffness"], found["limit"], response.slide - response.slide[0])
-    np.testing.assert_allclose(force, response.force, atol=2e-3 * found["limit"].sum())
-    np.testing.assert_allclose(found["limit"].sum(), 0.3 * 26 * 4.4482216152605, rtol=1e-6)
-    assert found["direction"].shape == (found["limit"].size, 1) and found["form"] == "elements"
+    force = element_force(
+        exported["stiffness"], exported["limit"], response.slide - response.slide[0]
+    )
+    np.testing.assert_allclose(force, response.force, atol=2e-3 * exported["limit"].sum())
+    np.testing.assert_allclose(exported["limit"].sum(), 0.3 * 26 * 4.4482216152605, rtol=1e-6)
+    assert (
+        exported["direction"].shape == (exported["limit"].size, 1)
+        and exported["form"] == "elements"
+    )
 
 
-def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
-    """A cell array of structures with type, direction and numbers, a D and an Fex1 of the drive; several interfaces."""
-    model, path = written(tmp_path, PAIR + DRIVE, ".mat")
-    found = loadmat(path)
+def test_exact_matlab_file_has_nlvib_elements(tmp_path):
+    """A .mat export has matrices, drive and friction elements in the form of NLvib, for several interfaces.
+
+    The linear response of the matrices agrees with that of the modes within 1e-9.
+    """
+    model, path = export_structure(tmp_path, PAIR + DRIVE, ".mat")
+    exported = loadmat(path)
     modes = model.rig.modes
     drive = model.rig.drive.signal
     omega = drive.omega
-    stiff = found["K"] + 1j * omega * found["D"] - omega**2 * found["M"]
-    moved = found["T_out"] @ np.linalg.solve(stiff, found["Fex1"])
-    own = np.linalg.solve(
+    dynamic_stiffness = exported["K"] + 1j * omega * exported["D"] - omega**2 * exported["M"]
+    response = exported["T_out"] @ np.linalg.solve(dynamic_stiffness, exported["Fex1"])
+    modal_response = np.linalg.solve(
         np.diag(modes.omega**2 - omega**2) + 1j * omega * modes.damping_matrix, modes.base
     )
-    np.testing.assert_allclose(moved.item(), -drive.acceleration * (modes.output @ own), rtol=1e-9)
-    assert found["D"].shape == found["M"].shape and found["T_out"].shape == (1, 2)
-    cells = found["nonlinear_elements"].ravel()
+    np.testing.assert_allclose(
+        response.item(), -drive.acceleration * (modes.output @ modal_response), rtol=1e-9
+    )
+    assert exported["D"].shape == exported["M"].shape and exported["T_out"].shape == (1, 2)
+    cells = exported["nonlinear_elements"].ravel()
     assert len(cells) == 2 and {str(cell["type"][0, 0][0]) for cell in cells} == {
         "elasticDryFriction"
     }
     for cell, law, row in zip(
         cells, model.rig.friction.interfaces, np.eye(2)
-    ):  # the slides come first
+    ):  # the slides are the first coordinates
         assert float(cell["ishysteretic"][0, 0].item()) == 1 and cell["force_direction"][
             0, 0
         ].shape == (2, 1)
@@ -133,26 +148,26 @@ FORCED = RUB.replace('kind = "base"', 'kind = "force"').replace(
 )
 
 
-def test_exact_the_guide_names_every_variable_of_both_files(tmp_path):
-    """Its table against files of a base, a force and tanh: the variables, their sizes, and the fields of an element."""
+def test_exact_documentation_lists_exported_variables(tmp_path):
+    """The documentation lists the variables of .mat and .npz exports, their sizes and the fields of an element."""
     page = (Path(pf.__file__).parent / "scene/MATRICES.md").read_text("utf-8")
     rows = {
         row[1].strip("` "): [cell.strip("` ") for cell in row[2:-1]]
         for row in (line.split("|") for line in page.splitlines() if line.startswith("| `"))
     }
-    found = {".mat": {}, ".npz": {}}
+    shapes = {".mat": {}, ".npz": {}}
     for text in (RUB, FORCED, POINT + friction_of("tanh") + STRUCTURE):
-        for ending, one in found.items():
-            path = written(tmp_path, text, ending)[1]
+        for ending, shape_by_name in shapes.items():
+            path = export_structure(tmp_path, text, ending)[1]
             values = loadmat(path) if ending == ".mat" else dict(np.load(path))
-            one |= {
+            shape_by_name |= {
                 name: value.shape for name, value in values.items() if not name.startswith("__")
             }
-    for ending, one in found.items():
-        assert set(one) == {name for name, row in rows.items() if row[0] in ("both", ending)}, (
-            ending
-        )
-        for name, shape in one.items():
+    for ending, shape_by_name in shapes.items():
+        assert set(shape_by_name) == {
+            name for name, row in rows.items() if row[0] in ("both", ending)
+        }, ending
+        for name, shape in shape_by_name.items():
             size = rows[name][1]
             assert len(shape) == (
                 2 if ending == ".mat" else 0 if size in ("1", "text") else 1 + size.count("×")
@@ -161,16 +176,18 @@ def test_exact_the_guide_names_every_variable_of_both_files(tmp_path):
     assert all(f"`{field}`" in page for field in (*cell, "stiffness"))
 
 
-def test_exact_tanh_has_its_speed(tmp_path):
-    _, path = written(tmp_path, POINT + friction_of("tanh") + STRUCTURE, ".mat")
+def test_exact_tanh_element_has_reference_speed(tmp_path):
+    """The element of the law tanh has its reference speed."""
+    _, path = export_structure(tmp_path, POINT + friction_of("tanh") + STRUCTURE, ".mat")
     cell = loadmat(path)["nonlinear_elements"].ravel()[0]
     assert str(cell["type"][0, 0][0]) == "tanhDryFriction" and cell["eps"][0, 0].item() == 1e-3
 
 
-def test_exact_a_release_has_no_excitation(tmp_path):
+def test_exact_released_rig_has_no_excitation(tmp_path):
+    """The export of a released rig has no excitation."""
     text = RUB.split("[drive]")[0] + '[drive]\nkind = "free"\ndisplacement = "20 um"\ncycles = 5\n'
-    with np.load(written(tmp_path, text, ".npz")[1]) as found:
-        assert not found["Fex1"].any() and not {"force", "base", "Omega"} & set(found.files)
+    with np.load(export_structure(tmp_path, text, ".npz")[1]) as exported:
+        assert not exported["Fex1"].any() and not {"force", "base", "Omega"} & set(exported.files)
 
 
 HEAD = RUB.split("[drive]")[0]
@@ -178,7 +195,7 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
 
 
 @pytest.mark.parametrize(
-    "text, says",
+    "text, message",
     [
         (
             RUB,
@@ -203,18 +220,19 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
         ),
     ],
 )
-def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
+def test_always_export_states_omitted_features(tmp_path, text, message):
+    """The printed line of an export states the features of the scene that the file does not contain."""
     (tmp_path / "rig.toml").write_text(text)
     answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.npz")
-    assert answer.code == 0 and answer.out.endswith(says), answer.out
-    with np.load(tmp_path / "rig.npz") as found:
-        assert found["Omega"] == pytest.approx(
+    assert answer.code == 0 and answer.out.endswith(message), answer.out
+    with np.load(tmp_path / "rig.npz") as exported:
+        assert exported["Omega"] == pytest.approx(
             2 * np.pi * (100 if LEVELS in text else 143), rel=1e-12
         )
 
 
 @pytest.mark.parametrize(
-    "text, ending, says",
+    "text, ending, message",
     [
         (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
         (
@@ -258,9 +276,10 @@ def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
         ),
     ],
 )
-def test_refuses_what_has_no_such_form(tmp_path, text, ending, says):
+def test_refuses_structure_without_exportable_form(tmp_path, text, ending, message):
+    """Friction laws, loads and structures that friction elements cannot represent are refused, and no file is written."""
     (tmp_path / "rig.toml").write_text(text)
     answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / f"rig{ending}")
-    assert answer.code == 2 and says in answer.err and not (tmp_path / f"rig{ending}").exists(), (
-        answer.err
-    )
+    assert (
+        answer.code == 2 and message in answer.err and not (tmp_path / f"rig{ending}").exists()
+    ), answer.err

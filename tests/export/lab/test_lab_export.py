@@ -1,4 +1,4 @@
-"""Histories and loops in the formats of laboratories: read back by other programs' readers, to the last bit."""
+"""Histories and loops in laboratory formats agree to the last bit when other programs read them."""
 
 import json
 
@@ -42,12 +42,20 @@ cycles = 60
 """
 
 
-def functions(path):
-    return {one["id1"]: one for one in pyuff.UFF(str(path)).read_sets() if one["type"] == 58}
+def read_uff_functions(path):
+    """Return the functions (datasets of type 58) of a universal file by name."""
+    return {
+        dataset["id1"]: dataset
+        for dataset in pyuff.UFF(str(path)).read_sets()
+        if dataset["type"] == 58
+    }
 
 
-def test_exact_round_trip_of_a_universal_file_imported_fitted_overlaid_and_exported(tmp_path):
-    """A loop that pyuff alone wrote gives its numbers back to the fit and its bits back to the exported file."""
+def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
+    """A loop in a file of pyuff is imported and fitted; the fitted parameters agree within 1e-6.
+
+    The exported file has the same numbers as the imported one, to the last bit.
+    """
     time, slide, force = loop()
     written(tmp_path / "lab.uff", [SI, record(time, slide, 8), record(time, force, 13)])
     (tmp_path / "scene.toml").write_text(SCENE)
@@ -70,17 +78,19 @@ def test_exact_round_trip_of_a_universal_file_imported_fitted_overlaid_and_expor
     assert values["friction.bond_length"]["value"] == pytest.approx(BOND, rel=1e-6)
     assert "measured" in (tmp_path / "fit/fit.svg").read_text()
     assert cli("export", tmp_path / "fit", "-o", tmp_path / "back.uff").code == 0
-    found = functions(tmp_path / "back.uff")
-    for name, truth, kind in (("displacement", slide, 8), ("force", force, 13)):
-        assert found[name]["data"].tobytes() == truth.tobytes()
-        assert found[name]["x"].tobytes() == time.tobytes()
-        assert found[name]["ordinate_spec_data_type"] == kind and found[name]["func_type"] == 1
-    measured = found["force over displacement"]
-    fitted = found["fitted over displacement"]
+    exported = read_uff_functions(tmp_path / "back.uff")
+    for name, expected, kind in (("displacement", slide, 8), ("force", force, 13)):
+        assert exported[name]["data"].tobytes() == expected.tobytes()
+        assert exported[name]["x"].tobytes() == time.tobytes()
+        assert (
+            exported[name]["ordinate_spec_data_type"] == kind and exported[name]["func_type"] == 1
+        )
+    measured = exported["force over displacement"]
+    fitted = exported["fitted over displacement"]
     assert measured["x"].tobytes() == slide.tobytes()
     assert measured["data"].tobytes() == force.tobytes()
     assert fitted["data"] == pytest.approx(force, abs=1e-4)
-    again = cli(
+    second_import = cli(
         "import",
         tmp_path / "back.uff",
         "-o",
@@ -90,38 +100,40 @@ def test_exact_round_trip_of_a_universal_file_imported_fitted_overlaid_and_expor
         "--map",
         "force=force",
     )
-    assert again.code == 0, again.err
+    assert second_import.code == 0, second_import.err
     assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "loop.csv").read_bytes()
 
 
-def test_exact_histories_of_a_run_in_every_format(bench, tmp_path):
-    with h5netcdf.File(bench / "result.nc", "r") as file:
-        truth = {
+def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
+    """Histories exported as .uff, .mat and .csv equal those of result.nc to the last bit."""
+    with h5netcdf.File(bench_folder / "result.nc", "r") as file:
+        histories = {
             name: np.asarray(one[...])
             for name, one in file.variables.items()
             if one.dimensions == ("time",)
         }
         stress = np.asarray(file["normal_stress"][...])
     for name in ("a.uff", "a.mat", "a.csv"):
-        answer = cli("export", bench, "-o", tmp_path / name, "--histories")
+        answer = cli("export", bench_folder, "-o", tmp_path / name, "--histories")
         assert (
-            answer.code == 0 and f"{truth['time'].size} rows of relative_displacement" in answer.out
+            answer.code == 0
+            and f"{histories['time'].size} rows of relative_displacement" in answer.out
         ), answer.err
-    uff = functions(tmp_path / "a.uff")
+    uff = read_uff_functions(tmp_path / "a.uff")
     mat = loadmat(tmp_path / "a.mat", simplify_cells=True)
     table = np.genfromtxt(tmp_path / "a.csv", delimiter=",", names=True, deletechars="")
-    head = (tmp_path / "a.csv").read_text().splitlines()[0]
-    for name in set(truth) - {"time"}:
-        assert uff[name]["data"].tobytes() == truth[name].tobytes(), name
-        assert uff[name]["x"].tobytes() == truth["time"].tobytes()
-        assert mat[name].tobytes() == truth[name].tobytes()
+    header = (tmp_path / "a.csv").read_text().splitlines()[0]
+    for name in set(histories) - {"time"}:
+        assert uff[name]["data"].tobytes() == histories[name].tobytes(), name
+        assert uff[name]["x"].tobytes() == histories["time"].tobytes()
+        assert mat[name].tobytes() == histories[name].tobytes()
         column = [one for one in table.dtype.names if one.startswith(name + "_[")]
-        assert np.array_equal(table[column[0]], truth[name]), name
-    assert "relative_velocity [m s-1]" in head and mat["units"]["friction_force"] == "N"
+        assert np.array_equal(table[column[0]], histories[name]), name
+    assert "relative_velocity [m s-1]" in header and mat["units"]["friction_force"] == "N"
     assert np.array_equal(mat["normal_stress"], stress)  # .mat holds arrays of any shape
-    both = uff["friction_force over relative_displacement"]
-    assert np.array_equal(both["x"], truth["relative_displacement"])
-    assert np.array_equal(both["data"], truth["friction_force"]) and both["func_type"] == 0
+    loop = uff["friction_force over relative_displacement"]
+    assert np.array_equal(loop["x"], histories["relative_displacement"])
+    assert np.array_equal(loop["data"], histories["friction_force"]) and loop["func_type"] == 0
     units = next(
         one for one in pyuff.UFF(str(tmp_path / "a.uff")).read_sets() if one["type"] == 164
     )
@@ -130,8 +142,11 @@ def test_exact_histories_of_a_run_in_every_format(bench, tmp_path):
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["exact", "march"])
-def test_exact_the_loop_over_the_slide_encloses_the_loop_area(method, tmp_path):
-    """The output moves otherwise than the interface where there are modes besides the first."""
+def test_exact_loop_over_slide_encloses_loop_area(method, tmp_path):
+    """The loop of the friction force over the slide encloses the loop area within its error.
+
+    The loop over the output displacement does not, because the second mode moves the output.
+    """
     (tmp_path / "rig.toml").write_text(TWO_MODES + f'[accuracy]\nmethod = "{method}"\n')
     answer = cli("run", tmp_path / "rig.toml", "-o", tmp_path / "out", "-q", "--json", "--no-page")
     assert answer.code == 0, answer.err
@@ -143,17 +158,22 @@ def test_exact_the_loop_over_the_slide_encloses_the_loop_area(method, tmp_path):
             for name in ("time", "slide", "relative_displacement", "friction_force")
         )
     last = slice(np.searchsorted(time, time[-1] - 1 / 40 - 1e-9), None)
-    enclosed, other = (np.trapezoid(force[last], x[last]) for x in (slide, output))
+    enclosed, output_area = (np.trapezoid(force[last], x[last]) for x in (slide, output))
     assert abs(enclosed - area["value"]) <= area["error"] + area["floor"]
-    assert abs(other - area["value"]) > 10 * (area["error"] + area["floor"])
+    assert abs(output_area - area["value"]) > 10 * (area["error"] + area["floor"])
     assert cli("export", tmp_path / "out", "-o", tmp_path / "a.uff", "--histories").code == 0
-    loops = [one for name, one in functions(tmp_path / "a.uff").items() if " over " in name]
+    loops = [
+        dataset
+        for name, dataset in read_uff_functions(tmp_path / "a.uff").items()
+        if " over " in name
+    ]
     assert len(loops) == 1
     assert loops[0]["id1"] == "friction_force over slide"
     assert np.array_equal(loops[0]["x"], slide)
 
 
-def test_exact_counts_of_complex_and_even_functions(tmp_path):
+def test_exact_uff_header_states_number_of_bytes(tmp_path):
+    """The header of a universal file states the bytes of real and complex data, with and without abscissae."""
     x = np.arange(5.0)
     for k, (data, spacing, numbers) in enumerate(((x, 1, 5), (x + 1j, 1, 10), (x + 1j, 0, 15))):
         write_sets(tmp_path / f"{k}.uff", [record(x, data, 12, abscissa_spacing=spacing)])
@@ -163,7 +183,7 @@ def test_exact_counts_of_complex_and_even_functions(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words, code, says",
+    "arguments, code, message",
     [
         (["-o", "a.uff", "--frame", "1"], 2, "used only with fields"),
         (["-o", "a.vtu", "--histories"], 2, "not as .vtu"),
@@ -171,41 +191,50 @@ def test_exact_counts_of_complex_and_even_functions(tmp_path):
         (["-o", "a.xlsx"], 2, "histories and loops as .uff"),
     ],
 )
-def test_refuses_exports_of_histories_by_name(bench, tmp_path, monkeypatch, words, code, says):
+def test_refuses_history_export_with_wrong_options(
+    bench_folder, tmp_path, monkeypatch, arguments, code, message
+):
+    """Histories are not exported with options of fields or as an unsupported file type, and no file is written."""
     monkeypatch.chdir(tmp_path)
-    answer = cli("export", bench, *words)
-    assert answer.code == code and says in answer.err and "internal fault" not in answer.err
+    answer = cli("export", bench_folder, *arguments)
+    assert answer.code == code and message in answer.err and "internal fault" not in answer.err
     assert not list(tmp_path.iterdir())
 
 
-def test_refuses_folders_without_histories(tmp_path):
-    for folder, out, code, says in (
+def test_refuses_folder_without_histories(tmp_path):
+    """A folder that is absent, empty or has a damaged result.nc is refused with a message that states the cause."""
+    for folder, out, code, message in (
         ("none", "a.uff", 4, "no such results folder"),
         (".", "a.mat", 4, "neither"),
     ):
         answer = cli("export", tmp_path / folder, "-o", tmp_path / out)
-        assert answer.code == code and says in answer.err, answer.err
+        assert answer.code == code and message in answer.err, answer.err
     (tmp_path / "result.nc").write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
     assert "cannot be read as netCDF" in cli("export", tmp_path, "-o", tmp_path / "a.uff").err
 
 
-def test_refuses_what_the_format_would_change(tmp_path):
-    """A value that is not finite would stand as 0 in a universal file; the others keep it."""
+def test_refuses_non_finite_values_in_universal_file(tmp_path):
+    """A value that is not finite is refused, because a universal file would store it as 0."""
     (tmp_path / "fit.csv").write_text(
         "time [s],displacement [m],force [N],fitted,held\n0,0,0,0,0\n1,1e-6,1,1,0\n"
     )
-    bad = Histories("", np.arange(2.0), [Column("force", "N", np.array([0.0, np.nan]), 0)], {})
+    histories = Histories(
+        "", np.arange(2.0), [Column("force", "N", np.array([0.0, np.nan]), 0)], {}
+    )
     with pytest.raises(PatchfemError, match="force has values that are not finite"):
-        write_histories(tmp_path / "a.uff", bad)
+        write_histories(tmp_path / "a.uff", histories)
     assert cli("export", tmp_path, "-o", tmp_path / "a.uff").code == 0
 
 
-def test_exact_round_trip_of_an_exported_run_to_a_fit_and_an_import(bench, tmp_path):
-    """What a run exports is a measured loop as it stands: its own values come back, by every name of a column."""
-    assert cli("export", bench, "-o", tmp_path / "loop.csv", "--histories").code == 0
+def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path):
+    """The exported histories of a run are a valid measured loop: displacement and force come back unchanged.
+
+    This holds after an import and with a column in millimetres.
+    """
+    assert cli("export", bench_folder, "-o", tmp_path / "loop.csv", "--histories").code == 0
     text = (tmp_path / "loop.csv").read_text()
     measured = read_loop(tmp_path / "loop.csv")
-    with h5netcdf.File(bench / "result.nc", "r") as file:
+    with h5netcdf.File(bench_folder / "result.nc", "r") as file:
         slide, force = (
             np.asarray(file[name][...]) for name in ("relative_displacement", "friction_force")
         )
@@ -214,19 +243,20 @@ def test_exact_round_trip_of_an_exported_run_to_a_fit_and_an_import(bench, tmp_p
     )
     assert measured.quantity == "force" and "normal_load" in measured.labels
     assert cli("import", tmp_path / "loop.csv", "-o", tmp_path / "lab.csv").code == 0
-    again = read_loop(tmp_path / "lab.csv")
-    assert np.array_equal(again.displacement, measured.displacement) and np.array_equal(
-        again.reading, force
+    imported = read_loop(tmp_path / "lab.csv")
+    assert np.array_equal(imported.displacement, measured.displacement) and np.array_equal(
+        imported.reading, force
     )
     assert (tmp_path / "lab.csv").read_text().startswith("time [s],displacement [m],force [N]\n")
     (tmp_path / "both.csv").write_text(text.replace("relative_velocity [m s-1]", "slide [mm]", 1))
-    own = np.loadtxt(tmp_path / "both.csv", delimiter=",", skiprows=1)[:, 2]
+    column = np.loadtxt(tmp_path / "both.csv", delimiter=",", skiprows=1)[:, 2]
     assert np.allclose(
-        read_loop(tmp_path / "both.csv").displacement, 1e-3 * (own - own[0]), rtol=1e-12
+        read_loop(tmp_path / "both.csv").displacement, 1e-3 * (column - column[0]), rtol=1e-12
     )
 
 
-def test_refuses_a_loop_without_a_displacement_or_a_force(tmp_path):
+def test_refuses_loop_without_displacement_or_force(tmp_path):
+    """A loop file without a column of displacement or force is refused with its file and line."""
     (tmp_path / "a.csv").write_text("time [s],force [N]\n0,0\n1,1\n")
     with pytest.raises(PatchfemError, match=r"a\.csv:1: a header like .*no column displacement"):
         read_loop(tmp_path / "a.csv")

@@ -1,4 +1,4 @@
-"""The ring-down of a run, exported and imported as a measured decay: it gives back the run's own curve."""
+"""The free decay of a run, exported and imported as a measurement, agrees with the decay curve of the run."""
 
 import numpy as np
 import pytest
@@ -56,34 +56,36 @@ CASES = {
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory):
-    """name of CASES -> results folder, each once."""
+def decay_folders(tmp_path_factory):
+    """Return a function from a name of CASES to its results folder; each case runs once."""
     folder = tmp_path_factory.mktemp("decays")
-    kept = {}
+    folders = {}
 
-    def of(name):
-        if name not in kept:
+    def run_case(name):
+        """Return the results folder of a case, which is run at its first use."""
+        if name not in folders:
             text, words = CASES[name]
             drive = (
                 RELEASED.replace('displacement = "300 um"\n', "") if "start" in text else RELEASED
             )
             (folder / f"{name}.toml").write_text(text + drive, "utf-8")
-            kept[name] = folder / name
+            folders[name] = folder / name
             assert (
-                cli("run", folder / f"{name}.toml", "-o", kept[name], "--no-page", *words).code == 0
+                cli("run", folder / f"{name}.toml", "-o", folders[name], "--no-page", *words).code
+                == 0
             )
-        return kept[name]
+        return folders[name]
 
-    return of
+    return run_case
 
 
-def columns(path) -> np.ndarray:
-    """(6, k) of an imported decay."""
+def read_decay_columns(path) -> np.ndarray:
+    """Return the six columns of an imported decay, of shape (6, k)."""
     return np.loadtxt(path, delimiter=",", skiprows=1, ndmin=2).T
 
 
-def own_curve(folder) -> DecayCurve:
-    """The curve of a results folder."""
+def read_decay_curve(folder) -> DecayCurve:
+    """Return the decay curve that a results folder contains."""
     import xarray as xr
 
     with xr.open_dataset(folder / "result.nc") as data:
@@ -93,48 +95,56 @@ def own_curve(folder) -> DecayCurve:
 
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("ending", ["csv", "uff"])
-def test_exact_export_and_import_give_back_the_decay_of_a_run(ran, tmp_path, name, ending):
-    """Without --map: where the run's own curve reaches, 95 % of the amplitudes of the import have its frequency and
-    damping within both intervals, which are of 95 %, and none is off by twice as much, from the first swings on."""
-    folder = ran(name)
+def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, ending):
+    """The decay imported from exported histories agrees with that of the run in frequency and damping.
+
+    At least 95 % of the amplitudes agree within the sum of both errors, and all within twice this
+    sum.
+    """
+    folder = decay_folders(name)
     assert cli("export", folder, "-o", tmp_path / f"run.{ending}", "--histories").code == 0
     answer = cli("import", tmp_path / f"run.{ending}", "--decay", "-o", tmp_path / "decay.csv")
     assert answer.code == 0, answer.err
-    _, amplitude, frequency, frequency_error, damping, damping_error = columns(
+    _, amplitude, frequency, frequency_error, damping, damping_error = read_decay_columns(
         tmp_path / "decay.csv"
     )
-    own = own_curve(folder).interpolate(amplitude)
-    there = np.isfinite(own.frequency)
-    assert there.sum() > 10 and amplitude[there].max() > 0.7 * 300e-6
-    for off in (
-        np.abs(frequency - own.frequency) / (frequency_error + own.frequency_error),
-        np.abs(damping - own.damping) / (damping_error + own.damping_error),
+    curve = read_decay_curve(folder).interpolate(amplitude)
+    inside = np.isfinite(curve.frequency)
+    assert inside.sum() > 10 and amplitude[inside].max() > 0.7 * 300e-6
+    for ratio in (
+        np.abs(frequency - curve.frequency) / (frequency_error + curve.frequency_error),
+        np.abs(damping - curve.damping) / (damping_error + curve.damping_error),
     ):
-        assert np.mean(off[there] <= 1) >= 0.95 and off[there].max() < 2
+        assert np.mean(ratio[inside] <= 1) >= 0.95 and ratio[inside].max() < 2
     assert np.median(frequency_error / frequency) < 5e-3
     assert np.median(damping_error / np.abs(damping)) < 0.25
 
 
-def test_exact_a_march_gives_the_decay_of_the_exact_method(tmp_path):
-    """All of it, not its last cycles alone: before, nine amplitudes at the end of a release of 60 cycles were left."""
+def test_exact_decay_of_march_agrees_with_exact_method(tmp_path):
+    """The decay of a march agrees with that of the exact method within both errors, at all amplitudes.
+
+    Earlier only nine amplitudes at the end of 60 cycles were returned.
+    """
     exact, march = (
         pf.run(PLASTIC + RELEASED, **{"accuracy.method": method}).extra["decay"]
         for method in ("auto", "march")
     )
     assert march.amplitude[0] == pytest.approx(exact.amplitude[0], rel=0.02)
-    beside = exact.interpolate(march.amplitude)
-    there = np.isfinite(beside.frequency)
-    assert there.sum() > 30 and march.time.size > 0.7 * exact.time.size
+    reference = exact.interpolate(march.amplitude)
+    inside = np.isfinite(reference.frequency)
+    assert inside.sum() > 30 and march.time.size > 0.7 * exact.time.size
     assert (
-        np.abs(march.frequency - beside.frequency) <= march.frequency_error + beside.frequency_error
-    )[there].all()
-    assert (np.abs(march.damping - beside.damping) <= march.damping_error + beside.damping_error)[
-        there
-    ].all()
+        np.abs(march.frequency - reference.frequency)
+        <= march.frequency_error + reference.frequency_error
+    )[inside].all()
+    assert (
+        np.abs(march.damping - reference.damping) <= march.damping_error + reference.damping_error
+    )[inside].all()
 
 
-def test_always_histories_are_said_to_be_thinned_where_they_are(ran, tmp_path):
-    answer = cli("export", ran("exact"), "-o", tmp_path / "whole.csv", "--histories")
+def test_always_export_states_time_of_reduced_rows(decay_folders, tmp_path):
+    """The export states up to which time the rows of a long run are only turning points."""
+    answer = cli("export", decay_folders("exact"), "-o", tmp_path / "whole.csv", "--histories")
     assert "turning points" not in answer.out
     (tmp_path / "long.toml").write_text(
         (IWAN + RELEASED).replace("cycles = 40", "cycles = 1100"), "utf-8"
@@ -145,13 +155,16 @@ def test_always_histories_are_said_to_be_thinned_where_they_are(ran, tmp_path):
     assert "1000 cycles (drive.cycles)" in answer.out
 
 
-def test_always_gaps_of_a_record_are_named_and_amplitudes_that_tell_nothing_left_out(tmp_path):
-    """A record whose samples lie half a period apart from the fifth half cycle on once gave an amplitude with a damping
-    ratio of -0.009 ± 0.082, without a word."""
+def test_always_decay_import_reports_sparse_samples(tmp_path):
+    """The import reports sparsely sampled parts of a record and omits amplitudes without useful information.
+
+    Earlier samples half a period apart gave a damping ratio of -0.009 ± 0.082 without a warning.
+    """
     time = np.r_[np.arange(0, 0.0225, 2e-4), np.arange(0.0225, 0.5, 5e-3)]
     value = 1e-3 * np.exp(-12 * time) * np.cos(2 * np.pi * 100 * time)
 
-    def imported(time, value):
+    def import_decay(time, value):
+        """Write a record and return the answer of its import as a decay."""
         np.savetxt(
             tmp_path / "a.csv",
             np.column_stack([time, value]),
@@ -161,25 +174,26 @@ def test_always_gaps_of_a_record_are_named_and_amplitudes_that_tell_nothing_left
         )
         return cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
 
-    answer = imported(time, value)
+    answer = import_decay(time, value)
     assert answer.code == 0
     assert "the decay is followed up to 0.0" in answer.err
     assert "and at least 5 are needed" in answer.err
-    found = columns(tmp_path / "decay.csv")
-    assert (found[5] <= 2 * np.abs(found[4])).all()
+    columns_of_decay = read_decay_columns(tmp_path / "decay.csv")
+    assert (columns_of_decay[5] <= 2 * np.abs(columns_of_decay[4])).all()
     early = time < 0.0095
-    answer = imported(
+    answer = import_decay(
         np.r_[time[early], time[time > 0.03]], np.r_[value[early], value[time > 0.03]]
     )
     assert answer.code == 2
     assert "fewer than three half cycles of a free decay have samples enough" in answer.err
     noise = np.random.default_rng(5).normal(size=(2, 200))
     time = np.arange(200) / 4000
-    answer = imported(time, 1e-3 * np.cos(2 * np.pi * 100 * time) + 3e-5 * noise[0])
+    answer = import_decay(time, 1e-3 * np.cos(2 * np.pi * 100 * time) + 3e-5 * noise[0])
     assert answer.code == 0 and "1 of 2 amplitudes are left out" in answer.err
 
 
-def test_refuses_a_record_without_a_response_and_lists_its_columns(tmp_path):
+def test_refuses_record_without_response(tmp_path):
+    """A record without a column of a response is refused, and the message lists its columns."""
     (tmp_path / "a.csv").write_text(
         "time [s],tip [mm],base_acceleration [g]\n0,0,1\n1,1,0\n", "utf-8"
     )
@@ -188,8 +202,8 @@ def test_refuses_a_record_without_a_response_and_lists_its_columns(tmp_path):
     assert "--map displacement=CHANNEL among 1 'time' [s], 2 'tip' [mm], 3 'base_" in answer.err
 
 
-def test_exact_a_scene_with_a_sweep_is_exported_with_its_own_values(tmp_path):
-    """The template of a blade with dampers has the table; without it the same matrices and elements are written."""
+def test_exact_export_of_scene_ignores_its_sweep(tmp_path):
+    """The scene of a blade with dampers has a table [sweep]; without it the exported matrices are the same."""
     text = read_template("damper")
     assert "[sweep]" in text
     (tmp_path / "damper.toml").write_text(text, "utf-8")
@@ -198,14 +212,14 @@ def test_exact_a_scene_with_a_sweep_is_exported_with_its_own_values(tmp_path):
     assert "[sweep] is left out: structure.interface[1].load as the scene gives it" in answer.err
     assert "in these coordinates x the output is output·x" in answer.out
     assert "row i of slide·x" in answer.out
-    alone = "\n".join(
+    scene_without_sweep = "\n".join(
         line
         for line in text.splitlines()
         if not line.startswith(("[sweep]", '"structure.interface'))
     )
-    (tmp_path / "alone.toml").write_text(alone, "utf-8")
+    (tmp_path / "alone.toml").write_text(scene_without_sweep, "utf-8")
     pf.export(tmp_path / "alone.toml", tmp_path / "alone.npz")
-    with np.load(tmp_path / "damper.npz") as one, np.load(tmp_path / "alone.npz") as other:
-        assert set(one.files) == set(other.files)
-        assert all(np.array_equal(one[name], other[name]) for name in one.files)
-        assert one["limit"] == pytest.approx([0.3 * 1140.0], rel=1e-12)
+    with np.load(tmp_path / "damper.npz") as exported, np.load(tmp_path / "alone.npz") as reference:
+        assert set(exported.files) == set(reference.files)
+        assert all(np.array_equal(exported[name], reference[name]) for name in exported.files)
+        assert exported["limit"] == pytest.approx([0.3 * 1140.0], rel=1e-12)

@@ -1,4 +1,4 @@
-"""A sweep as its page takes it, and a browser where there is one."""
+"""Data of a sweep as its page needs them, and a browser if one is installed."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,8 @@ from page_data import swept_key, swept_measure, swept_table
 
 
 @pytest.fixture
-def table() -> dict:
-    """Three loads by four tilts: a measure in closed form, one case failed, one grows."""
+def sweep_table() -> dict:
+    """Return a sweep of three loads and four tilts; a measure in closed form, one failed case, one that grows."""
     tilt, load = (
         grid.ravel()
         for grid in np.meshgrid([1e-6, 1e-5, 1e-4, 1e-3], [10.0, 20.0, 40.0], indexing="ij")
@@ -41,7 +41,7 @@ def table() -> dict:
 
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory):
-    """A browser for all tests of a process, which are skipped where there is none."""
+    """Return the browser that all tests of a process share; without a browser they are skipped."""
     if program() is None:
         pytest.skip("no Chromium here")
     browser = Chromium(tmp_path_factory.mktemp("chromium"))
@@ -50,6 +50,6 @@ def chromium(tmp_path_factory):
 
 
 @pytest.fixture
-def browser(chromium):
-    """A function from a page to the document that a browser made of it in 6 s of the page's clock."""
+def load_page(chromium):
+    """Return a function from a page to its document after 6 s of the page's clock."""
     return lambda page: chromium.after(page, 6000)

@@ -1,4 +1,4 @@
-"""What a page of a sweep answers: which input matters most, how far drawn answers scatter, where the resonance is."""
+"""Answers on the page of a sweep: ranking of inputs, scatter of random cases, and resonance peaks."""
 
 import json
 
@@ -21,77 +21,97 @@ RIG = POINT + COULOMB + SHORT
 AMPLITUDE = "relative_displacement_amplitude"
 
 
-def key(name, values, texts=None):
+def make_key(name, values, texts=None):
+    """Return a swept key with its values in hertz."""
     return swept_key(name, values, "Hz", texts or [f"{value:.12g} Hz" for value in values])
 
 
-def curve(x, centre, damping):
+def resonance_amplitude(x, centre, damping):
+    """Return the amplitude of a single mode with a given centre frequency and damping ratio."""
     return 1e-6 / np.sqrt((1 - (x / centre) ** 2) ** 2 + (2 * damping * x / centre) ** 2)
 
 
 @pytest.mark.parametrize("damping", [0.02, 0.05])
-def test_exact_the_peak_and_width_of_a_resonance(damping):
-    """Of one mode: peak at w sqrt(1 - 2 z^2), half-power width 2 z w to the order of z^2."""
+def test_exact_resonance_peak_and_width_agree_with_closed_form(damping):
+    """Frequency, height and half-power width of the peak of one mode agree with the closed form.
+
+    The errors cover the differences and are below 1e-6 of the value.
+    """
     x = np.linspace(80, 120, 161)
-    both = np.concatenate([curve(x, 100, damping), curve(x, 95, damping)])
+    amplitude = np.concatenate(
+        [resonance_amplitude(x, 100, damping), resonance_amplitude(x, 95, damping)]
+    )
     keys = [
-        key("drive.frequency", np.tile(x, 2)),
-        key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161 + ["2 g"] * 161),
+        make_key("drive.frequency", np.tile(x, 2)),
+        make_key("drive.acceleration", np.repeat([1.0, 2.0], 161), ["1 g"] * 161 + ["2 g"] * 161),
     ]
-    found = find_peaks(keys, both)
-    for peak, centre in zip(found, (100, 95)):
-        # squares of the half-power frequencies over the centre
+    peaks_found = find_amplitude_peaks(keys, amplitude)
+    for peak, centre in zip(peaks_found, (100, 95)):
+        # squared half-power frequencies relative to the centre frequency
         square = 1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])
-        truth = (
+        expected = (
             centre * np.sqrt(1 - 2 * damping**2),
             1e-6 / (2 * damping * np.sqrt(1 - damping**2)),
             -np.diff(centre * np.sqrt(square))[0],
         )
         swept = peak.swept
-        for (value, error), true in zip(
-            (swept.frequency, swept.height, swept.half_power_width), truth
+        for (value, error), exact_value in zip(
+            (swept.frequency, swept.height, swept.half_power_width), expected
         ):
-            assert abs(value - true) <= error + 1e-9 * true and error < 1e-6 * true
-    sentence = peaks.peaks_sentence(found)
+            assert (
+                abs(value - exact_value) <= error + 1e-9 * exact_value
+                and error < 1e-6 * exact_value
+            )
+    sentence = peaks.peaks_sentence(peaks_found)
     assert "with drive.acceleration 1 g" in sentence and "with drive.acceleration 2 g" in sentence
     assert "(cases lie 0.25 Hz apart)" in sentence
-    found = find_peaks(keys, np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both))
-    first, second = (peak.swept for peak in found)
-    assert np.isnan(first.height.value)  # no value beside this peak
+    peaks_found = find_amplitude_peaks(
+        keys, np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, amplitude)
+    )
+    first, second = (peak.swept for peak in peaks_found)
+    assert np.isnan(first.height.value)  # this peak has no height because cases are missing
     assert second.frequency.value == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
-    sentence = peaks.peaks_sentence(found)
+    sentence = peaks.peaks_sentence(peaks_found)
     assert "; where it peaks with drive.acceleration 1 g is not known" in sentence
-    assert "not known" in peaks.peaks_table(found)
-    assert peaks.peaks_sentence(found[:1]).startswith("Where relative displacement am")
+    assert "not known" in peaks.peaks_table(peaks_found)
+    assert peaks.peaks_sentence(peaks_found[:1]).startswith("Where relative displacement am")
 
 
-def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
+def test_always_peak_needs_both_flanks():
+    """A maximum at the end of the swept range is not a peak, and a peak with one flank has no half-power width."""
     x = np.linspace(80, 120, 41)
-    keys = [key("drive.frequency", x)]
-    for values in (x, -x + 200, np.where(x < 99, np.nan, curve(x, 98, 0.05))):
-        assert find_peaks(keys, values) == []
+    keys = [make_key("drive.frequency", x)]
+    for values in (x, -x + 200, np.where(x < 99, np.nan, resonance_amplitude(x, 98, 0.05))):
+        assert find_amplitude_peaks(keys, values) == []
     assert peaks.find_peaks(keys, {}, {}, True) == []
     narrow = x[(x > 97) & (x < 130)]
-    (peak,) = find_peaks([key("drive.frequency", narrow)], curve(narrow, 100, 0.05))
+    (peak,) = find_amplitude_peaks(
+        [make_key("drive.frequency", narrow)], resonance_amplitude(narrow, 100, 0.05)
+    )
     assert np.isnan(peak.swept.half_power_width.value)
     assert "width" not in peaks.peaks_sentence([peak])
-    # cases that have not settled count by their estimate of the steady amplitude
+    # cases that are not steady count with their estimate of the steady amplitude
     settled = {AMPLITUDE: x < 90, f"{AMPLITUDE}_steady": np.ones(41, bool)}
     measures = {
-        AMPLITUDE: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
-        f"{AMPLITUDE}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m"),
+        AMPLITUDE: (np.where(x < 90, resonance_amplitude(x, 100, 0.05), 1.0), 0 * x, "m"),
+        f"{AMPLITUDE}_steady": (
+            np.where(x < 90, np.nan, resonance_amplitude(x, 100, 0.05)),
+            0 * x,
+            "m",
+        ),
     }
     (peak,) = peaks.find_peaks(keys, measures, settled, True)
     assert peak.swept.frequency.value == pytest.approx(99.75, abs=0.02)
 
 
 @pytest.fixture(scope="module")
-def drawn(tmp_path_factory):
-    out = tmp_path_factory.mktemp("drawn")
-    (out / "rig.toml").write_text(RIG, encoding="utf-8")
+def random_sweep(tmp_path_factory):
+    """Return the results folder of a sweep of 64 random cases and the answer of the command."""
+    folder = tmp_path_factory.mktemp("drawn")
+    (folder / "rig.toml").write_text(RIG, encoding="utf-8")
     answer = cli(
         "sweep",
-        out / "rig.toml",
+        folder / "rig.toml",
         "--over",
         "friction.static=0.25..0.3",
         "--over",
@@ -103,35 +123,40 @@ def drawn(tmp_path_factory):
         "--sobol",
         "64",
         "-o",
-        out / "swept",
+        folder / "swept",
     )
     assert answer.code == 0
-    return out / "swept", answer
+    return folder / "swept", answer
 
 
-def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
-    out, answer = drawn
-    told = json.loads((out / "sweep.json").read_text())
-    shares = told["ranking"]["loop_area"]
-    assert {one["key"] for one in shares} == {
+def test_always_random_cases_are_ranked_with_scatter(random_sweep):
+    """The answer of a random sweep ranks the keys and states the range of 90 % of the cases.
+
+    The page, sweep.json and the command line state the same.
+    """
+    out, answer = random_sweep
+    summary = json.loads((out / "sweep.json").read_text())
+    shares = summary["ranking"]["loop_area"]
+    assert {index["key"] for index in shares} == {
         "friction.static",
         "drive.acceleration",
         "structure.mode.0.damping",
     }
     assert all(
-        set(one) == {"key", "first", "total", "low", "high"}
-        and one["low"] <= one["total"] <= one["high"]
-        for one in shares
+        set(index) == {"key", "first", "total", "low", "high"}
+        and index["low"] <= index["total"] <= index["high"]
+        for index in shares
     )
-    assert "depends most on" in told["answer"]
-    assert "90 % of the 64 random cases have" in told["answer"]
+    assert "depends most on" in summary["answer"]
+    assert "90 % of the 64 random cases have" in summary["answer"]
     page = (out / "report.html").read_text("utf-8")
     assert "Keys that matter most" in page
     assert "Scatter of the answers" in page
     assert "<svg viewBox" in page
-    again = summarise_sweep(read_table(out)).said  # what `patchfem report` draws from the files
+    # `patchfem report` makes this text from the files
+    sentences = summarise_sweep(read_table(out)).said
     head, count, *_ = answer.out.splitlines()
-    assert head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"]
+    assert head == f"{sentences.rank.rstrip('.')}; {sentences.scatter}" == summary["answer"]
     assert count == "64 cases: 64 steady"
     loops = read_table(out)["measures"]["loop_area"]["values"]
     low, _, high = summarise_sweep(read_table(out)).spread["loop_area"][1]
@@ -139,35 +164,40 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
     assert np.count_nonzero((loops >= low) & (loops <= high)) == 64 - 2 * 4
 
 
-def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
-    """Without the 12 smallest of 40, whose bars are wide, the 5 % quantile was 2.3 times as large."""
+def test_exact_quantiles_include_cases_that_miss_tolerance():
+    """Quantiles are those of all cases with a value, also of those that miss the tolerance.
+
+    Without the 12 smallest of 40 values the 5 % quantile was 2.3 times as large.
+    """
     values = np.append(np.arange(1.0, 41), np.nan)
     loop = swept_measure(values, np.where(values < 13, 0.5 * values, 0.0), "J")
     outcome = ["steady"] * 40 + ["failed"]
-    table = drawn_table([key("normal.load", values)], {"loop_area": loop}, outcome=outcome)
-    found = ranked.measure_quantiles(table, {"loop_area": np.append(values[:-1] > 12, True)})
-    unit, ends, count, misses = found["loop_area"]
-    assert (unit, count, misses) == ("J", 40, 12)
-    assert ends == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
+    table = random_table([make_key("normal.load", values)], {"loop_area": loop}, outcome=outcome)
+    quantiles = ranked.measure_quantiles(table, {"loop_area": np.append(values[:-1] > 12, True)})
+    unit, limits_found, count, n_missed = quantiles["loop_area"]
+    assert (unit, count, n_missed) == ("J", 40, 12)
+    assert limits_found == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
     assert (
         "(12 of 40 miss the tolerance and are included with their values)"
-        in ranked.describe_scatter(found, 41)
+        in ranked.describe_scatter(quantiles, 41)
     )
-    assert "40 of 41 random cases that have a value" in ranked.describe_scatter(found, 41, False)
+    assert "40 of 41 random cases that have a value" in ranked.describe_scatter(
+        quantiles, 41, False
+    )
 
 
-def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
-    """Their numbers then count as they ended; 256 such cases were told as if they had settled."""
-    table = read_table(drawn[0])
+def test_always_answer_states_that_no_case_is_steady(random_sweep):
+    """If no case of a sweep reached its steady state, the first sentence of the answer states this."""
+    table = read_table(random_sweep[0])
     count = len(table["outcome"])
-    said = "o case has settled, so this answer describes the end of each run"
-    assert said not in "".join(summarise_sweep(table).sentences())
-    lead = summarise_sweep(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
-    assert lead.sentences()[0] == lead.answer() and lead.answer().endswith(
-        f" (1 of {count} cases has no result yet and is left out; n{said})."
+    warning = "o case has settled, so this answer describes the end of each run"
+    assert warning not in "".join(summarise_sweep(table).sentences())
+    summary = summarise_sweep(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
+    assert summary.sentences()[0] == summary.answer() and summary.answer().endswith(
+        f" (1 of {count} cases has no result yet and is left out; n{warning})."
     )
-    assert "settled" not in lead.said.scatter and not any(
-        said in one for one in lead.sentences()[1:]
+    assert "settled" not in summary.said.scatter and not any(
+        warning in sentence for sentence in summary.sentences()[1:]
     )
     assert summarise_sweep(table | {"outcome": ["failed"] * count}).said.left == ""
 
@@ -181,79 +211,85 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
         (3, True, "; 3 cases that have not settled are included with their last values."),
     ],
 )
-def test_exact_cases_that_do_not_count_are_named_by_their_reason(count, has_motion, ending):
-    """Patches only miss the tolerance: nothing of them has to settle."""
+def test_exact_ranking_states_why_cases_are_uncertain(count, has_motion, ending):
+    """The ranking states whether uncertain cases miss the tolerance or are not steady.
+
+    Cases of patches without motion can only miss the tolerance.
+    """
     ranks = {"pressure_peak": [SobolIndex("contact.load", 0.8, 0.9, 0.8, 1.0)]}
     assert ranked.ranking_sentence(ranks, count, has_motion).endswith(ending)
 
 
-def find_peaks(keys: list, values):
-    """Return the peaks of the amplitude over the cases of a grid, all settled and without errors."""
+def find_amplitude_peaks(keys: list, values):
+    """Return the peaks of the amplitude over the cases of a grid, all steady and without errors."""
     measures = {AMPLITUDE: (values, 0 * values, "m")}
     return peaks.find_peaks(keys, measures, {AMPLITUDE: np.ones(values.size, bool)}, True)
 
 
-def drawn_table(keys, measures, **more):
+def random_table(keys, measures, **more):
+    """Return the table of a sweep of random cases."""
     return swept_table(keys, measures, grid=False, drawn=True, **more)
 
 
-def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_where_it_is_largest():
-    """A damping of 30 - 400 (mu - 0.475)^2 is largest in the case next to mu = 0.475. No case of a draw is a reference
-    for a limit: the sweep once began with how far friction.static may go from its least value."""
+def test_exact_answer_of_random_sweep_names_requested_maximum():
+    """The answer states the maximum of the requested measure, 30 - 400 (mu - 0.475)^2, at mu = 0.475.
+
+    Random cases give no limit of a key, because none of them is a reference.
+    """
     mu = np.random.default_rng(1).permutation(np.append(np.linspace(0.1, 0.6, 60), 0.475))
     damping = 30 - 400 * (mu - 0.475) ** 2
     columns = {
         "equivalent_damping": swept_measure(damping),
         AMPLITUDE: swept_measure(1 - mu / 4, unit="m"),
     }
-    table = drawn_table(
-        [key("friction.static", mu, [f"{value:.6g}" for value in mu])],
+    table = random_table(
+        [make_key("friction.static", mu, [f"{value:.6g}" for value in mu])],
         columns,
         first="equivalent_damping",
     )
-    lead = summarise_sweep(table)
+    summary = summarise_sweep(table)
     low, high = np.quantile(damping, [0.05, 0.95])
-    assert lead.limits == limits.Limits() and not any(
-        "may reach" in said for said in lead.sentences()
+    assert summary.limits == limits.Limits() and not any(
+        "may reach" in sentence for sentence in summary.sentences()
     )
-    assert lead.answer().startswith(
+    assert summary.answer().startswith(
         f"Equivalent damping ratio is largest, 30, at friction.static 0.475; 90 % of the 61 random cases have an "
         f"equivalent damping ratio from {low:.3g} to {high:.3g}, "
     )
-    for slope, says in ((1, "grows with"), (-1, "falls with growing")):
+    for slope, trend in ((1, "grows with"), (-1, "falls with growing")):
         columns["equivalent_damping"] = swept_measure(2 + slope * mu)
         assert (
             summarise_sweep(table)
             .answer()
-            .startswith(f"Equivalent damping ratio {says} friction.static; 90 % of")
+            .startswith(f"Equivalent damping ratio {trend} friction.static; 90 % of")
         )
     columns["equivalent_damping"] = swept_measure(np.abs(mu - 0.3) + 1)
     assert "is least, 1" in summarise_sweep(table).answer()
 
 
-def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_not_make():
-    """y = 4 a + b grows with a; noise alone has no direction."""
+def test_exact_trend_of_strongest_key():
+    """The trend of y = 4 a + b is that it grows with a; a measure that is only noise has no trend."""
     rng = np.random.default_rng(2)
     a, b, noise = rng.random((3, 200))
     keys = [
-        key(name, values, [f"{value:.6g}" for value in values])
+        make_key(name, values, [f"{value:.6g}" for value in values])
         for name, values in (("a.a", a), ("b.b", b))
     ]
     settled = np.ones(200, bool)
-    shares = {
+    indices = {
         "loop_area": [SobolIndex("a.a", 0.9, 0.9, 0.9, 0.9), SobolIndex("b.b", 0.1, 0.1, 0.1, 0.1)]
     }
-    for values, says in (
+    for values, sentence in (
         (4 * a + b, "Loop area grows with a.a."),
         (b - 4 * a, "Loop area falls with growing a.a."),
         (noise, ""),
     ):
-        table = drawn_table(keys, {"loop_area": swept_measure(values, unit="J")})
-        assert ranked.describe_trend(table, shares, settled) == says
-    table = drawn_table(keys, {"loop_area": swept_measure(b - 9 * (a - 0.5) ** 2, unit="J")})
+        table = random_table(keys, {"loop_area": swept_measure(values, unit="J")})
+        assert ranked.describe_trend(table, indices, settled) == sentence
+    table = random_table(keys, {"loop_area": swept_measure(b - 9 * (a - 0.5) ** 2, unit="J")})
     low, high = map(
         float,
-        ranked.describe_trend(table, shares, settled)
+        ranked.describe_trend(table, indices, settled)
         .removeprefix("Loop area is largest between a.a ")
         .removesuffix(".")
         .split(" and "),
@@ -261,26 +297,29 @@ def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_no
     assert low < 0.5 < high and np.mean((a >= low) & (a <= high)) == pytest.approx(0.2, abs=0.02)
 
 
-def test_exact_too_few_settled_cases_are_no_ranking():
-    """Of 64 cases 32 failed and 31 had not settled: the answer was the amplitude of the one that had."""
+def test_exact_too_few_steady_cases_give_no_ranking():
+    """Of 64 cases 32 failed and 31 are not steady, so the answer is that no ranking is possible.
+
+    Earlier the answer was the amplitude of the single steady case.
+    """
     rng = np.random.default_rng(3)
-    keys = [key(name, rng.random(64)) for name in ("a.a", "b.b")]
+    keys = [make_key(name, rng.random(64)) for name in ("a.a", "b.b")]
     values = np.append(np.full(32, np.nan), rng.random(32))
-    table = drawn_table(
+    table = random_table(
         keys,
         {AMPLITUDE: swept_measure(values, unit="m")},
         outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"],
     )
-    lead = summarise_sweep(table)
-    assert lead.answer() == (
+    summary = summarise_sweep(table)
+    assert summary.answer() == (
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
         "the transient cases settle and correct what the messages of the failed cases name."
     )
-    assert lead.said.span.startswith(
+    assert summary.said.span.startswith(
         "31 of 64 cases did not settle; their relative displacement amplitude at the end"
     )
-    assert "; relative displacement amplitude of the only settled case is " in lead.said.span
-    assert "throughout" not in lead.said.span and lead.said.span in lead.sentences()
+    assert "; relative displacement amplitude of the only settled case is " in summary.said.span
+    assert "throughout" not in summary.said.span and summary.said.span in summary.sentences()
     table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
     assert (
         summarise_sweep(table)
@@ -291,11 +330,14 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     assert "so no ranking is possible" not in "".join(summarise_sweep(table).sentences())
 
 
-def test_exact_curves_that_are_largest_at_an_end_are_counted():
-    """Of five curves two are largest at 372 Hz, one at 300 Hz, one inside; a motionless one is not counted."""
+def test_exact_maxima_at_range_ends_are_counted():
+    """The answer counts three of five curves with their maximum at an end of the swept frequencies.
+
+    A case without motion is not counted.
+    """
     height = np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3
-    place = np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
-    columns = ((AMPLITUDE, "m", height), ("peak_frequency", "Hz", place))
+    frequency = np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
+    columns = ((AMPLITUDE, "m", height), ("peak_frequency", "Hz", frequency))
     measures = {
         name: swept_measure(values, 1e-9 * values, unit, floors=np.zeros(5))
         for name, unit, values in columns
@@ -308,7 +350,8 @@ def test_exact_curves_that_are_largest_at_an_end_are_counted():
         assert "end of the swept" not in summarise_sweep(table | ends).answer()
 
 
-def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
+def test_exact_swept_frequency_range_is_stored(tmp_path):
+    """The answer counts a maximum at 372 Hz, the end of the sweep, also after the results are read again."""
     scene = tmp_path / "damper.toml"
     scene.write_text(read_template("damper"), "utf-8")
     answer = cli(
@@ -321,24 +364,25 @@ def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
         "-o",
         tmp_path / "out",
     )
-    said = "n 1 of 2 cases the largest response lies at an end of the swept frequencies"
-    assert said in answer.out
-    assert said in summarise_sweep(read_table(tmp_path / "out")).answer()
+    sentence = "n 1 of 2 cases the largest response lies at an end of the swept frequencies"
+    assert sentence in answer.out
+    assert sentence in summarise_sweep(read_table(tmp_path / "out")).answer()
 
 
-def test_exact_a_drive_above_what_friction_limits_is_told_with_its_limit(tmp_path):
-    """Of the shipped rig friction alone does not limit the motion above 4 mu N / (pi m) = 5.067 g."""
+def test_exact_warning_states_drive_limit_of_friction(tmp_path):
+    """Above an acceleration of 4 mu N/(pi m) = 5.067 g friction alone does not limit the motion; the run states it."""
     scene = tmp_path / "rig.toml"
     scene.write_text(read_template("rig"), "utf-8")
-    words = ("--set", "drive.acceleration=6 g", "--no-page", "-o", tmp_path / "run")
-    limit = "6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude"
-    assert limit in cli("run", scene, *words).out
+    arguments = ("--set", "drive.acceleration=6 g", "--no-page", "-o", tmp_path / "run")
+    warning = "6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude"
+    assert warning in cli("run", scene, *arguments).out
 
 
 @pytest.mark.parametrize(
     "values, is_counted", [([2e-3, 1e-6, 3e-3, 2e-6], True), ([1e-6, 2e-6, 1e-6, 3e-6], False)]
 )
-def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted(values, is_counted):
+def test_exact_transient_cases_are_counted_in_answer(values, is_counted):
+    """The answer counts cases that are not steady if their amplitudes exceed those of the steady cases."""
     measures = {AMPLITUDE: swept_measure(values, unit="m")}
     outcome = ["transient", "steady"] * 2
     table = swept_table([swept_key("normal.load", [1, 2, 3, 4], "N")], measures, outcome=outcome)
@@ -347,36 +391,43 @@ def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted(values, is
     assert answer.startswith(start) == ("did not settle" in answer) == is_counted
 
 
-def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
-    """A peak of 1 Hz between cases 5 Hz apart, and a curve whose cases end above peak/sqrt2. Both stood as a dash."""
+def test_exact_missing_half_power_width_has_reason():
+    """The page states why a half-power width is missing: cases too far apart, or a peak wider than the sweep."""
     x = np.linspace(80, 120, 9)
-    found = find_peaks([key("drive.frequency", x)], curve(x, 102.4, 0.005))
-    assert "half-power width not resolved by these cases" in peaks.peaks_sentence(found)
-    assert "; add cases near 102.4 Hz" in peaks.peaks_table(found)
+    peaks_found = find_amplitude_peaks(
+        [make_key("drive.frequency", x)], resonance_amplitude(x, 102.4, 0.005)
+    )
+    assert "half-power width not resolved by these cases" in peaks.peaks_sentence(peaks_found)
+    assert "; add cases near 102.4 Hz" in peaks.peaks_table(peaks_found)
     x = np.linspace(98, 102, 9)
-    found = find_peaks([key("drive.frequency", x)], curve(x, 100.2, 0.05))
-    assert "half-power" not in peaks.peaks_sentence(found)
-    assert "reaches beyond the swept frequencies" in peaks.peaks_table(found)
+    peaks_found = find_amplitude_peaks(
+        [make_key("drive.frequency", x)], resonance_amplitude(x, 100.2, 0.05)
+    )
+    assert "half-power" not in peaks.peaks_sentence(peaks_found)
+    assert "reaches beyond the swept frequencies" in peaks.peaks_table(peaks_found)
 
 
-def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have_not():
-    """Of 256 cases 116 had not settled, with motions a hundred times as large: 5 to 95 % of the others stood in the
-    table as those of all, above a curve that the page did not have."""
+def test_exact_scatter_is_unknown_with_many_transient_cases():
+    """If a third of the cases is not steady, the page states that the scatter is not known.
+
+    Earlier it gave the scatter of the steady cases as that of all.
+    """
     rng = np.random.default_rng(7)
-    keys = [key(name, rng.random(100)) for name in ("a.a", "b.b")]
-    late = np.arange(100) % 3 == 0
-    values = 1e-6 * (1 + rng.random(100)) * np.where(late, 1e3, 1)
-    table = drawn_table(keys, {AMPLITUDE: swept_measure(values, unit="m")})
+    keys = [make_key(name, rng.random(100)) for name in ("a.a", "b.b")]
+    transient = np.arange(100) % 3 == 0
+    values = 1e-6 * (1 + rng.random(100)) * np.where(transient, 1e3, 1)
+    table = random_table(keys, {AMPLITUDE: swept_measure(values, unit="m")})
 
-    def scatter(table) -> str:
+    def scatter_section(table) -> str:
+        """Return the section of the page about the scatter."""
         return (
             page_html(table).partition("Scatter of the answers</h2>")[2].partition("</section>")[0]
         )
 
-    text = scatter(table)
+    text = scatter_section(table)
     assert "not known" not in text and "do not count" not in text
-    table["outcome"] = np.where(late, "transient", "steady").tolist()
-    text = scatter(table)
+    table["outcome"] = np.where(transient, "transient", "steady").tolist()
+    text = scatter_section(table)
     assert text.count("not known") == 4 and "34 of 100 cases do not count" in text
     assert "curve" not in text
     assert (
@@ -385,28 +436,29 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
     )
 
 
-def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
+def test_exact_keys_with_overlapping_intervals_rank_equally():
+    """Keys whose sensitivity intervals overlap have no order in the ranking; a grid gives indices without intervals."""
     name = "loop_area"
     load = SobolIndex("contact.load", 0.5, 0.58, 0.46, 0.66)
     friction = SobolIndex("friction.static", 0.5, 0.56, 0.44, 0.6)
     damping = SobolIndex("damping", 0.01, 0.02, 0.0, 0.06)
     tilt = SobolIndex("tilt", 0.0, 0.001, 0.0, 0.04)
-    said = ranked.ranking_sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
-    assert said.startswith(
+    sentence = ranked.ranking_sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
+    assert sentence.startswith(
         "56 of 64 cases have not settled; with their last values included, loop area depends most "
         "on contact.load and friction.static about equally (58 and 56 % of the variance; their "
         "intervals overlap), then on damping and tilt (at most 6 % each), where each share"
     )
-    apart = ranked.ranking_sentence({name: [load, damping]}, 3, True, 64)
-    assert apart == (
+    short_sentence = ranked.ranking_sentence({name: [load, damping]}, 3, True, 64)
+    assert short_sentence == (
         "Loop area depends most on contact.load, which contributes to 58 % of the variance (46 to 66 %), "
         "then on damping (at most 6 %); 3 cases that have not settled are included with their last "
         "values."
     )
-    far = SobolIndex("far", 0.3, 0.3, 0.25, 0.47)
+    force = SobolIndex("far", 0.3, 0.3, 0.25, 0.47)
     assert (
         "depends on contact.load and far (58 and 30 % of the variance; their"
-        in ranked.ranking_sentence({name: [load, far]})
+        in ranked.ranking_sentence({name: [load, force]})
     )
     grid = [
         SobolIndex("a", 0.6, 0.6, 0.6, 0.6),
@@ -419,11 +471,14 @@ def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
     )
 
 
-def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(tmp_path):
-    """Up to 3 g the block sticks at all frequencies: the first of them, 100.0 +- 0 Hz, was given as its peak."""
+def test_always_stuck_case_has_no_peak_frequency(tmp_path):
+    """A block that sticks at all frequencies has no peak frequency.
+
+    Earlier the first frequency, 100 Hz, was given without an error.
+    """
     scene = tmp_path / "rig.toml"
     scene.write_text(read_template("rig"), "utf-8")
-    swept = [
+    settings = [
         "drive.waveform=sweep",
         "drive.from=142 Hz",
         "drive.to=144 Hz",
@@ -433,7 +488,7 @@ def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(t
     cli(
         "sweep",
         scene,
-        *(word for one in swept for word in ("--set", one)),
+        *(word for setting in settings for word in ("--set", setting)),
         "--over",
         "drive.acceleration=2 g,6 g",
         "-o",
@@ -444,10 +499,10 @@ def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(t
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
     cases = text[text.index("id=cases") :] if "id=cases" in text else text[text.index(">Cases<") :]
     assert "peak frequency [Hz]" in cases[: cases.index("</table>")].replace("</a>", "")
-    said = cli(
+    output = cli(
         "run",
         scene,
-        *(word for one in swept for word in ("--set", one)),
+        *(word for setting in settings for word in ("--set", setting)),
         "--set",
         "drive.acceleration=2 g",
         "-o",
@@ -455,5 +510,5 @@ def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(t
     ).out
     assert (
         "peak_frequency                     - (the output does not move at any of the swept frequencies"
-        in said
+        in output
     )

@@ -1,4 +1,4 @@
-"""Several runs on one page: read from their folders, differences beyond both errors marked."""
+"""Comparison of several runs on one page, with differences that exceed both errors marked."""
 
 import re
 
@@ -42,8 +42,8 @@ cycles = 10
 """
 
 
-def made(folder, load: float, amplitude: float, error: float):
-    """A results folder of a sine of 100 Hz, 20 cycles of 50 samples."""
+def write_run_folder(folder, load: float, amplitude: float, error: float):
+    """Write a results folder of a sine of 100 Hz with 20 cycles of 50 samples, and return it."""
     folder.mkdir()
     measures = {
         "relative_displacement_amplitude": Measure(amplitude, "m", error, 0.0),
@@ -55,13 +55,13 @@ def made(folder, load: float, amplitude: float, error: float):
     )
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=load))
     time = np.linspace(0.0, 0.2, 1001)
-    motion = amplitude * np.sin(2 * np.pi * 100 * time)
+    displacement = amplitude * np.sin(2 * np.pi * 100 * time)
     write_netcdf(
         run_contents(
             {
                 "time": time,
-                "relative_displacement": motion,
-                "friction_force": -load * np.sign(motion),
+                "relative_displacement": displacement,
+                "friction_force": -load * np.sign(displacement),
             },
             None,
             {},
@@ -73,10 +73,11 @@ def made(folder, load: float, amplitude: float, error: float):
     return folder
 
 
-def test_exact_differences_and_the_last_two_cycles(tmp_path):
+def test_exact_page_compares_two_runs(tmp_path):
+    """The page of two runs shows the keys and measures that differ, and the last two cycles of the displacement."""
     runs = [
-        read_run(made(tmp_path / "light", 10.0, 2e-6, 1e-9)),
-        read_run(made(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9)),
+        read_run(write_run_folder(tmp_path / "light", 10.0, 2e-6, 1e-9)),
+        read_run(write_run_folder(tmp_path / "<b>heavy", 20.0, 1e-6, 1e-9)),
     ]
     text = page_html(runs)
     assert "<b>heavy" not in text and "&lt;b&gt;heavy" in text
@@ -85,19 +86,20 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
     assert "<b class=v>1.0000 ± 0.0010 um</b> <span class=v>(-50.00%)</span>" in text
     history = charts_of(text)["Displacement", "displacement"]
     assert history["x"]["unit"] == "ms" and history["y"]["unit"] == "um"
-    assert [one["name"] for one in history["marks"]] == ["light", "<b>heavy"]
-    for one, size in zip(history["marks"], (2.0, 1.0)):
-        assert one["x"][0] == pytest.approx(-20.0, abs=1e-6) and one["x"][-1] == 0.0
+    assert [mark["name"] for mark in history["marks"]] == ["light", "<b>heavy"]
+    for mark, size in zip(history["marks"], (2.0, 1.0)):
+        assert mark["x"][0] == pytest.approx(-20.0, abs=1e-6) and mark["x"][-1] == 0.0
         np.testing.assert_allclose(
-            one["y"], size * np.sin(2 * np.pi * 0.1 * np.array(one["x"])), atol=1e-8
+            mark["y"], size * np.sin(2 * np.pi * 0.1 * np.array(mark["x"])), atol=1e-8
         )
 
 
-def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
+def test_always_change_within_errors_is_not_marked(tmp_path):
+    """A difference of two runs within both errors is not marked."""
     text = page_html(
         [
-            read_run(made(tmp_path / "a", 10.0, 2e-6, 3e-8)),
-            read_run(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
+            read_run(write_run_folder(tmp_path / "a", 10.0, 2e-6, 3e-8)),
+            read_run(write_run_folder(tmp_path / "b", 10.0, 2.05e-6, 3e-8)),
         ]
     )
     assert "There is no difference: the resolved scenes" in text
@@ -107,7 +109,7 @@ def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
 
 @pytest.mark.share(0, 3, 6)
 @pytest.mark.parametrize(
-    "value, first, error, told",
+    "value, first, error, change",
     [
         (2.1e-6, 1e-12, 2e-12, "&ndash;"),
         (2.1e-6, 0.0, 0.0, "&ndash;"),
@@ -118,26 +120,35 @@ def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
         (-1.5e-6, -1e-6, 0.0, "-50.00%"),
     ],
 )
-def test_exact_a_change_is_told_by_what_the_first_value_bears(tmp_path, value, first, error, told):
-    """In per cent, as a factor from ten times on, and not at all from a value that is 0 within its error."""
+def test_exact_change_is_percentage_or_factor(tmp_path, value, first, error, change):
+    """A change is given in per cent, or as a factor from 10 upwards.
+
+    It is left out if the first value is 0 within its error.
+    """
     text = page_html(
         [
-            read_run(made(tmp_path / "a", 10.0, first, error)),
-            read_run(made(tmp_path / "b", 10.0, value, 1e-10)),
+            read_run(write_run_folder(tmp_path / "a", 10.0, first, error)),
+            read_run(write_run_folder(tmp_path / "b", 10.0, value, 1e-10)),
         ]
     )
-    assert f"</b> <span class=v>({told})</span>" in text
+    assert f"</b> <span class=v>({change})</span>" in text
 
 
-def test_always_runs_of_the_same_name_are_told_apart(tmp_path):
+def test_always_runs_of_same_name_are_numbered(tmp_path):
+    """Runs whose folders have the same name are numbered."""
     (tmp_path / "x").mkdir()
     (tmp_path / "y").mkdir()
-    text = page_html([read_run(made(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"])
+    text = page_html(
+        [read_run(write_run_folder(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"]
+    )
     assert "out (1)" in text and "out (2)" in text
 
 
-def test_always_levels_in_different_units_have_different_figures(tmp_path):
-    """A base of 5 and 10 m/s^2 acts like forces of 50 and 100 N on 10 kg; an axis shows one unit."""
+def test_always_levels_of_different_units_have_separate_charts(tmp_path):
+    """Levels in m/s^2 and in N have separate charts, because an axis has one unit.
+
+    A base acceleration of 5 m/s^2 acts on 10 kg as a force of 50 N.
+    """
     drives = (("base", 5, 10, "m/s^2"), ("force", 50, 100, "N"), ("force", 40, 80, "N"))
     runs = []
     for number, (kind, first, last, unit) in enumerate(drives):
@@ -147,29 +158,30 @@ def test_always_levels_in_different_units_have_different_figures(tmp_path):
         runs.append(read_run(tmp_path / f"run{number}"))
     html = page_html(runs)
     charts = data_of(html)["charts"]
-    assert len({one["anchor"] for one in charts}) == len(charts)
+    assert len({chart["anchor"] for chart in charts}) == len(charts)
     onset = re.search(r"<tr>(?:(?!</tr>).)*onset level.*?</tr>", html, re.S)[0]
     assert onset.count(" N</span>") == 2 and "%" not in onset and "&times;" not in onset
     assert "5.0 m/s^2, 10.0 m/s^2<" in html
-    # a long text is cut before its characters are written as entities of HTML
+    # a long text is shortened before its characters become HTML entities
     assert "&#x27;" * 76 + " …" in html
-    levels = [one for one in charts if one["title"] == "Levels"]
-    assert [one["x"]["unit"] for one in levels] == ["g", "N"]
+    levels = [chart for chart in charts if chart["title"] == "Levels"]
+    assert [chart["x"]["unit"] for chart in levels] == ["g", "N"]
     accelerations, forces = levels
-    assert [one["name"] for one in accelerations["marks"]] == ["run0"]
-    assert [one["name"] for one in forces["marks"]] == ["run1", "run2"]
+    assert [chart["name"] for chart in accelerations["marks"]] == ["run0"]
+    assert [chart["name"] for chart in forces["marks"]] == ["run1", "run2"]
     assert accelerations["marks"][0]["x"] == pytest.approx([5 / 9.80665, 10 / 9.80665])
     assert forces["marks"][0]["x"] == [50, 100] and forces["marks"][1]["x"] == [40, 80]
     np.testing.assert_allclose(accelerations["marks"][0]["y"], forces["marks"][0]["y"], rtol=1e-6)
 
 
-def test_refuses_a_folder_without_results(tmp_path):
+def test_refuses_folder_without_readable_results(tmp_path):
+    """A folder whose summary, scene or result.nc is missing or unreadable is refused by the name of the file."""
     with pytest.raises(PatchfemError, match=r"not a results folder: it has no summary\.json"):
         read_run(tmp_path)
     (tmp_path / "summary.json").write_text("{")
     with pytest.raises(PatchfemError, match="cannot be read"):
         read_run(tmp_path)
-    folder = made(tmp_path / "good", 1.0, 1e-6, 0.0)
+    folder = write_run_folder(tmp_path / "good", 1.0, 1e-6, 0.0)
     (folder / "scene.resolved.toml").write_text("drive = 3")
     with pytest.raises(PatchfemError, match=r"scene\.resolved\.toml: drive is not a table"):
         read_run(folder)
@@ -180,7 +192,7 @@ def test_refuses_a_folder_without_results(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text, why",
+    "text, reason",
     [
         ("[" * 100_000, "recursion limit exceeded"),
         ("[]", "should be an object"),
@@ -197,10 +209,13 @@ def test_refuses_a_folder_without_results(tmp_path):
         ("3", "should be an object"),
     ],
 )
-def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
-    """Each of them once ended `report` with an internal fault."""
+def test_refuses_summary_of_wrong_structure(tmp_path, text, reason):
+    """A summary.json of a wrong structure is refused with the faulty field.
+
+    Earlier `report` ended with an internal fault.
+    """
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(
-        PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"
+        PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{reason}"
     ):
         read_run(tmp_path)

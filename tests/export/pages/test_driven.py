@@ -1,4 +1,4 @@
-"""What drives a run in words, and the command that runs it again; captions and links of its page."""
+"""Description of the drive of a run, the command that repeats it, and captions and links of its page."""
 
 import tomllib
 from pathlib import Path
@@ -40,23 +40,28 @@ METHODS = [("", "exact"), ("", "march"), ("", "harmonic"), (BENCH, "exact"), (BE
 
 
 @pytest.mark.parametrize("friction, method", METHODS)
-def test_exact_under_a_force_the_base_rests_in_every_engine(friction, method):
-    """It was force over mass in the histories of five engines; their acceleration did not contain it."""
+def test_exact_base_acceleration_is_zero_under_force_drive(friction, method):
+    """Under a force the base acceleration is zero in the histories of every engine.
+
+    Earlier five engines stored force over mass.
+    """
     drive = '[drive]\nkind = "force"\nfrequency = "20 Hz"\nforce = "30 N"\ncycles = 2'
     r = pf.run(f"{friction}{MODES}{drive}", **{"accuracy.method": method}).response
     assert not r.base_acceleration.any() and r.acceleration.any()
 
 
 @pytest.mark.parametrize(
-    "text, words",
-    [(f"{MODES}[drive]\n{keys}", words) for keys, words in DRIVES.items()]
-    + [(f"{BENCH}[slide]\n{keys}", words) for keys, words in SLIDES.items()],
+    "text, description",
+    [(f"{MODES}[drive]\n{keys}", description) for keys, description in DRIVES.items()]
+    + [(f"{BENCH}[slide]\n{keys}", description) for keys, description in SLIDES.items()],
 )
-def test_exact_every_drive_and_slide_has_its_own_words(text, words):
-    assert describe_drive(tomllib.loads(pf.build(pf.load(text)).source.resolved)) == words
+def test_exact_description_of_each_drive_and_slide(text, description):
+    """The description of each drive and slide states its kind, amplitude and frequency."""
+    assert describe_drive(tomllib.loads(pf.build(pf.load(text)).source.resolved)) == description
 
 
-def test_exact_nothing_moves_a_patch_and_a_record_is_named():
+def test_exact_description_of_recorded_and_absent_drive():
+    """The description of a recorded drive names its file; a patch without a drive has an empty description."""
     assert describe_drive({"contact": {}}) == ""
     assert describe_drive({"slide": {"kind": "file", "file": "in/a.csv"}}) == "the slide of a.csv"
     assert (
@@ -65,11 +70,12 @@ def test_exact_nothing_moves_a_patch_and_a_record_is_named():
     )
 
 
-def test_exact_the_command_quotes_and_names_no_place():
-    found = run_command(
+def test_exact_command_is_quoted_and_has_no_folders():
+    """The command that repeats a run quotes its settings and contains no folders."""
+    command = run_command(
         Path("/home/one/rig.toml"), ("drive.acceleration=6 g", "slide.file=/home/one/a.csv")
     )
-    assert found == "patchfem run rig.toml --set 'drive.acceleration=6 g' --set slide.file=a.csv"
+    assert command == "patchfem run rig.toml --set 'drive.acceleration=6 g' --set slide.file=a.csv"
     assert (
         pf.build(
             pf.load(BENCH + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"')
@@ -78,9 +84,10 @@ def test_exact_the_command_quotes_and_names_no_place():
     )
 
 
-def test_exact_the_page_says_what_drives_how_to_repeat_it_and_links_its_files_and_measures(
+def test_exact_page_states_drive_command_and_links(
     tmp_path,
 ):
+    """The page states the drive and the command that repeats the run, and links measures and existing files."""
     (tmp_path / "swing.toml").write_text(
         f'title = "t"\n{MODES}[drive]\nkind = "force"\nfrequency = "20 Hz"\n'
         'force = "30 N"\ncycles = 20',
@@ -95,27 +102,28 @@ def test_exact_the_page_says_what_drives_how_to_repeat_it_and_links_its_files_an
     assert str(tmp_path) not in text
 
 
-@pytest.mark.parametrize("column, share", [("force [N]", 1.0), ("friction_ratio [1]", 0.1)])
-def test_exact_the_page_of_a_recorded_slide_shows_the_force_measured_with_it(
-    tmp_path, column, share
-):
+@pytest.mark.parametrize("column, factor", [("force [N]", 1.0), ("friction_ratio [1]", 0.1)])
+def test_exact_page_shows_measured_force_of_recorded_slide(tmp_path, column, factor):
+    """The page of a recorded slide shows the measured force beside the computed one."""
     time = np.linspace(0.0, 1.0, 201)
     slide = 10 * np.sin(4 * np.pi * time)
     force = 2.5 * np.cos(4 * np.pi * time)
     (tmp_path / "loop.csv").write_text(
         f"time [s],displacement [um],{column}\n"
         + "\n".join(
-            f"{t},{a!r},{b * share!r}" for t, a, b in zip(time, slide.tolist(), force.tolist())
+            f"{t},{a!r},{b * factor!r}" for t, a, b in zip(time, slide.tolist(), force.tolist())
         ),
         "utf-8",
     )
     (tmp_path / "a.toml").write_text(BENCH + '[slide]\nkind = "file"\nfile = "loop.csv"', "utf-8")
     pf.run(tmp_path / "a.toml").save(tmp_path / "out")
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    found = {name: one["marks"] for (name, _), one in charts_of(text).items()}
-    title = next(name for name in found if name.startswith("Friction loop") or "against" in name)
+    chart_marks = {name: one["marks"] for (name, _), one in charts_of(text).items()}
+    title = next(
+        name for name in chart_marks if name.startswith("Friction loop") or "against" in name
+    )
     for name, x in ((title, slide), ("Friction force", time)):
-        measured, computed = found[name]
+        measured, computed = chart_marks[name]
         assert (measured["name"], computed["name"]) == ("measured", "computed")
         scale = 1e3 if name == "Friction force" and np.max(np.abs(measured["x"])) > 1 else 1.0
         np.testing.assert_allclose(measured["x"], x * scale, atol=1e-6)

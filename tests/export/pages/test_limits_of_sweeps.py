@@ -1,4 +1,4 @@
-"""How far a key may go until the motion is off by 5 %: places known from a closed form, between the right cases."""
+"""Limit of a key beyond which a measure changes by more than 5 %, compared with closed forms."""
 
 import json
 import re
@@ -18,71 +18,82 @@ TILT = np.array([0.05, 0.1, 0.2, 0.5, 1.0])
 LINE = 1 + 0.25 * (TILT - 0.05)
 
 
-def key(values=TILT, name="contact.tilt.angle", unit="mrad", **more) -> dict:
+def make_key(values=TILT, name="contact.tilt.angle", unit="mrad", **more) -> dict:
     """Return a key whose values are written in mrad, or in another unit of 1/1000 of its own."""
     texts = [f"{value:g} {unit}" for value in values]
     return swept_key(name, np.array(values) * 1e-3, "rad", texts, **more)
 
 
-def limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, **more):
-    """Return the limits of {measure: values} over the tilt."""
+def tilt_limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, **more):
+    """Return the limits of the tilt for measures given as {name: values}."""
     columns = {
         name: (np.array(values, float), np.zeros(len(values)) + errors)
         for name, values in measures.items()
     }
-    good = np.ones(len(tilt), bool) if trusted is None else np.array(trusted, bool)
-    keys = [key(tilt, log=factors, **more)]
-    return find_limits(keys, columns, dict.fromkeys(columns, good), True, {"length": 12.7e-3})
+    trusted_cases = np.ones(len(tilt), bool) if trusted is None else np.array(trusted, bool)
+    keys = [make_key(tilt, log=factors, **more)]
+    return find_limits(
+        keys, columns, dict.fromkeys(columns, trusted_cases), True, {"length": 12.7e-3}
+    )
 
 
-def one_of(values, errors=0.0, **more):
-    """Allowed of the loop area."""
-    (one,) = limits({"loop_area": values}, errors, **more).found
-    return one
+def loop_area_limit(values, errors=0.0, **more):
+    """Return the limit of the tilt for the loop area."""
+    (limit,) = tilt_limits({"loop_area": values}, errors, **more).found
+    return limit
 
 
-def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
-    """E = 1 + 0.25 t - 0.0125 of a tilt t [mrad] from 0.05 on: 5 % are reached at t = 0.25, 3.175 um over 12.7 mm."""
-    one = one_of(LINE)
-    assert (one.inside, one.beyond) == (2, 3) and one.value == pytest.approx(0.25e-3)
-    assert one.last_change == pytest.approx(0.25 * 0.95) and one.change == 0.05
-    assert limits_sentence(limits({"loop_area": LINE})) == (
+def test_exact_limit_of_linear_measure():
+    """The measure 1 + 0.25 t - 0.0125 of a tilt t [mrad] changes by 5 % at 0.25 mrad, a gap of 3.175 um over 12.7 mm."""
+    limit = loop_area_limit(LINE)
+    assert (limit.inside, limit.beyond) == (2, 3) and limit.value == pytest.approx(0.25e-3)
+    assert limit.last_change == pytest.approx(0.25 * 0.95) and limit.change == 0.05
+    assert limits_sentence(tilt_limits({"loop_area": LINE})) == (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) before "
         "loop area changes by 5 % (first to change: loop area)."
     )
 
 
 @pytest.mark.parametrize("unit, size", [("rad", 1e3), ("mrad", 1.0), ("urad", 1e-3)])
-def test_exact_a_limit_has_the_same_words_in_whatever_unit_its_cases_were_written(unit, size):
-    one = key(TILT / size, unit=unit) | {"values": TILT * 1e-3}
+def test_exact_limit_is_independent_of_unit(unit, size):
+    """The sentence about a limit is the same for cases written in rad, mrad and urad."""
+    tilt_key = make_key(TILT / size, unit=unit) | {"values": TILT * 1e-3}
     values = LINE
-    found = find_limits([one], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)})
-    assert limits_sentence(found).startswith(
+    limits_found = find_limits(
+        [tilt_key], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)}
+    )
+    assert limits_sentence(limits_found).startswith(
         "Tilt may reach 0.25 mrad (interpolated between the cases at 0.2 and 0.5 mrad) before"
     )
 
 
-def test_exact_a_key_of_factors_is_read_along_its_logarithm():
-    """E = 1 - 0.02 ln(t/t0) has fallen by 5 % at t0 e^2.5; what grows as t^0.5 has doubled at 4 t0."""
+def test_exact_limit_of_logarithmic_key():
+    """Along a logarithmic key, 1 - 0.02 ln(t/t0) changes by 5 % at t0 e^2.5, and t^0.5 doubles at 4 t0."""
     tilt = np.geomspace(1e-3, 10, 9)
-    one = one_of(1 - 0.02 * np.log(tilt / 1e-3), tilt=tilt, factors=True)
-    assert log(one.value / 1e-6) == pytest.approx(2.5) and (one.inside, one.beyond, one.change) == (
+    limit = loop_area_limit(1 - 0.02 * np.log(tilt / 1e-3), tilt=tilt, factors=True)
+    assert log(limit.value / 1e-6) == pytest.approx(2.5) and (
+        limit.inside,
+        limit.beyond,
+        limit.change,
+    ) == (
         2,
         3,
         -0.05,
     )
-    (peak,) = limits({"pressure_peak": (tilt / 1e-3) ** 0.5}, tilt=tilt, factors=True).found
+    (peak,) = tilt_limits({"pressure_peak": (tilt / 1e-3) ** 0.5}, tilt=tilt, factors=True).found
     assert peak.value == pytest.approx(4e-6) and peak.change == 1
     assert (
-        limits({"pressure_peak": (tilt / 1e-3) ** -0.5}, tilt=tilt, factors=True).found[0].beyond
+        tilt_limits({"pressure_peak": (tilt / 1e-3) ** -0.5}, tilt=tilt, factors=True)
+        .found[0]
+        .beyond
         is None
     )
 
 
-def test_exact_a_limit_of_the_patch_stands_with_its_cases():
-    """1 - (t - 15)^2 / 2000 from 15 urad on, as a patch that opens there, is 5 % off at 25 urad."""
+def test_exact_limit_of_patch_stiffness():
+    """The stiffness 1 - (t - 15)^2/2000 above 15 urad changes by 5 % at 25 urad, inside the interval of the sentence."""
     tilt = np.geomspace(1e-3, 1, 7)
-    found = limits(
+    limits_found = tilt_limits(
         {
             "tangential_stiffness": 1 - np.maximum(1e3 * tilt - 15, 0) ** 2 / 2000,
             "pressure_peak": (tilt / 1e-3) ** 0.5,
@@ -90,91 +101,114 @@ def test_exact_a_limit_of_the_patch_stands_with_its_cases():
         tilt=tilt,
         factors=True,
     )
-    assert limits_sentence(found) == (
+    assert limits_sentence(limits_found) == (
         "As contact.tilt.angle grows, the pressure peak doubles at about 4 urad (between 3.2 "
         "and 10 urad); the stiffness of the patch changes by 5 % at about 15 urad (tangential; "
         "between 10 and 32 urad)."
     )
-    known, _ = limits_json(found)
-    assert (known["low"], known["high"]) == pytest.approx((1e-5, 10**-4.5)) and known[
-        "low"
-    ] < 25e-6 < known["high"]
+    stiffness_limit, _ = limits_json(limits_found)
+    assert (stiffness_limit["low"], stiffness_limit["high"]) == pytest.approx(
+        (1e-5, 10**-4.5)
+    ) and stiffness_limit["low"] < 25e-6 < stiffness_limit["high"]
 
 
-def test_exact_the_gap_is_that_of_the_angle_as_it_is_written():
-    """0.169 mrad, written 0.16, opens 2.03 um over 12.7 mm."""
-    said = limits_sentence(limits({"loop_area": 1 + (TILT - 0.05) * 0.05 / 0.119}))
-    assert said.startswith("Tilt may reach 0.16 mrad (2 um over the patch; interpolated")
+def test_exact_gap_follows_rounded_angle():
+    """The gap in the sentence belongs to the rounded angle: 0.169 mrad is written as 0.16 mrad, 2.03 um over 12.7 mm."""
+    sentence = limits_sentence(tilt_limits({"loop_area": 1 + (TILT - 0.05) * 0.05 / 0.119}))
+    assert sentence.startswith("Tilt may reach 0.16 mrad (2 um over the patch; interpolated")
 
 
-def test_exact_a_case_that_its_error_leaves_open_is_no_end():
-    """5 % of 1 with the errors of both: 1.04 +- 0.02 is open, 1.09 +- 0.02 is beyond."""
+def test_exact_uncertain_case_does_not_bound_limit():
+    """The limit lies between the nearest cases that are certainly below and beyond a change of 5 %.
+
+    With 1.04 ± 0.02 undecided these are its neighbours.
+    """
     values = [1, 1.001, 1.04, 1.09, 1.2]
-    one = one_of(values, 0.01)
-    assert (one.inside, one.beyond) == (1, 3) and 1e-4 < one.value < 5e-4
+    limit = loop_area_limit(values, 0.01)
+    assert (limit.inside, limit.beyond) == (1, 3) and 1e-4 < limit.value < 5e-4
     assert "interpolated between the cases at 0.1 and 0.5 mrad)" in limits_sentence(
-        limits({"loop_area": values}, 0.01)
+        tilt_limits({"loop_area": values}, 0.01)
     )
-    assert (one_of(values).inside, one_of(values).beyond) == (2, 3)
+    assert (loop_area_limit(values).inside, loop_area_limit(values).beyond) == (2, 3)
 
 
-def test_exact_cases_that_did_not_settle_or_miss_their_tolerance_are_passed_over():
-    """The case at 0.2 mrad does not count: the place lies somewhere between 0.1 and 0.5."""
-    one = one_of([1, 1.01, 7, 1.2, 1.3], trusted=[1, 1, 0, 1, 1])
-    assert (one.inside, one.beyond) == (1, 3) and one.value == pytest.approx(
+def test_exact_untrusted_cases_are_skipped():
+    """A case that is not steady or misses its tolerance is skipped.
+
+    Without the case at 0.2 mrad the limit lies between 0.1 and 0.5 mrad.
+    """
+    limit = loop_area_limit([1, 1.01, 7, 1.2, 1.3], trusted=[1, 1, 0, 1, 1])
+    assert (limit.inside, limit.beyond) == (1, 3) and limit.value == pytest.approx(
         1e-4 + 4e-4 * 0.04 / 0.19
     )
     assert (
-        limits_sentence(limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, trusted=[0, 1, 1, 1, 1]))
+        limits_sentence(
+            tilt_limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, trusted=[0, 1, 1, 1, 1])
+        )
         == ""
     )
 
 
-def test_exact_what_the_first_step_leaves_says_nothing():
-    """A loop that doubles from case to case was once said to stay within 5 % up to its first case."""
-    said = limits_sentence(
-        limits({"loop_area": 2.0 ** np.arange(5), "friction_force_peak": [1, 1, 1, 1.1, 1.2]})
+def test_exact_limit_within_first_step_has_no_sentence():
+    """A loop area that doubles from case to case has its limit below the second case, and no sentence states it.
+
+    Earlier it was stated to stay within 5 % up to the first case.
+    """
+    sentence = limits_sentence(
+        tilt_limits({"loop_area": 2.0 ** np.arange(5), "friction_force_peak": [1, 1, 1, 1.1, 1.2]})
     )
-    (known,) = limits_json(limits({"loop_area": 2.0 ** np.arange(5)}))
-    assert said == "" and [known[name] for name in ("low", "high")] == pytest.approx([5e-5, 1e-4])
-    assert limits({"loop_area": [0, 1, 2, 3, 4]}).found == []
+    (limit,) = limits_json(tilt_limits({"loop_area": 2.0 ** np.arange(5)}))
+    assert sentence == "" and [limit[name] for name in ("low", "high")] == pytest.approx(
+        [5e-5, 1e-4]
+    )
+    assert tilt_limits({"loop_area": [0, 1, 2, 3, 4]}).found == []
 
 
-def test_exact_keys_that_drive_have_no_limit():
-    assert limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, name="slide.amplitude").key is None
+def test_exact_drive_keys_have_no_limit():
+    """Keys of the drive, such as the slide amplitude, have no limit."""
+    assert tilt_limits({"loop_area": [1, 1.01, 1.02, 1.2, 1.3]}, name="slide.amplitude").key is None
 
 
-def test_exact_nothing_that_moves_changes():
+def test_exact_sentence_without_limit_in_range():
+    """If no measure of the motion changes by 5 %, the sentence states the last case that counts as a lower bound."""
     assert (
-        limits_sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}))
+        limits_sentence(tilt_limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}))
         == "Tilt may reach 1 mrad (13 um over the patch): loop area changes by less than 5 %."
     )
     assert limits_sentence(
-        limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])
+        tilt_limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])
     ) == (
         "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the cases with "
         "larger values do not show where this limit lies."
     )
 
 
-def test_exact_a_limit_that_errors_leave_open_is_told_with_the_case_that_is_surely_beyond():
-    """The rig at 1, 150, 170 and 190 urad: the loop falls by 4.5, 5.007 and 5.23 %, known to 0.05 %, so that 5 % lie
-    between 150 and 190 urad; the slip, 5.03 % off in the last case, is left open there."""
+def test_exact_limit_within_errors_is_given_as_interval():
+    """If errors hide the limit, the sentence gives the last case inside and the first case beyond.
+
+    In the rig the loop area changes by 5 % between 150 and 190 urad.
+
+    In the rig the loop area changes by 5 % between 150 and 190 urad.
+    """
     tilt = np.array([1e-3, 0.15, 0.17, 0.19])
     loop = [1, 0.955, 0.94993, 0.9477]
     slip = [1, 0.96, 0.9495, 0.9497]
-    want = (
+    expected = (
         "Tilt may reach at least 0.15 mrad (1.9 um over the patch) before slip amplitude or loop area changes by 5 "
         "%; loop area has changed by more than 5 % at 0.19 mrad."
     )
-    assert limits_sentence(limits({"slip_amplitude": slip, "loop_area": loop}, 5e-4, tilt)) == want
+    assert (
+        limits_sentence(tilt_limits({"slip_amplitude": slip, "loop_area": loop}, 5e-4, tilt))
+        == expected
+    )
     measures = {"slip_amplitude": [1, 1.01, 1.05, 1.05], "loop_area": [1, 1.01, 1.01, 1.2]}
-    assert limits_sentence(limits(measures, 5e-4, tilt)) == want
+    assert limits_sentence(tilt_limits(measures, 5e-4, tilt)) == expected
 
 
-def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
-    said = limits_sentence(limits({"loop_area": LINE, "slip_amplitude": [0, 1, 1, 1, 1]}))
-    assert "before loop area changes by 5 %" in said
+def test_exact_undetermined_measure_is_omitted():
+    """A measure whose limit cannot be determined is not named in the sentence."""
+    sentence = limits_sentence(tilt_limits({"loop_area": LINE, "slip_amplitude": [0, 1, 1, 1, 1]}))
+    assert "before loop area changes by 5 %" in sentence
     line = {
         "loop_area": LINE,
         "slip_amplitude": 1 + 0 * TILT,
@@ -182,14 +216,14 @@ def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
     }
     assert (
         "before slip amplitude or loop area changes by 5 % (first to change: loop area)"
-        in limits_sentence(limits(line))
+        in limits_sentence(tilt_limits(line))
     )
 
 
-def test_exact_what_is_round_off_in_every_case_does_not_move():
-    """Loops of 1e-12 J that change their sign once kept a stuck rig from having any limit."""
-    said = limits_sentence(
-        limits(
+def test_exact_measures_of_roundoff_are_ignored():
+    """Measures that are only round-off, such as loops of 1e-12 J, do not influence the limit of a stuck rig."""
+    sentence = limits_sentence(
+        tilt_limits(
             {
                 "loop_area": [1e-12, -3e-12, 2e-12, -1e-12, 1e-12],
                 "slip_amplitude": 0 * TILT,
@@ -199,23 +233,26 @@ def test_exact_what_is_round_off_in_every_case_does_not_move():
     )
     assert (
         "before relative displacement amplitude changes by 5 % (first to change: relative "
-        "displacement amplitude)" in said
+        "displacement amplitude)" in sentence
     )
 
 
-def test_exact_of_several_lines_the_one_that_allows_least():
-    """E = 1 + s (t - 0.05) leaves at 0.05 + 0.05/s: 0.25 and 0.15 for slopes of 0.25 and 0.5."""
+def test_exact_limit_is_smallest_over_lines():
+    """Over several loads the limit is the smallest one.
+
+    The measure 1 + s (t - 0.05) has limits of 0.25 and 0.15 mrad for slopes s of 0.25 and 0.5.
+    """
     tilt, slope = (grid.ravel() for grid in np.meshgrid(TILT, [0.25, 0.5], indexing="ij"))
-    keys = [key(tilt), swept_key("normal.load", slope, "N")]
+    keys = [make_key(tilt), swept_key("normal.load", slope, "N")]
     values = 1 + slope * (tilt - 0.05)
-    good = {"loop_area": np.ones(10, bool)}
-    (limit,) = find_limits(keys, {"loop_area": (values, 0 * values)}, good).found
+    trusted = {"loop_area": np.ones(10, bool)}
+    (limit,) = find_limits(keys, {"loop_area": (values, 0 * values)}, trusted).found
     assert limit.value == pytest.approx(0.15e-3)
-    assert find_limits(keys, {"loop_area": (values, 0 * values)}, good, grid=False).key is None
+    assert find_limits(keys, {"loop_area": (values, 0 * values)}, trusted, grid=False).key is None
 
 
-def swept() -> dict:
-    """Return a sweep over the tilt: straight lines, a pressure in proportion, two cases that miss the tolerance."""
+def make_tilt_sweep() -> dict:
+    """Return a sweep over the tilt with linear measures and two cases that miss the tolerance."""
     columns = {
         "loop_area": ("J", LINE, 0.0),
         "relative_displacement_amplitude": ("m", 1e-5 * LINE**0.5, 0.0),
@@ -228,14 +265,14 @@ def swept() -> dict:
         name: swept_measure(values, errors, unit)
         for name, (unit, values, errors) in columns.items()
     }
-    return swept_table([key()], measures, patch={"length": 12.7e-3})
+    return swept_table([make_key()], measures, patch={"length": 12.7e-3})
 
 
-def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
-    """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
-    text = own_part(page_html(swept()))
-    found = sweep_summary(summarise_sweep(swept()), swept()["outcome"])
-    want = (
+def test_exact_page_and_summary_state_limits():
+    """The page and sweep.json state the same limits, which agree with the closed forms: 0.46, 0.15 and 0.5475 mrad."""
+    text = own_part(page_html(make_tilt_sweep()))
+    summary = sweep_summary(summarise_sweep(make_tilt_sweep()), make_tilt_sweep()["outcome"])
+    expected = (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) "
         "before relative displacement amplitude or loop area changes by 5 % (first to change: loop area or "
         "relative displacement amplitude); the pressure peak doubles at about 0.15 mrad (between 0.1 and 0.2 "
@@ -244,24 +281,24 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     assert "Change relative to the first case" in text
     assert "about 0.25 mrad (between the cases at 0.2 and 0.5 mrad)" in text
     assert "in no case" in text and "+23.8 %" in text
-    assert found["cases"] == {
+    assert summary["cases"] == {
         "count": 5,
         "failed": 0,
         "unfinished": 0,
         "outcomes": {"steady": 5},
         "over_tolerance": {"moment": {"count": 2, "worst": pytest.approx(0.4)}},
     }
-    miss = (
+    tolerance_miss = (
         "2 of 5 cases miss the tolerance of 1 % in moment; the largest error, at contact.tilt.angle 1 mrad, is 40 "
         "% of its value"
     )
-    assert found["answer"] == f"{want.rstrip('.')} ({miss})."
-    assert found["sentences"][0] == found["answer"]
-    assert text.index(f"<p>{found['answer']}</p>") < text.index("<b>5 cases</b>")
-    assert text.count(miss) == 1
-    assert "".join(found["sentences"]).count(want.rstrip(".")) == 1
-    known = {one["measure"]: one for one in found["limits"]}
-    assert known["pressure_peak"] == {
+    assert summary["answer"] == f"{expected.rstrip('.')} ({tolerance_miss})."
+    assert summary["sentences"][0] == summary["answer"]
+    assert text.index(f"<p>{summary['answer']}</p>") < text.index("<b>5 cases</b>")
+    assert text.count(tolerance_miss) == 1
+    assert "".join(summary["sentences"]).count(expected.rstrip(".")) == 1
+    limits_by_measure = {limit["measure"]: limit for limit in summary["limits"]}
+    assert limits_by_measure["pressure_peak"] == {
         "measure": "pressure_peak",
         "key": "contact.tilt.angle",
         "unit": "rad",
@@ -270,34 +307,39 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
         "low": pytest.approx(1e-4),
         "high": pytest.approx(2e-4),
     }
-    assert known["normal_stiffness"]["change"] == -0.05 and found["ranking"] == {}
-    json.dumps(found, allow_nan=False)
+    assert limits_by_measure["normal_stiffness"]["change"] == -0.05 and summary["ranking"] == {}
+    json.dumps(summary, allow_nan=False)
 
 
-def test_always_a_sweep_over_words_has_no_limit():
-    table = swept() | {"keys": [swept_key("friction.law", TILT, texts=list("abcde"), words=True)]}
-    found = sweep_summary(summarise_sweep(table), table["outcome"])
-    assert found["limits"] == []
-    assert "moment; the largest error, at friction.law e" in found["answer"]
+def test_always_sweep_over_words_has_no_limit():
+    """A key with words as values, such as the friction law, has no limit."""
+    table = make_tilt_sweep() | {
+        "keys": [swept_key("friction.law", TILT, texts=list("abcde"), words=True)]
+    }
+    summary = sweep_summary(summarise_sweep(table), table["outcome"])
+    assert summary["limits"] == []
+    assert "moment; the largest error, at friction.law e" in summary["answer"]
 
 
-def test_exact_the_last_digits_of_a_value_are_no_change():
-    """The friction force of the tilted rig was said to change by -4.26e-11 %."""
-    share = (TILT - TILT[0]) / np.ptp(TILT)
+def test_exact_changes_of_roundoff_are_zero():
+    """A change of 4e-13 of the value is given as 0 %. Earlier it was given as -4.26e-11 %."""
+    fraction = (TILT - TILT[0]) / np.ptp(TILT)
     changes = {"friction_force_peak": -4.26e-13, "slip_amplitude": -0.0836, "loop_area": 58.6}
-    values = {name: 1 + change * share for name, change in changes.items()}
-    text = limits_table(limits(values), {name: (values[name], 0 * share, "N") for name in values})
+    values = {name: 1 + change * fraction for name, change in changes.items()}
+    text = limits_table(
+        tilt_limits(values), {name: (values[name], 0 * fraction, "N") for name in values}
+    )
     cells = re.findall(r"<td[^>]*>(0 %|[-+]\S+ %|&times; \S+?)</td>", text)
     assert sorted(cells) == ["&times; 59.6", "-8.36 %", "0 %"]
 
 
-def test_exact_what_may_change_first_is_all_named():
-    """Both fall as the square of the tilt: the cases do not show which of them is the first to change."""
+def test_exact_all_possible_first_measures_are_named():
+    """Two measures that fall with the square of the tilt are both named, if the cases do not show which changes first."""
     tilt = np.geomspace(1e-3, 1, 7)
-    found = limits(
+    limits_found = tilt_limits(
         {"slip_amplitude": 1 - 14 * tilt**2, "loop_area": 1 - 13 * tilt**2}, tilt=tilt, factors=True
     )
-    assert "(first to change: slip amplitude or loop area)" in limits_sentence(found)
+    assert "(first to change: slip amplitude or loop area)" in limits_sentence(limits_found)
 
 
 @pytest.mark.parametrize(
@@ -318,19 +360,24 @@ def test_exact_what_may_change_first_is_all_named():
 @pytest.mark.parametrize(
     "tilt", [np.geomspace(1e-3, 1, 7), np.geomspace(2e-3, 3, 12), np.linspace(0, 1.3, 12)]
 )
-def test_always_the_limit_lies_between_the_cases_that_are_named(curve, error, tilt):
-    """Curves with a kink, with an inflection and without, as when a patch opens between two cases."""
-    (one,) = limits({"loop_area": 1 - curve(tilt)}, error, tilt=tilt, factors=tilt[0] > 0).found
-    first = 1 - curve(tilt[0])
-    limit = brentq(lambda t: 1 - (1 - curve(t)) / first - 0.05, 0, 3, xtol=1e-9)
-    assert tilt[one.inside] <= limit + 1e-6 and (
-        one.beyond is None or limit <= tilt[one.beyond] + 2e-6
+def test_always_limit_lies_between_named_cases(curve, error, tilt):
+    """The limit of curves with a kink, with and without an inflection lies between the two cases that are named."""
+    (limit_found,) = tilt_limits(
+        {"loop_area": 1 - curve(tilt)}, error, tilt=tilt, factors=tilt[0] > 0
+    ).found
+    reference = 1 - curve(tilt[0])
+    limit = brentq(lambda t: 1 - (1 - curve(t)) / reference - 0.05, 0, 3, xtol=1e-9)
+    assert tilt[limit_found.inside] <= limit + 1e-6 and (
+        limit_found.beyond is None or limit <= tilt[limit_found.beyond] + 2e-6
     )
-    assert one.beyond is None or tilt[one.inside] <= 1e3 * one.value <= tilt[one.beyond]
+    assert (
+        limit_found.beyond is None
+        or tilt[limit_found.inside] <= 1e3 * limit_found.value <= tilt[limit_found.beyond]
+    )
 
 
-def test_exact_one_sentence_has_one_unit():
-    """Limits of 0.16 mrad and of 10 to 32 urad once stood in one sentence."""
+def test_exact_sentence_has_single_unit():
+    """All limits of a sentence have the same unit; earlier one sentence contained mrad and urad."""
     tilt = np.geomspace(1e-3, 1, 7)
     texts = [f"{1e3 * value!r} urad" for value in tilt.tolist()]
     measures = {
@@ -338,7 +385,7 @@ def test_exact_one_sentence_has_one_unit():
         "normal_stiffness": swept_measure(1 - np.minimum(1e3 * tilt / 300, 0.9)),
         "moment": swept_measure(np.ones(7), np.array([0, 0, 0, 0, 0, 0.4, 0.2])),
     }
-    table = swept_table([key(tilt, log=True) | {"texts": texts}], measures)
+    table = swept_table([make_key(tilt, log=True) | {"texts": texts}], measures)
     sentences = summarise_sweep(table | {"patch": {"length": 12.7e-3}}).sentences()
     assert "0.316228 mrad, is 40 %" in sentences[0]
     assert all(("mrad" in text) + ("urad" in text) < 2 for text in sentences)

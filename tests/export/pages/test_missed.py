@@ -1,4 +1,4 @@
-"""Which cases miss their tolerance: against the rule by hand, and against a single run of every case."""
+"""Cases that miss their tolerance, compared with the rule evaluated by hand and with single runs."""
 
 import numpy as np
 import pytest
@@ -17,76 +17,82 @@ from patchfem.export.tolerance_misses import (
 NAN = np.nan
 
 
-def one(values, errors, floors=0.0) -> dict:
+def make_measure(values, errors, floors=0.0) -> dict:
+    """Return a measure with its values, errors and floors."""
     return {"values": np.array(values, float), "errors": np.array(errors, float), "floors": floors}
 
 
-def test_exact_an_error_is_over_where_it_is_more_than_tolerance_and_floor():
-    found = one(
+def test_exact_case_misses_tolerance_and_floor():
+    """A case misses its tolerance if its error exceeds tolerance times value plus floor."""
+    measure = make_measure(
         [1, -1, 0, 0, NAN, 2],
         [0.011, 0.009, 1e-9, 1e-3, 0.1, NAN],
         np.array([0, 0, 1e-6, 1e-6, 0, NAN]),
     )
-    assert is_over_tolerance(found, 0.01).tolist() == [True, False, False, True, False, False]
-    assert is_over_tolerance(found, NAN).sum() == 0
-    assert is_over_tolerance(found, np.full(6, 0.02)).tolist() == [False] * 3 + [True] + [False] * 2
-    assert count_over_tolerance({"a": found, "b": one([1], [0])}, 0.01) == {
+    assert is_over_tolerance(measure, 0.01).tolist() == [True, False, False, True, False, False]
+    assert is_over_tolerance(measure, NAN).sum() == 0
+    assert (
+        is_over_tolerance(measure, np.full(6, 0.02)).tolist() == [False] * 3 + [True] + [False] * 2
+    )
+    assert count_over_tolerance({"a": measure, "b": make_measure([1], [0])}, 0.01) == {
         "a": {"count": 2, "worst": pytest.approx(0.011)}
     }
-    assert count_over_tolerance({"a": one([0, 0], [1, 0])}, 0.01) == {
+    assert count_over_tolerance({"a": make_measure([0, 0], [1, 0])}, 0.01) == {
         "a": {"count": 1, "worst": None}
     }
 
 
-def test_exact_the_worst_is_relative_and_named_with_its_case():
-    """The largest absolute error, of the last case, is the smallest of all: 2e-5 of 0.19 is one in ten thousand."""
-    loop = one([2e-7, 5e-6, 0.19], [4.4e-7, 5e-7, 2e-5])
-    where = ["slide.amplitude 0.05 um", "", ""].__getitem__
-    assert tolerance_sentence({"loop_area": loop}, 0.01, where) == (
+def test_exact_largest_relative_error_is_named():
+    """The sentence names the largest relative error with its case, not the largest absolute error."""
+    loop = make_measure([2e-7, 5e-6, 0.19], [4.4e-7, 5e-7, 2e-5])
+    case_label = ["slide.amplitude 0.05 um", "", ""].__getitem__
+    assert tolerance_sentence({"loop_area": loop}, 0.01, case_label) == (
         "2 of 3 cases miss the tolerance of 1 % in loop area; the largest error, at slide.amplitude 0.05 um, is 220 "
         "% of its value."
     )
-    others = {
+    measures = {
         "loop_area": loop,
-        "moment": one([1, 1, 1], [9, 9, 9]),
-        "rotation": one([1] * 3, [0, 0, 1]),
+        "moment": make_measure([1, 1, 1], [9, 9, 9]),
+        "rotation": make_measure([1] * 3, [0, 0, 1]),
     }
-    assert tolerance_sentence(others, 0.01, where).endswith(
+    assert tolerance_sentence(measures, 0.01, case_label).endswith(
         "220 % of its value; 2 other measures miss the tolerance in some cases."
     )
-    zero = {
-        "energy": one([1e-15, 1, 1], [1e-11, 0, 0], 1e-12),
-        "moment": one([1, 1, 1], [0.5, 0, 0]),
+    near_zero = {
+        "energy": make_measure([1e-15, 1, 1], [1e-11, 0, 0], 1e-12),
+        "moment": make_measure([1, 1, 1], [0.5, 0, 0]),
     }
-    # not 10
+    # the energy is zero within its floor, so its error of 10 times the floor is not the largest
     assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in tolerance_sentence(
-        zero, 0.01, where
+        near_zero, 0.01, case_label
     )
-    assert tolerance_sentence({"energy": zero["energy"]}, 0.01, where).endswith(
+    assert tolerance_sentence({"energy": near_zero["energy"]}, 0.01, case_label).endswith(
         "0.05 um, is larger than the value."
     )
     assert (
-        tolerance_sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where)
+        tolerance_sentence({"loop_area": make_measure([1, 1], [1e-3, 0])}, 0.01, case_label)
         == "All 2 cases meet the tolerance of 1 %."
     )
     assert (
-        tolerance_sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where)
+        tolerance_sentence(
+            {"loop_area": make_measure([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, case_label
+        )
         == "2 of 3 cases have an answer; all of these meet the tolerance of 1 %."
     )
     assert (
-        tolerance_sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), where)
+        tolerance_sentence({"loop_area": loop}, np.array([9, 0.2, 0.1]), case_label)
         == "All 3 cases meet their tolerance."
     )
     assert (
-        tolerance_sentence({"loop_area": loop}, NAN, where)
-        == tolerance_sentence({"a": one([1], [NAN])}, 0.1, where)
+        tolerance_sentence({"loop_area": loop}, NAN, case_label)
+        == tolerance_sentence({"a": make_measure([1], [NAN])}, 0.1, case_label)
         == ""
     )
 
 
 @pytest.mark.share(1)
-def test_exact_the_count_is_that_of_single_runs():
-    """A joint in deep microslip on a mesh too coarse for it: every case run alone, its measures and its warnings."""
+def test_exact_missed_cases_agree_with_single_runs():
+    """On a coarse mesh a sweep of a joint in microslip counts the same missed cases as single runs with their warnings."""
     scene = pf.load(
         PIECE
         + """
@@ -109,32 +115,38 @@ tolerance = 1e-2
 """
     )
     swept = pf.sweep(scene, {"slide.amplitude": "0.02 um..20 um:5"})
-    alone = [
+    single_runs = [
         pf.run(scene, **{"slide.amplitude": float(value)}) for value in swept.slide_amplitude.values
     ]
     names = [name.removesuffix("_error") for name in swept if name.endswith("_error")]
-    lost = {name: [_misses(run.measures.get(name)) for run in alone] for name in names}
-    for name, missed in lost.items():
+    missed_by_measure = {
+        name: [_misses_tolerance(run.measures.get(name)) for run in single_runs] for name in names
+    }
+    for name, missed in missed_by_measure.items():
         floors = swept[f"{name}_floor"].values if f"{name}_floor" in swept else 0.0
-        found = one(swept[name].values, swept[f"{name}_error"].values, floors)
-        assert is_over_tolerance(found, swept.attrs["tolerance"]).tolist() == missed, name
-    assert 0 < sum(lost["loop_area"]) < 5 and sum(
-        map(any, zip(*lost.values(), strict=True))
+        measure = make_measure(swept[name].values, swept[f"{name}_error"].values, floors)
+        assert is_over_tolerance(measure, swept.attrs["tolerance"]).tolist() == missed, name
+    assert 0 < sum(missed_by_measure["loop_area"]) < 5 and sum(
+        map(any, zip(*missed_by_measure.values(), strict=True))
     ) in range(1, 6)
-    warned = [any("the tolerance is 0.01" in text for text in run.warnings) for run in alone]
-    assert warned == [any(missed) for missed in zip(*lost.values(), strict=True)]
+    warned = [any("the tolerance is 0.01" in text for text in run.warnings) for run in single_runs]
+    assert warned == [any(missed) for missed in zip(*missed_by_measure.values(), strict=True)]
 
 
-def _misses(measure) -> bool:
+def _misses_tolerance(measure) -> bool:
+    """Return whether a measure has a value and an error above the tolerance of 0.01 and the floor."""
     return (
         None not in (measure and measure.value, measure and measure.error)
         and measure.error > 0.01 * abs(measure.value) + measure.floor
     )
 
 
-def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
-    """A loop of 0.16 nJ, known to 60 %, "met the tolerance of 0.1 %" by a floor of 0.1 nJ, and nothing said so."""
-    loop = one([1.6e-10, 1e-3], [0.96e-10, 1e-7], 1e-10) | {"unit": "J"}
+def test_exact_sentence_states_floor_if_decisive():
+    """If cases meet the tolerance only by the floor of a measure, the sentence states the floor.
+
+    A loop of 0.16 nJ with an error of 60 % meets a tolerance of 0.1 % by the floor of 0.1 nJ.
+    """
+    loop = make_measure([1.6e-10, 1e-3], [0.96e-10, 1e-7], 1e-10) | {"unit": "J"}
     assert is_within_by_floor(loop, 1e-3).tolist() == [True, False]
     assert tolerance_sentence({"loop_area": loop}, 1e-3, str) == (
         "All 2 cases meet the tolerance of 0.1 % or the floor of their "
@@ -149,16 +161,17 @@ def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
     )
 
 
-def test_exact_the_measure_that_is_asked_for_is_spoken_of_first():
-    found = {
-        "loop_area": one([1, 1], [0.5, 0]),
-        "peak_frequency": one([1, 1], [0, 0.02]),
-        "moment": one([1], [0.1]),
+def test_exact_requested_measure_comes_first():
+    """The sentence about missed tolerances begins with the requested measure."""
+    measures = {
+        "loop_area": make_measure([1, 1], [0.5, 0]),
+        "peak_frequency": make_measure([1, 1], [0, 0.02]),
+        "moment": make_measure([1], [0.1]),
     }
-    assert tolerance_sentence(found, 0.01, str, "peak_frequency") == (
+    assert tolerance_sentence(measures, 0.01, str, "peak_frequency") == (
         "1 of 2 cases misses the tolerance of 1 % in peak frequency; the largest error, at 1, is 2 % of its value; 2 "
         "other measures miss the tolerance in some cases."
     )
-    assert tolerance_sentence(found, 0.1, str, "peak_frequency") == (
+    assert tolerance_sentence(measures, 0.1, str, "peak_frequency") == (
         "In peak frequency all 2 cases meet the tolerance of 10 %; 1 other measure misses the tolerance in some cases."
     )

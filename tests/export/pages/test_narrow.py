@@ -1,4 +1,4 @@
-"""Pages of results on a telephone: words stay whole, and the page is no wider than the screen."""
+"""Pages of results on a narrow screen: words are not broken and the page is not wider than the screen."""
 
 import pytest
 
@@ -6,8 +6,11 @@ import patchfem as pf
 
 
 @pytest.mark.parametrize("width", [360, 390])
-def test_always_no_word_is_broken_on_a_narrow_page(chromium, tmp_path, width):
-    """The heading "in customary units" once stood as "customar y"."""
+def test_always_narrow_page_breaks_no_word(chromium, tmp_path, width):
+    """No word of a page is broken on a narrow screen.
+
+    Earlier "customary" in a heading was broken.
+    """
     pf.run(pf.new("patch")).save(tmp_path)
     page = chromium.visit(tmp_path / "report.html", width)
     page.settled()

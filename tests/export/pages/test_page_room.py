@@ -1,4 +1,4 @@
-"""Pictures of a page are samples that keep what the eye looks for: extremes of a line, integrals of a field."""
+"""Charts of a page contain sampled points that keep the extremes of a line, within a limit of characters."""
 
 import numpy as np
 import pytest
@@ -8,26 +8,33 @@ from patchfem.export.pages.document import document_html
 
 
 @pytest.mark.parametrize("size", [1000, 4001, 100_003])
-def test_exact_a_sampled_line_keeps_its_extremes_and_its_ends(size):
+def test_exact_sampled_line_keeps_extremes_and_ends(size):
+    """A sampled line of at most 1000 points keeps its ends and the extremes of each of its sections."""
     rng = np.random.default_rng(size)
-    # neither is monotonic, as in a loop
+    # neither coordinate is monotonic, as in a loop
     x = np.cumsum(rng.normal(size=size))
     y = rng.normal(size=size)
-    keep = charts.sample_indices(x, y, 1000)
-    assert keep.size <= 1000 and keep[0] == 0 and keep[-1] == size - 1 and np.all(np.diff(keep) > 0)
+    indices = charts.sample_indices(x, y, 1000)
+    assert (
+        indices.size <= 1000
+        and indices[0] == 0
+        and indices[-1] == size - 1
+        and np.all(np.diff(indices) > 0)
+    )
     for values in (x, y):
-        assert values[keep].max() == values.max() and values[keep].min() == values.min()
+        assert values[indices].max() == values.max() and values[indices].min() == values.min()
     width = -(-size // 249)
-    for first in range(0, size, width):  # of every stretch, not only of the whole
-        own = keep[(keep >= first) & (keep < first + width)]
-        assert y[own].max() == y[first : first + width].max()
-        assert x[own].min() == x[first : first + width].min()
+    # the extremes of each section are kept, not only those of the whole line
+    for first in range(0, size, width):
+        section_indices = indices[(indices >= first) & (indices < first + width)]
+        assert y[section_indices].max() == y[first : first + width].max()
+        assert x[section_indices].min() == x[first : first + width].min()
 
 
-def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
-    """40 lines of 30 000 points: 6 MB as they are drawn, 18 MB as they are."""
+def test_always_charts_stay_within_size_limit():
+    """Charts of 40 lines with 30 000 points are reduced to a given number of characters and keep their maxima."""
     x = np.linspace(0, 1, 30_000)
-    many = [
+    all_charts = [
         charts.make_chart(
             "a",
             charts.make_axis("x"),
@@ -35,13 +42,13 @@ def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
             [charts.make_line(x, np.sin(40 * x + k), "accent") for k in range(40)],
         )
     ]
-    for room in (700_000, 200_000):
-        found = charts.limit_characters(many, room)
-        text = document_html("", "", [], {"charts": found}, ("figures.js",))
+    for max_characters in (700_000, 200_000):
+        reduced = charts.limit_characters(all_charts, max_characters)
+        text = document_html("", "", [], {"charts": reduced}, ("figures.js",))
         bare = document_html("", "", [], {"charts": []}, ("figures.js",))
-        assert len(text) - len(bare) < 1.1 * room
+        assert len(text) - len(bare) < 1.1 * max_characters
         assert all(
-            max(one["y"]) == max(full["y"])
-            for one, full in zip(found[0]["marks"], many[0]["marks"])
+            max(mark["y"]) == max(full["y"])
+            for mark, full in zip(reduced[0]["marks"], all_charts[0]["marks"])
         )
-    assert charts.limit_characters(many[:0], 10) == []
+    assert charts.limit_characters(all_charts[:0], 10) == []

@@ -1,4 +1,4 @@
-"""Printed pages: what is drawn in the dark theme has the colours of the light one on paper."""
+"""Printed pages have the colours of the light theme, also if the screen has the dark theme."""
 
 import io
 import re
@@ -14,12 +14,12 @@ from patchfem.export.pages.sweep import page_html
 TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
 
 
-def stress_map() -> str:
-    """A page with a map of cells and a line beside it, as a run has them."""
+def stress_page() -> str:
+    """Return a page with a map of stresses over cells and a line, as the page of a run has them."""
     x = np.linspace(0.0, 4.0, 5)
     y = np.linspace(0.0, 3.0, 4)
     value = np.add.outer(np.arange(4.0), np.arange(3.0))
-    drawn = [
+    chart_list = [
         charts.make_chart(
             "Von Mises stress",
             charts.make_axis("x", "mm"),
@@ -33,58 +33,64 @@ def stress_map() -> str:
             [charts.make_mark("line", "accent", x=x, y=x**2)],
         ),
     ]
-    for number, one in enumerate(drawn):
-        one["anchor"] = f"chart-{number}"
-    places = "".join(f'<div id="{one["anchor"]}" class=chart role=img></div>' for one in drawn)
+    for number, chart in enumerate(chart_list):
+        chart["anchor"] = f"chart-{number}"
+    places = "".join(
+        f'<div id="{chart["anchor"]}" class=chart role=img></div>' for chart in chart_list
+    )
     return document_html(
         "Maps",
         "",
         [Section("maps", "Maps", f"<div class=row>{places}</div>")],
-        {"charts": drawn},
+        {"charts": chart_list},
         ("figures.js", "curves.js"),
     )
 
 
-def sweep_map(table: dict) -> str:
+def sweep_page(table: dict) -> str:
+    """Return the page of a sweep with its map selected."""
     return page_html(table).replace("</body>", f"<script>{LATER.format(TURN)}</script></body>")
 
 
-def on_paper(chromium: Chromium, text: str, dark: bool) -> np.ndarray:
-    """Pixels of the first picture as paper has it, of a page drawn in one theme."""
+def printed_chart_pixels(chromium: Chromium, text: str, dark: bool) -> np.ndarray:
+    """Return the pixels of the first chart in the print style, after the page was drawn in one theme."""
     import matplotlib.image
 
-    seen = chromium.opened(text, dark=dark)
-    assert not seen.faults, seen.faults
-    assert seen.js("document.documentElement.dataset.drawn") == ("dark" if dark else "light")
-    seen.themed(dark, "print")
-    seen.js("new Promise(done => setTimeout(done, 200))")
-    seen.js(
+    page = chromium.opened(text, dark=dark)
+    assert not page.faults, page.faults
+    assert page.js("document.documentElement.dataset.drawn") == ("dark" if dark else "light")
+    page.themed(dark, "print")
+    page.js("new Promise(done => setTimeout(done, 200))")
+    page.js(
         "[...document.querySelectorAll('.chart')].find(one => one.offsetWidth).scrollIntoView()"
     )
-    left, top, wide, high = (
-        round(one)
-        for one in seen.js(
+    left, top, width, height = (
+        round(number)
+        for number in page.js(
             "(({x, y, width, height}) => [x, y, width, height])([...document.querySelectorAll('.chart')]"
             ".find(one => one.offsetWidth).getBoundingClientRect())"
         )
     )
-    shot = matplotlib.image.imread(io.BytesIO(seen.picture()))[..., :3]
-    return shot[max(top, 0) : top + high, left : left + wide]
+    image = matplotlib.image.imread(io.BytesIO(page.picture()))[..., :3]
+    return image[max(top, 0) : top + height, left : left + width]
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("kind", ["stress", "sweep"])
-def test_exact_a_map_on_paper_has_the_colours_of_its_scale(chromium, table, kind):
-    """Inverted, the highest stress of a dark page was the darkest on paper; now light and dark print alike."""
-    text = stress_map() if kind == "stress" else sweep_map(table)
-    light, dark = (on_paper(chromium, text, theme) for theme in (False, True))
+def test_exact_printed_map_is_independent_of_theme(chromium, sweep_table, kind):
+    """A map printed from the dark and from the light theme has the same colours.
+
+    Earlier the highest stress was the darkest if printed from the dark theme.
+    """
+    text = stress_page() if kind == "stress" else sweep_page(sweep_table)
+    light, dark = (printed_chart_pixels(chromium, text, theme) for theme in (False, True))
     assert light.shape == dark.shape and light.std() > 0.1
     assert np.mean(np.abs(light - dark) > 0.02) < 2e-3
 
 
 @pytest.mark.parametrize("dark, ink", [(False, "rgb(28, 36, 48)"), (True, "rgb(228, 233, 239)")])
-def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, dark, ink):
-    """Pages of surfaces stood dark on white in the dark."""
+def test_exact_static_figure_follows_page_theme(chromium, dark, ink):
+    """A figure that is drawn before the page is opened has the text colour of the theme of the page."""
     svg = pictures.draw_charts(
         [
             charts.make_chart(
@@ -101,27 +107,28 @@ def test_exact_a_picture_drawn_beforehand_has_the_colours_of_the_page(chromium, 
     assert not re.search("|".join(PAGE_COLOURS), text[text.index("<svg") :]) and set(
         pictures.COLOURS.values()
     ) < set(PAGE_COLOURS)
-    seen = chromium.opened(text, dark=dark)
-    assert seen.js("getComputedStyle(document.querySelector('figure text')).fill") == ink
-    assert seen.js("getComputedStyle(document.body).color") == ink
+    page = chromium.opened(text, dark=dark)
+    assert page.js("getComputedStyle(document.querySelector('figure text')).fill") == ink
+    assert page.js("getComputedStyle(document.body).color") == ink
 
 
-def test_always_lines_are_dark_on_white_paper_and_the_screen_stays_dark(chromium):
-    seen = chromium.opened(stress_map(), dark=True)
-    shown = (
+def test_always_dark_page_is_printed_light(chromium):
+    """A page in the dark theme is printed in dark on white, and the screen stays dark afterwards."""
+    page = chromium.opened(stress_page(), dark=True)
+    styles = (
         "[...document.querySelectorAll('.chart')].map(one => getComputedStyle(one).display + ' ' + "
         "getComputedStyle(one).visibility + ' ' + getComputedStyle(one).filter)"
     )
-    assert seen.js(shown) == ["block visible none", "block hidden none", "block visible none"]
-    assert seen.js("document.documentElement.scrollWidth") <= 1200
-    seen.themed(True, "print")
-    assert seen.js(shown) == [
+    assert page.js(styles) == ["block visible none", "block hidden none", "block visible none"]
+    assert page.js("document.documentElement.scrollWidth") <= 1200
+    page.themed(True, "print")
+    assert page.js(styles) == [
         "none visible invert(1) hue-rotate(180deg)",
         "block visible none",
         "block visible invert(1) hue-rotate(180deg)",
     ]
-    assert seen.js("getComputedStyle(document.body).color") == "rgb(28, 36, 48)"
-    seen.themed(False)
-    seen.js("new Promise(done => setTimeout(done, 300))")
-    assert seen.js("document.querySelectorAll('.onpaper').length") == 0
-    assert seen.printed().startswith(b"%PDF")
+    assert page.js("getComputedStyle(document.body).color") == "rgb(28, 36, 48)"
+    page.themed(False)
+    page.js("new Promise(done => setTimeout(done, 300))")
+    assert page.js("document.querySelectorAll('.onpaper').length") == 0
+    assert page.printed().startswith(b"%PDF")

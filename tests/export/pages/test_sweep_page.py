@@ -1,4 +1,4 @@
-"""The page of a sweep: one file, nothing fetched, texts shown as texts, numbers as they came."""
+"""Page of a sweep: one file without external resources, with escaped texts and unchanged numbers."""
 
 import json
 import re
@@ -20,61 +20,65 @@ NAN = np.nan
 AMPLITUDE = "relative_displacement_amplitude"
 
 
-def test_exact_numbers_stand_in_the_page_in_the_unit_they_were_written_in(table):
-    data = data_of(page_html(table))
+def test_exact_page_has_numbers_in_input_units(sweep_table):
+    """The page holds keys in the units of the input and measures in customary units, with their errors."""
+    data = data_of(page_html(sweep_table))
     assert data["keys"][0]["unit"] == "mrad" and data["keys"][1]["unit"] == "N"
     np.testing.assert_allclose(
-        data["keys"][0]["values"], table["keys"][0]["values"] * 1e3, rtol=1e-9
+        data["keys"][0]["values"], sweep_table["keys"][0]["values"] * 1e3, rtol=1e-9
     )
-    shown = next(one for one in data["measures"] if one["name"] == AMPLITUDE)
+    shown = next(measure for measure in data["measures"] if measure["name"] == AMPLITUDE)
     assert shown["unit"] == "um" and shown["values"][7] is None
-    rest = np.arange(12) != 7
+    valid = np.arange(12) != 7
     np.testing.assert_allclose(
-        np.array(shown["values"], float)[rest],
-        table["measures"][shown["name"]]["values"][rest] * 1e6,
+        np.array(shown["values"], float)[valid],
+        sweep_table["measures"][shown["name"]]["values"][valid] * 1e6,
         rtol=1e-8,
     )
     np.testing.assert_allclose(
-        np.array(shown["errors"], float)[rest] / np.array(shown["values"], float)[rest],
+        np.array(shown["errors"], float)[valid] / np.array(shown["values"], float)[valid],
         0.01,
         rtol=1e-8,
     )
     assert data["along"] == "contact.tilt.angle" and data["first"] == AMPLITUDE
 
 
-def test_exact_a_key_of_words_carries_the_word_of_each_of_its_numbers(table):
-    assert [one["words"] for one in data_of(page_html(table))["keys"]] == [None, None]
-    table["keys"][0] |= {
+def test_exact_key_of_words_has_table_of_words(sweep_table):
+    """A key with words as values holds the word of each of its numbers; other keys hold none."""
+    assert [key["words"] for key in data_of(page_html(sweep_table))["keys"]] == [None, None]
+    sweep_table["keys"][0] |= {
         "name": "friction.law",
         "values": np.arange(12) % 3.0,
         "unit": "1",
         "log": False,
         "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)],
     }
-    law, load = data_of(page_html(table))["keys"]
+    law, load = data_of(page_html(sweep_table))["keys"]
     assert law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]]
     assert load["words"] is None
 
 
-def test_always_one_file_below_three_megabytes_that_fetches_nothing(table):
-    text = page_html(table)
+def test_always_page_is_small_and_self_contained(sweep_table):
+    """The page is one file below 3 MB that loads no other file and links only files of its folder."""
+    text = page_html(sweep_table)
     assert len(text.encode()) < 3e6
     targets = re.findall(r"(?:src|href)=[\"']?([^\"' >]+)", own_part(text))
-    assert targets and all(re.match(r"#|sweep\.|cases/", one) for one in targets)
+    assert targets and all(re.match(r"#|sweep\.|cases/", target) for target in targets)
     assert not re.search(r"@import|url\(", own_part(text))
 
 
-def test_always_texts_from_outside_are_shown_as_texts(table):
-    whole = page_html(table)
-    text = own_part(whole)
+def test_always_foreign_texts_are_escaped(sweep_table):
+    """Titles, scenes, meanings and messages with HTML markup are escaped on the page."""
+    page = page_html(sweep_table)
+    text = own_part(page)
     assert "Tilt &lt;/script&gt;&lt;b&gt;&amp;amp;" in text
-    for foreign in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
-        assert foreign not in text
-    assert whole.count("</script>") == 5
+    for markup in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
+        assert markup not in text
+    assert page.count("</script>") == 5
 
 
 @pytest.mark.parametrize(
-    "value, error, shown",
+    "value, error, text",
     [
         (15.3131, 0.02, "15.313 ± 0.020"),
         (1.0, 1e-9, "1"),
@@ -85,23 +89,26 @@ def test_always_texts_from_outside_are_shown_as_texts(table):
         (-3.0, 7.0, "-3.0 ± 7.0"),
     ],
 )
-def test_exact_a_case_shows_its_error_where_its_digits_do_not(table, value, error, shown):
-    one = table["measures"][AMPLITUDE]
-    one |= {"unit": "1", "values": np.full(12, value), "errors": np.full(12, error)}
-    one["values"][3] = 7.25  # so that the measure changes from case to case
-    assert page_html(table).count(f"<td class=n>{shown}</td>") >= 11
+def test_exact_case_shows_value_with_error(sweep_table, value, error, text):
+    """The table of cases shows values with errors; the error is left out if it is below the shown digits."""
+    measure = sweep_table["measures"][AMPLITUDE]
+    measure |= {"unit": "1", "values": np.full(12, value), "errors": np.full(12, error)}
+    measure["values"][3] = 7.25  # with one other value the measure changes from case to case
+    assert page_html(sweep_table).count(f"<td class=n>{text}</td>") >= 11
 
 
-def test_exact_the_scene_is_named_beneath_the_keys_that_were_swept(table):
-    text = own_part(page_html(table | {"of": "<a> rig tilted by 0.1 mrad"}))
-    # and no seconds: those of all processes are neither wall nor CPU
+def test_exact_page_names_scene_below_keys(sweep_table):
+    """The page names the scene and the version below the swept keys."""
+    text = own_part(page_html(sweep_table | {"of": "<a> rig tilted by 0.1 mrad"}))
+    # the page states no computing time, because that of all processes is neither wall nor CPU time
     assert "patchfem 1.2.3</p>" in text
     assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
 
 
-def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_told(table):
-    text = page_html(table)
-    assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
+def test_always_page_lists_outcomes_and_failed_cases(sweep_table):
+    """The page counts the outcomes and states the message of a failed case; measures without values are left out."""
+    text = page_html(sweep_table)
+    assert "loop_area" not in [measure["name"] for measure in data_of(text)["measures"]]
     assert (
         "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows."
         in text
@@ -111,14 +118,19 @@ def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_
     assert "1 case failed: normal.load: &lt;refused&gt;" in text
 
 
-def test_always_a_sweep_without_a_value_has_a_page_without_pictures(table):
-    for one in table["measures"].values():
-        one["values"] = np.full(12, np.nan)
-    text = page_html(table)
+def test_always_sweep_without_values_has_no_charts(sweep_table):
+    """The page of a sweep without any value states this and has no charts."""
+    for measure in sweep_table["measures"].values():
+        measure["values"] = np.full(12, np.nan)
+    text = page_html(sweep_table)
     assert "No case has a value to draw" in text and "<script" not in text
 
 
-def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_extremes():
+def test_always_page_of_many_cases_keeps_extremes():
+    """The page of 200 000 random cases stays below 3 MB and shows a subset of the cases.
+
+    It contains the extremes of every key and measure, with unchanged values.
+    """
     n_cases = 200_000
     random = np.random.default_rng(3)
     keys = [
@@ -148,7 +160,8 @@ def test_always_many_cases_are_thinned_to_a_page_below_three_megabytes_with_all_
         assert {np.argmin(column["values"]), np.argmax(column["values"])} <= set(cases)
 
 
-def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes():
+def test_always_page_of_large_grid_keeps_extremes():
+    """The page of a grid of 50 000 cases shows evenly spaced cases and the extremes of the measure."""
     places = [grid.ravel() for grid in np.meshgrid(np.arange(500), np.arange(100), indexing="ij")]
     n_cases = places[0].size
     values = np.random.default_rng(4).normal(size=n_cases)
@@ -162,15 +175,16 @@ def test_always_a_grid_that_is_too_large_is_thinned_to_points_with_its_extremes(
     assert {int(np.argmax(values)), int(np.argmin(values))} <= set(cases.tolist())
 
 
-def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(table):
-    load = table["keys"][1]
+def test_exact_key_of_mixed_units_has_base_unit(sweep_table):
+    """A key whose values are written in N and kN is shown in N."""
+    load = sweep_table["keys"][1]
     load["texts"] = ["10 N" if value == 10 else f"{value / 1e3:g} kN" for value in load["values"]]
-    shown = data_of(page_html(table))["keys"][1]
+    shown = data_of(page_html(sweep_table))["keys"][1]
     assert shown["unit"] == "N" and shown["values"] == load["values"].tolist()
 
 
 @pytest.mark.parametrize(
-    "text, shown",
+    "text, shortened",
     [
         ("3.16227766016838e-06 rad", "3.16228e-6 rad"),
         ("26 lbf", "26 lbf"),
@@ -179,11 +193,13 @@ def test_exact_a_key_written_in_several_units_is_shown_in_that_of_its_numbers(ta
         ("0.123456789", "0.123457"),
     ],
 )
-def test_exact_long_numbers_are_shown_short(text, shown):
-    assert shorten_number(text) == shown
+def test_exact_long_numbers_are_shortened(text, shortened):
+    """Numbers with many digits are shortened to six digits; other texts are unchanged."""
+    assert shorten_number(text) == shortened
 
 
-def test_exact_numbers_that_are_not_finite_are_null():
+def test_exact_non_finite_numbers_become_null():
+    """Numbers that are not finite become null in JSON, and finite ones have nine digits."""
     given = {
         "a": [np.nan, np.inf, 1 / 3],
         "b": np.float64(2.0),
@@ -198,7 +214,8 @@ def test_exact_numbers_that_are_not_finite_are_null():
     }
 
 
-def test_exact_a_script_cannot_end_its_element():
+def test_exact_data_cannot_end_script_element():
+    """Data that contain the end of a script element are escaped, and are read back unchanged."""
     assert (
         library.escape_script("a</script>b<!--c</SCRIPT x</p")
         == "a<\\/script>b<\\!--c<\\/SCRIPT x</p"
@@ -209,19 +226,25 @@ def test_exact_a_script_cannot_end_its_element():
 
 @pytest.mark.share(2)
 @pytest.mark.parametrize(
-    "off", [slice(0, 3), slice(9, 12), slice(None)], ids=["first", "last", "all"]
+    "cases", [slice(0, 3), slice(9, 12), slice(None)], ids=["first", "last", "all"]
 )
-def test_always_a_browser_draws_a_sweep_that_does_not_settle_at_an_end(table, browser, off):
-    """A shading without a left or right end once left the picture out."""
-    table["outcome"] = np.array(table["outcome"], object)
-    table["outcome"][off] = "grows"
-    seen = browser(page_html(table))
-    assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
+def test_always_browser_draws_sweep_with_unsteady_ends(sweep_table, load_page, cases):
+    """A browser draws the chart of a sweep whose first, last or all cases are not steady.
+
+    Earlier such a chart was missing.
+    """
+    sweep_table["outcome"] = np.array(sweep_table["outcome"], object)
+    sweep_table["outcome"][cases] = "grows"
+    document = load_page(page_html(sweep_table))
+    assert re.search(r'<div id="?chart"?[^>]*>\s*<div', document), "no picture in its place"
 
 
-def test_exact_labels_of_a_logarithmic_axis_are_numbers_that_people_read(chromium, table):
-    """An axis from 0.05 to 3 once had labels from 0.5 on alone, one from 1e-7 powers of ten."""
-    chromium.opened(page_html(table))
+def test_exact_labels_of_logarithmic_axis_are_round(chromium, sweep_table):
+    """The labels of a logarithmic axis are round numbers that cover the axis.
+
+    Earlier an axis from 0.05 to 3 had labels only above 0.5.
+    """
+    chromium.opened(page_html(sweep_table))
     for ends, labels in (
         ((0.05, 3), [0.05, 0.1, 0.2, 0.5, 1, 2]),
         ((0.9, 40), [1, 2, 5, 10, 20]),
@@ -236,68 +259,71 @@ def test_exact_labels_of_a_logarithmic_axis_are_numbers_that_people_read(chromiu
     assert not chromium.faults
 
 
-def test_exact_values_over_two_decades_have_a_logarithmic_axis_and_what_misses_the_tolerance_is_hollow(
-    chromium, table
-):
-    amplitude = table["measures"][AMPLITUDE]
+def test_exact_wide_range_has_logarithmic_axis_with_hollow_marks(chromium, sweep_table):
+    """Values over more than two decades have a logarithmic axis, and cases that miss the tolerance have hollow marks.
+
+    A negative value makes the axis linear.
+    """
+    amplitude = sweep_table["measures"][AMPLITUDE]
     amplitude["values"] = 1e-9 * 4.0 ** np.arange(12)
-    # the bars go below 0
+    # the error bars of the first cases extend below 0
     amplitude["errors"] = amplitude["values"] * np.where(np.arange(12) < 3, 2.0, 1e-3)
-    text = page_html(table | {"tolerance": 0.01})
+    text = page_html(sweep_table | {"tolerance": 0.01})
     assert text.count(
         "<td class=n data-over>"
     ) == 3 and "3 of 12 cases miss the tolerance of 1 %" in own_part(text)
-    held = """Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"""
-    hollow = f"""{held}.renderers.filter((r) => r.glyph.type === 'Scatter').flatMap((r) =>
+    figure = """Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"""
+    hollow = f"""{figure}.renderers.filter((r) => r.glyph.type === 'Scatter').flatMap((r) =>
         r.data_source.get_array('fill')).filter((c) => c === pictures.ink('--paper')).length"""
     for dark in (False, True):
         chromium.opened(text, dark=dark)
         assert chromium.js("document.getElementById('log').checked") is True
-        assert chromium.js(f"{held}.y_scale.type") == "LogScale"
+        assert chromium.js(f"{figure}.y_scale.type") == "LogScale"
         assert chromium.js(hollow) == 3 and not chromium.faults
     chromium.js("document.getElementById('log').click()")
     chromium.settled()
-    assert chromium.js(f"{held}.y_scale.type") == "LinearScale" and not chromium.faults
-    amplitude["values"] = amplitude["values"] - 2e-9  # one is negative
-    chromium.opened(page_html(table))
+    assert chromium.js(f"{figure}.y_scale.type") == "LinearScale" and not chromium.faults
+    amplitude["values"] = amplitude["values"] - 2e-9  # one value is negative
+    chromium.opened(page_html(sweep_table))
     assert chromium.js("document.getElementById('log').checked") is False
 
 
-def test_exact_the_axis_can_be_switched_and_no_band_leaves_it(chromium, table):
-    """A band drawn for a wider page once stayed on a phone, beyond the axes."""
-    held = "Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"
-    for key in table["keys"]:
+def test_exact_axis_scale_can_be_switched(chromium, sweep_table):
+    """The scale of the axis can be switched, and no error band extends beyond the axes on a narrow screen."""
+    figure = "Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"
+    for key in sweep_table["keys"]:
         key["log"] = True
-    chromium.opened(page_html(table), width=420)
+    chromium.opened(page_html(sweep_table), width=420)
     scales = []
     for _ in range(2):
-        scales.append(chromium.js(f"{held}.x_scale.type"))
+        scales.append(chromium.js(f"{figure}.x_scale.type"))
         chromium.js("document.getElementById('log-along').click()")
         chromium.settled()
     assert scales == ["LogScale", "LinearScale"] and not chromium.faults
-    kinds = chromium.js(f"[...{held}.references()].map((one) => one.type)")
+    kinds = chromium.js(f"[...{figure}.references()].map((one) => one.type)")
     assert "VArea" in kinds and "Band" not in kinds
     assert chromium.js("document.documentElement.scrollWidth") <= 420
 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("shown", ["lines", "map", "cloud"])
-def test_always_a_browser_draws_it(table, browser, shown):
-    table["grid"] = shown != "cloud"
-    text = page_html(table)
+def test_always_browser_draws_lines_map_and_cloud(sweep_table, load_page, shown):
+    """A browser draws a sweep as lines, as a map and as a cloud, and its caption states the highest value."""
+    sweep_table["grid"] = shown != "cloud"
+    text = page_html(sweep_table)
     if shown == "map":
-        turn = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
-        text = text.replace("</body>", f"<script>{LATER.format(turn)}</script></body>")
-    seen = browser(text)
-    words = re.search(r'<p id="?means"?[^>]*>(.*?)</p>', seen, re.S)[1]
-    # grid: the loads are lines of their own, so the highest is that of 40 N at 1 mrad: 1e-5 * 5 * 4 = 200 um
-    where = "" if shown == "cloud" else ", normal.load 40 N"
-    assert f"highest value 200.0 ± 2.0 um at contact.tilt.angle 1 mrad{where}" in words
-    assert "2 of 12 cases did not settle" in words
-    assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
+        script = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
+        text = text.replace("</body>", f"<script>{LATER.format(script)}</script></body>")
+    document = load_page(text)
+    caption = re.search(r'<p id="?means"?[^>]*>(.*?)</p>', document, re.S)[1]
+    # in a grid each load is a line; the highest is that of 40 N at 1 mrad, 1e-5 * 5 * 4 = 200 um
+    load_text = "" if shown == "cloud" else ", normal.load 40 N"
+    assert f"highest value 200.0 ± 2.0 um at contact.tilt.angle 1 mrad{load_text}" in caption
+    assert "2 of 12 cases did not settle" in caption
+    assert re.search(r'<div id="?chart"?[^>]*>\s*<div', document), "no picture in its place"
 
 
-SPANS = {  # measures, cases that count, the sentence
+SPANS = {  # measures, steady cases, and the sentence about the range
     "the first measure that has values, with its largest relative error": (
         {
             "loop_area": ([NAN] * 3, [NAN] * 3, "J"),
@@ -341,12 +367,17 @@ SPANS = {  # measures, cases that count, the sentence
 
 
 @pytest.mark.parametrize("measures, settled, sentence", SPANS.values(), ids=SPANS)
-def test_exact_the_span_of_the_settled_cases(measures, settled, sentence):
+def test_exact_range_of_steady_cases(measures, settled, sentence):
+    """The sentence about the range of a measure states the extremes of the steady cases.
+
+    It also states their largest relative error.
+    """
     settled = np.array(settled)
     assert span_sentence(measures, dict.fromkeys(measures, settled), settled) == sentence
 
 
-def test_exact_the_span_of_the_only_case_that_meets_the_tolerance_says_so():
+def test_exact_range_of_single_case_within_tolerance():
+    """If a single case meets the tolerance, the sentence gives its value and states that it is the only one."""
     measures = {AMPLITUDE: ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
     within = {AMPLITUDE: np.array([False, True])}
     assert span_sentence(measures, within, np.ones(2, bool)) == (
@@ -355,49 +386,56 @@ def test_exact_the_span_of_the_only_case_that_meets_the_tolerance_says_so():
     )
 
 
-def test_exact_a_fraction_has_percent_in_sentence_table_and_picture():
+def test_exact_fractions_are_given_in_percent():
+    """A fraction is given in per cent in the sentence, the table and the charts."""
     values = np.array([1.0, 0.2193, 0.1231])
     measures = {"contact_fraction": (values, np.zeros(3), "1")}
-    every = np.ones(3, bool)
+    all_cases = np.ones(3, bool)
     assert (
-        span_sentence(measures, {"contact_fraction": every}, every, ("contact_fraction",))
+        span_sentence(measures, {"contact_fraction": all_cases}, all_cases, ("contact_fraction",))
         == "Contact fraction ranges from 12.31 % to 100 %."
     )
     tilt = swept_key("contact.tilt.angle", [0, 1e-4, 2e-4], "rad")
     text = page_html(swept_table([tilt], {"contact_fraction": swept_measure(values)}))
-    (shown,) = data_of(text)["measures"]
-    assert shown["unit"] == "%" and shown["values"] == pytest.approx([100, 21.93, 12.31])
+    (measure,) = data_of(text)["measures"]
+    assert measure["unit"] == "%" and measure["values"] == pytest.approx([100, 21.93, 12.31])
     assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
 
 
-def test_exact_sweeps_side_by_side_keep_the_numbers_of_their_cases(table):
-    other = table | {
-        "measures": {"contact_fraction": table["measures"]["contact_fraction"]},
+def test_exact_joined_sweeps_keep_case_numbers(sweep_table):
+    """Two sweeps joined in one table keep the order, messages and values of their cases."""
+    other = sweep_table | {
+        "measures": {"contact_fraction": sweep_table["measures"]["contact_fraction"]},
         "outcome": ["steady"] * 12,
         "messages": {0: "another"},
-        "keys": table["keys"][::-1],
+        "keys": sweep_table["keys"][::-1],
     }
-    joined = join_tables([table, other], ["one", "other"])
+    joined = join_tables([sweep_table, other], ["one", "other"])
     assert joined["messages"] == {7: "normal.load: <refused>", 12: "another"}
-    assert joined["outcome"] == table["outcome"] + other["outcome"]
+    assert joined["outcome"] == sweep_table["outcome"] + other["outcome"]
     np.testing.assert_array_equal(
         joined["measures"][AMPLITUDE]["values"],
-        np.append(table["measures"][AMPLITUDE]["values"], np.full(12, np.nan)),
+        np.append(sweep_table["measures"][AMPLITUDE]["values"], np.full(12, np.nan)),
     )
     keys = {key["name"]: key for key in joined["keys"]}
-    for key in table["keys"]:
-        both = keys[key["name"]]
-        np.testing.assert_array_equal(both["values"], np.tile(key["values"], 2))
-        assert list(both["texts"]) == key["texts"] * 2
+    for key in sweep_table["keys"]:
+        joined_key = keys[key["name"]]
+        np.testing.assert_array_equal(joined_key["values"], np.tile(key["values"], 2))
+        assert list(joined_key["texts"]) == key["texts"] * 2
 
 
-def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
-    """Each sweep numbers its words as they come: with coulomb first in one and tanh in the other both were 0."""
+def test_exact_joined_sweeps_share_word_numbers(sweep_table):
+    """Each word has one number in the table of several sweeps.
+
+    Earlier two sweeps with different first words gave both the number 0.
+    """
     laws = [
         swept_key("friction.law", np.arange(12) % 2, texts=list(words))
         for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)
     ]
-    joined = join_tables([table | {"keys": [law]} for law in laws], ["one", "other"])["keys"][1]
+    joined = join_tables([sweep_table | {"keys": [law]} for law in laws], ["one", "other"])["keys"][
+        1
+    ]
     numbers = dict(zip(joined["texts"], joined["values"]))
     assert numbers == {"coulomb": 0, "tanh": 1, "iwan": 2}
     assert [numbers[text] for text in joined["texts"]] == list(joined["values"])
@@ -419,12 +457,14 @@ def test_exact_a_word_has_one_number_on_the_page_of_several_sweeps(table):
         ((0.0, 1.0, 9.0), False),
     ],
 )
-def test_exact_an_axis_of_a_decade_or_more_is_logarithmic(values, log):
+def test_exact_axis_of_a_decade_is_logarithmic(values, log):
+    """An axis of at least one decade is logarithmic, also if one value is 0, but not if values are evenly spaced."""
     assert suits_log_axis(values) is log
 
 
-def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
-    text = page_html(table)
+def test_always_old_browser_shows_notice(chromium, sweep_table):
+    """A browser that cannot decompress the data of a page shows a notice."""
+    text = page_html(sweep_table)
     chromium.opened(text)
     assert chromium.js("document.getElementById('old').hidden") and not chromium.faults
     chromium._to(
@@ -436,35 +476,41 @@ def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
     assert chromium.js("document.getElementById('old').offsetHeight") > 0 and not chromium.faults
 
 
-def test_always_a_page_can_be_heard(table):
-    """The sliders of the player had no name once: their labels named the value that stood before them."""
-    assert unheard(page_html(table)) == []
+def test_always_page_is_accessible_to_screen_readers(sweep_table):
+    """Pages have a language, labelled inputs and images, table scopes and ordered headings for screen readers.
+
+    A page without them is reported with each fault.
+    """
+    assert unheard(page_html(sweep_table)) == []
     assert unheard(library.read_file("player.html")) == []
     assert (
         unheard(document_html("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))]))
         == []
     )
-    bad = "<html><h1>a</h1><h3>b</h3><label>c <output></output><input></label><svg></svg><th>d</th>"
-    assert unheard(bad) == ["<html>", "<input>", "<svg>", "<th>", "h1 before h3"]
+    faulty_page = (
+        "<html><h1>a</h1><h3>b</h3><label>c <output></output><input></label><svg></svg><th>d</th>"
+    )
+    assert unheard(faulty_page) == ["<html>", "<input>", "<svg>", "<th>", "h1 before h3"]
 
 
-def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, table):
-    seen = chromium.opened(page_html(table))
+def test_always_chart_is_operated_by_keyboard(chromium, sweep_table):
+    """A chart is one stop of the tab key; arrow keys move it, and + and 0 change its magnification."""
+    page = chromium.opened(page_html(sweep_table))
     stops = """(function all(node) { return [...node.querySelectorAll('*')].flatMap((one) =>
         [...(one.tabIndex >= 0 ? [one.id] : []), ...(one.shadowRoot ? all(one.shadowRoot) : [])]) })"""
-    assert seen.js(f"{stops}(document.getElementById('chart'))") == []
-    assert seen.js("document.getElementById('chart').tabIndex") == 0
-    assert seen.js("document.getElementById('chart').ariaDescription").startswith("arrow keys move")
+    assert page.js(f"{stops}(document.getElementById('chart'))") == []
+    assert page.js("document.getElementById('chart').tabIndex") == 0
+    assert page.js("document.getElementById('chart').ariaDescription").startswith("arrow keys move")
     ends = "(({start, end}) => [start, end])(Bokeh.documents.at(-1).roots()[0].y_range)"
-    low, high = seen.js(ends)
-    seen.js("document.getElementById('chart').focus()")
-    seen.pressed("+")
-    assert seen.js(ends) == pytest.approx([low + 0.1 * (high - low), high - 0.1 * (high - low)])
-    seen.pressed("ArrowUp")
-    assert seen.js(ends) == pytest.approx([low + 0.18 * (high - low), high - 0.02 * (high - low)])
-    seen.pressed("0")
-    assert seen.js(ends) == pytest.approx([low, high])
-    assert seen.faults == []
+    low, high = page.js(ends)
+    page.js("document.getElementById('chart').focus()")
+    page.pressed("+")
+    assert page.js(ends) == pytest.approx([low + 0.1 * (high - low), high - 0.1 * (high - low)])
+    page.pressed("ArrowUp")
+    assert page.js(ends) == pytest.approx([low + 0.18 * (high - low), high - 0.02 * (high - low)])
+    page.pressed("0")
+    assert page.js(ends) == pytest.approx([low, high])
+    assert page.faults == []
 
 
 HIDDEN = """[...document.querySelectorAll('.across,.wide,figure')].filter(
@@ -473,9 +519,8 @@ DOUBLE = """[...document.querySelectorAll('.across,.wide')].filter(
     (one) => one.scrollHeight > one.clientHeight + 1).length"""
 
 
-def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chromium):
-    """At 1400 px the cases were cut beside empty margins; at 420 px the changes scrolled within the page, meanings and
-    halves of pictures lay outside."""
+def test_always_tables_and_figures_fit_page_width(chromium):
+    """Tables and figures are not cut off on pages of 1400 and 420 pixels; only the table of cases scrolls."""
     rows = [
         [
             name,
@@ -485,7 +530,7 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
         ]
         for name in ("contact_half_width", "rotational_stiffness")
     ]
-    heads = ("measure", ">value", ">error", ">95 %", "unit", "what it is")
+    headers = ("measure", ">value", ">error", ">95 %", "unit", "what it is")
     cases = sheet(
         [
             "contact.tilt.angle",
@@ -503,20 +548,25 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
             Section(
                 "a",
                 "A",
-                sheet(heads, rows, "wide")
-                + sheet(heads, rows, "across many")
+                sheet(headers, rows, "wide")
+                + sheet(headers, rows, "across many")
                 + figure_html(1, svg, "A picture.", "A picture"),
             ),
             Section("cases", "Cases", cases),
         ],
     )
-    wide = chromium.opened(text, 1400)
-    assert wide.js(HIDDEN) == []
-    assert wide.js(DOUBLE) == 0
-    assert wide.js("document.body.scrollWidth") <= 1400
-    narrow = chromium.opened(text, 420)
-    assert [one for one in narrow.js(HIDDEN) if not one.startswith("contact.tilt.angle")] == []
-    assert narrow.js(DOUBLE) == 0 and narrow.js("document.documentElement.scrollWidth") <= 420
+    wide_page = chromium.opened(text, 1400)
+    assert wide_page.js(HIDDEN) == []
+    assert wide_page.js(DOUBLE) == 0
+    assert wide_page.js("document.body.scrollWidth") <= 1400
+    narrow_page = chromium.opened(text, 420)
+    assert [
+        label for label in narrow_page.js(HIDDEN) if not label.startswith("contact.tilt.angle")
+    ] == []
+    assert (
+        narrow_page.js(DOUBLE) == 0
+        and narrow_page.js("document.documentElement.scrollWidth") <= 420
+    )
 
 
 @pytest.mark.parametrize(
@@ -534,8 +584,8 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
         (None, ""),
     ],
 )
-def test_exact_the_page_says_what_a_click_on_a_case_opens(links, sentence):
-    """It promised to open cases of which nothing was kept, and opened raw JSON as if it were a page."""
+def test_exact_page_states_target_of_click(links, sentence):
+    """The page states whether a click on a case opens its page or its summary, or nothing if no case is stored."""
     keys = [swept_key("normal.load", [1, 2], "N")]
     text = page_html(
         swept_table(keys, {"loop_area": swept_measure([1, 2], unit="J")}, folders=links)
@@ -543,12 +593,13 @@ def test_exact_the_page_says_what_a_click_on_a_case_opens(links, sentence):
     assert sentence in text and ("Click on a case" in text) == bool(sentence)
 
 
-def test_exact_names_of_keys_break_behind_dots_and_the_table_of_cases_fits():
-    """structure.mode.axial.dampi/ng broke between its letters on a phone, and four keys with six measures did not fit a
-    screen of 1400 pixels; a column of round-off, 0 in every row, was among them."""
+def test_exact_key_names_break_after_dots():
+    """Names of keys break after their dots, and the table of cases has at most four measures and none of round-off."""
     names = ["friction.static", "normal.load", "drive.acceleration", "structure.mode.axial.damping"]
-    shown = "absolute_acceleration_peak friction_force_peak slip_amplitude friction_work loop_area"
-    measures = {name: swept_measure([1, 2]) for name in (AMPLITUDE, *shown.split())}
+    names_of_measures = (
+        "absolute_acceleration_peak friction_force_peak slip_amplitude friction_work loop_area"
+    )
+    measures = {name: swept_measure([1, 2]) for name in (AMPLITUDE, *names_of_measures.split())}
     measures["energy_balance"] = swept_measure([1e-16, 2e-16])
     keys = [swept_key(name, [1, 2], "N") for name in names]
     text = page_html(swept_table(keys, measures, title="Sweep of " + " × ".join(names), grid=False))

@@ -1,4 +1,4 @@
-"""Answers of a sweep as columnar files: what is written is read, what is damaged is run again, memory does not grow."""
+"""Results of a sweep in columnar files: they are read as written, and cases of damaged files run again."""
 
 import csv
 import shutil
@@ -23,78 +23,86 @@ TABLES = ("sweep.csv", "sweep.nc")
 
 
 @pytest.fixture(scope="module")
-def scene(tmp_path_factory):
+def scene_file(tmp_path_factory):
+    """Return the file of a rig under a base acceleration."""
     path = tmp_path_factory.mktemp("scene") / "rig.toml"
     path.write_text(RIG, encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
-def swept(scene):
-    """A sweep of 110 cases, ten of which are refused, with columns alone."""
-    out = scene.parent / "swept"
-    assert cli("sweep", scene, *OVER, "-o", out, "--keep", "none").code == 3
-    return out
+def swept_folder(scene_file):
+    """Return the folder of a sweep of 110 cases, ten of which are refused, stored only in columns."""
+    folder = scene_file.parent / "swept"
+    assert cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
+    return folder
 
 
-def some(count: int, seed: int) -> CaseResults:
-    """Answers of chance, with failed cases, measures that some have not and reasons."""
+def random_results(count: int, seed: int) -> CaseResults:
+    """Return random results with failed cases, missing measures and reasons."""
     rng = np.random.default_rng(seed)
-    found = CaseResults.blank(count)
-    found.outcome[:] = rng.choice(np.array(["steady", "stuck"], object), count)
+    results = CaseResults.blank(count)
+    results.outcome[:] = rng.choice(np.array(["steady", "stuck"], object), count)
     for name, unit in (("loop_area", "J"), ("onset_level", "m s-2")):
-        found.measure(name, unit)
-        for part in (found.values, found.errors, found.floors):
+        results.measure(name, unit)
+        for part in (results.values, results.errors, results.floors):
             part[name][:] = np.where(
                 rng.random(count) < 0.2, np.nan, 10 ** rng.uniform(-12, 3, count)
             )
-    found.fail(count - 1, "normal.load: must be ≥ 0")
-    found.reasons["onset_level"] = {0: "nothing slips", count - 1: "nothing slips"}
-    found.seconds[:] = rng.random(count).astype(np.float32)
-    return found
+    results.fail(count - 1, "normal.load: must be ≥ 0")
+    results.reasons["onset_level"] = {0: "nothing slips", count - 1: "nothing slips"}
+    results.seconds[:] = rng.random(count).astype(np.float32)
+    return results
 
 
-def same(found: CaseResults, want: CaseResults) -> None:
-    assert found.outcome.tolist() == want.outcome.tolist() and found.messages == want.messages
-    assert found.units == want.units and found.reasons == want.reasons
+def assert_results_equal(results: CaseResults, expected: CaseResults) -> None:
+    """Assert that the results of two sets of cases are equal."""
+    assert (
+        results.outcome.tolist() == expected.outcome.tolist()
+        and results.messages == expected.messages
+    )
+    assert results.units == expected.units and results.reasons == expected.reasons
     for part in ("values", "errors", "floors"):
-        for name in want.units:
-            np.testing.assert_array_equal(getattr(found, part)[name], getattr(want, part)[name])
-    np.testing.assert_array_equal(found.seconds, want.seconds)
+        for name in expected.units:
+            np.testing.assert_array_equal(
+                getattr(results, part)[name], getattr(expected, part)[name]
+            )
+    np.testing.assert_array_equal(results.seconds, expected.seconds)
 
 
 @pytest.mark.parametrize("count", [1, 7, 4096])
-def test_exact_a_file_gives_back_what_was_written(tmp_path, count):
+def test_exact_chunk_file_is_read_as_written(tmp_path, count):
+    """Results are read from a chunk file as they were written, with the names of the cases."""
     names = np.random.default_rng(count).integers(0, 2**64 - 1, count, np.uint64)
-    written = chunks.write_chunk(tmp_path, range(count), names, some(count, count))
-    found, read = chunks.read_chunk(tmp_path / written)
-    np.testing.assert_array_equal(found, names)
-    same(read, some(count, count))
-    assert [one.name for one in tmp_path.iterdir()] == [written]
+    written = chunks.write_chunk(tmp_path, range(count), names, random_results(count, count))
+    read_names, results = chunks.read_chunk(tmp_path / written)
+    np.testing.assert_array_equal(read_names, names)
+    assert_results_equal(results, random_results(count, count))
+    assert [path.name for path in tmp_path.iterdir()] == [written]
 
 
-def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
-    """Of files with cases of other sweeps, a case that stands twice, and one that two files have: the later counts."""
+def test_exact_cases_are_read_by_name(tmp_path):
+    """Cases are read by name in any order, also if requested twice; of two files with one case the later counts."""
     names = np.arange(1, 12, dtype=np.uint64) ** 5
-    first = some(6, 1)
-    second = some(5, 2)
+    first = random_results(6, 1)
+    second = random_results(5, 2)
     chunks.write_chunk(tmp_path, range(6), names[:6], first)
     chunks.write_chunk(tmp_path, range(6, 11), names[[5, 7, 8, 9, 10]], second)
-    wanted = Chunks(tmp_path, names[[9, 2, 0, 9, 5, 6]])
-    wanted.look()
-    assert (wanted.held >= 0).tolist() == [True] * 5 + [False]
+    stored = Chunks(tmp_path, names[[9, 2, 0, 9, 5, 6]])
+    stored.look()
+    assert (stored.held >= 0).tolist() == [True] * 5 + [False]
     total = CaseResults.blank(6)
-    for at, part in wanted.parts(np.arange(6)):
-        total.insert(at, part)
-    want = [second.values["loop_area"][k] for k in (3, 0)]
+    for indices, part in stored.parts(np.arange(6)):
+        total.insert(indices, part)
+    expected = [second.values["loop_area"][k] for k in (3, 0)]
     np.testing.assert_array_equal(
         total.values["loop_area"],
         [
-            want[0],
+            expected[0],
             first.values["loop_area"][2],
             first.values["loop_area"][0],
-            want[0],
-            want[1],
+            expected[0],
+            expected[1],
             np.nan,
         ],
     )
@@ -104,54 +112,58 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     }
 
 
-def test_exact_small_files_are_packed(tmp_path):
+def test_exact_small_files_are_merged(tmp_path):
+    """A hundred small files are merged into one; a file of another sweep stays, unless the folder is cleaned."""
     names = np.arange(300, dtype=np.uint64) * 7919
-    found = some(300, 5)
+    results = random_results(300, 5)
     for first in range(0, 300, 3):
         chunks.write_chunk(
             tmp_path,
             range(first, first + 3),
             names[first : first + 3],
-            found.select(np.arange(first, first + 3)),
+            results.select(np.arange(first, first + 3)),
         )
-    foreign = chunks.write_chunk(tmp_path, [0], np.array([3], np.uint64), some(1, 3))
-    wanted = Chunks(tmp_path, names)
-    wanted.look()
-    wanted.pack(False)
-    # another sweep's, gone on with
-    assert len(list(tmp_path.iterdir())) == 2 and (tmp_path / foreign).exists()
-    wanted.look()
-    ((at, part),) = wanted.parts(np.arange(300))
-    assert at.tolist() == list(range(300))
-    same(part, found)
-    wanted.pack(True)
-    assert not (tmp_path / foreign).exists()
+    other_file = chunks.write_chunk(tmp_path, [0], np.array([3], np.uint64), random_results(1, 3))
+    stored = Chunks(tmp_path, names)
+    stored.look()
+    stored.pack(False)
+    # the file of another sweep stays, because that sweep may be continued
+    assert len(list(tmp_path.iterdir())) == 2 and (tmp_path / other_file).exists()
+    stored.look()
+    ((indices, part),) = stored.parts(np.arange(300))
+    assert indices.tolist() == list(range(300))
+    assert_results_equal(part, results)
+    stored.pack(True)
+    assert not (tmp_path / other_file).exists()
 
 
-def test_exact_a_sweep_of_columns_has_the_rows_of_one_with_summaries(swept, scene, tmp_path):
-    """And at most 600 bytes a case of them, though a file has its own size."""
-    assert cli("sweep", scene, *OVER, "-o", tmp_path / "a").code == 3
-    assert sorted(one.name for one in swept.iterdir()) == [
+def test_exact_columns_and_summaries_give_equal_tables(swept_folder, scene_file, tmp_path):
+    """A sweep stored in columns has the same rows as one stored with summaries, in less than 600 bytes per case."""
+    assert cli("sweep", scene_file, *OVER, "-o", tmp_path / "a").code == 3
+    assert sorted(entry.name for entry in swept_folder.iterdir()) == [
         "chunks",
         "report.html",
         "sweep.csv",
         "sweep.json",
         "sweep.nc",
     ]
-    own, other = (
-        list(csv.DictReader(open(place / "sweep.csv", encoding="utf-8", newline="")))
-        for place in (swept, tmp_path / "a")
+    rows, expected = (
+        list(csv.DictReader(open(folder / "sweep.csv", encoding="utf-8", newline="")))
+        for folder in (swept_folder, tmp_path / "a")
     )
-    assert len(own) == 110
-    assert [one | {"case": row["case"]} for one, row in zip(own, other)] == other
-    assert sum(one.stat().st_size for one in (swept / "chunks").iterdir()) < 600 * 110
+    assert len(rows) == 110
+    assert [entry | {"case": row["case"]} for entry, row in zip(rows, expected)] == expected
+    assert sum(entry.stat().st_size for entry in (swept_folder / "chunks").iterdir()) < 600 * 110
 
 
 @pytest.mark.share(2, 3)
 @pytest.mark.parametrize("damage", ["empty", "half", "one byte", "another sign"])
-def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch, damage):
-    out = shutil.copytree(swept, tmp_path / "out")
-    for path in list((out / "chunks").iterdir()):
+def test_always_cases_of_damaged_file_run_again(
+    swept_folder, scene_file, tmp_path, monkeypatch, damage
+):
+    """If all chunk files are damaged, all cases run again and the tables are the same."""
+    folder = shutil.copytree(swept_folder, tmp_path / "out")
+    for path in list((folder / "chunks").iterdir()):
         data = bytearray(path.read_bytes())
         data[len(data) // 2] ^= 1
         path.write_bytes(
@@ -164,61 +176,61 @@ def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch,
         if damage == "another sign":
             path.rename(path.with_stem(path.stem[:-4] + "0000"))
     computed = ComputedCases(monkeypatch)
-    assert cli("sweep", scene, *OVER, "-o", out, "--resume", "--keep", "none").code == 3
+    assert cli("sweep", scene_file, *OVER, "-o", folder, "--resume", "--keep", "none").code == 3
     assert len(computed) == 110
     for name in TABLES:
-        assert (out / name).read_bytes() == (swept / name).read_bytes()
+        assert (folder / name).read_bytes() == (swept_folder / name).read_bytes()
 
 
-def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monkeypatch):
-    """As sweeps were kept before they had columns; a summary that is damaged is run again."""
-    out = tmp_path / "out"
-    words = ("sweep", scene, *OVER, "-o", tmp_path / "out")
-    assert cli(*words).code == 3
-    before = {name: (out / name).read_bytes() for name in TABLES}
-    shutil.rmtree(out / "chunks")
-    (next((out / "cases").iterdir()) / "summary.json").write_text("{")
+def test_exact_sweep_with_only_summaries_is_resumed(scene_file, tmp_path, monkeypatch):
+    """A sweep that is stored only in summaries, as in older versions, is resumed; a damaged summary runs again."""
+    folder = tmp_path / "out"
+    arguments = ("sweep", scene_file, *OVER, "-o", tmp_path / "out")
+    assert cli(*arguments).code == 3
+    before = {name: (folder / name).read_bytes() for name in TABLES}
+    shutil.rmtree(folder / "chunks")
+    (next((folder / "cases").iterdir()) / "summary.json").write_text("{")
     computed = ComputedCases(monkeypatch)
-    assert cli(*words, "--resume").code == 3 and len(computed) == 1
-    assert {name: (out / name).read_bytes() for name in TABLES} == before
+    assert cli(*arguments, "--resume").code == 3 and len(computed) == 1
+    assert {name: (folder / name).read_bytes() for name in TABLES} == before
 
 
-def test_always_who_does_not_see_the_folder_hands_its_answers_on(
-    swept, scene, tmp_path, monkeypatch
+def test_always_worker_without_folder_returns_results(
+    swept_folder, scene_file, tmp_path, monkeypatch
 ):
-    """As a worker of a cluster without a common disk; there may even be a folder of the same name."""
+    """A worker that cannot write to the folder, as on a cluster without a common disk, returns its results."""
     monkeypatch.setattr("patchfem.export.sweeps.folder.Writer.__call__", lambda *given: False)
-    assert cli("sweep", scene, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
+    assert cli("sweep", scene_file, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
     for name in TABLES:
-        assert (tmp_path / "out" / name).read_bytes() == (swept / name).read_bytes()
+        assert (tmp_path / "out" / name).read_bytes() == (swept_folder / name).read_bytes()
 
 
-@pytest.mark.parametrize("older", [False, True])
-def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_there(
-    scene, tmp_path, older
-):
-    out = tmp_path / "out"
-    if older:
-        out.mkdir()
-        (out / "sweep.csv").write_text("older", encoding="utf-8")
-    with limited(200):  # the summary of a case wants some kB
-        found = cli("sweep", scene, "--over", "drive.acceleration=1 g,2 g", "-o", out)
-    assert found.code == 4 and "a case cannot be written" in found.err
-    assert [place.read_text() for place in tmp_path.rglob("*") if place.is_file()] == [
+@pytest.mark.parametrize("has_older_file", [False, True])
+def test_refuses_sweep_without_disk_space(scene_file, tmp_path, has_older_file):
+    """A sweep without disk space for its first case ends with code 4 and leaves the folder as it was."""
+    folder = tmp_path / "out"
+    if has_older_file:
+        folder.mkdir()
+        (folder / "sweep.csv").write_text("older", encoding="utf-8")
+    with limited(200):  # the summary of a case needs a few kB
+        answer = cli("sweep", scene_file, "--over", "drive.acceleration=1 g,2 g", "-o", folder)
+    assert answer.code == 4 and "a case cannot be written" in answer.err
+    assert [path.read_text() for path in tmp_path.rglob("*") if path.is_file()] == [
         "older"
-    ] * older
-    assert [place.name for place in tmp_path.rglob("*") if place.is_dir()] == ["out"] * older
+    ] * has_older_file
+    assert [path.name for path in tmp_path.rglob("*") if path.is_dir()] == ["out"] * has_older_file
 
 
-def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monkeypatch):
+def test_exact_columns_on_disk_give_equal_tables(swept_folder, scene_file, tmp_path, monkeypatch):
+    """A sweep whose columns are kept on disk has the same tables as one with its columns in memory."""
     monkeypatch.setattr(kept, "MIN_CASES_ON_DISK", 10)
     monkeypatch.setattr(chunks, "MAX_CASES_PER_FILE", 16)
     monkeypatch.setattr(sweep, "MAX_CASES_PER_CHUNK", 16)
-    out = tmp_path / "out"
-    assert cli("sweep", scene, *OVER, "-o", out, "--keep", "none").code == 3
+    folder = tmp_path / "out"
+    assert cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
     for name in TABLES:
-        assert (out / name).read_bytes() == (swept / name).read_bytes()
-    assert 7 <= len(list((out / "chunks").iterdir())) <= 14
+        assert (folder / name).read_bytes() == (swept_folder / name).read_bytes()
+    assert 7 <= len(list((folder / "chunks").iterdir())) <= 14
     total = CaseResults.blank(11, tmp_path)
     total.measure("loop_area", "J")
     assert isinstance(total.values["loop_area"], kept.ArrayOnDisk)
@@ -230,4 +242,4 @@ def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monk
         == (11, 1)
         == np.shape(total.values["loop_area"].reshape((11, 1)))
     )
-    assert not [one for one in Path(tmp_path).iterdir() if one.name != "out"]
+    assert not [path for path in Path(tmp_path).iterdir() if path.name != "out"]

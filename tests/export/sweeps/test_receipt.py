@@ -1,4 +1,4 @@
-"""A whole sweep that is resumed is there at once, and only while nothing it is made of has changed."""
+"""Resuming a finished sweep returns at once, unless a file or an argument of it has changed."""
 
 import csv
 import os
@@ -19,18 +19,21 @@ assert not {"numpy", "pydantic", "h5py", "numba"} & set(sys.modules)"""
 
 
 @pytest.fixture(scope="module")
-def swept(tmp_path_factory):
+def finished_sweep(tmp_path_factory):
+    """Return the scene, the results folder and the answer of a finished sweep."""
     scene = tmp_path_factory.mktemp("receipt") / "rig.toml"
     scene.write_text(POINT + COULOMB + SHORT, encoding="utf-8")
     return scene, scene.parent / "out", cli("sweep", scene, *OVER, "-o", scene.parent / "out")
 
 
-def words(*over) -> tuple:
+def request_words(*over) -> tuple:
+    """Return the words of a request with the given values of --over."""
     return (*over, "", "draw=0,0,0", "of=", "page=True")
 
 
-def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):
-    scene, out, first = swept
+def test_exact_finished_sweep_resumes_without_numpy(finished_sweep):
+    """A finished sweep that is resumed prints the same answer and does not import NumPy."""
+    scene, folder, answer = finished_sweep
     done = subprocess.run(
         [
             sys.executable,
@@ -40,28 +43,31 @@ def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):
             scene,
             *OVER,
             "-o",
-            out,
+            folder,
             "--resume",
         ],
         capture_output=True,
         text=True,
         check=True,
     )
-    assert first.code == 0 and done.stdout == first.out
-    told = cli("sweep", scene, *OVER, "-o", out, "--resume", "--json")
-    assert '"cases": 3' in told.out and told.code == 0
+    assert answer.code == 0 and done.stdout == answer.out
+    answer_json = cli("sweep", scene, *OVER, "-o", folder, "--resume", "--json")
+    assert '"cases": 3' in answer_json.out and answer_json.code == 0
 
 
 @pytest.mark.parametrize("change", ["chunk", "table", "gone", "scene", "words", "page"])
-def test_always_whatever_has_changed_is_looked_at(swept, change):
-    scene, out, _ = swept
-    assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 0
+def test_always_change_invalidates_manifest(finished_sweep, change):
+    """The manifest of a sweep is not used after a change of a chunk, a table, the scene or the arguments."""
+    scene, folder, _ = finished_sweep
+    assert cli("sweep", scene, *OVER, "-o", folder, "--resume").code == 0
     over = OVER[1]
     assert (
-        manifest.read_manifest(out, manifest.hash_request(scene, words(over)))["cases"]["count"]
+        manifest.read_manifest(folder, manifest.hash_request(scene, request_words(over)))["cases"][
+            "count"
+        ]
         == 3
     )
-    file = next((out / "chunks").glob("*.h5")) if change == "chunk" else out / "sweep.csv"
+    file = next((folder / "chunks").glob("*.h5")) if change == "chunk" else folder / "sweep.csv"
     text = scene.read_text("utf-8")
     stamp = file.stat()
     if change in ("chunk", "table"):
@@ -70,24 +76,25 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
         file.unlink()
     if change == "scene":
         scene.write_text(text + "# more\n", encoding="utf-8")
-    asked = (
+    request = (
         (over + ",0.5", "", "draw=0,0,0", "page=True")
         if change == "words"
         else (over, "", "draw=0,0,0", "page=False")
         if change == "page"
-        else words(over)
+        else request_words(over)
     )
-    assert manifest.read_manifest(out, manifest.hash_request(scene, asked)) == {}
+    assert manifest.read_manifest(folder, manifest.hash_request(scene, request)) == {}
     scene.write_text(text, encoding="utf-8")
-    # it is whole again, and has its receipt
-    again = cli("sweep", scene, *OVER, "-o", out, "--resume")
-    assert again.code == 0 and manifest.read_manifest(
-        out, manifest.hash_request(scene, words(over))
+    # the sweep is complete again and has its manifest
+    answer = cli("sweep", scene, *OVER, "-o", folder, "--resume")
+    assert answer.code == 0 and manifest.read_manifest(
+        folder, manifest.hash_request(scene, request_words(over))
     )
 
 
-def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
-    scene, *_ = swept
+def test_exact_failed_case_prevents_manifest(finished_sweep, tmp_path):
+    """A sweep with a failed case has no manifest."""
+    scene, *_ = finished_sweep
     assert (
         cli(
             "sweep",
@@ -109,7 +116,7 @@ BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
 
 @pytest.mark.share(0, 3, 5, 6)
 @pytest.mark.parametrize(
-    "table, words",
+    "table, arguments",
     [
         ('[sweep]\n"slide.file" = "one.csv,two.csv"\n', ()),
         ("", ("--cases", "cases.csv")),
@@ -118,11 +125,14 @@ BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
     ],
     ids=["sweep", "cases", "set", "table"],
 )
-@pytest.mark.parametrize("whole", [True, False])
-def test_always_a_file_that_a_sweep_names_anywhere_counts(
-    tmp_path, monkeypatch, table, words, whole
+@pytest.mark.parametrize("has_manifest", [True, False])
+def test_always_change_of_referenced_file_runs_again(
+    tmp_path, monkeypatch, table, arguments, has_manifest
 ):
-    """The older answers were told after two.csv had changed."""
+    """A sweep runs again after a change of a file that its scene or its arguments name.
+
+    Earlier the older results were returned.
+    """
     monkeypatch.chdir(tmp_path)
     rows = "time [s],displacement [um]\n0,0\n1,{}\n2,0\n"
     for name, text in (
@@ -133,29 +143,31 @@ def test_always_a_file_that_a_sweep_names_anywhere_counts(
     ):
         (tmp_path / name).write_text(text, encoding="utf-8")
 
-    def last() -> float:
-        done = cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out", "--resume")
+    def run_sweep() -> float:
+        """Run or resume the sweep and return the slip amplitude of its last case."""
+        done = cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out", "--resume")
         assert done.code == 0, done.err
         with open("out/sweep.csv", encoding="utf-8", newline="") as file:
             return float(list(csv.DictReader(file))[-1]["slip_amplitude"])
 
-    first = last()
+    first_amplitude = run_sweep()
     (tmp_path / "two.csv").write_text(rows.format(20), encoding="utf-8")
-    if not whole:
+    if not has_manifest:
         (tmp_path / "out" / manifest.MANIFEST_NAME).unlink()
-    if "--set" in words:  # of all cases: the folder is that of another scene
-        told = cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out", "--resume")
-        assert told.code == 2 and "contains a sweep of another scene" in told.err
-        assert cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out").code == 0
-    assert last() == pytest.approx(2 * first, rel=1e-9)
+    if "--set" in arguments:  # --set changes all cases, so the folder belongs to another scene
+        refused = cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out", "--resume")
+        assert refused.code == 2 and "contains a sweep of another scene" in refused.err
+        assert cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out").code == 0
+    assert run_sweep() == pytest.approx(2 * first_amplitude, rel=1e-9)
 
 
-def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
-    scene, *_ = swept
-    other = scene.parent / "push.csv"
-    other.write_text("1", encoding="utf-8")
-    before = manifest.hash_request(scene, words('drive.file="push.csv"'))
-    other.write_text("2", encoding="utf-8")
-    assert before != manifest.hash_request(scene, words('drive.file="push.csv"'))
-    assert manifest.hash_request(scene.parent / "none.toml", words()) == ""
+def test_always_hash_includes_contents_of_files(finished_sweep):
+    """The hash of a request includes the contents of the files that its arguments name."""
+    scene, *_ = finished_sweep
+    table_file = scene.parent / "push.csv"
+    table_file.write_text("1", encoding="utf-8")
+    before = manifest.hash_request(scene, request_words('drive.file="push.csv"'))
+    table_file.write_text("2", encoding="utf-8")
+    assert before != manifest.hash_request(scene, request_words('drive.file="push.csv"'))
+    assert manifest.hash_request(scene.parent / "none.toml", request_words()) == ""
     assert manifest.read_manifest(scene.parent, "") == {}
