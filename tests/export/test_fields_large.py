@@ -175,7 +175,7 @@ def framewise_writing(monkeypatch):
     monkeypatch.setattr(vtkhdf, "MIN_FRAMEWISE_BYTES", 0)
 
 
-@pytest.mark.usefixtures("always_large")
+@pytest.mark.usefixtures("framewise_writing")
 def test_exact_large_series_has_rounded_frames(tmp_path):
     """A series written frame by frame contains every frame, rounded to the stated number of bits."""
     small = write_small(tmp_path / "out", 5)
@@ -227,7 +227,7 @@ def test_always_killed_writer_leaves_complete_frames(tmp_path):
     assert number == count - 1
 
 
-@pytest.mark.usefixtures("always_large")
+@pytest.mark.usefixtures("framewise_writing")
 def test_always_exported_series_is_compact(tmp_path):
     """An exported series takes at most 1.15 times the space of the fields file, with equal numbers.
 
