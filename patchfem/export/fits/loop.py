@@ -37,11 +37,9 @@ def describe_loop_fit(fit: FittedLoop, folder: Path) -> FitFiles:
     rms = format_quantity(fit_data["rms"], fit_data["unit"], 4)
     details = [f"  rms of the residual   {rms}, {format_number(rms_fraction, 2)} of the peak"]
     if fit.loop.quantity == "force":
-        works = [
-            format_quantity(np.trapezoid(force, fit.loop.displacement), "J", 4)
-            for force in (fit.loop.reading, fit.model)
-        ]
-        details.append(f"  work over the record   {works[0]} measured, {works[1]} fitted")
+        work = np.trapezoid([fit.loop.reading, fit.model], fit.loop.displacement)
+        measured, fitted = (format_quantity(value, "J", 4) for value in work)
+        details.append(f"  work over the record   {measured} measured, {fitted} fitted")
     if fit_data["held"] is not None:
         held_out_score = fit_data["held"]
         rms = format_quantity(held_out_score["rms"], fit_data["unit"], 4)
