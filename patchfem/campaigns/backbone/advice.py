@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from ...effects import law_has_trait
 from ...formatting import format_length, format_quantity
 from .band import Band, forced_mode_ratio
 from .joint import Joint
@@ -57,6 +58,12 @@ def _describe_slip(joint: Joint, curve) -> list:
         return []
     edge = format_length(joint.slip_amplitude, 3)
     sentences = [f"A contact that sticks reaches its friction limit at {edge}."]
+    # Micro-slip has no onset: the smallest slider of a mesh or of a density sets where its loss begins.
+    model = joint.model
+    has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
+    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
+    if has_partial_slip or any(law_has_trait(law, "cells") for law in laws):
+        return sentences
     slips = curve.loss > ROUND_OFF_ERROR * joint.spring * (curve.amplitude / joint.reach) ** 2
     count = int(np.argmax(slips)) if slips.any() else curve.amplitude.size
     if count and not np.isnan(curve.loss).any():
