@@ -1,4 +1,4 @@
-"""A crowned piece pressed on a flat one of the same material: Hertz's line contact."""
+"""A crowned piece pressed on a flat piece of the same material, compared with Hertz's line contact."""
 
 from __future__ import annotations
 
@@ -11,50 +11,53 @@ from pieces import TITANIUM, bare, pair_of, refined_middle
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
 
-A = 0.1e-3  # half width wanted [m]
+HALF_WIDTH = 0.1e-3  # half-width of the contact [m]
 LOAD = 9107.0  # per metre of width [N/m]
-HALF_SPACE = {"strain": TITANIUM[0] / (1 - TITANIUM[1] ** 2), "stress": TITANIUM[0]}
+PLANE_MODULUS = {"strain": TITANIUM[0] / (1 - TITANIUM[1] ** 2), "stress": TITANIUM[0]}
 
 
-def radius(plane):
-    """R with a^2 = 4 P R / (pi E*), E* = E'/2 as both pieces are elastic."""
-    return np.pi * HALF_SPACE[plane] / 2 * A**2 / (4 * LOAD)
+def crown_radius(plane):
+    """Return the radius R of a^2 = 4 P R/(pi E*), with E* = E'/2 because both pieces are elastic."""
+    return np.pi * PLANE_MODULUS[plane] / 2 * HALF_WIDTH**2 / (4 * LOAD)
 
 
 @cache
-def pressed(per_half_width, plane="strain"):
-    grid = refined_middle(1.5 * A, A / per_half_width, 12.7e-3, 6e-3)
+def press_crown(per_half_width, plane="strain"):
+    """Return the grid and the contact state of the crowned pair."""
+    grid = refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, 12.7e-3, 6e-3)
     pair = pair_of(grid, bare(TITANIUM, plane), width=1.0)
-    return grid, press(pair, crown(grid.x, radius(plane)), LOAD)
+    return grid, press(pair, crown(grid.x, crown_radius(plane)), LOAD)
 
 
-def half_width(x, p):
-    """From the fit p^2 = A - B x^2 inside 0.8 a."""
-    inside = np.abs(x) < 0.8 * A
-    slope, top = np.polyfit(x[inside] ** 2, p[inside] ** 2, 1)
-    return np.sqrt(-top / slope)
+def fit_half_width(x, p):
+    """Return the contact half-width from a fit of p^2 = A - B x^2 inside 0.8 a."""
+    inside = np.abs(x) < 0.8 * HALF_WIDTH
+    slope, intercept = np.polyfit(x[inside] ** 2, p[inside] ** 2, 1)
+    return np.sqrt(-intercept / slope)
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
-def test_exact_hertz_peak_within_3e_4_and_half_width_within_5e_4(plane):
-    grid, state = pressed(16, plane)
-    peak = 2 * LOAD / (np.pi * A)
+def test_exact_hertz_peak_pressure_and_half_width(plane):
+    """Peak pressure and half-width agree with Hertz within 3e-4 and 5e-4 at 16 elements per half-width."""
+    grid, state = press_crown(16, plane)
+    peak = 2 * LOAD / (np.pi * HALF_WIDTH)
     assert state.sigma_n.max() == pytest.approx(peak, rel=3e-4)
-    assert half_width(grid.x, state.sigma_n) == pytest.approx(A, rel=5e-4)
-    inside = np.abs(grid.x) < 0.9 * A
-    hertz = peak * np.sqrt(1 - (grid.x[inside] / A) ** 2)
+    assert fit_half_width(grid.x, state.sigma_n) == pytest.approx(HALF_WIDTH, rel=5e-4)
+    inside = np.abs(grid.x) < 0.9 * HALF_WIDTH
+    hertz = peak * np.sqrt(1 - (grid.x[inside] / HALF_WIDTH) ** 2)
     assert np.abs(state.sigma_n[inside] - hertz).max() <= 8e-3 * peak
     assert state.residuals["force_balance"] <= 1e-10
-    assert np.abs(grid.x[state.sigma_n > 0]).max() <= A + A / 16
+    assert np.abs(grid.x[state.sigma_n > 0]).max() <= HALF_WIDTH + HALF_WIDTH / 16
 
 
-def test_order_hertz_pressure_in_the_mean_square_is_one():
+def test_order_of_hertz_pressure_error_is_one():
+    """The root-mean-square error of the pressure converges to Hertz with order one."""
     counts = np.array([8, 16, 32])
     errors = []
     for count in counts:
-        grid, state = pressed(int(count))
-        peak = 2 * LOAD / (np.pi * A)
-        hertz = peak * np.sqrt(np.maximum(1 - (grid.x / A) ** 2, 0))
+        grid, state = press_crown(int(count))
+        peak = 2 * LOAD / (np.pi * HALF_WIDTH)
+        hertz = peak * np.sqrt(np.maximum(1 - (grid.x / HALF_WIDTH) ** 2, 0))
         errors.append(
             np.sqrt(
                 grid.tributary_lengths()
@@ -67,16 +70,17 @@ def test_order_hertz_pressure_in_the_mean_square_is_one():
     assert errors[-1] <= 1.3e-2
 
 
-def test_exact_hertz_gap_outside_the_contact():
-    grid, state = pressed(32)
-    peak = 2 * LOAD / (np.pi * A)
-    x = grid.x[(grid.x > 1.1 * A) & (grid.x < 1.5 * A)] / A
-    opened = (
+def test_exact_hertz_gap_outside_contact():
+    """The gap outside the contact agrees with Hertz within 1 %."""
+    grid, state = press_crown(32)
+    peak = 2 * LOAD / (np.pi * HALF_WIDTH)
+    x = grid.x[(grid.x > 1.1 * HALF_WIDTH) & (grid.x < 1.5 * HALF_WIDTH)] / HALF_WIDTH
+    expected = (
         peak
-        * A
-        / HALF_SPACE["strain"]
+        * HALF_WIDTH
+        / PLANE_MODULUS["strain"]
         * 2
         * (x * np.sqrt(x**2 - 1) - np.log(x + np.sqrt(x**2 - 1)))
     )
-    found = state.gap[(grid.x > 1.1 * A) & (grid.x < 1.5 * A)]
-    assert np.abs(found / opened - 1).max() <= 1e-2
+    gap = state.gap[(grid.x > 1.1 * HALF_WIDTH) & (grid.x < 1.5 * HALF_WIDTH)]
+    assert np.abs(gap / expected - 1).max() <= 1e-2

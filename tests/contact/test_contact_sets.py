@@ -1,4 +1,4 @@
-"""The compiled search for contact sets against a unilateral solve at every motion."""
+"""The compiled search for contact sets compared with a unilateral solve at every rigid-body motion."""
 
 from functools import cache
 
@@ -18,8 +18,8 @@ PRESS = load("contact.press_kernels")
 
 
 @cache
-def crowned(cells: int = 40, radius: float = 50.0) -> tuple:
-    """(sets, pressure) of a crowned pair under the load of the rig."""
+def make_crowned_sets(cells: int = 40, radius: float = 50.0) -> tuple:
+    """Return the contact sets and the state of a crowned pair under the load of the rig."""
     pieces = coated_pair(cells)
     x = pieces.interface.x
     state = press(pieces, x**2 / (2 * radius), LOAD, 0.1 * LOAD * x[-1])
@@ -28,14 +28,14 @@ def crowned(cells: int = 40, radius: float = 50.0) -> tuple:
     return ContactSets(pieces.normal, x, opening, force > 0), state
 
 
-def compiled_sets(sets, room: float = 64e6) -> tuple:
-    """(arrays of the search, slot of the reference set)."""
-    kept = sets.make_arrays(room)
-    return kept, PRESS.build_first_set(kept, name_set(kept, sets.reference.in_contact))
+def make_search_arrays(sets, memory_limit: float = 64e6) -> tuple:
+    """Return the arrays of the search and the slot of the reference set."""
+    arrays = sets.make_arrays(memory_limit)
+    return arrays, PRESS.build_first_set(arrays, name_set(arrays, sets.reference.in_contact))
 
 
-def solved_at(sets, d: float, t: float) -> np.ndarray:
-    """Nodal forces (m,) [N] of a unilateral solve at an approach d [m] and a rotation t beyond the reference."""
+def solve_at_motion(sets, d: float, t: float) -> np.ndarray:
+    """Return the nodal forces (m,) [N] of a unilateral solve at an approach d [m] and a rotation t beyond the reference."""
     gap = sets.opening - d + t * sets.x
     return (
         np.zeros(sets.x.size)
@@ -44,56 +44,57 @@ def solved_at(sets, d: float, t: float) -> np.ndarray:
     )
 
 
-def check_state(sets, found: tuple, force, d: float, t: float, within: float) -> None:
-    """Require the forces of a unilateral solve, their load and moment, and the energy from its definition."""
-    load_, moment, energy = found
-    wanted = solved_at(sets, d, t)
-    assert np.abs(force - wanted).max() <= within * max(LOAD, wanted.max())
+def check_state(sets, totals: tuple, force, d: float, t: float, tolerance: float) -> None:
+    """Check force, load, moment and stored energy against a unilateral solve."""
+    load_, moment, energy = totals
+    expected = solve_at_motion(sets, d, t)
+    assert np.abs(force - expected).max() <= tolerance * max(LOAD, expected.max())
     assert (load_, moment) == pytest.approx(
-        (wanted.sum(), wanted @ sets.x), abs=within * (LOAD + wanted.sum())
+        (expected.sum(), expected @ sets.x), abs=tolerance * (LOAD + expected.sum())
     )
     stored = force @ sets.c @ force / 2 - sets.energy - d * sets.load + t * sets.moment
     assert energy == pytest.approx(
-        stored, abs=within * (sets.energy + abs(d) * sets.load + abs(energy))
+        stored, abs=tolerance * (sets.energy + abs(d) * sets.load + abs(energy))
     )
 
 
-def path(sets, state, count: int, size: float = 1.5):
-    """Motions (d, t) that lift off, come back and tilt to both sides."""
-    k = np.arange(count)
-    d = size * state.approach * np.sin(0.7 * k) - 0.2 * state.approach
-    return np.stack([d, size * state.approach / sets.x[-1] * np.sin(1.3 * k + 0.4)], axis=1)
+def motion_path(sets, state, n_points: int, scale: float = 1.5):
+    """Return motions (d, t) that separate the pieces, press them again and tilt them to both sides."""
+    k = np.arange(n_points)
+    d = scale * state.approach * np.sin(0.7 * k) - 0.2 * state.approach
+    return np.stack([d, scale * state.approach / sets.x[-1] * np.sin(1.3 * k + 0.4)], axis=1)
 
 
-@pytest.mark.parametrize("room", [64e6, 0.0])
-def test_exact_forces_are_those_of_the_solver(room):
-    """Along motions that change the set, lift off and return; room for 16 sets, or for all of them."""
-    sets, state = crowned()
-    kept, slot = compiled_sets(sets, room)
+@pytest.mark.parametrize("memory_limit", [64e6, 0.0])
+def test_exact_set_search_forces_equal_unilateral_solve(memory_limit):
+    """Forces along motions with separation and tilt equal those of a unilateral solve, whatever the memory limit."""
+    sets, state = make_crowned_sets()
+    arrays, slot = make_search_arrays(sets, memory_limit)
     force = np.zeros(sets.x.size)
-    apart = 0
-    for d, t in path(sets, state, 80):
-        slot = PRESS.find_set(kept, slot, d, t)
-        check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)
-        apart += not force.any()
-    assert apart >= 5 and kept.counters[N_BUILT] > 16
-    assert room or kept.stored.names.size == kept.counters[N_STORED] == 16
+    n_separated = 0
+    for d, t in motion_path(sets, state, 80):
+        slot = PRESS.find_set(arrays, slot, d, t)
+        check_state(sets, PRESS.press_state(arrays, slot, d, t, force), force, d, t, 1e-12)
+        n_separated += not force.any()
+    assert n_separated >= 5 and arrays.counters[N_BUILT] > 16
+    assert memory_limit or arrays.stored.names.size == arrays.counters[N_STORED] == 16
 
 
-def test_exact_many_pivots_do_not_wear_the_tableau():
-    """After 3000 pivots to and fro the forces are those of a fresh solve."""
-    sets, state = crowned()
-    kept, slot = compiled_sets(sets, 0.0)
+def test_exact_tableau_stays_accurate_after_many_pivots():
+    """The forces after 3000 pivots equal those of a new solve within 1e-12."""
+    sets, state = make_crowned_sets()
+    arrays, slot = make_search_arrays(sets, 0.0)
     force = np.zeros(sets.x.size)
-    for d, t in path(sets, state, 400):
-        slot = PRESS.find_set(kept, slot, d, t)
-    assert kept.counters[N_PIVOTS] > 3000
-    check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-12)
+    for d, t in motion_path(sets, state, 400):
+        slot = PRESS.find_set(arrays, slot, d, t)
+    assert arrays.counters[N_PIVOTS] > 3000
+    check_state(sets, PRESS.press_state(arrays, slot, d, t, force), force, d, t, 1e-12)
 
 
 @settings(settings.get_profile("costly"))
 @given(st.integers(0, 10**6))
-def test_always_rough_surfaces_are_solved(seed):
+def test_always_set_search_solves_rough_surfaces(seed):
+    """The set search gives the forces of a unilateral solve on random rough surfaces within 1e-11."""
     rng = np.random.default_rng(seed)
     pieces = coated_pair(40)
     x = pieces.interface.x
@@ -101,13 +102,14 @@ def test_always_rough_surfaces_are_solved(seed):
     state = press(pieces, gap, LOAD, 0.0)
     force = state.sigma_n * pieces.interface.weight
     sets = ContactSets(pieces.normal, x, gap + state.rotation * x - state.approach, force > 0)
-    kept, slot = compiled_sets(sets)
-    deep = np.abs(sets.opening).max()
-    for d, t in rng.normal(size=(6, 2)) * [deep, deep / x[-1]]:
-        slot = PRESS.find_set(kept, slot, d, t)
-        check_state(sets, PRESS.press_state(kept, slot, d, t, force), force, d, t, 1e-11)
+    arrays, slot = make_search_arrays(sets)
+    max_overlap = np.abs(sets.opening).max()
+    for d, t in rng.normal(size=(6, 2)) * [max_overlap, max_overlap / x[-1]]:
+        slot = PRESS.find_set(arrays, slot, d, t)
+        check_state(sets, PRESS.press_state(arrays, slot, d, t, force), force, d, t, 1e-11)
 
 
-def test_refuses_a_start_without_load():
+def test_refuses_contact_sets_without_load():
+    """Contact sets without a node in contact are refused with the key to raise."""
     with pytest.raises(PatchfemError, match=r"raise contact\.load"):
         ContactSets([[1e-9]], [0.0], [1e-7], [False])

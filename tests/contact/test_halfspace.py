@@ -1,4 +1,4 @@
-"""The periodic half-plane solver against Westergaard, Hertz, a dense solve, and the finite-element pair against it."""
+"""The periodic half-plane solver compared with Westergaard, Hertz, a dense solve and the finite-element pair."""
 
 from __future__ import annotations
 
@@ -24,107 +24,134 @@ press_periodic, residuals, wave_numbers = (
     halfspace.residuals,
     halfspace.wave_numbers,
 )
-WAVE, HIGH = 80e-6, 1.5e-6
+WAVELENGTH, AMPLITUDE = 80e-6, 1.5e-6
 MODULUS = exact.combined_modulus(*CARBIDE)
-FULL = exact.westergaard_full_pressure(WAVE, HIGH, MODULUS)
+FULL_CONTACT_PRESSURE = exact.westergaard_full_pressure(WAVELENGTH, AMPLITUDE, MODULUS)
 
 
-def half_planes(points, length, modulus=MODULUS):
-    """C(k) of two bodies of one material each, nothing for k = 0."""
-    k = wave_numbers(points, length)
+def half_plane_compliance(n_points, length, modulus=MODULUS):
+    """Return the compliance C(k) of two half-planes, zero for k = 0."""
+    k = wave_numbers(n_points, length)
     return np.concatenate([[0.0], 2 / (modulus * k[1:])])
 
 
-def coated(points, length):
-    """C(k) of the coated pair, half planes below the coatings."""
-    k = wave_numbers(points, length)
+def coated_compliance(n_points, length):
+    """Return the compliance C(k) of the coated pair with half-planes below the coatings, zero for k = 0."""
+    k = wave_numbers(n_points, length)
     return np.concatenate([[0.0], 2 * exact.layered_compliance(k[1:], CARBIDE, TITANIUM, COATING)])
 
 
-def places(points, length):
-    return (np.arange(points) - points // 2) * length / points
+def make_points(n_points, length):
+    """Return uniform points about zero."""
+    return (np.arange(n_points) - n_points // 2) * length / n_points
 
 
 @cache
-def waves(points, share):
-    x = places(points, WAVE)
-    gap = 2 * HIGH * np.sin(np.pi * x / WAVE) ** 2
-    return x, press_periodic(half_planes(points, WAVE), gap, WAVE, share * FULL * WAVE)
+def press_wavy_surface(n_points, fraction):
+    """Return the points and the state of a wavy surface under a fraction of the full-contact pressure."""
+    x = make_points(n_points, WAVELENGTH)
+    gap = 2 * AMPLITUDE * np.sin(np.pi * x / WAVELENGTH) ** 2
+    return x, press_periodic(
+        half_plane_compliance(n_points, WAVELENGTH),
+        gap,
+        WAVELENGTH,
+        fraction * FULL_CONTACT_PRESSURE * WAVELENGTH,
+    )
 
 
 # ---- the wavy surface
 
 
-@pytest.mark.parametrize("share", [0.3, 0.5, 0.7, 0.9, 0.99])
-def test_exact_westergaard_at_64_points_per_half_wave(share):
-    """p(0) to 1e-4, edge to a cell, mean gap closed to 1e-4 at 64 points; pressure everywhere to 1e-2 at 1024."""
-    args = share * FULL, WAVE, HIGH, MODULUS
-    x, state = waves(128, share)
-    assert state.pressure[64] == pytest.approx(exact.westergaard_pressure(0.0, *args), rel=1e-4)
+@pytest.mark.parametrize("fraction", [0.3, 0.5, 0.7, 0.9, 0.99])
+def test_exact_wavy_surface_agrees_with_westergaard(fraction):
+    """Pressure, half-width and approach of a wavy surface agree with Westergaard at 128 and 2048 points per wave."""
+    wave = fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
+    x, state = press_wavy_surface(128, fraction)
+    assert state.pressure[64] == pytest.approx(exact.westergaard_pressure(0.0, *wave), rel=1e-4)
     assert np.abs(x[state.pressure > 0]).max() == pytest.approx(
-        exact.westergaard_half_width(*args), abs=WAVE / 128
+        exact.westergaard_half_width(*wave), abs=WAVELENGTH / 128
     )
-    assert state.closing == pytest.approx(exact.westergaard_approach(*args), rel=1e-4)
-    x, state = waves(2048, share)
-    p = exact.westergaard_pressure(x, *args)
-    assert np.abs(state.pressure - p)[np.abs(p) > 0.2 * p.max()].max() <= 1e-3 * p.max()
-    assert state.closing == pytest.approx(exact.westergaard_approach(*args), rel=1e-6)
+    assert state.closing == pytest.approx(exact.westergaard_approach(*wave), rel=1e-4)
+    x, state = press_wavy_surface(2048, fraction)
+    expected = exact.westergaard_pressure(x, *wave)
+    assert (
+        np.abs(state.pressure - expected)[np.abs(expected) > 0.2 * expected.max()].max()
+        <= 1e-3 * expected.max()
+    )
+    assert state.closing == pytest.approx(exact.westergaard_approach(*wave), rel=1e-6)
     assert state.iterations <= 250  # conjugate directions; steepest descent takes 3000
 
 
 # ---- crowns
 
 
-def crowned(half, fine, growth):
-    """Coated piece with columns of `fine` over |x| <= half, growing outwards; at least 8 rows in the coating."""
-    outer = half + np.cumsum(graded_rows(fine * growth, LENGTH / 2 - half, growth))
-    right = np.concatenate([np.arange(1, round(half / fine) + 1) * fine, outer])
-    rows = graded_rows(min(fine, COATING / 8), COATING, growth, 8)
-    under = graded_rows(rows[-1] * growth, HEIGHT - COATING, growth)
+def make_crown_grid(half_width, spacing, growth):
+    """Return a coated grid with uniform columns in the contact that grow outwards, and at least 8 rows of coating."""
+    outer = half_width + np.cumsum(graded_rows(spacing * growth, LENGTH / 2 - half_width, growth))
+    right = np.concatenate([np.arange(1, round(half_width / spacing) + 1) * spacing, outer])
+    rows = graded_rows(min(spacing, COATING / 8), COATING, growth, 8)
+    substrate_rows = graded_rows(rows[-1] * growth, HEIGHT - COATING, growth)
     depth = np.concatenate(
-        [[0.0], np.cumsum(rows)[:-1], [COATING], COATING + np.cumsum(under)[:-1], [HEIGHT]]
+        [[0.0], np.cumsum(rows)[:-1], [COATING], COATING + np.cumsum(substrate_rows)[:-1], [HEIGHT]]
     )
     return TensorGrid(np.concatenate([-right[::-1], [0.0], right]), depth, rows.size)
 
 
 @pytest.mark.parametrize(
-    "radius, load, low, high, within",
+    "radius, load, min_ratio, max_ratio, tolerance",
     [
-        (0.01, 1e4, 0.98, 0.995, 1e-3),  # contact of a fifth of the coating: nearly all carbide
-        (0.01, 2e5, 0.83, 0.87, 2e-3),  # as wide as the coating is thick
+        (
+            0.01,
+            1e4,
+            0.98,
+            0.995,
+            1e-3,
+        ),  # contact of a fifth of the coating thickness: nearly a carbide half-plane
+        (0.01, 2e5, 0.83, 0.87, 2e-3),  # contact as wide as the coating is thick
         (0.1, 1e5, 0.73, 0.76, 2e-3),
     ],
-)  # three times as wide
-def test_exact_coated_finite_elements_agree_with_coated_half_planes(
-    radius, load, low, high, within
+)  # contact three times as wide as the coating is thick
+def test_exact_coated_elements_agree_with_half_plane_transform(
+    radius, load, min_ratio, max_ratio, tolerance
 ):
-    """The finite block and the transform share no line of code; `low` to `high`: peak over Hertz on carbide alone."""
-    wide = exact.hertz_half_width(load, radius, exact.combined_modulus(*TITANIUM))
-    fine = exact.hertz_half_width(load, radius, MODULUS) / 16
-    points = 8 * round(LENGTH / fine / 2)
-    x = places(points, points * fine / 4)
-    truth = press_periodic(
-        coated(points, points * fine / 4), crown(x, radius), points * fine / 4, load
+    """Pressure and gap of the coated finite-element pair agree with the transform solution of coated half-planes.
+
+    The peak relative to Hertz on carbide alone lies between `min_ratio` and `max_ratio`. The two
+    solutions share no code.
+    """
+    substrate_half_width = exact.hertz_half_width(load, radius, exact.combined_modulus(*TITANIUM))
+    spacing = exact.hertz_half_width(load, radius, MODULUS) / 16
+    n_points = 8 * round(LENGTH / spacing / 2)
+    x = make_points(n_points, n_points * spacing / 4)
+    reference = press_periodic(
+        coated_compliance(n_points, n_points * spacing / 4),
+        crown(x, radius),
+        n_points * spacing / 4,
+        load,
     )
-    peak = truth.pressure.max()
-    assert low <= peak / exact.hertz_peak(load, radius, MODULUS) <= high
-    grid = crowned(16 * fine * np.ceil(1.5 * wide / fine / 16), fine, 1.1)
+    peak = reference.pressure.max()
+    assert min_ratio <= peak / exact.hertz_peak(load, radius, MODULUS) <= max_ratio
+    grid = make_crown_grid(
+        16 * spacing * np.ceil(1.5 * substrate_half_width / spacing / 16), spacing, 1.1
+    )
     state = press(pair_of(grid, COATED, 1.0), crown(grid.x, radius), load)
-    half = np.abs(x[truth.pressure > 0]).max()
-    same = np.interp(grid.x, x, truth.pressure)
-    inside = np.abs(grid.x) < 0.9 * half
-    assert state.sigma_n.max() == pytest.approx(peak, rel=within)
-    assert np.abs(state.sigma_n - same)[inside].max() <= 4e-3 * peak
-    assert np.abs(grid.x[state.sigma_n > 0]).max() == pytest.approx(half, abs=1.01 * fine)
-    near = (np.abs(grid.x) > 1.1 * half) & (np.abs(grid.x) < 1.4 * half)
-    opened = np.interp(grid.x[near], x, truth.gap)
-    assert np.abs(state.gap[near] - opened).max() <= 1e-2 * opened.max()
+    half_width = np.abs(x[reference.pressure > 0]).max()
+    reference_pressure = np.interp(grid.x, x, reference.pressure)
+    inside = np.abs(grid.x) < 0.9 * half_width
+    assert state.sigma_n.max() == pytest.approx(peak, rel=tolerance)
+    assert np.abs(state.sigma_n - reference_pressure)[inside].max() <= 4e-3 * peak
+    assert np.abs(grid.x[state.sigma_n > 0]).max() == pytest.approx(half_width, abs=1.01 * spacing)
+    is_outside = (np.abs(grid.x) > 1.1 * half_width) & (np.abs(grid.x) < 1.4 * half_width)
+    reference_gap = np.interp(grid.x[is_outside], x, reference.gap)
+    assert np.abs(state.gap[is_outside] - reference_gap).max() <= 1e-2 * reference_gap.max()
 
 
 # ---- any gap
 
 
-@example(4, 24476, 1.8125, -9.0, True)  # one point touches on the way, another still overlaps
+@example(
+    4, 24476, 1.8125, -9.0, True
+)  # an intermediate set has a point that touches while another overlaps
 @given(
     st.integers(4, 120),
     st.integers(0, 2**32 - 1),
@@ -132,20 +159,20 @@ def test_exact_coated_finite_elements_agree_with_coated_half_planes(
     st.floats(-9, -5),
     st.booleans(),
 )
-def test_always_the_dense_active_set_finds_the_same(points, seed, load, height, smooth):
-    """The same circulant operator as a full matrix, solved by the primal-dual active set."""
+def test_always_dense_active_set_gives_same_pressure(n_points, seed, load, height, smooth):
+    """A dense active-set solve with the same circulant operator gives the same pressures and approach."""
     rng = np.random.default_rng(seed)
-    gap = 10**height * rng.normal(size=points)
+    gap = 10**height * rng.normal(size=n_points)
     gap = np.cumsum(gap) if smooth else gap
     length = 1e-3
     load = 10**load
-    compliance = coated(points, length)
+    compliance = coated_compliance(n_points, length)
     compliance[0] = compliance[1]
     state = press_periodic(compliance, gap, length, load)
-    column = np.fft.irfft(compliance, points) * points / length
-    dense = column[(np.arange(points)[:, None] - np.arange(points)) % points]
-    force, motion, _ = solve_forces(dense, places(points, length), gap, np.array([load]))
-    step = length / points
+    column = np.fft.irfft(compliance, n_points) * n_points / length
+    dense = column[(np.arange(n_points)[:, None] - np.arange(n_points)) % n_points]
+    force, motion, _ = solve_forces(dense, make_points(n_points, length), gap, np.array([load]))
+    step = length / n_points
     assert np.abs(state.pressure * step - force).max() <= 1e-6 * force.max()
     assert state.closing == pytest.approx(
         motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step)

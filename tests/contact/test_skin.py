@@ -1,4 +1,4 @@
-"""The skin of asperities: wedges in closed form, the unilateral limit, quadrature, scales, and random controls."""
+"""The layer of asperities: limits, quadrature, scaling, stiffness and random gaps."""
 
 from __future__ import annotations
 
@@ -28,30 +28,34 @@ from patchfem.contact.strips import STRIP_RESIDUAL_TOL, HolderPosition, compute_
 from patchfem.core import NotConverged, Outcome, PatchfemError
 
 AREA = LENGTH * WIDTH
-MEAN = LOAD / AREA
-PEAKS = HertzAsperities(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)
-SKINS = {
+MEAN_PRESSURE = LOAD / AREA
+HERTZ_LAYER = HertzAsperities(radius=10e-6, density=1e10, deviation=1e-6, modulus=1.3e11)
+LAYERS = {
     "linear": LinearAsperities(1e13),
     "exponential": ExponentialAsperities(0.5e-6, 1e6),
-    "hertz": PEAKS,
+    "hertz": HERTZ_LAYER,
 }
-each_skin = pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS.keys())
+each_layer = pytest.mark.parametrize("layer", LAYERS.values(), ids=LAYERS.keys())
 
 
-def bodies(cells=100):
-    """Closing compliance, places and areas of the coated pair."""
-    pair = coated_pair(cells)
+def pair_arrays(n_elements=100):
+    """Return the normal compliance, the nodes and the nodal areas of the coated pair."""
+    pair = coated_pair(n_elements)
     return pair.normal, pair.interface.x, pair.interface.weight
 
 
-def test_exact_reference_pressure_only_shifts_the_approach():
-    c, x, weight = bodies()
+def test_exact_reference_pressure_shifts_approach_only():
+    """The reference pressure of an exponential layer shifts the approach by u0 log(ratio) and keeps the forces."""
+    compliance, x, weight = pair_arrays()
     gap = rough(np.random.default_rng(1), x, 1e-6)
-    one, two = (
-        solve(ExponentialAsperities(1e-7, p), c, x, weight, gap, LOAD) for p in (None, 1e3 * MEAN)
+    mean_reference, high_reference = (
+        solve(ExponentialAsperities(1e-7, p), compliance, x, weight, gap, LOAD)
+        for p in (None, 1e3 * MEAN_PRESSURE)
     )
-    assert np.abs(one.force - two.force).max() <= 1e-11 * LOAD
-    assert one.delta - two.delta == pytest.approx(1e-7 * np.log(1e3), rel=1e-9)
+    assert np.abs(mean_reference.force - high_reference.force).max() <= 1e-11 * LOAD
+    assert mean_reference.delta - high_reference.delta == pytest.approx(
+        1e-7 * np.log(1e3), rel=1e-9
+    )
 
 
 # ------------------------------------------------------------------------------------------ against the bare unilateral
@@ -63,74 +67,79 @@ GAPS = {
 
 
 @pytest.mark.parametrize("offset", [None, 2e-3])
-def test_order_one_a_stiff_linear_skin_tends_to_bare_contact(offset):
+def test_order_one_stiff_linear_layer_converges_to_bare_contact(offset):
+    """The pressure with a linear layer converges to that of bare contact with the inverse of the layer stiffness."""
     pair = coated_pair(100)
-    c, x, weight = bodies()
+    compliance, x, weight = pair_arrays()
     gap = GAPS["tilt"](x)
     moment = None if offset is None else offset * LOAD
     bare = press(pair, gap, LOAD, moment)
-    off = [
+    errors = [
         np.abs(
-            solve(LinearAsperities(k), c, x, weight, gap, LOAD, moment).pressure - bare.sigma_n
+            solve(LinearAsperities(k), compliance, x, weight, gap, LOAD, moment).pressure
+            - bare.sigma_n
         ).max()
-        / MEAN
+        / MEAN_PRESSURE
         for k in (1e16, 1e17, 1e18)
     ]
-    assert off[2] < 1e-3
-    assert np.log10(off[0] / off[1]) == pytest.approx(1, abs=0.1)
-    assert np.log10(off[1] / off[2]) == pytest.approx(1, abs=0.1)
+    assert errors[2] < 1e-3
+    assert np.log10(errors[0] / errors[1]) == pytest.approx(1, abs=0.1)
+    assert np.log10(errors[1] / errors[2]) == pytest.approx(1, abs=0.1)
 
 
-@pytest.mark.parametrize("skin", [ExponentialAsperities(1e-6, MEAN), PEAKS])
-def test_order_one_thin_smooth_skins_tend_to_bare_contact(skin):
-    """P(s/t) with t -> 0, to within the logarithm of t."""
-    c, x, weight = bodies()
+@pytest.mark.parametrize("layer", [ExponentialAsperities(1e-6, MEAN_PRESSURE), HERTZ_LAYER])
+def test_order_one_thin_layers_converge_to_bare_contact(layer):
+    """The pressure with a thin layer converges to that of bare contact with the thickness, up to a logarithm."""
+    compliance, x, weight = pair_arrays()
     gap = GAPS["tilt"](x)
     bare = press(coated_pair(100), gap, LOAD).sigma_n
-    off = [
-        np.abs(solve(longer(skin, t), c, x, weight, gap, LOAD).pressure - bare).max() / bare.max()
+    errors = [
+        np.abs(solve(longer(layer, t), compliance, x, weight, gap, LOAD).pressure - bare).max()
+        / bare.max()
         for t in (1e-3, 1e-4, 1e-5, 1e-6)
     ]
-    assert off[3] < 2e-3 and all(6 < a / b < 14 for a, b in pairwise(off[1:]))
+    assert errors[3] < 2e-3 and all(6 < a / b < 14 for a, b in pairwise(errors[1:]))
 
 
-@each_skin
+@each_layer
 @pytest.mark.parametrize("offset", [0.0, 1.7e-3, -6.2e-3])
-def test_exact_rotation_and_approach_held_where_the_moment_put_them_give_the_same_forces(
-    skin, offset
-):
-    c, x, weight = bodies()
+def test_exact_layer_controls_give_same_forces(layer, offset):
+    """Prescribing the rotation and the approach that moment control returned gives the same forces."""
+    compliance, x, weight = pair_arrays()
     gap = 2e-5 * x + rough(np.random.default_rng(3), x, 1e-7)
-    free = solve(skin, c, x, weight, gap, LOAD, LOAD * offset)
-    held = solve(skin, c, x, weight, gap + free.theta * x, LOAD, rotation=free.theta)
-    pushed = solve(
-        skin, c, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta
+    free = solve(layer, compliance, x, weight, gap, LOAD, LOAD * offset)
+    prescribed_rotation = solve(
+        layer, compliance, x, weight, gap + free.theta * x, LOAD, rotation=free.theta
     )
-    for other in (held, pushed):
+    prescribed_approach = solve(
+        layer, compliance, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta
+    )
+    for other in (prescribed_rotation, prescribed_approach):
         assert np.abs(other.force - free.force).max() <= 1e-9 * free.force.max()
         assert other.delta == pytest.approx(free.delta, rel=1e-9) and other.theta == free.theta
-    assert pushed.load == pytest.approx(LOAD, rel=1e-9)
+    assert prescribed_approach.load == pytest.approx(LOAD, rel=1e-9)
 
 
-def test_exact_forces_minimise_the_energy():
-    """f.Cf/2 + g.f + sum A Psi(f/A) with Psi' = -P^-1 rises in every direction that keeps load and moment."""
-    c, x, weight = bodies()
+def test_exact_layer_forces_minimise_energy():
+    """The gradient of the complementary energy vanishes in every direction that keeps load and moment."""
+    compliance, x, weight = pair_arrays()
     rng = np.random.default_rng(4)
     gap = rough(rng, x, 1e-7)
-    for skin in (ExponentialAsperities(1e-7, 1e6), PEAKS):
-        state = solve(skin, c, x, weight, gap, LOAD, 1e-3 * LOAD)
-        slope = c @ state.force + gap - skin.separation(state.pressure)
-        move = np.stack([np.ones(x.size), x / LENGTH], axis=1)
-        left = slope - move @ np.linalg.lstsq(move, slope, rcond=None)[0]
-        assert np.abs(left).max() <= 1e-10 * (np.ptp(gap) + np.ptp(c @ state.force))
+    for layer in (ExponentialAsperities(1e-7, 1e6), HERTZ_LAYER):
+        state = solve(layer, compliance, x, weight, gap, LOAD, 1e-3 * LOAD)
+        slope = compliance @ state.force + gap - layer.separation(state.pressure)
+        rigid_motions = np.stack([np.ones(x.size), x / LENGTH], axis=1)
+        residual = slope - rigid_motions @ np.linalg.lstsq(rigid_motions, slope, rcond=None)[0]
+        assert np.abs(residual).max() <= 1e-10 * (np.ptp(gap) + np.ptp(compliance @ state.force))
 
 
 # ----------------------------------------------------------------------------------------------------- the law of peaks
 @pytest.mark.parametrize("h", [-200.0, -8.001, -7.999, -3.0, 0.0, 0.7, 3.0, 12.0, 30.0])
-def test_exact_peak_integral_against_adaptive_quadrature(h):
-    log, fall = peak_integral(np.array([h]))
+def test_exact_peak_integral_agrees_with_quadrature(h):
+    """The logarithm and the decay of the integral over Gaussian peaks agree with adaptive quadrature."""
+    log_integral, decay = peak_integral(np.array([h]))
 
-    def weighted(power):  # in units of phi(h) for a positive h: the tail underflows
+    def integrate_peaks(power):  # in units of phi(h) for positive h, because the tail underflows
         if h > 0:
             return quad(
                 lambda t: t**power * np.exp(-h * t - t * t / 2), 0, np.inf, epsabs=0, epsrel=1e-12
@@ -144,94 +153,117 @@ def test_exact_peak_integral_against_adaptive_quadrature(h):
         return sum(inner)
 
     shift = -h * h / 2 - 0.5 * np.log(2 * np.pi) if h > 0 else 0.0
-    assert log[0] == pytest.approx(np.log(weighted(1.5)) + shift, abs=1e-10, rel=1e-12)
-    assert fall[0] == pytest.approx(1.5 * weighted(0.5) / weighted(1.5), rel=1e-9)
+    assert log_integral[0] == pytest.approx(
+        np.log(integrate_peaks(1.5)) + shift, abs=1e-10, rel=1e-12
+    )
+    assert decay[0] == pytest.approx(1.5 * integrate_peaks(0.5) / integrate_peaks(1.5), rel=1e-9)
 
 
-def test_always_the_tail_of_the_peaks_is_finite_and_keeps_its_law():
-    """log F -> -h^2/2 - 5/2 log h + log(Gamma(5/2)/sqrt(2 pi)) far out, where F itself underflows."""
-    log, fall = peak_integral(np.array([1e2, 1e3, 1e5]))
+def test_always_peak_integral_tail_follows_asymptote():
+    """The logarithm of the peak integral follows its asymptotic expansion where the integral itself underflows."""
+    log_integral, decay = peak_integral(np.array([1e2, 1e3, 1e5]))
     h = np.array([1e2, 1e3, 1e5])
-    far = -h * h / 2 - 2.5 * np.log(h) + np.log(0.75 * np.sqrt(np.pi) / np.sqrt(2 * np.pi))
-    assert np.abs(log - far).max() <= 1e-3 and np.abs(fall / h - 1).max() <= 1e-3
-    middle = np.linspace(-20, 30, 400)
+    asymptote = -h * h / 2 - 2.5 * np.log(h) + np.log(0.75 * np.sqrt(np.pi) / np.sqrt(2 * np.pi))
+    assert np.abs(log_integral - asymptote).max() <= 1e-3 and np.abs(decay / h - 1).max() <= 1e-3
+    separations = np.linspace(-20, 30, 400)
     step = 1e-4
-    rate = (peak_integral(middle - step)[0] - peak_integral(middle + step)[0]) / (2 * step)
-    assert np.abs(rate / peak_integral(middle)[1] - 1).max() <= 1e-6
+    rate = (peak_integral(separations - step)[0] - peak_integral(separations + step)[0]) / (
+        2 * step
+    )
+    assert np.abs(rate / peak_integral(separations)[1] - 1).max() <= 1e-6
 
 
-@pytest.mark.parametrize("skin", [ExponentialAsperities(1e-7, 1e6), PEAKS])
-def test_exact_separation_inverts_the_pressure(skin):
-    wanted = 10.0 ** np.arange(-60, 16)
-    assert np.abs(skin.pressure(skin.separation(wanted)) / wanted - 1).max() <= 1e-10
-    s = np.linspace(-5, 5, 21) * 1e-6
+@pytest.mark.parametrize("layer", [ExponentialAsperities(1e-7, 1e6), HERTZ_LAYER])
+def test_exact_separation_inverts_pressure(layer):
+    """The separation is the inverse of the pressure over 76 decades, and the stiffness is its derivative."""
+    pressures = 10.0 ** np.arange(-60, 16)
+    assert np.abs(layer.pressure(layer.separation(pressures)) / pressures - 1).max() <= 1e-10
+    separations = np.linspace(-5, 5, 21) * 1e-6
     step = 1e-12
-    slope = -(skin.pressure(s + step) - skin.pressure(s - step)) / (2 * step)
-    assert np.abs(slope / skin.stiffness(s) - 1).max() <= 1e-5
+    slope = -(layer.pressure(separations + step) - layer.pressure(separations - step)) / (2 * step)
+    assert np.abs(slope / layer.stiffness(separations) - 1).max() <= 1e-5
 
 
 # ------------------------------------------------------------------------------------------- scales and whole stiffness
-@each_skin
-def test_exact_twice_the_gap_skin_and_load_doubles_the_pressure(skin):
-    c, x, weight = bodies()
+@each_layer
+def test_exact_doubled_problem_doubles_pressure(layer):
+    """Doubling the gap, the layer thickness and the load doubles forces and approach."""
+    compliance, x, weight = pair_arrays()
     gap = 3e-5 * x + rough(np.random.default_rng(2), x, 1e-7)
-    twice = {
-        "linear": lambda: skin,
+    scaled_layers = {
+        "linear": lambda: layer,
         "exponential": lambda: ExponentialAsperities(1e-6, 2e6),
-        "hertz": lambda: replace(longer(skin, 2.0), density=2 * longer(skin, 2.0).density),
+        "hertz": lambda: replace(longer(layer, 2.0), density=2 * longer(layer, 2.0).density),
     }
-    other = next(twice[name]() for name, law in SKINS.items() if law is skin)
+    scaled_layer = next(scaled_layers[name]() for name, law in LAYERS.items() if law is layer)
     for moment in (None, 1e-3 * LOAD):
-        one = solve(skin, c, x, weight, gap, LOAD, moment)
-        two = solve(other, c, x, weight, 2 * gap, 2 * LOAD, None if moment is None else 2 * moment)
-        assert np.abs(two.force - 2 * one.force).max() <= 1e-9 * two.force.max()
-        assert two.delta == pytest.approx(2 * one.delta, rel=1e-9)
+        state = solve(layer, compliance, x, weight, gap, LOAD, moment)
+        scaled_state = solve(
+            scaled_layer,
+            compliance,
+            x,
+            weight,
+            2 * gap,
+            2 * LOAD,
+            None if moment is None else 2 * moment,
+        )
+        assert np.abs(scaled_state.force - 2 * state.force).max() <= 1e-9 * scaled_state.force.max()
+        assert scaled_state.delta == pytest.approx(2 * state.delta, rel=1e-9)
 
 
-def test_exact_skin_and_bodies_in_series():
-    """Rigid bodies leave the skin's sum k A; a stiff skin leaves the bodies; between, the matrix C + 1/(k A)."""
+def test_exact_tangential_stiffness_of_layer_and_bodies():
+    """The tangential stiffness is that of the layer and the bodies in series.
+
+    Rigid bodies leave the sum of k A of the layer; a stiff layer leaves the stiffness of the
+    bodies.
+    """
     pair = coated_pair(100)
-    c, _, weight = bodies()
+    compliance, _, weight = pair_arrays()
     k = np.full(weight.size, 1e13)
-    assert tangent(0 * c, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
-    everywhere = np.ones(weight.size, bool)
-    assert tangent(c, weight, 1e9 * k) == pytest.approx(
-        tangential_stiffness(c, everywhere), rel=1e-5
+    assert tangent(0 * compliance, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
+    all_nodes = np.ones(weight.size, bool)
+    assert tangent(compliance, weight, 1e9 * k) == pytest.approx(
+        tangential_stiffness(compliance, all_nodes), rel=1e-5
     )
-    ratio = tangent(pair.tangential, weight, 0.8 * k)
-    summed = np.linalg.solve(
+    stiffness = tangent(pair.tangential, weight, 0.8 * k)
+    expected = np.linalg.solve(
         pair.tangential + np.diag(1 / (0.8e13 * weight)), np.ones(weight.size)
     ).sum()
-    assert ratio == pytest.approx(summed, rel=1e-11)
-    assert ratio < min(0.8e13 * AREA, tangential_stiffness(pair.tangential, everywhere))
-    half = np.where(np.arange(weight.size) < 40, k, 0.0)
-    part = np.ix_(half > 0, half > 0)
-    assert tangent(c, weight, half) == pytest.approx(
-        np.linalg.solve(c[part] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)).sum(), rel=1e-11
+    assert stiffness == pytest.approx(expected, rel=1e-11)
+    assert stiffness < min(0.8e13 * AREA, tangential_stiffness(pair.tangential, all_nodes))
+    partial_stiffness = np.where(np.arange(weight.size) < 40, k, 0.0)
+    contact_block = np.ix_(partial_stiffness > 0, partial_stiffness > 0)
+    assert tangent(compliance, weight, partial_stiffness) == pytest.approx(
+        np.linalg.solve(
+            compliance[contact_block] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)
+        ).sum(),
+        rel=1e-11,
     )
-    assert tangent(c, weight, 0 * k) == 0.0
+    assert tangent(compliance, weight, 0 * k) == 0.0
 
 
 # ------------------------------------------------------------------------------------------------------- never failing
-@each_skin
+@each_layer
 @pytest.mark.parametrize("spring", [1e2, 1e4, 1e7])
-def test_exact_spring_of_the_holder_is_the_moment_it_gives(skin, spring):
-    """The rotation against a spring, sum f x = M + K theta, is the free rotation under the moment M + K theta."""
-    c, x, weight = bodies(60)
+def test_exact_holder_spring_equals_applied_moment(layer, spring):
+    """A rotation against a spring equals the free rotation under the moment that the spring exerts."""
+    compliance, x, weight = pair_arrays(60)
     gap = 1e-4 * x
     moment = 2e-3 * LOAD
-    held = solve(skin, c, x, weight, gap, LOAD, moment, rotation=1e-4, spring=spring)
-    turned = held.theta - 1e-4
-    free = solve(skin, c, x, weight, gap, LOAD, moment + spring * turned)
-    assert abs(turned) > 1e-9 and free.theta == pytest.approx(turned, rel=1e-7)
-    assert np.abs(held.force - free.force).max() <= 1e-9 * LOAD
-    assert held.moment == pytest.approx(
-        moment + spring * turned, rel=1e-8, abs=1e-9 * LOAD * LENGTH
+    with_spring = solve(
+        layer, compliance, x, weight, gap, LOAD, moment, rotation=1e-4, spring=spring
+    )
+    rotation = with_spring.theta - 1e-4
+    free = solve(layer, compliance, x, weight, gap, LOAD, moment + spring * rotation)
+    assert abs(rotation) > 1e-9 and free.theta == pytest.approx(rotation, rel=1e-7)
+    assert np.abs(with_spring.force - free.force).max() <= 1e-9 * LOAD
+    assert with_spring.moment == pytest.approx(
+        moment + spring * rotation, rel=1e-8, abs=1e-9 * LOAD * LENGTH
     )
 
 
-def holds(skin, c, x, weight, gap, state, load, moment):
-    """Law, balance and signs, from the state alone."""
+def check_layer_state(layer, compliance, x, weight, gap, state, load, moment):
+    """Check the law, the balance and the signs of a state."""
     assert state.outcome is Outcome.DONE and max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
     assert (
         state.force.min() >= 0 and np.isfinite(state.stiffness).all() and state.stiffness.min() >= 0
@@ -239,44 +271,67 @@ def holds(skin, c, x, weight, gap, state, load, moment):
     assert state.force.sum() == pytest.approx(load, rel=1e-11)
     if moment is not None:
         assert abs(state.force @ x - moment) <= 1e-11 * load * np.ptp(x)
-    opening = gap + (0.0 if moment is None else state.theta) * x - state.delta + c @ state.force
-    depth = np.ptp(gap) + np.abs(c @ state.force).max() + np.abs(state.theta * x).max()
-    big = state.force > 1e-3 * state.force.max()
+    opening = (
+        gap + (0.0 if moment is None else state.theta) * x - state.delta + compliance @ state.force
+    )
+    scale = np.ptp(gap) + np.abs(compliance @ state.force).max() + np.abs(state.theta * x).max()
+    is_loaded = state.force > 1e-3 * state.force.max()
     assert (
-        np.abs(opening - state.separation)[big].max()
-        <= 1e-9 * np.abs(state.separation[big]).max() + 1e-13 * depth
+        np.abs(opening - state.separation)[is_loaded].max()
+        <= 1e-9 * np.abs(state.separation[is_loaded]).max() + 1e-13 * scale
     )
 
 
 @given(
     law=st.sampled_from(["linear", "exponential", "hertz"]),
-    scale=st.floats(-9, 6),
-    stiff=st.floats(9, 18),
-    thin=st.floats(-9, -5),
+    log_load=st.floats(-9, 6),
+    log_stiffness=st.floats(9, 18),
+    log_thickness=st.floats(-9, -5),
     angle=st.floats(-6, -2),
-    rough_size=st.floats(-9, -4),
-    jagged=st.booleans(),
-    place=st.none() | st.floats(-0.499, 0.499),
-    rigid=st.booleans(),
+    log_roughness=st.floats(-9, -4),
+    is_noise=st.booleans(),
+    load_line=st.none() | st.floats(-0.499, 0.499),
+    is_rigid=st.booleans(),
     seed=st.integers(0, 2**32 - 1),
 )
-def test_always_any_gap_load_moment_and_skin_converge(
-    law, scale, stiff, thin, angle, rough_size, jagged, place, rigid, seed
+def test_always_layer_solve_converges(
+    law,
+    log_load,
+    log_stiffness,
+    log_thickness,
+    angle,
+    log_roughness,
+    is_noise,
+    load_line,
+    is_rigid,
+    seed,
 ):
-    c, x, weight = bodies(40)
-    c = 0 * c if rigid else c
+    """The solve converges for random gaps, loads, moments and layers."""
+    compliance, x, weight = pair_arrays(40)
+    compliance = 0 * compliance if is_rigid else compliance
     rng = np.random.default_rng(seed)
     gap = 10**angle * x + (
-        10**rough_size * rng.normal(size=x.size) if jagged else rough(rng, x, 10**rough_size)
+        10**log_roughness * rng.normal(size=x.size)
+        if is_noise
+        else rough(rng, x, 10**log_roughness)
     )
-    skin = {
-        "linear": LinearAsperities(10**stiff),
-        "exponential": ExponentialAsperities(10**thin),
-        "hertz": replace(PEAKS, deviation=10**thin),
+    layer = {
+        "linear": LinearAsperities(10**log_stiffness),
+        "exponential": ExponentialAsperities(10**log_thickness),
+        "hertz": replace(HERTZ_LAYER, deviation=10**log_thickness),
     }[law]
-    load = LOAD * 10**scale
-    moment = None if place is None else place * LENGTH * load
-    holds(skin, c, x, weight, gap, solve(skin, c, x, weight, gap, load, moment), load, moment)
+    load = LOAD * 10**log_load
+    moment = None if load_line is None else load_line * LENGTH * load
+    check_layer_state(
+        layer,
+        compliance,
+        x,
+        weight,
+        gap,
+        solve(layer, compliance, x, weight, gap, load, moment),
+        load,
+        moment,
+    )
 
 
 @given(
@@ -285,97 +340,113 @@ def test_always_any_gap_load_moment_and_skin_converge(
     seed=st.integers(0, 2**32 - 1),
     law=st.sampled_from(["linear", "exponential", "hertz"]),
 )
-def test_always_any_approach_is_answered(depth, sign, seed, law):
-    c, x, weight = bodies(40)
+def test_always_prescribed_approach_converges(depth, sign, seed, law):
+    """The solve under a prescribed approach converges, and its outcome states whether there is contact."""
+    compliance, x, weight = pair_arrays(40)
     gap = 1e-6 * np.random.default_rng(seed).normal(size=x.size)
-    skin = {**SKINS, "exponential": ExponentialAsperities(1e-8, 1e6)}[law]
-    state = solve(skin, c, x, weight, gap, approach=gap.min() + sign * 10**depth)
+    layer = {**LAYERS, "exponential": ExponentialAsperities(1e-8, 1e6)}[law]
+    state = solve(layer, compliance, x, weight, gap, approach=gap.min() + sign * 10**depth)
     assert (
         state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= STRIP_RESIDUAL_TOL
     )
-    # a linear skin that is open is not solved
+    # a linear layer without contact is not solved
     assert state.residuals or state.outcome is Outcome.NO_CONTACT
     assert (state.outcome is Outcome.DONE) == (state.load > 0)
 
 
-def test_exact_an_approach_about_the_floor_of_the_pressure_is_answered():
-    c, x, weight = bodies(40)
+def test_exact_approach_near_pressure_floor():
+    """An approach at which the pressure is near its smallest representable value gives the correct outcome."""
+    compliance, x, weight = pair_arrays(40)
     gap = 1e-6 * np.random.default_rng(0).normal(size=x.size)
-    skin = ExponentialAsperities(1e-8, 1e6)
-    edge = 1e-8 * (
+    layer = ExponentialAsperities(1e-8, 1e6)
+    limit_separation = 1e-8 * (
         np.log(1e6) + 300
     )  # the separation at which the pressure is exp(MIN_LOG_PRESSURE)
-    for part in (1 - 1e-3, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-3, 1 + 1e-2):
-        state = solve(skin, c, x, weight, gap, approach=gap.min() - part * edge)
+    for factor in (1 - 1e-3, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-3, 1 + 1e-2):
+        state = solve(
+            layer, compliance, x, weight, gap, approach=gap.min() - factor * limit_separation
+        )
         assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
         assert (state.outcome is Outcome.DONE) == (state.load > 0)
     assert state.outcome is Outcome.NO_CONTACT
 
 
-def test_exact_going_down_the_dual_alone_leads_to_the_same_answer(monkeypatch):
-    c, x, weight = bodies(40)
+def test_exact_dual_descent_gives_newton_forces(monkeypatch):
+    """The dual descent without Newton steps for the load gives the same forces, in more iterations."""
+    compliance, x, weight = pair_arrays(40)
     gap = 1e-5 * np.random.default_rng(9).normal(size=x.size)
     newton = asperity_layer._solve_newton
-    for skin in (ExponentialAsperities(1e-8, MEAN), replace(PEAKS, deviation=1e-8)):
+    for layer in (ExponentialAsperities(1e-8, MEAN_PRESSURE), replace(HERTZ_LAYER, deviation=1e-8)):
         for moment in (None, 2e-3 * LOAD):
-            here = solve(skin, c, x, weight, gap, LOAD, moment)
-            with monkeypatch.context() as without:  # Newton on the patch under its approach alone
-                without.setattr(
+            with_newton = solve(layer, compliance, x, weight, gap, LOAD, moment)
+            with (
+                monkeypatch.context() as patch
+            ):  # Newton steps are left only for the patch under a prescribed approach
+                patch.setattr(
                     asperity_layer,
                     "_solve_newton",
                     lambda *a: None if a[0].contact.target.size else newton(*a),
                 )
-                there = solve(skin, c, x, weight, gap, LOAD, moment)
-            assert there.iterations > here.iterations
-            assert np.abs(there.force - here.force).max() <= 1e-9 * LOAD
+                without_newton = solve(layer, compliance, x, weight, gap, LOAD, moment)
+            assert without_newton.iterations > with_newton.iterations
+            assert np.abs(without_newton.force - with_newton.force).max() <= 1e-9 * LOAD
 
 
 # ------------------------------------------------------------------------------------------------------------- refusals
 
 
-def test_refuses_controls_without_an_answer():
-    c, x, weight = bodies(40)
+def test_refuses_unsolvable_layer_controls():
+    """Inconsistent controls, an invalid load, a moment that tips the piece over and an excessive pressure are refused."""
+    c, x, weight = pair_arrays(40)
     for control in ({}, {"load": 1.0, "approach": 1e-6}, {"approach": 1e-6, "moment": 0.0}):
         with pytest.raises(PatchfemError, match="give a load"):
-            solve(PEAKS, c, x, weight, 0 * x, **control)
+            solve(HERTZ_LAYER, c, x, weight, 0 * x, **control)
     for load in (-1.0, np.nan, np.inf):
         with pytest.raises(PatchfemError, match=r"contact\.load"):
-            solve(PEAKS, c, x, weight, 0 * x, load)
+            solve(HERTZ_LAYER, c, x, weight, 0 * x, load)
     with pytest.raises(PatchfemError, match="tips over"):
-        solve(PEAKS, c, x, weight, 0 * x, LOAD, 0.5 * LENGTH * LOAD)
+        solve(HERTZ_LAYER, c, x, weight, 0 * x, LOAD, 0.5 * LENGTH * LOAD)
     with pytest.raises(PatchfemError, match="no first touch"):
         solve(ExponentialAsperities(1e-6), c, x, weight, 0 * x, approach=1e-6)
     with pytest.raises(PatchfemError, match="rough layer is too large to compute"):
         solve(ExponentialAsperities(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
 
 
-def test_refuses_an_answer_that_did_not_settle(monkeypatch):
-    c, x, weight = bodies(40)
+def test_refuses_unconverged_layer_solve(monkeypatch):
+    """A solve that exceeds the number of Newton steps is refused."""
+    c, x, weight = pair_arrays(40)
     monkeypatch.setattr(asperity_layer, "MAX_NEWTON_STEPS", 1)
     with pytest.raises(NotConverged, match=r"contact\.asperities"):
-        solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
+        solve(HERTZ_LAYER, c, x, weight, 1e-4 * x, LOAD)
 
 
-def test_refuses_an_answer_whose_residual_is_too_large_with_a_remedy(monkeypatch):
-    c, x, weight = bodies(40)
-    monkeypatch.setattr("patchfem.contact.strips.STRIP_RESIDUAL_TOL", -1.0)  # below any residual
+def test_refuses_large_layer_residual_with_advice(monkeypatch):
+    """A solve whose residual exceeds the tolerance is refused with advice to soften the layer."""
+    c, x, weight = pair_arrays(40)
+    monkeypatch.setattr(
+        "patchfem.contact.strips.STRIP_RESIDUAL_TOL", -1.0
+    )  # smaller than any residual
     with pytest.raises(
         NotConverged, match=r"contact\.asperities: .* exceeds .*; make the rough layer softer"
     ):
-        solve(PEAKS, c, x, weight, 1e-4 * x, LOAD)
+        solve(HERTZ_LAYER, c, x, weight, 1e-4 * x, LOAD)
 
 
-def test_always_the_independent_check_sees_a_wrong_force():
-    c, x, weight = bodies(40)
-    for skin in (SKINS["exponential"], PEAKS):
-        state = solve(skin, c, x, weight, 1e-5 * x, LOAD)
+def test_always_residual_check_detects_wrong_force():
+    """The independent residual check detects a wrong force that still balances the load."""
+    compliance, x, weight = pair_arrays(40)
+    for layer in (LAYERS["exponential"], HERTZ_LAYER):
+        state = solve(layer, compliance, x, weight, 1e-5 * x, LOAD)
         wrong = state.force.copy()
         wrong[3], wrong[4] = wrong[3] * 1.001, wrong[4] - 0.001 * wrong[3]
-        checks = compute_strip_residuals(
-            strips_of(c, x, weight, np.zeros(1), skin),
+        residuals = compute_strip_residuals(
+            strips_of(compliance, x, weight, np.zeros(1), layer),
             1e-5 * x[None],
             wrong[None],
             HolderPosition(state.delta),
             HolderLoads(LOAD),
         )
-        assert checks["law"] > STRIP_RESIDUAL_TOL and checks["force_balance"] < STRIP_RESIDUAL_TOL
+        assert (
+            residuals["law"] > STRIP_RESIDUAL_TOL
+            and residuals["force_balance"] < STRIP_RESIDUAL_TOL
+        )

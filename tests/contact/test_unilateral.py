@@ -1,4 +1,4 @@
-"""The unilateral solve: balance, symmetry, scaling, hundreds of random gaps, and a quadratic program beside it."""
+"""The unilateral solve: signs, independence of the start, zero load, and comparison with two full bodies."""
 
 from __future__ import annotations
 
@@ -14,45 +14,47 @@ from patchfem.mesh import graded_grid
 
 
 @pytest.mark.parametrize("offset", [0.0, 1e-3, 3e-3])
-def test_always_a_load_line_to_the_right_opens_the_left_side(offset):
-    """Rotation > 0 opens the gap at +x, so a load right of the middle rotates by less than zero."""
+def test_always_load_line_on_right_opens_left_side(offset):
+    """A load line right of the centre gives a negative rotation, which opens the left side."""
     pair = coated_pair(100)
     state = press(pair, np.zeros(101), LOAD, LOAD * offset)
     assert np.sign(np.round(state.rotation, 16)) == -np.sign(offset)
-    held = press(pair, tilt(pair.interface.x, 1e-5), LOAD)
-    assert held.moment < 0
+    fixed = press(pair, tilt(pair.interface.x, 1e-5), LOAD)
+    assert fixed.moment < 0
 
 
-def random_cases(count):
-    """Smooth, jagged and spiked gaps of 1 nm to 100 um with loads and load lines of every kind."""
+def random_cases(n_cases):
+    """Yield pairs with smooth, noisy and spiked gaps of 1 nm to 100 um, loads and load lines."""
     rng = np.random.default_rng(2026)
     pair = pair_of(graded_grid(LENGTH, 6.35e-3, LENGTH / 40, COATING), COATED)
     x = pair.interface.x
-    for k in range(count):
-        size = 10 ** rng.uniform(-9, -4)
+    for k in range(n_cases):
+        amplitude = 10 ** rng.uniform(-9, -4)
         gap = (
-            rough(rng, x, size),
-            size * rng.normal(size=x.size),
-            size * rng.standard_cauchy(x.size),
+            rough(rng, x, amplitude),
+            amplitude * rng.normal(size=x.size),
+            amplitude * rng.standard_cauchy(x.size),
         )[k % 3]
         yield pair, gap, 10 ** rng.uniform(0, 4), rng.uniform(-0.499, 0.499) * LENGTH
 
 
-def test_always_the_start_of_the_active_set_does_not_change_the_answer():
+def test_always_initial_active_set_does_not_affect_forces():
+    """The initial active set does not affect the forces."""
     rng = np.random.default_rng(8)
     for pair, gap, load, offset in random_cases(30):
         x = pair.interface.x
         for target in (np.array([load]), np.array([load, load * offset])):
-            cold, _, _ = solve_forces(pair.normal, x, gap, target)
+            reference, _, _ = solve_forces(pair.normal, x, gap, target)
             for _ in range(3):
-                warm, _, _ = solve_forces(
+                restarted, _, _ = solve_forces(
                     pair.normal, x, gap, target, rng.random(x.size) < rng.random()
                 )
-                assert np.abs(warm - cold).max() <= 1e-8 * load
+                assert np.abs(restarted - reference).max() <= 1e-8 * load
 
 
 @pytest.mark.parametrize("moment", [None, 0.0])
-def test_exact_zero_load_touches_and_carries_nothing(moment):
+def test_exact_zero_load_gives_touching_pieces_without_force(moment):
+    """Under zero load the pieces touch without force, and the approach is the smallest gap."""
     pair = coated_pair(100)
     gap = crown(pair.interface.x, 1.0) + 3e-6
     state = press(pair, gap, 0.0, moment)
@@ -62,7 +64,8 @@ def test_exact_zero_load_touches_and_carries_nothing(moment):
     assert state.gap.min() == 0 and np.abs(state.gap - (gap - 3e-6)).max() <= 1e-20
 
 
-def test_exact_an_approach_is_counted_from_a_gap_that_lies_below_zero():
+def test_exact_approach_is_relative_to_gap_offset():
+    """Shifting gap and approach by the same negative offset leaves load and pressure unchanged."""
     pair = coated_pair(100)
     gap = crown(pair.interface.x, 1.0)
     above = press_to_approach(pair, gap, 2e-6)
@@ -71,9 +74,9 @@ def test_exact_an_approach_is_counted_from_a_gap_that_lies_below_zero():
     assert below.sigma_n == pytest.approx(above.sigma_n, rel=1e-6, abs=1e-9 * above.sigma_n.max())
 
 
-# contact fraction, dT/d(slide) [N/m], greatest pressure [Pa] and approach [m] of the coated pair at 200 cells, from
+# contact fraction, tangential stiffness [N/m], peak pressure [Pa] and approach [m] of the coated pair at 200 cells, from
 # both pieces together as one sparse saddle-point problem with its own element matrix (no condensation)
-TWO_BODIES = {
+TWO_BODY_RESULTS = {
     0.0: (1.00000, 4.04955667e8, 8.793741e5, 6.24762054e-8),
     1e-5: (0.93750, 4.04942844e8, 1.8289766e6, 6.24471316e-8),
     1e-4: (0.22250, 2.30395570e8, 7.9044006e6, -2.35528915e-7),
@@ -82,12 +85,13 @@ TWO_BODIES = {
 
 
 @pytest.mark.parametrize("angle", TILTS)
-def test_exact_coated_pair_agrees_with_two_whole_bodies(angle):
+def test_exact_coated_pair_agrees_with_uncondensed_bodies(angle):
+    """Contact fraction, stiffness, peak pressure and approach agree with a solution of both bodies without condensation."""
     pair = coated_pair(200)
     x = pair.interface.x
     weight = pair.interface.weight
     state = press(pair, tilt(x, angle), LOAD)
-    fraction, stiffness, peak, approach = TWO_BODIES[angle]
+    fraction, stiffness, peak, approach = TWO_BODY_RESULTS[angle]
     active = state.sigma_n > 0
     assert weight[active].sum() / (LENGTH * WIDTH) == pytest.approx(fraction, rel=1e-12)
     tangent = np.linalg.solve(pair.tangential[np.ix_(active, active)], np.ones(active.sum())).sum()
