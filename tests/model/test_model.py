@@ -8,11 +8,14 @@ import pytest
 from scene_texts import (
     BENCH,
     COULOMB,
+    FORCED,
     GROWING,
     LINEAR,
+    MODE,
     PATCH,
     POINT,
     RIG,
+    SECOND,
     SHEAR,
     SHORT,
     SMALL_PATCH,
@@ -22,7 +25,9 @@ from scene_texts import (
 )
 
 from patchfem.core import Missing, PatchfemError
+from patchfem.effects import EFFECTS, import_effect
 from patchfem.model import build
+from patchfem.runs import drive_and_knee
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -301,3 +306,35 @@ cycles = 3
     assert rig.first_mode.frequency == pytest.approx(
         3 / (2 * np.pi) * np.sqrt((5 - 17**0.5) / 4), rel=1e-12
     )
+
+
+# ---- effects and derived properties
+
+
+def test_always_every_effect_names_a_module_that_exists():
+    """The module of every effect that has code of its own can be imported."""
+    for name, effect in EFFECTS.items():
+        assert not effect.module or import_effect(name).__name__ == effect.module, name
+
+
+@pytest.mark.parametrize("length, overhangs", [(12.7, False), (16.0, True), (26.0, True)])
+def test_exact_longer_piece_overhangs_interface(length, overhangs):
+    """A piece that is longer than the interface, by 26 % or by 105 %, overhangs it."""
+    text = SMALL_PATCH + f'[contact.lower]\nlength = "{length} mm"\n'
+    assert build(loads(text)).patch.pieces.has_overhang == overhangs
+
+
+@pytest.mark.parametrize(
+    "text, sets, has_knee",
+    [
+        (STRUCTURE, [], True),
+        (STRUCTURE, ['drive.frequency="120 Hz"'], False),
+        (STRUCTURE + SECOND, [], False),
+        (MODE + FORCED.replace("mass = 2\n", ""), ['drive.frequency="143 Hz"'], False),
+    ],
+    ids=["resonance", "below resonance", "two modes", "force"],
+)
+def test_exact_only_base_sine_at_resonance_of_single_mode_has_knee(text, sets, has_knee):
+    """Only a sine of the base at resonance of a single mode has a drive that friction can bound."""
+    model = build(loads(POINT + COULOMB + text, sets=sets))
+    assert set(drive_and_knee(model)) == ({"drive", "knee"} if has_knee else set())
