@@ -429,7 +429,7 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
         assert compiled.cache_folder() == first  # the same in one process
         user_cache.make_process_folder.cache_clear()
         assert compiled.cache_folder() != first  # another in the next
-        monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
+        shutil.rmtree(temporary)
         user_cache.make_process_folder.cache_clear()
         assert not compiled.cache_folder().exists()  # nothing is kept, nothing fails
     finally:

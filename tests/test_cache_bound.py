@@ -110,8 +110,6 @@ def test_always_what_cannot_be_removed_is_no_fault(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "rename", refused)
     cache_limit.remove_old_folders(mine, 0)
-    monkeypatch.setattr(os, "utime", refused)
-    cache_limit.mark_used(mine)
     cache_limit.mark_used(tmp_path / "nowhere")
     assert old.is_dir()
 

@@ -50,6 +50,11 @@ def test_exact_the_parameters_of_a_computed_decay_are_recovered(tmp_path):
     assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(
         -0.35, abs=1e-5
     )
+    measured, rows = (
+        np.loadtxt(file, delimiter=",", skiprows=1) for file in (path, tmp_path / "out/fit.csv")
+    )
+    np.testing.assert_allclose(rows[:, :5], measured, rtol=1e-12)
+    np.testing.assert_allclose(rows[:, 5:], measured[:, [1, 3]], rtol=1e-5)
 
 
 FLUID = shaken('law = "tanh"\nreference_speed = "0.3 m/s"').replace("static = 0.3", "static = 0.6")

@@ -77,6 +77,12 @@ def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
         track["area_gross"]["value"] / width, rel=1e-12
     )
     assert track["depth_mean"]["value"] < track["depth_floor"]["value"] < deepest
+    for end in (
+        track["from"],
+        track["to"],
+    ):  # known to an element of 0.2 mm, or to half of one at an end
+        assert 0.099e-3 < end["high"] - end["value"] <= 0.2e-3
+        assert end["value"] - end["low"] == pytest.approx(end["high"] - end["value"], rel=1e-9)
     depth_error = found["worn_depth_max"]["high"] - deepest
     for name in ("area_net", "area_gross"):
         assert track[name]["high"] - track[name]["value"] == pytest.approx(

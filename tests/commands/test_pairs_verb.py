@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -82,6 +83,14 @@ def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):
         (max(values.mean() - side, 0.0), values.mean() + side)
     )
     assert json.loads(json.dumps(pf.compare(pairs=table))) == said
+    picture = (out / "report.html").read_text()
+    bars = re.findall(
+        r'd="M ([\d.]+) ([\d.]+) \nL \1 ([\d.]+) \n" [^>]*stroke: var.--accent', picture
+    )
+    dots = re.findall(r'x="([\d.]+)" y="([\d.]+)" style="fill: var.--accent', picture)
+    assert len(bars) >= 2
+    for x, low, high in bars:
+        assert any(at == x and float(high) < float(y) < float(low) for at, y in dots)
 
 
 def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():

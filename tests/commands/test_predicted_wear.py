@@ -69,17 +69,22 @@ def crowned(tmp_path_factory) -> Path:
     return folder
 
 
-def test_always_the_interval_of_the_coefficient_contains_the_truth(made):
+def test_always_the_interval_of_the_coefficient_contains_the_truth(made, tmp_path):
+    """Traces whose x runs against that of the patch."""
     folder, pair = made
     out = folder / "out"
-    files = (folder / "before.csv", folder / "after.csv")
+    files = []
+    for name in ("before.csv", "after.csv"):
+        x, z = np.loadtxt(folder / name, delimiter=",", skiprows=1, unpack=True) * 1e-6
+        files.append(write_trace(tmp_path / name, x, z[::-1]))
+    centre = x[0] + x[-1] - pair.centre
     answer = cli(
         "compare", *files, "--predicted", folder / "wear", "--piece", pair.piece, "-o", out
     )
     assert answer.code == 0, answer.err
     data = json.loads((out / "compare.json").read_text("utf-8"))
     predicted = data["predicted"]
-    for name, truth in (("coefficient", pair.scene.coefficient), ("patch_centre", pair.centre)):
+    for name, truth in (("coefficient", pair.scene.coefficient), ("patch_centre", centre)):
         assert predicted[name]["low"] <= truth <= predicted[name]["high"]
     assert predicted["coefficient"]["high"] < 1.1 * predicted["coefficient"]["low"]
     assert predicted["coefficient"]["unit"] == "m2 N-1"
@@ -88,6 +93,10 @@ def test_always_the_interval_of_the_coefficient_contains_the_truth(made):
     table = np.loadtxt(out / "predicted.csv", delimiter=",", skiprows=1)
     rms = np.sqrt(np.mean(table[np.abs(table[:, 0]) <= 5e5 * pair.scene.patch.length, 3] ** 2))
     assert rms * 1e-6 == pytest.approx(predicted["difference_rms"], rel=1e-4)
+    with xarray.open_dataset(folder / "wear" / "result.nc") as result:
+        depth = np.interp(table[:, 0] * 1e-6, result.x.values, result.worn_depth.values[-1])
+    inside = np.abs(table[:, 0]) < 0.45e6 * pair.scene.patch.length
+    assert np.corrcoef(depth[inside], table[inside, 2])[0, 1] > 0.99
     page = (out / "report.html").read_text("utf-8")
     assert "Computed wear over the measured wear" in page
 

@@ -100,29 +100,37 @@ def test_exact_point_compliance_is_symmetric_and_invertible():
     assert not force[~in_contact].any()
 
 
+def press_points(points, gap, load: float) -> tuple:
+    """Return the positions of the contact edges of equally spaced points, and the stiffness."""
+    force, _ = solve_by_gradients(
+        points, patch_problem(points.x, gap - gap.min(), load), 1e-10, 3000
+    )
+    in_contact = force > 0
+    ones = np.ones(points.x.size)
+    opening = gap + points.product(force)
+    gap_after = np.where(in_contact, 0.0, opening - opening[in_contact].mean())
+    edges = find_edges(points, force, gap_after, points.solve_forces(in_contact, ones))
+    return [edge.position for edge in edges], set_stiffness(points, in_contact, ones, edges)
+
+
 @pytest.mark.parametrize("n_points", [721, pytest.param(2967, marks=pytest.mark.slow)])
 def test_exact_point_edges_agree_with_refined_points(n_points):
     """Edges agree with points eight times as dense within 0.03 of a spacing, and the stiffness within 7e-5."""
-    results = []
-    for points in (make_points(n_points), make_points(8 * n_points)):
-        gap = (points.x - 0.123e-3) ** 2 / (2 * 0.3)
-        force, _ = solve_by_gradients(
-            points, patch_problem(points.x, gap - gap.min(), 2e4), 1e-10, 3000
-        )
-        in_contact = force > 0
-        ones = np.ones(points.x.size)
-        opening = gap + points.product(force)
-        edges = find_edges(
-            points,
-            force,
-            np.where(in_contact, 0.0, opening - opening[in_contact].mean()),
-            points.solve_forces(in_contact, ones),
-        )
-        results.append(
-            (*(edge.position for edge in edges), set_stiffness(points, in_contact, ones, edges))
-        )
-    assert results[0][:2] == pytest.approx(results[1][:2], abs=0.03 * LENGTH / n_points)
-    assert results[0][2] == pytest.approx(results[1][2], rel=7e-5)
+    coarse, fine = (
+        press_points(points, (points.x - 0.123e-3) ** 2 / (2 * 0.3), 2e4)
+        for points in (make_points(n_points), make_points(8 * n_points))
+    )
+    assert coarse[0] == pytest.approx(fine[0], abs=0.03 * LENGTH / n_points)
+    assert coarse[1] == pytest.approx(fine[1], rel=7e-5)
+
+
+def test_always_mirrored_contact_has_same_stiffness():
+    """The stiffness of a narrow contact beside a wide one does not depend on their order: the compliances at the edges
+    are those of the wide one."""
+    points = make_points(400)
+    gap = np.minimum((points.x - 2e-3) ** 2, (points.x + 3e-3) ** 2 + 0.04e-6) / 0.6
+    (edges, stiffness), (_, mirrored) = (press_points(points, z, 1e4) for z in (gap, gap[::-1]))
+    assert len(edges) == 4 and stiffness == pytest.approx(mirrored, rel=1e-6)
 
 
 def test_exact_smooth_modes_reproduce_end_compliance():

@@ -412,23 +412,19 @@ def test_refuses_unsolvable_layer_controls():
         solve(ExponentialAsperities(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
 
 
-def test_refuses_unconverged_layer_solve(monkeypatch):
-    """A solve that exceeds the number of Newton steps is refused."""
+@pytest.mark.parametrize(
+    ("limit", "value", "message"),
+    [
+        ("asperity_layer.MAX_NEWTON_STEPS", 1, r"contact\.asperities"),
+        # smaller than any residual
+        ("strips.STRIP_RESIDUAL_TOL", -1.0, r"contact\.asperities: .* exceeds .*; make the rough"),
+    ],
+)
+def test_refuses_unconverged_layer_solve(monkeypatch, limit, value, message):
+    """A solve with too many Newton steps or a large residual is refused, with advice to soften the layer."""
     c, x, weight = pair_arrays(40)
-    monkeypatch.setattr(asperity_layer, "MAX_NEWTON_STEPS", 1)
-    with pytest.raises(NotConverged, match=r"contact\.asperities"):
-        solve(HERTZ_LAYER, c, x, weight, 1e-4 * x, LOAD)
-
-
-def test_refuses_large_layer_residual_with_advice(monkeypatch):
-    """A solve whose residual exceeds the tolerance is refused with advice to soften the layer."""
-    c, x, weight = pair_arrays(40)
-    monkeypatch.setattr(
-        "patchfem.contact.strips.STRIP_RESIDUAL_TOL", -1.0
-    )  # smaller than any residual
-    with pytest.raises(
-        NotConverged, match=r"contact\.asperities: .* exceeds .*; make the rough layer softer"
-    ):
+    monkeypatch.setattr(f"patchfem.contact.{limit}", value)
+    with pytest.raises(NotConverged, match=message):
         solve(HERTZ_LAYER, c, x, weight, 1e-4 * x, LOAD)
 
 

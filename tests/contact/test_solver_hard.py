@@ -385,18 +385,18 @@ CONTROLS = {
 
 
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
-def test_exact_solution_is_unchanged_without_primal_dual_method(control, monkeypatch):
-    """The solution is unchanged if the primal-dual method fails for every set."""
+def test_exact_primal_method_agrees_under_every_control(control):
+    """The primal method and the default method have the same solution under every control."""
     pair = coated_pair(100)
     gap = rough(np.random.default_rng(3), pair.interface.x, 1e-6)
     problem = patch_problem(
         pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control
     )
     expected = solve(StripCompliance(pair.normal), problem)
-    monkeypatch.setattr(unilateral, "solve_primal_dual", lambda *_: (None, 1))
-    solution = solve(StripCompliance(pair.normal), problem)
+    start = np.full(gap.size, LOAD / gap.size) if control[0] else np.zeros(gap.size)
+    solution, _ = solve_primal(StripCompliance(pair.normal), problem, start)
     assert np.abs(solution.force - expected.force).max() <= 1e-10 * expected.force.sum()
-    assert solution.closing == pytest.approx(expected.closing, rel=1e-10, abs=1e-20)
+    assert solution.motion == pytest.approx(expected.motion, rel=1e-10, abs=1e-20)
 
 
 def test_refuses_solution_with_large_residual(monkeypatch):

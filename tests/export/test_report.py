@@ -337,6 +337,15 @@ def test_always_captions_match_run(run_pages):
         report.page_html(make_patch_data(effects=("contact", "contact.coating")))
     )
     assert "with their coatings under the load." in coated
+    history = {"cycle": np.array([0, 2e4, 5e4]), "pressure_peak_at_edge": np.array([0, 3e6, 0])}
+    states = {"time": np.array([0, 5e4 * PERIOD]), "normal_stress": np.ones((2, 201))}
+    states["worn_depth"] = np.ones((2, 201))
+    wear = SimpleNamespace(history=history, states=states, period=PERIOD)
+    data = make_patch_data()
+    data = replace(data, evaluations=replace(data.evaluations, wear=wear))
+    worn = join_captions(report.page_html(data))
+    assert "over 50000 cycles" in worn
+    assert re.search(r"After 20000 cycles the peak pressure .* up to 3(\.0)? MPa above", worn)
 
 
 def test_always_page_without_contact_has_no_charts(run_pages):

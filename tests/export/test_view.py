@@ -188,6 +188,17 @@ def test_refuses_window_without_opengl(bench_folder, tmp_path, monkeypatch, stan
     assert "-o FILE.png" in answer.err
 
 
+def test_exact_picture_names_its_frame(bench_folder, tmp_path):
+    """The command prints the number and the time of the frame that it drew."""
+    last = len(Series(bench_folder)) - 1
+    for frame, name in (
+        ("0", f"frame 0 (of 0 to {last}), 0 s"),
+        (str(last), f"frame {last} (the last)"),
+    ):
+        answer = cli("view", bench_folder, "-o", tmp_path / "a.svg", "--frame", frame)
+        assert answer.code == 0 and name in answer.out
+
+
 @pytest.mark.parametrize(
     "arguments, code, message",
     [

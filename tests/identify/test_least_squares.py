@@ -180,6 +180,15 @@ def test_always_failures_are_counted_and_passed_over():
     )
 
 
+def test_always_a_start_without_neighbours_that_have_values_is_not_converged():
+    def residual(v):
+        if v[0] > 0.0:
+            raise PatchfemError("no value")
+        return v[0] - np.array([1.0, 1.1])
+
+    assert Problem(residual, [0.0], [1.0], start=[0.0]).solve().outcome is Outcome.NOT_CONVERGED
+
+
 def test_refuses_what_cannot_be_fitted():
     with pytest.raises(
         NotConverged, match="failed at all 9 starting points of the search: nothing works"

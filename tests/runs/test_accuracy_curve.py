@@ -89,7 +89,10 @@ def test_exact_report_shows_neighbouring_step_counts(marched_result, tmp_path):
     assert "This run: 1600 steps per cycle" in text
     assert "Next cheaper: accuracy.steps_per_cycle = 800" in text
     assert "Next better: accuracy.steps_per_cycle = 3200" in text
-    names = marched_result.plot.accuracy().get_legend_handles_labels()[1]
+    axes = marched_result.plot.accuracy()
+    seconds = list(axes.get_lines()[0].get_xdata())
+    assert len(seconds) == 3 and seconds == sorted(seconds)
+    names = axes.get_legend_handles_labels()[1]
     assert {"this run", "fewer steps per cycle"} < set(names)
 
 

@@ -63,6 +63,16 @@ def test_exact_cached_run_agrees_with_fresh_run_on_shared_mesh(angle):
         ), name
 
 
+def test_always_shared_mesh_meets_tolerance_of_every_case():
+    """The mesh is refined until the errors of the worst case are below the tolerance."""
+    text = TEXT.replace("1e-2", "1e-3")
+    cases = [build(scene.loads(text.format(100, angle, ""))) for angle in (2e-5, 1e-3)]
+    for case in with_shared_meshes(cases):
+        measures = run(case).measures
+        for measure in (measures["pressure_peak"], measures["normal_stiffness"]):
+            assert measure.error <= 1e-3 * measure.value + measure.floor
+
+
 def test_exact_single_cases_keep_their_own_mesh():
     """Only cases with the same pieces share a mesh; a single case, a prescribed mesh and a refused
     case are left unchanged."""

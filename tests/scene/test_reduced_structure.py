@@ -104,6 +104,9 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
 
 def test_exact_all_modes_kept_are_the_whole_matrices(folder):
     small = run_of(folder, SCENE, **{"structure.reduced.modes": 100})
+    note = next(note for note in small.extra["notes"] if "reduced keeps" in note)
+    first = small.plan.model.rig.structure.frequencies[0]
+    assert f"the first frequency of the reduced structure is {first:.5g} Hz" in note
     whole = run_of(folder, WHOLE)
     for name, one in whole.measures.items():
         if one.value is not None:

@@ -31,12 +31,6 @@ def random_start(rng, n_modes):
     return InitialState(rng.normal(size=n_modes), rng.normal(size=n_modes))
 
 
-def interface_slides(modes, phase, times):
-    """Return the slides of all interfaces in a phase, at times after its beginning."""
-    z = np.array([s.many(times) for s in phase.modal])
-    return np.asarray(modes.interfaces) @ z
-
-
 # comparison with other integrators
 
 

@@ -55,6 +55,8 @@ def test_exact_continuation_follows_circle_through_fold():
     )
     assert path.x[:, 0] ** 2 + path.p**2 == pytest.approx(np.ones(path.p.size), abs=1e-8)
     assert path.folds == (pytest.approx(1.0, abs=1e-8),) and not path.crossings
+    back = follow_curve(circle, [0.6], 0.8, (-0.5, 2.0), False, PathSettings(0.05, 0.05))
+    assert back.ended == "end" and (np.diff(back.p) < 0).all() and (back.x > 0).all()
 
 
 def test_exact_pitchfork_is_reported_as_crossing():

@@ -262,3 +262,15 @@ def test_order_of_merge_width_is_two(reading, order, growth):
     # the age of growing bonds limits wide merges
     assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)
     assert n_strips[1] < n_strips[0] < 500 < full.status[STATUS.max_strips]
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0])
+def test_exact_repeated_passes_are_merged_into_one_strip(order):
+    """Growing bonds of many passes over one range, merged into strips, agree with all strips."""
+    law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
+    path = triangle(0.1, 30, 40)
+    full = follow_list(law, path, 0.05)
+    merged = follow_list(law, path, 0.05, 0.05)
+    assert merged.status[STATUS.n_spread] > 5
+    assert merged.after == pytest.approx(full.after, abs=2e-3)
+    assert merged.stored == pytest.approx(full.stored, abs=1e-4)

@@ -98,18 +98,29 @@ def test_exact_chunks_of_study_agree_with_whole():
         np.testing.assert_array_equal(concatenated, values)
 
 
-def test_always_failed_lane_check_makes_batch_exact(monkeypatch):
+@pytest.fixture
+def falsify(monkeypatch):
+    """Return a function that makes the lanes give some models a loop area that is 1 % too large."""
+
+    def falsify_models(wrong_models: list) -> None:
+        collect_runs = lane_runs.collect_runs
+
+        def collect_wrong_runs(models, *arguments):
+            runs, *further = collect_runs(models, *arguments)
+            is_wrong = [any(model is wrong for wrong in wrong_models) for model in models]
+            runs.values["loop_area"][is_wrong] *= 1.01
+            return runs, *further
+
+        monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
+
+    return falsify_models
+
+
+def test_always_failed_lane_check_makes_batch_exact(falsify):
     """If the checked cases differ from the exact engine, all cases are solved by the exact engine,
     and a note says so."""
     cases = draw_models("coulomb", 5, 64)
-    collect_runs = lane_runs.collect_runs
-
-    def collect_wrong_runs(models, *arguments):
-        runs, *further = collect_runs(models, *arguments)
-        runs.values["loop_area"][:] *= 1.01
-        return runs, *further
-
-    monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
+    falsify(cases)
     results = batches.solve_models(cases)
     exact = solve_by_group(cases)
     assert all(numerics["engine"] == "exact" for numerics in results.numerics.values())
@@ -121,7 +132,7 @@ def test_always_failed_lane_check_makes_batch_exact(monkeypatch):
     np.testing.assert_array_equal(results.values["loop_area"], exact.values["loop_area"])
 
 
-def test_always_single_failed_lane_check_replaces_only_this_case(monkeypatch):
+def test_always_single_failed_lane_check_replaces_only_this_case(falsify):
     """If a single checked case differs from the exact engine, only this case is solved again; the
     others keep their values."""
     cases = draw_models("coulomb", 7, 96)
@@ -129,15 +140,7 @@ def test_always_single_failed_lane_check_replaces_only_this_case(monkeypatch):
     numbers = np.column_stack(lane_numbers.make_cases(cases)[0])
     is_fast = np.array([untouched.numerics[case]["engine"] == "lanes" for case in range(96)])
     checked = lane_check.select_checked_cases(numbers, is_fast)[0]
-    collect_runs = lane_runs.collect_runs
-
-    def collect_wrong_runs(models, *arguments):
-        runs, *further = collect_runs(models, *arguments)
-        is_checked = np.array([model is cases[checked] for model in models])
-        runs.values["loop_area"][is_checked] *= 1.01
-        return runs, *further
-
-    monkeypatch.setattr(lane_runs, "collect_runs", collect_wrong_runs)
+    falsify([cases[checked]])
     results = batches.solve_models(cases)
     assert results.numerics[checked]["engine"] == "exact"
     assert "differed from it in 1, in loop_area of this case" in results.notes[checked][-1]

@@ -25,10 +25,12 @@ class StubBatch(batches.Batch):
 def set_batch(monkeypatch):
     """Return a function that sets the only batch; if it is not called, each case runs by itself."""
 
-    def replace_batch(*functions) -> None:
-        monkeypatch.setattr(batches, "BATCHES", (StubBatch(*functions),))
+    stub_batches = []
+    monkeypatch.setattr(batches, "BATCHES", stub_batches)
 
-    monkeypatch.setattr(batches, "BATCHES", ())
+    def replace_batch(*functions) -> None:
+        stub_batches[:] = [StubBatch(*functions)]
+
     return replace_batch
 
 

@@ -1,5 +1,6 @@
 """Every kind of batch solves its cases together; no kind falls back to single runs."""
 
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -55,9 +56,16 @@ LANE_BATCHES = {"lumped.lanes", "lumped.tabled"}
 
 
 @pytest.fixture
-def single_runs(monkeypatch) -> list:
-    """Return the list of plans that run one by one; the working directory is that of the shipped
-    rig."""
+def replace_single_runs(monkeypatch):
+    """Return a function that replaces the runs of one case; the working directory is that of the
+    shipped rig."""
+    monkeypatch.chdir(STUDIES / "rig")
+    return partial(monkeypatch.setattr, one_by_one, "run")
+
+
+@pytest.fixture
+def single_runs(replace_single_runs) -> list:
+    """Return the list of plans that run one by one."""
     plans = []
     run = one_by_one.run
 
@@ -65,8 +73,7 @@ def single_runs(monkeypatch) -> list:
         plans.append(plan)
         return run(plan, *arguments, **options)
 
-    monkeypatch.setattr(one_by_one, "run", record)
-    monkeypatch.chdir(STUDIES / "rig")
+    replace_single_runs(record)
     return plans
 
 
@@ -106,13 +113,15 @@ def test_always_batch_solves_its_cases_together(name, single_runs):
         ("gathered", gathered, "reduce_to_few_points"),
     ],
 )
-def test_always_batch_fault_is_noted_in_each_case(name, module, function, single_runs, monkeypatch):
+def test_always_batch_fault_is_noted_in_each_case(
+    name, module, function, replace_single_runs, monkeypatch
+):
     """If a step of a batch fails, its cases run one by one, and a note of each case names the
     fault."""
     models = MODELS[name]()
     monkeypatch.setattr(module, function, lambda *given, **options: 1 / 0)
     # Any result will do: the test reads only the notes.
-    monkeypatch.setattr(one_by_one, "run", lambda plan, *given, **options: pf.run(BENCH))
+    replace_single_runs(lambda plan, *given, **options: pf.run(BENCH))
     results = batches.solve_models(models)
     for case in range(len(models)):
         assert f"{name}: ZeroDivisionError: division by zero" in results.notes[case][-1]

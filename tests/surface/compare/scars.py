@@ -7,10 +7,9 @@ A surface of 160 sines of 8 um to 300 um (Rq 0.3 um), read every 2 um twice, 10 
   50 nm deep.
 * wide: a parabola, trapezoid, half wave or wedge of 5.0 mm to 5.9 mm around the middle, 1.5 um deep.
 
-The rules were built on seeds below 7000; `HELD_OUT` was named before their score. `python scars.py [seed]` prints it.
+The rules were built on seeds below 7000; `HELD_OUT` was named before their score.
 """
 
-import sys
 from functools import cache
 
 import numpy as np
@@ -126,12 +125,3 @@ def score(kind: str, seeds) -> tuple:
         half_width = float(np.median([half for _, half in rows]))
         intervals[name] = (sum(is_held for is_held, _ in rows), len(rows), half_width)
     return heads, intervals, false
-
-
-if __name__ == "__main__":
-    start = int(sys.argv[1]) if len(sys.argv) > 1 else HELD_OUT
-    for kind in sys.argv[2:] or KINDS:
-        heads, held, false = score(kind, range(start, start + 20))
-        print(f"{kind}: worn {false} of 20; {heads}")
-        for name, (good, given, half) in held.items():
-            print(f"    {name:<20} {good} of {given} contain, half width {half:.3g}", flush=True)

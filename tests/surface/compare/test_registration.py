@@ -111,6 +111,8 @@ def test_always_traces_of_two_places_have_no_depth(count):
         assert found.basis == "" and found.worn.mean.value is found.motion.shift.value is None
         assert "no common part" in found.worn.mean.reason
         assert "unworn flanks" in found.worn.mean.reason
+        worn = found.worn
+        assert [part.unit for part in (worn.largest, worn.mean, worn.area)] == ["m", "m", "m2"]
 
 
 @pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])

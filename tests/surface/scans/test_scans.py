@@ -256,10 +256,10 @@ def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
     z = grooved[1].z.copy()
     z[120:122, 20:22] += 4e-6
     grown = [
-        change.compare_scans(grooved[0], replace(scan, z=z), keep)
+        change.compare_scans(grooved[0], replace(scan, z=z), **keep)
         .volumes.values["grown_volume"]
         .value
-        for keep in (False, True)
+        for keep in ({}, {"keep_spikes": True})
     ]
     assert grown[0] < 0.1 * grown[1] and grown[1] == pytest.approx(4 * STEP**2 * 4e-6, rel=0.3)
 
