@@ -12,7 +12,7 @@ import os
 import sys
 from pathlib import Path
 
-# set before NumPy is imported, here and in child processes
+# NumPy reads this variable when it is imported, here and in child processes
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
@@ -23,18 +23,18 @@ from patchfem.compiled import UNCACHED_FUNCTIONS, cache_folder
 
 HERE = Path(__file__).parent
 
-# Without a folder per version of the sources numba runs the old code of an edited kernel.
+# Numba would run the old code of an edited kernel if its folder did not depend on the sources.
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 
 # Folders whose tests compile code run first, folders that use this code again run last, all others in between.
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
 LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
 
-# a test runs compiled code also where a short run would choose plain Python
+# Short runs, which plain Python would compute otherwise, use compiled code in the tests too.
 compiled.MAX_PYTHON_SECONDS = -1.0
 
 if sys.dont_write_bytecode:
-    # Hundreds of child processes would each translate all modules that they import.
+    # Otherwise each of hundreds of child processes translates all modules that it imports.
     sys.dont_write_bytecode = False
     sys.pycache_prefix = str(cache_folder() / "bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
@@ -42,7 +42,7 @@ if sys.dont_write_bytecode:
 
 
 def list_compiled_functions() -> set:
-    """Return the cached files of compiled functions."""
+    """Return the paths of the compiled functions in the cache."""
     return set((cache_folder() / "code").glob("*.code"))
 
 
@@ -50,7 +50,7 @@ COMPILED_BEFORE = list_compiled_functions()
 
 
 def pytest_configure(config):
-    """Set the number of examples, and let every second worker collect the folders in reverse order.
+    """Set the number of random examples; every second worker collects the folders in reverse order.
 
     Two workers that collect in opposite orders do not translate the same modules to bytecode at the same time.
     """
@@ -76,7 +76,7 @@ def pytest_configure(config):
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
-    """Return one worker per core for folders, none for files, single tests, -k and --lf, which end sooner without."""
+    """Return one worker per core for folders, and none for single files, -k and --lf, which are faster in one process."""
     is_selection = any(
         getattr(config.option, name, False) for name in ("keyword", "lf", "collectonly")
     )
@@ -88,7 +88,7 @@ def pytest_xdist_auto_num_workers(config):
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_pycollect_makeitem(collector):
-    """Mark as slow what a normal run leaves out.
+    """Mark the cases that a normal run omits as slow.
 
     These are the cases of a test marked `share(places)` at other places. With `-m slow` all property tests are among
     them, because they draw more examples there.
@@ -105,19 +105,20 @@ def pytest_pycollect_makeitem(collector):
 
 
 def pytest_collection_modifyitems(items):
-    """Sort the tests by folder: those that compile code, those that need none, those that use compiled code again."""
+    """Sort the tests by folder: those that compile code, those that need none, those that use code compiled before."""
     rank = {name: place - len(COMPILING) for place, name in enumerate(COMPILING)}
     rank |= {name: place + 1 for place, name in enumerate(LATER)}
 
-    def place_of(item) -> tuple:
+    def sort_key(item) -> tuple:
+        """Return the rank of the folder of a test, and the parts of its path."""
         parts = item.path.relative_to(HERE).parts
         return rank.get(parts[0], 0 if len(parts) > 1 else 1), parts
 
-    items.sort(key=place_of)
+    items.sort(key=sort_key)
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Print how much code the run had to compile, which tells a cold run from a warm one."""
+    """Print the numbers of functions taken from the cache and compiled in this run."""
     new = len(list_compiled_functions() - COMPILED_BEFORE)
     terminalreporter.write_line(
         f"{len(COMPILED_BEFORE)} compiled functions were kept, {new} more are now, in "
@@ -126,12 +127,12 @@ def pytest_terminal_summary(terminalreporter):
 
 
 def pytest_collection():
-    """Switch the garbage collector off while modules are imported and tests are collected."""
+    """Disable the garbage collector while modules are imported and tests are collected."""
     gc.disable()
 
 
 def pytest_collection_finish(session):
-    """Keep what is imported and collected out of later searches for garbage, and make these rare.
+    """Exclude the imported and collected objects from later garbage collections, and make these rare.
 
     This saves a twelfth of the CPU time of tests that run mostly Python.
     """
@@ -142,7 +143,7 @@ def pytest_collection_finish(session):
 
 
 @pytest.fixture(autouse=True)
-def machine_code_is_kept():
+def fail_on_uncached_functions():
     """Fail a test that calls a compiled function whose machine code cannot be cached.
 
     Each process that calls such a function would wait for numba and its compiler.

@@ -32,13 +32,13 @@ from import_graph import syntax_nodes  # noqa: E402
 
 BASELINE = "tests/house.toml"
 TREES = ("patchfem", "studies", "tests")
-SHOWN_LINES = 12  # lines that the message about one count names
+SHOWN_LINES = 12  # largest number of lines that a message lists
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 CALLABLES = (*FUNCTIONS, ast.Lambda)
 SCOPES = (*CALLABLES, ast.ClassDef)
 DOCUMENTED = (*FUNCTIONS, ast.ClassDef, ast.Module)
 COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
-# The tokens of Python 3.11, where a formatted string is a single token. `tokenize` takes ten times as long.
+# Tokens of Python 3.11, where a formatted string is one token. The module tokenize takes ten times as long.
 TOKEN = re.compile(
     r"""(?P<comment>\#[^\n]*)
     | [a-zA-Z]{0,2}(?:\"{3}(?:[^\\]|\\.)*?\"{3} | '{3}(?:[^\\]|\\.)*?'{3} | "(?:[^\\"]|\\.)*" | '(?:[^\\']|\\.)*')
@@ -93,9 +93,9 @@ FILLERS = frozenset(
     "things told way what which who whole why wide worth".split()
 )
 PREPOSITIONS = frozenset("after at before beyond by from in of over under without".split())
-# `from_file` is idiomatic
+# Names such as `from_file` and `to_text` are idiomatic.
 VERBS_BEFORE_PREPOSITION = ("from_", "to_", "as_", "on_", "at_", "in_", "by_")
-AXES = frozenset("xyztnm_")  # letters of coordinates, time and sizes need no explanation
+AXES = frozenset("xyztnm_")  # letters of coordinates, time and counts need no explanation
 SECTION = re.compile(r"^ *(Parameters|Returns|Yields|Attributes)\n *---", re.M)
 OPENING = re.compile(
     r"(What|Who|Whether what|How many|How far|That|With|As|Where|Why|Between which)\b"
@@ -133,13 +133,13 @@ def parse_source(text: str, path: Path) -> Source:
 
 
 def is_participle(word: str) -> bool:
-    """Return whether a word without underscores is a past participle."""
+    """Return whether a word without underscores is a past participle, such as "settled" or "given"."""
     regular = word.endswith("ed") and len(word) > 4 and word not in NOUNS_IN_ED
     return "_" not in word and (regular or word in IRREGULAR_PARTICIPLES)
 
 
 def name_rules(node):
-    """Yield the rules that the name of a function breaks, with the name."""
+    """Yield the rules of names that a function breaks."""
     word = node.name.strip("_")
     first = word.partition("_")[0]
     last = word.rpartition("_")[2]
@@ -158,7 +158,7 @@ def name_rules(node):
 
 
 def parameter_rules(node, documentation: str):
-    """Yield the rules that the parameters of a function break."""
+    """Yield the rules of parameters that a function breaks."""
     positional = [
         arg for arg in (*node.args.posonlyargs, *node.args.args) if arg.arg not in ("self", "cls")
     ]
@@ -191,8 +191,8 @@ def docstring_rules(node, documentation: str):
         yield "D5", node, f"{node.name}: {first}"
 
 
-def own_nodes(node) -> list:
-    """List the nodes of a function; of the functions and classes inside it only the nodes that define them."""
+def nodes_of_function(node) -> list:
+    """Return the nodes of a function; functions and classes inside it count as single nodes."""
     nodes = list(ast.iter_child_nodes(node))
     for child in nodes:
         if not isinstance(child, SCOPES):
@@ -203,7 +203,7 @@ def own_nodes(node) -> list:
 def body_rules(node):
     """Yield the rules that the statements of a function break."""
     longest = 0
-    nodes = own_nodes(node)
+    nodes = nodes_of_function(node)
     for part in nodes:
         n_lines = getattr(part, "end_lineno", 0) - getattr(part, "lineno", 0) + 1
         if isinstance(part, ast.Return) and isinstance(part.value, ast.Tuple):
@@ -226,7 +226,7 @@ def body_rules(node):
 
 
 def record_rules(node):
-    """Yield the rule that a NamedTuple or dataclass with too many fields breaks."""
+    """Yield the rule broken by a NamedTuple or dataclass with too many fields."""
     is_record = re.search(
         "NamedTuple|dataclass", " ".join(map(ast.unparse, [*node.bases, *node.decorator_list]))
     )
@@ -281,8 +281,8 @@ def absolute_module(node, package: tuple) -> str:
     return ".".join([*base, *filter(None, [node.module])])
 
 
-def names_used(nodes: tuple, package: tuple):
-    """Yield the dotted names that a module imports, and those that it reads as attributes of what it imports."""
+def imported_names(nodes: tuple, package: tuple):
+    """Yield the dotted names that a module imports, and the attributes that it reads from imported modules."""
     aliases = {}
     attributes = []
     for node in nodes:
@@ -299,14 +299,14 @@ def names_used(nodes: tuple, package: tuple):
 
 
 def offered_names(sources: list, root: Path) -> frozenset:
-    """Return the dotted names that folders of the package offer: those that modules of other folders use."""
+    """Return the dotted names that modules of other folders import or read: the interface of each folder."""
     package = [source for source in sources if source.path.is_relative_to(root / "patchfem")]
     modules = {".".join(source.path.relative_to(root).with_suffix("").parts) for source in package}
     offered = set()
     for source in package:
         own_folder = ".".join(source.path.relative_to(root).parts[:-1])
-        for name in names_used(source.nodes, source.path.relative_to(root).parts[:-1]):
-            # the folder of a module, or of the module that has the name
+        for name in imported_names(source.nodes, source.path.relative_to(root).parts[:-1]):
+            # the folder that contains the module, or the module that defines the name
             folder = name.rsplit(".", 1 if name in modules else 2)[0]
             if folder != own_folder:
                 offered.add(name)
@@ -314,7 +314,7 @@ def offered_names(sources: list, root: Path) -> frozenset:
 
 
 def border_rules(nodes: tuple, offered: frozenset):
-    """Yield (rule, node, text) where a test reaches behind the border of a folder of the package."""
+    """Yield (rule, node, text) where a test uses a name from inside a folder of the package."""
     modules = set()  # names of imported modules of the package
     for node in nodes:
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "patchfem":
@@ -349,12 +349,12 @@ def count_tokens(source: Source) -> int:
 
 
 def folder_of_file(path: Path, root: Path) -> str:
-    """Return the folder in which a file is counted: patchfem/export for patchfem/export/pages/headline.py."""
+    """Return the folder under which a file is counted, e.g. patchfem/export for patchfem/export/pages/headline.py."""
     return "/".join(path.relative_to(root).parts[:-1][:2])
 
 
 class Counts(NamedTuple):
-    """Counts of a checkout."""
+    """Token counts and breaches of the rules in a checkout, by folder."""
 
     values: dict  # folder -> {rule: count}, without zeros
     breaches: dict  # (folder, rule) -> list of Breach
@@ -399,7 +399,7 @@ def write_baseline(values: dict, root: Path = ROOT) -> None:
 
 
 def exceeded_counts(counts: Counts, baseline: dict) -> list:
-    """Return one message for every count above the baseline; lines of the files changed last come first."""
+    """Return one message for every count above the baseline; the files changed most recently come first."""
     messages = []
     for folder, values in counts.values.items():
         allowed = baseline.get(folder, {})
@@ -417,7 +417,7 @@ def exceeded_counts(counts: Counts, baseline: dict) -> list:
 
 
 def lower_baseline(counts: Counts, baseline: dict) -> dict:
-    """Return the baseline with every count lowered to the present one; none rises."""
+    """Return the baseline with every count lowered to the present count where this is smaller."""
     lowered = {}
     for folder, values in counts.values.items():
         allowed = baseline.get(folder, values)
@@ -426,7 +426,7 @@ def lower_baseline(counts: Counts, baseline: dict) -> dict:
 
 
 def print_table(values: dict) -> None:
-    """Print the sums of the three trees and the counts of their folders."""
+    """Print the sums of the three source trees and the counts of their folders."""
     for tree in TREES:
         folders = {
             folder: counts
@@ -439,7 +439,7 @@ def print_table(values: dict) -> None:
 
 
 def main(words: list) -> None:
-    """Run the command line."""
+    """Run the command line with the given arguments."""
     counts = count_sources()
     if words == ["--lower"]:
         write_baseline(lower_baseline(counts, read_baseline()))

@@ -1,4 +1,4 @@
-"""Eighty scenes whose answers must not change: run them with two states of the package and compare all numbers.
+"""Run eighty scenes with two states of the package and compare all results.
 
     python tests/same_answers.py run DIR [--only k/n] [--scenes OTHER]
     python tests/same_answers.py compare DIR_A DIR_B [--within 1e-10]
@@ -23,7 +23,9 @@ from pathlib import Path
 from string import Template
 from time import perf_counter
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported: sums in one order
+os.environ.setdefault(
+    "OPENBLAS_NUM_THREADS", "1"
+)  # set before NumPy is imported: one thread adds in a fixed order
 
 import h5py
 import numpy as np
@@ -31,14 +33,14 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 WRITTEN = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 COUNT = 80
-# attributes
+# Attributes of the netCDF file that repeat other contents or differ between files.
 REPEATED = (
     "source scene scene_sha256 summary versions CLASS NAME DIMENSION_LIST REFERENCE_LIST".split()
 )
 
 
 def main() -> None:
-    """The command line; exit code 1 where something differs."""
+    """Run the command line; the exit code is 1 if a result differs."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     verbs = parser.add_subparsers(dest="verb", required=True)
     runs = verbs.add_parser("run")
@@ -52,16 +54,16 @@ def main() -> None:
     pair.add_argument(
         "--within", type=float, default=0.0, help="largest relative change that passes"
     )
-    asked = parser.parse_args()
+    arguments = parser.parse_args()
     sys.exit(
-        run(asked.folder, asked.only, asked.scenes)
-        if asked.verb == "run"
-        else compare(*asked.folders, asked.within)
+        run_scenes(arguments.folder, arguments.only, arguments.scenes)
+        if arguments.verb == "run"
+        else compare_folders(*arguments.folders, arguments.within)
     )
 
 
-def scenes() -> dict:
-    """Name -> (text of the scene file, its --set words)."""
+def collect_scenes() -> dict:
+    """Return {name: (text of the scene file, arguments of --set)}."""
     files = {
         path.stem: path.read_text("utf-8") for path in sorted((ROOT / "studies").rglob("*.toml"))
     }
@@ -71,15 +73,15 @@ def scenes() -> dict:
     out = {name: (text, WRITTEN["shorter"].get(name, [])) for name, text in files.items()}
     lines = WRITTEN["scenes"].splitlines()
     draw = random.Random(1985)
-    lines += [drawn(draw) for _ in range(COUNT - len(out) - len(lines))]
+    lines += [random_line(draw) for _ in range(COUNT - len(out) - len(lines))]
     for number, line in enumerate(lines, 1):
         letters, *sets = Template(line).substitute(WRITTEN["words"]).split("; ")
         out[f"{number:02d}-{letters}"] = ("".join(WRITTEN["parts"][one] for one in letters), sets)
     return out
 
 
-def drawn(draw: random.Random) -> str:
-    """A line like those of same_answers.toml by chance."""
+def random_line(draw: random.Random) -> str:
+    """Return a random line in the format of same_answers.toml."""
     letters = draw.choice(["NFSQ", "CFSQ", "NFMDQ", "CFMDQ"])
     words = [
         draw.choice(["friction.law=coulomb", "friction.law=elastic-plastic", "$BONDS"]),
@@ -100,8 +102,8 @@ def drawn(draw: random.Random) -> str:
     return "; ".join([letters, *words, load, size.format(draw.uniform(2, 9))])
 
 
-def beside(folder: Path) -> None:
-    """The files that the scenes name."""
+def write_input_files(folder: Path) -> None:
+    """Write the data files that the scenes name."""
     import pyuff
 
     shutil.copy(ROOT / "studies/rig/table1.csv", folder)
@@ -156,15 +158,15 @@ def beside(folder: Path) -> None:
     )
 
 
-def run(folder: Path, only: str, other: Path | None) -> int:
-    """Run the k-th of n shares of the scenes, one after the other in this process."""
+def run_scenes(folder: Path, only: str, other: Path | None) -> int:
+    """Run the k-th of n parts of the scenes in sequence in this process."""
     place, (k, n) = folder.resolve() / "scenes", map(int, only.split("/"))
     place.mkdir(parents=True, exist_ok=True)
     if other is not None:
         shutil.copytree(other / "scenes", place, dirs_exist_ok=True)
     else:
-        beside(place)
-        for name, (text, _) in (made := scenes()).items():
+        write_input_files(place)
+        for name, (text, _) in (made := collect_scenes()).items():
             (place / f"{name}.toml").write_text(text, "utf-8")
         (place / "sets.json").write_text(
             json.dumps({name: sets for name, (_, sets) in made.items()}, indent=1)
@@ -176,9 +178,9 @@ def run(folder: Path, only: str, other: Path | None) -> int:
         start = perf_counter()
         words = [f"{name}.toml", *(word for one in sets for word in ("--set", one))]
         answer = {
-            "check": told("check", *words),
-            "plan": told("plan", *words, "--json"),
-            "run": told("run", *words, "-o", f"../{name}", "-q", "--fresh"),
+            "check": run_command("check", *words),
+            "plan": run_command("plan", *words, "--json"),
+            "run": run_command("run", *words, "-o", f"../{name}", "-q", "--fresh"),
         }
         answer["seconds"] = round(perf_counter() - start, 3)
         Path(f"../{name}.json").write_text(json.dumps(answer, indent=1), "utf-8")
@@ -189,8 +191,8 @@ def run(folder: Path, only: str, other: Path | None) -> int:
     return 0
 
 
-def told(*words: str) -> dict:
-    """Exit code and stdout (of a run: in its folder) of the command line, and stderr where the code is not 0."""
+def run_command(*words: str) -> dict:
+    """Return exit code and stdout of a command; stdout is empty for `run_scenes`, stderr is kept after a failure."""
     from patchfem.__main__ import main as patchfem
 
     out = io.StringIO()
@@ -208,15 +210,17 @@ def told(*words: str) -> dict:
     }
 
 
-def compare(a: Path, b: Path, within: float) -> int:
-    """Print a line per difference and the total; 1 where a scene differs."""
+def compare_folders(a: Path, b: Path, within: float) -> int:
+    """Print one line per difference and the total; return 1 if a scene differs."""
     names = sorted({path.stem for folder in (a, b) for path in folder.glob("*.json")})
     differ = 0
-    for one, two, name in ((answers(a, name), answers(b, name), name) for name in names):
-        changed = {key: value for key in one | two if (value := change(key, one, two)) > within}
+    for one, two, name in ((read_results(a, name), read_results(b, name), name) for name in names):
+        changed = {
+            key: value for key in one | two if (value := relative_change(key, one, two)) > within
+        }
         for key, value in sorted(changed.items()):
             said = [" ".join(str(found.get(key, "absent")).split()) for found in (one, two)]
-            # before what differs
+            # start of the excerpt: 30 characters before the first difference
             at = max(0, next((k for k, (p, q) in enumerate(zip(*said)) if p != q), 0) - 30)
             said = (
                 f"{said[0][at : at + 90]} | {said[1][at : at + 90]}"
@@ -229,8 +233,8 @@ def compare(a: Path, b: Path, within: float) -> int:
     return 1 if differ or not names else 0
 
 
-def answers(folder: Path, name: str) -> dict:
-    """Name -> number, text or array of everything that a scene answered."""
+def read_results(folder: Path, name: str) -> dict:
+    """Return {name: number, text or array} of all results of a scene."""
     out = {}
     place = folder / name
     for at, path in {"told": folder / f"{name}.json", "summary": place / "summary.json"}.items():
@@ -255,7 +259,7 @@ def answers(folder: Path, name: str) -> dict:
 
 
 def flatten(at: str, value: object, out: dict) -> None:
-    """Leaves of nested tables under dotted names, without the seconds and the version."""
+    """Store the leaves of nested tables under dotted names, without computing times and versions."""
     value = json.loads(value) if at == "told.plan.out" and value else value
     value = dict(enumerate(value)) if isinstance(value, list) else value
     out |= {} if isinstance(value, dict) else {at: value}
@@ -263,8 +267,8 @@ def flatten(at: str, value: object, out: dict) -> None:
         flatten(f"{at}.{key}", value[key], out)
 
 
-def change(key: str, one: dict, two: dict) -> float:
-    """Largest relative change of an answer: 0 where equal, infinite where it cannot be told."""
+def relative_change(key: str, one: dict, two: dict) -> float:
+    """Return the largest relative change of a result: 0 if equal, infinite if not comparable."""
     x, y = (np.asarray(found.get(key, "absent")) for found in (one, two))
     if x.dtype != y.dtype or x.shape != y.shape:
         return np.inf
@@ -279,7 +283,9 @@ def change(key: str, one: dict, two: dict) -> float:
     stem = key.rpartition(".")[0]
     scale = np.abs(x).max()
     if stem.startswith("summary.measures."):
-        relative = stem.endswith(("energy_balance", "work_check"))  # already, of round-off
+        relative = stem.endswith(
+            ("energy_balance", "work_check")
+        )  # these measures are relative already
         scale = max(abs(one[f"{stem}.value"] or 0.0), one[f"{stem}.floor"], float(relative))
     return float(np.abs(x - y).max() / scale) if scale > 0 and np.isfinite(y).all() else np.inf
 

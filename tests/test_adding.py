@@ -1,4 +1,4 @@
-"""The examples of ADDING.md work exactly as the page prints them, up to the page of a run and a sweep."""
+"""The examples of ADDING.md (new laws, shapes, drives and measures) run as printed on the page."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,10 @@ from support import adding
 from patchfem.core import G_N
 
 PAGE = (adding.PACKAGE / "ADDING.md").read_text("utf-8")
-LATER = ("accuracy.method=march", "accuracy.method=harmonic")  # engines that another test compiles
+LATER = (
+    "accuracy.method=march",
+    "accuracy.method=harmonic",
+)  # commands with engines that are compiled in another test
 WAVED = """\
 [contact]
 length = "12.7 mm"
@@ -23,13 +26,16 @@ substrate = {young = "120 GPa", poisson = 0.3, density = "4400 kg/m^3"}
 height = "35 nm"
 wavelength = "1.27 mm"
 """
-AVERAGE = 115 / 12.7e-3**2  # Pa, mean pressure of this scene
-LIMIT, LENGTH = 0.3 * 115, 0.3 * 115 / 2e7  # N, m of the law on the page
+AVERAGE = 115 / 12.7e-3**2  # mean pressure of this scene [Pa]
+LIMIT, LENGTH = (
+    0.3 * 115,
+    0.3 * 115 / 2e7,
+)  # friction limit [N] and length [m] of the law on the page
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A copy of the package with all examples, in which the commands of the page have run, but for two engines."""
+def example_folder(tmp_path_factory):
+    """Return a copy of the package with all examples, where the commands of the page have run, except for two engines."""
     folder = tmp_path_factory.mktemp("adding")
     adding.copied(folder, PAGE)
     (folder / "waved.toml").write_text(WAVED, "utf-8")
@@ -41,21 +47,22 @@ def folder(tmp_path_factory):
     return folder
 
 
-def measures_of(folder: Path) -> dict:
-    return json.loads((folder / "summary.json").read_text("utf-8"))["measures"]
+def read_measures(example_folder: Path) -> dict:
+    """Return the measures in the summary of a results folder."""
+    return json.loads((example_folder / "summary.json").read_text("utf-8"))["measures"]
 
 
-def test_always_every_kind_has_an_example_with_a_page(folder):
-    """Each run has a page and each sweep has one; the text of a drive is that of its phrase."""
+def test_always_examples_write_html_reports(example_folder):
+    """Every run and every sweep of the page writes a report, and the report of the drive describes the drive in words."""
     for name in ("smooth", "ripple", "hold", "rig", "holds", "rigs"):
-        assert (folder / name / "report.html").stat().st_size > 10_000, name
-    assert "base acceleration of 5 g for one second" in (folder / "hold" / "report.html").read_text(
-        "utf-8"
-    )
+        assert (example_folder / name / "report.html").stat().st_size > 10_000, name
+    assert "base acceleration of 5 g for one second" in (
+        example_folder / "hold" / "report.html"
+    ).read_text("utf-8")
 
 
-def check_law(found: dict) -> None:
-    """Compare a steady loop of the law with n = 2 with its closed form (see the page My own law of friction)."""
+def assert_loop_matches_closed_form(found: dict) -> None:
+    """Assert that a steady loop of the law with n = 2 agrees with its closed form (page "My own law of friction")."""
     amplitude = found["slip_amplitude"]["value"], found["relative_displacement_amplitude"]["value"]
     x = amplitude[1] / LENGTH
     tip = (np.sqrt(1 + 4 * x**2) - 1) / (2 * x)
@@ -64,19 +71,22 @@ def check_law(found: dict) -> None:
     assert found["friction_force_peak"]["value"] == pytest.approx(LIMIT * tip, rel=2e-4)
 
 
-def test_exact_the_law_has_its_closed_form(folder):
-    check_law(measures_of(folder / "smooth"))
+def test_exact_law_of_page_agrees_with_closed_form(example_folder):
+    """The loop area and the peak force of the added law agree with their closed form within 2e-4."""
+    assert_loop_matches_closed_form(read_measures(example_folder / "smooth"))
 
 
 @pytest.mark.slow
-def test_always_the_law_agrees_in_three_engines(folder):
+def test_always_law_of_page_agrees_in_three_engines(example_folder):
+    """Event engine, march and harmonic balance give the same loop of the added law within their error estimates."""
     adding.run(
-        folder, [line for line in adding.commands(PAGE) if any(word in line for word in LATER)]
+        example_folder,
+        [line for line in adding.commands(PAGE) if any(word in line for word in LATER)],
     )
-    smooth = measures_of(folder / "smooth")
+    smooth = read_measures(example_folder / "smooth")
     for engine in ("march", "harmonic"):
-        found = measures_of(folder / engine)
-        check_law(found)
+        found = read_measures(example_folder / engine)
+        assert_loop_matches_closed_form(found)
         for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
             one = found[name]
             other = smooth[name]
@@ -86,18 +96,21 @@ def test_always_the_law_agrees_in_three_engines(folder):
             )
 
 
-def test_always_a_ripple_touches_at_its_crests(folder):
-    """Westergaard's waves touch over 2/pi asin(sqrt(p/p*)) of their length; the ends of the piece hardly matter."""
+def test_always_ripple_contact_fraction_agrees_with_westergaard(example_folder):
+    """The contact fraction of the added ripple agrees with Westergaard's closed form within 10 %.
+
+    The closed form is 2/pi asin(sqrt(p/p*)); the ends of the piece have little effect.
+    """
     modulus = 120e9 / (1 - 0.3**2) / 2
     full = np.pi * modulus * 35e-9 / 2 / 1.27e-3
     touching = 2 / np.pi * np.arcsin(np.sqrt(AVERAGE / full))
-    assert measures_of(folder / "waved")["contact_fraction"]["value"] == pytest.approx(
+    assert read_measures(example_folder / "waved")["contact_fraction"]["value"] == pytest.approx(
         touching, rel=0.1
     )
 
 
-def test_refuses_a_shape_whose_table_has_no_key_for_its_piece(tmp_path):
-    """The table of a shape that somebody adds without `on` is not ignored: the scene has a mistake in its line."""
+def test_refuses_shape_table_without_piece_key(tmp_path):
+    """A scene with an added shape whose table lacks the key `on` is refused with the line of the table."""
     on = '    on: key(Piece, "the piece that carries the shape") = "upper"\n'
     assert on in PAGE
     adding.copied(tmp_path, PAGE.replace(on, ""))
@@ -106,14 +119,14 @@ def test_refuses_a_shape_whose_table_has_no_key_for_its_piece(tmp_path):
         adding.run(tmp_path, ["check waved.toml"])
 
 
-def test_always_a_drive_has_its_waveform_and_its_sweep(folder):
-    """The base accelerates by 5 g for one second and then rests, and the sweep has each of its cases."""
-    run = xarray.load_dataset(folder / "hold" / "result.nc")
+def test_always_added_drive_gives_waveform_and_sweep(example_folder):
+    """The base accelerates by 5 g for one second and then rests, and a sweep over the acceleration has three cases."""
+    run = xarray.load_dataset(example_folder / "hold" / "result.nc")
     acceleration = run.base_acceleration.values
     late = run.time.values > 1.0001
     assert np.allclose(acceleration[~late & (run.time.values < 0.9999)], 5 * G_N)
     assert not acceleration[late].any()
-    cases = xarray.load_dataset(folder / "holds" / "sweep.nc")
+    cases = xarray.load_dataset(example_folder / "holds" / "sweep.nc")
     assert cases.sizes["drive_acceleration"] == 3 and set(cases.outcome.values) <= {
         "stuck",
         "steady",
@@ -121,16 +134,19 @@ def test_always_a_drive_has_its_waveform_and_its_sweep(folder):
     }
 
 
-def test_always_a_measure_of_the_whole_run_has_a_small_error(folder):
-    """Both measures agree with the histories of the run, have errors, and stand in a sweep."""
-    found = measures_of(folder / "rig")
-    run = xarray.load_dataset(folder / "rig" / "result.nc")
+def test_always_added_measures_agree_with_histories(example_folder):
+    """Range and rms of the added measures agree with the histories of the run.
+
+    Their error estimates are small, and a sweep contains them.
+    """
+    found = read_measures(example_folder / "rig")
+    run = xarray.load_dataset(example_folder / "rig" / "result.nc")
     slide = run.relative_displacement.values
     assert found["slide_range"]["value"] == pytest.approx(np.ptp(slide), rel=1e-9)
     assert 0 <= found["slide_range"]["error"] < 1e-3 * found["slide_range"]["value"]
-    smooth = measures_of(folder / "smooth")["slide_range"]
+    smooth = read_measures(example_folder / "smooth")["slide_range"]
     assert 0 < smooth["error"] < 1e-3 * smooth["value"]
-    rms = found["friction_force_rms"]  # the start adds less than 1 % to that of the last cycles
+    rms = found["friction_force_rms"]  # the start transient changes it by less than 1 %
     late = run.isel(time=run.time.values >= 195 / 143)
     steady = np.sqrt(
         np.trapezoid(late.friction_force.values**2, late.time.values) / np.ptp(late.time.values)
@@ -141,6 +157,6 @@ def test_always_a_measure_of_the_whole_run_has_a_small_error(folder):
         abs(found["slide_mean"]["value"])
         <= found["slide_mean"]["error"] + found["slide_mean"]["floor"]
     )
-    cases = xarray.load_dataset(folder / "rigs" / "sweep.nc")
+    cases = xarray.load_dataset(example_folder / "rigs" / "sweep.nc")
     assert cases.slide_range.values[-1] == pytest.approx(found["slide_range"]["value"], rel=1e-9)
     assert np.isfinite(cases.slide_range_error.values).all()

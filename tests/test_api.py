@@ -1,4 +1,4 @@
-"""The package from Python: the command line's own numbers, sets of any kind, a result one can look at."""
+"""The Python interface: the same numbers as the command line, settings of any type, printed and drawn results."""
 
 import json
 from dataclasses import FrozenInstanceError
@@ -55,15 +55,16 @@ KINDS = {
 
 
 @pytest.fixture(scope="module")
-def runs() -> dict:
-    """One result of each kind."""
+def results() -> dict:
+    """Return one result of each kind of scene."""
     return {name: pf.run(text) for name, text in KINDS.items()}
 
 
 # ---- importing
 
 
-def test_exact_importing_imports_nothing_of_weight():
+def test_exact_import_loads_no_large_package():
+    """`import patchfem` loads neither NumPy, SciPy, xarray, pydantic nor Matplotlib."""
     modules = loaded(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
     assert not {"numpy", "pydantic", "scipy", "xarray", "matplotlib"} & modules
     assert {name for name in modules if name.startswith("patchfem")} == {
@@ -72,7 +73,8 @@ def test_exact_importing_imports_nothing_of_weight():
     }
 
 
-def test_exact_the_names_are_all_there():
+def test_exact_public_names_exist():
+    """All names in `__all__` exist, and a misspelt name raises AttributeError."""
     assert pf.__all__ == api.__all__
     assert set(pf.__all__) <= set(dir(pf))
     assert all(hasattr(pf, name) for name in dir(pf))
@@ -86,23 +88,25 @@ def test_exact_the_names_are_all_there():
 
 @pytest.mark.share(1, 2, 4)
 @pytest.mark.parametrize("name", KINDS)
-def test_exact_the_numbers_are_those_of_the_command_line(name, runs, tmp_path):
+def test_exact_results_equal_command_line(name, results, tmp_path):
+    """Measures, outcome, warnings and histories of `pf.run` equal those of the command line."""
     (tmp_path / "a.toml").write_text(KINDS[name], "utf-8")
     answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out", "-q", "--json")
-    said = json.loads(answer.out)
-    result = runs[name]
-    assert said["measures"] == {key: measure_object(one) for key, one in result.measures.items()}
-    assert said["outcome"] == result.outcome == str(result.outcome)
-    assert said["warnings"] == result.warnings
-    here = result.to_xarray()
-    there = xr.load_dataset(tmp_path / "out" / "result.nc")
-    xr.testing.assert_identical(here, there)
+    printed = json.loads(answer.out)
+    result = results[name]
+    assert printed["measures"] == {key: measure_object(one) for key, one in result.measures.items()}
+    assert printed["outcome"] == result.outcome == str(result.outcome)
+    assert printed["warnings"] == result.warnings
+    dataset = result.to_xarray()
+    saved = xr.load_dataset(tmp_path / "out" / "result.nc")
+    xr.testing.assert_identical(dataset, saved)
 
 
-def test_exact_saving_writes_the_folder_of_the_command_line(runs, tmp_path):
+def test_exact_save_writes_command_line_folder(results, tmp_path):
+    """`Result.save` writes the files and the summary of the command line, and refuses a folder with foreign files."""
     (tmp_path / "a.toml").write_text(BENCH, "utf-8")
     cli("run", tmp_path / "a.toml", "-o", tmp_path / "there", "-q")
-    assert runs["bench"].save(tmp_path / "here") == tmp_path / "here"
+    assert results["bench"].save(tmp_path / "here") == tmp_path / "here"
     names = {
         place: sorted(path.name for path in (tmp_path / place).iterdir())
         for place in ("here", "there")
@@ -110,24 +114,26 @@ def test_exact_saving_writes_the_folder_of_the_command_line(runs, tmp_path):
     assert names["here"] == names["there"]
     here, there = (json.loads((tmp_path / place / "summary.json").read_text()) for place in names)
     assert here | {"seconds": 0, "effects": 0} == there | {"seconds": 0, "effects": 0}
-    runs["bench"].save(str(tmp_path / "here"))  # an older one is replaced
+    results["bench"].save(str(tmp_path / "here"))  # an older result is replaced
     (tmp_path / "here" / "notes.txt").write_text("mine")
     with pytest.raises(pf.PatchfemError, match=r"notes\.txt"):
-        runs["bench"].save(tmp_path / "here")
+        results["bench"].save(tmp_path / "here")
 
 
 @pytest.mark.parametrize("of", [pf.load, pf.build, pf.plan], ids=["Scene", "Model", "Plan"])
-def test_exact_every_stage_can_be_handed_on(of, runs):
+def test_exact_run_accepts_scene_model_or_plan(of, results):
+    """`pf.run` gives the same measures for a Scene, a Model and a Plan of the same text."""
     measures = pf.run(of(RIG)).measures
     assert {name: measure_object(one) for name, one in measures.items()} == {
-        name: measure_object(one) for name, one in runs["rig"].measures.items()
+        name: measure_object(one) for name, one in results["rig"].measures.items()
     }
 
 
 # ---- loading and setting
 
 
-def test_exact_a_text_and_a_file_are_told_apart(tmp_path):
+def test_exact_load_distinguishes_text_from_path(tmp_path):
+    """`pf.load` reads a scene from a text or from a file, and names the source in its error messages."""
     path = tmp_path / "a[1].toml"
     path.write_text(POINT + COULOMB + STRUCTURE, "utf-8")
     assert pf.load(path).tables() == pf.load(POINT + COULOMB + STRUCTURE).tables()
@@ -164,7 +170,8 @@ def test_exact_a_text_and_a_file_are_told_apart(tmp_path):
         ("accuracy.tolerance", "0.5", np.float64(0.5)),
     ],
 )
-def test_exact_a_value_sets_what_its_text_sets(key, written, value, tmp_path):
+def test_exact_python_value_sets_same_as_text(key, written, value, tmp_path):
+    """A Python or NumPy value sets the same scene as the text of `--set`."""
     (tmp_path / "a.toml").write_text(SMALL_PATCH, "utf-8")
     from patchfem.scene import load
 
@@ -174,23 +181,25 @@ def test_exact_a_value_sets_what_its_text_sets(key, written, value, tmp_path):
 
 
 @pytest.mark.parametrize("value", [0.1, 1 / 3, 1e-300, 12345.678901234567, 5e22])
-def test_exact_a_number_arrives_to_the_last_bit(value):
+def test_exact_number_is_set_without_rounding(value):
+    """A floating-point number set from Python is stored without rounding."""
     assert pf.load(BENCH, **{"normal.load": value}).normal.load == value
 
 
-def test_exact_lists_and_modes_by_name():
+def test_exact_lists_and_named_modes_are_set():
+    """Lists and their elements, and modes by name or number, can be set from Python."""
     levels = (
         POINT
         + COULOMB
         + STRUCTURE.replace('acceleration = "5 g"\n', 'waveform = "levels"\nlevels = ["1 g"]\n')
     )
-    asked = pf.load(
+    scene = pf.load(
         levels, **{"drive.levels": np.linspace(1, 3, 3), "structure.mode.axial.frequency": 150.0}
     )
-    assert asked.drive.levels == (1.0, 2.0, 3.0) and asked.structure.mode[0].frequency == 150.0
+    assert scene.drive.levels == (1.0, 2.0, 3.0) and scene.structure.mode[0].frequency == 150.0
     assert pf.load(levels, **{"drive.levels": ["1 g", 2.0]}).drive.levels == (9.80665, 2.0)
-    again = pf.load(asked, **{"structure.mode.0.frequency": "1 kHz", "drive.levels.1": "1 m/s^2"})
-    assert again.structure.mode[0].frequency == 1000.0 and again.drive.levels == (1.0, 1.0, 3.0)
+    changed = pf.load(scene, **{"structure.mode.0.frequency": "1 kHz", "drive.levels.1": "1 m/s^2"})
+    assert changed.structure.mode[0].frequency == 1000.0 and changed.drive.levels == (1.0, 1.0, 3.0)
 
 
 @pytest.mark.parametrize(
@@ -210,7 +219,8 @@ def test_exact_lists_and_modes_by_name():
         ("contact.load", [1.0, 2.0], "not"),
     ],
 )
-def test_refuses_what_no_scene_can_hold(key, value, said):
+def test_refuses_invalid_keys_and_values(key, value, said):
+    """An unknown key or an invalid value is refused with exactly one mistake that names the key."""
     with pytest.raises(pf.SceneError) as caught:
         pf.run(SMALL_PATCH, **{key: value})
     assert caught.value.mistakes[0].startswith(key.rpartition(".")[0] or key)
@@ -243,21 +253,23 @@ BARE = {
         ),
     ],
 )
-def test_refuses_in_the_words_of_python(ask, said):
-    """No option of the command line, and no line of a text that nobody wrote."""
+def test_refuses_without_command_line_terms(ask, said):
+    """Error messages of Python calls name neither options of the command line nor lines of a text."""
     with pytest.raises(pf.PatchfemError) as caught:
         ask()
     assert str(caught.value).startswith(said)
     assert "--set" not in str(caught.value) and "<text>" not in str(caught.value)
 
 
-def test_refuses_sets_of_what_is_made():
-    for made in (pf.build(BENCH), pf.plan(BENCH)):
+def test_refuses_settings_of_built_model():
+    """A built Model or a Plan cannot be changed by settings."""
+    for built in (pf.build(BENCH), pf.plan(BENCH)):
         with pytest.raises(pf.PatchfemError, match=r"normal\.load cannot be set in a "):
-            pf.run(made, **{"normal.load": 3.0})
+            pf.run(built, **{"normal.load": 3.0})
 
 
-def test_refuses_a_bad_scene_with_all_its_mistakes():
+def test_refuses_scene_with_all_mistakes_listed():
+    """A scene with three mistakes is refused with all three of them."""
     with pytest.raises(pf.SceneError) as caught:
         pf.load(BENCH.replace("26 lbf", "26 lb").replace("static", "sttic"))
     assert len(caught.value.mistakes) == 3
@@ -271,8 +283,8 @@ def test_refuses_a_bad_scene_with_all_its_mistakes():
         if isinstance(getattr(pf, name), type) and issubclass(getattr(pf, name), Exception)
     ],
 )
-def test_always_one_except_catches_every_failure(name):
-    """`except pf.PatchfemError` around any call of the package."""
+def test_always_errors_derive_from_patchfem_error(name):
+    """Every public exception is a subclass of `pf.PatchfemError`."""
     assert issubclass(getattr(pf, name), pf.PatchfemError)
     with pytest.raises(pf.PatchfemError, match="wavform"):
         pf.run(BENCH.replace("[slide]", "[slide]\nwavform = 1"))
@@ -281,8 +293,9 @@ def test_always_one_except_catches_every_failure(name):
 # ---- looking at it
 
 
-def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):
-    measures = runs["bench"].measures
+def test_exact_measures_are_read_only_mapping(results):
+    """Measures form a read-only mapping with attribute access, and a misspelt name gets a suggestion."""
+    measures = results["bench"].measures
     assert list(measures) == measures._ipython_key_completions_()
     assert len(measures) == len(list(measures)) > 8
     assert measures["loop_area"] is measures.loop_area is measures.get(
@@ -300,48 +313,53 @@ def test_exact_measures_are_a_mapping_that_cannot_be_written(runs):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_always_every_measure_says_what_it_is(name, runs):
-    for key, one in runs[name].measures.items():
+def test_always_measures_have_description_and_unit(name, results):
+    """Every measure of a result has a unit and a description that begins with a lower-case letter."""
+    for key, measure in results[name].measures.items():
         assert (
-            one.text == describe_measure(key)
-            and one.text[0].islower()
-            and one.unit
-            and repr(one).startswith(str(one))
+            measure.text == describe_measure(key)
+            and measure.text[0].islower()
+            and measure.unit
+            and repr(measure).startswith(str(measure))
         ), key
 
 
-def test_exact_a_number_behind_a_name_counts_interfaces_or_strips(runs):
-    assert runs["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
+def test_exact_name_suffix_numbers_interfaces_and_strips(results):
+    """The number at the end of the name of a measure is the number of the interface or of the strip."""
+    assert results["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
     assert describe_measure("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
     assert describe_measure("relative_displacement_amplitude_steady").startswith(
         "steady amplitude under a periodic drive"
     )
 
 
-def test_exact_a_table_is_aligned_and_rounded_by_the_error(runs):
-    lines = repr(runs["patch"].measures).splitlines()[1:]
-    assert len(lines) == len(runs["patch"].measures) and all(len(line) < 80 for line in lines)
-    for line, (name, one) in zip(lines, runs["patch"].measures.items(), strict=True):
+def test_exact_measures_table_is_rounded_by_error(results):
+    """The printed table of measures has aligned lines below 80 characters, with values rounded by their errors."""
+    lines = repr(results["patch"].measures).splitlines()[1:]
+    assert len(lines) == len(results["patch"].measures) and all(len(line) < 80 for line in lines)
+    for line, (name, measure) in zip(lines, results["patch"].measures.items(), strict=True):
         first, text = line.split(None, 1)
-        assert first == name and text == format_with_error(name, measure_object(one))
+        assert first == name and text == format_with_error(name, measure_object(measure))
     assert repr(api.Measures({})) == ""
     assert repr(api.Measures({"a": Measure(2.0, "m")})) == "motion\n  a  2 m (error unknown)"
 
 
-def test_exact_a_measure_shows_value_and_error():
+def test_exact_measure_text_has_value_and_error():
+    """The text of a Measure gives value, error and unit."""
     assert str(Measure(1.48083e-5, "m", 4.4e-8)) == "14.808 ± 0.044 um"
     assert str(Measure(0.25, "1", 0.12)) == "0.25 ± 0.12" and str(Measure(None, "N")) == "- N"
     assert repr(Measure(3.0, "N", None, 0.0, "a force")) == "3 N (a force)"
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_always_what_one_prints_is_short(name, runs):
+def test_always_repr_is_short(name, results):
+    """The repr of scene, model, plan and result has at most 8 lines and no arrays."""
     scene = pf.load(KINDS[name])
     for one in (
         scene,
         pf.build(scene),
-        runs[name].plan,
-        runs[name],
+        results[name].plan,
+        results[name],
         pf.load(scene, **{"accuracy.tolerance": 2e-3}),
     ):
         shown = repr(one)
@@ -350,8 +368,9 @@ def test_always_what_one_prints_is_short(name, runs):
     assert "accuracy.tolerance=0.002" in shown
 
 
-def test_exact_a_result_has_what_the_contract_names(runs):
-    result = runs["rig"]
+def test_exact_result_has_documented_attributes(results):
+    """A Result has outcome, measures, warnings, notes and methods for xarray, files and plots."""
+    result = results["rig"]
     assert isinstance(result, pf.Result)
     assert isinstance(result.outcome, pf.Outcome)
     assert result.notes == []
@@ -371,73 +390,81 @@ PICTURES = {
 
 @pytest.mark.parametrize("name", ["patch", "bench", "rig", "linear"])
 @pytest.mark.parametrize("picture", PICTURES)
-def test_exact_a_picture_is_axes_or_the_run_lacks_it(picture, name, runs):
-    """Drawn on axes of one's own it is the first panel of the new figure, and what stood there stays."""
+def test_exact_plots_draw_on_given_axes(picture, name, results):
+    """Each plot returns Matplotlib axes, or draws on given axes without removing their lines.
+
+    A plot that the run has no data for is refused.
+    """
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    draw = getattr(runs[name].plot, picture)
+    draw = getattr(results[name].plot, picture)
     if name in PICTURES[picture]:
         new = draw()
         assert isinstance(new, Axes)
         assert new is new.figure.axes[0]
         assert new._repr_svg_().startswith("<svg")
-        _, mine = Figure().subplots(1, 2)
-        mine.plot([0, 1], [0, 1], label="measured")
-        assert draw(ax=mine) is mine
-        assert len(mine.figure.axes) == 2
-        assert mine.lines[0].get_label() == "measured"
-        assert len(mine.lines) == len(new.lines) + 1 and not hasattr(mine, "_repr_svg_")
-        for here, there in zip(mine.lines[1:], new.lines, strict=True):
-            np.testing.assert_array_equal(here.get_xydata(), there.get_xydata())
-        assert (mine.get_xlabel(), mine.get_ylabel()) == (new.get_xlabel(), new.get_ylabel())
+        _, axes = Figure().subplots(1, 2)
+        axes.plot([0, 1], [0, 1], label="measured")
+        assert draw(ax=axes) is axes
+        assert len(axes.figure.axes) == 2
+        assert axes.lines[0].get_label() == "measured"
+        assert len(axes.lines) == len(new.lines) + 1 and not hasattr(axes, "_repr_svg_")
+        for line, expected in zip(axes.lines[1:], new.lines, strict=True):
+            np.testing.assert_array_equal(line.get_xydata(), expected.get_xydata())
+        assert (axes.get_xlabel(), axes.get_ylabel()) == (new.get_xlabel(), new.get_ylabel())
     else:
         with pytest.raises(pf.PatchfemError, match=rf"plot\.{picture}: nothing to draw: \w+"):
             draw()
 
 
-def test_exact_levels_are_drawn():
+def test_exact_levels_plot_draws_on_given_axes():
+    """The plot of the drive levels has a title and can be drawn on given axes."""
     text = RIG.replace('acceleration = "5 g"\n', 'waveform = "levels"\nlevels = ["3 g", "6 g"]\n')
     from matplotlib.figure import Figure
 
     result = pf.run(text)
-    mine = Figure().subplots()
+    axes = Figure().subplots()
     assert result.plot.levels().get_title() == "Level by level"
-    assert result.plot.levels(ax=mine) is mine and len(mine.figure.axes) == 1 and mine.get_ylabel()
+    assert result.plot.levels(ax=axes) is axes and len(axes.figure.axes) == 1 and axes.get_ylabel()
 
 
 @pytest.mark.slow
-def test_exact_pictures_need_no_window():
+def test_exact_plots_do_not_import_pyplot():
+    """A plot of a loop does not import matplotlib.pyplot, which may open a window."""
     code = f"import patchfem as pf; pf.run({BENCH!r}).plot.loop()\n{MODULES}"
     assert "matplotlib.pyplot" not in loaded(code)
 
 
-def test_exact_what_takes_long_is_said_on_stderr_or_to_the_caller(capfd, monkeypatch):
-    def slow(what, say, progress):
+def test_exact_progress_goes_to_stderr_or_callback(capfd, monkeypatch):
+    """Messages on long computations go to stderr, or to the callback `say` if it is given."""
+
+    def run_slowly(what, say, progress):
+        """Report that code is compiled, then return the result."""
         say("compiling")
-        return found
+        return result
 
-    found = pf.run(BENCH)
-    monkeypatch.setattr(api, "run_plan", slow)
+    result = pf.run(BENCH)
+    monkeypatch.setattr(api, "run_plan", run_slowly)
     pf.run(BENCH)
-    heard = []
-    pf.run(BENCH, say=heard.append)
-    assert capfd.readouterr() == ("", "compiling\n") and heard == ["compiling"]
+    messages = []
+    pf.run(BENCH, say=messages.append)
+    assert capfd.readouterr() == ("", "compiling\n") and messages == ["compiling"]
 
 
-def test_exact_a_notebook_shows_the_answer_and_what_it_holds_as_text(runs):
-    """Every measure with its number and error as on the first screen; markup in a title is text."""
-    result = runs["rig"]
+def test_exact_notebook_table_lists_all_measures(results):
+    """The HTML table of a result lists every measure with value and error, and escapes markup in the title."""
+    result = results["rig"]
     shown = result._repr_html_()
     parsed = ElementTree.fromstring(
         shown.replace("colspan=2", "colspan='2'").replace("<br>", "<br/>")
     )
     cells = [[cell.text for cell in row] for row in parsed.iter("tr")]
-    found = dict(row for row in cells if len(row) == 2)
-    assert set(found) == set(result.measures)
-    for name, one in result.measures.items():
-        assert one.value is None or found[name].split(", ")[0] == format_with_error(
-            name, {"value": one.value, "unit": one.unit, "error": one.error}
+    shown_values = dict(row for row in cells if len(row) == 2)
+    assert set(shown_values) == set(result.measures)
+    for name, measure in result.measures.items():
+        assert measure.value is None or shown_values[name].split(", ")[0] == format_with_error(
+            name, {"value": measure.value, "unit": measure.unit, "error": measure.error}
         )
     assert result.outcome.sentence in shown
     marked = pf.run('title = "<script>x</script>"\n' + BENCH)._repr_html_()

@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem import api
 
 SECTIONS = ("Parameters", "Returns", "Raises", "Examples")
-# functions without a result, and functions that have no condition to refuse
+# functions without a return value
 WITHOUT_RETURN = {"view"}
 FUNCTIONS = {
     name: getattr(api, name) for name in api.__all__ if inspect.isfunction(getattr(api, name))
@@ -19,7 +19,8 @@ METHODS = {"Result.save": api.Result.save, "Result.to_pyvista": api.Result.to_py
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_always_a_public_function_describes_parameters_result_and_errors(name):
+def test_always_public_functions_have_numpydoc_sections(name):
+    """The docstring of every public function has sections for all parameters, the result and the errors."""
     text = inspect.getdoc(FUNCTIONS[name])
     wanted = [one for one in SECTIONS if one != "Returns" or name not in WITHOUT_RETURN]
     assert [one for one in wanted if f"\n{one}\n{'-' * len(one)}\n" not in text] == []
@@ -31,7 +32,8 @@ def test_always_a_public_function_describes_parameters_result_and_errors(name):
 
 
 @pytest.mark.parametrize("name", FUNCTIONS | CLASSES | METHODS)
-def test_exact_the_examples_print_what_they_say(name, tmp_path, monkeypatch):
+def test_exact_docstring_examples_run(name, tmp_path, monkeypatch):
+    """The examples in the docstrings of the public functions print the documented output."""
     monkeypatch.chdir(tmp_path)
     subject = (FUNCTIONS | CLASSES | METHODS)[name]
     example = doctest.DocTestParser().get_doctest(inspect.getdoc(subject), {}, name, None, None)
@@ -42,7 +44,8 @@ def test_exact_the_examples_print_what_they_say(name, tmp_path, monkeypatch):
     assert runner.failures == 0, "".join(printed)
 
 
-def test_refuses_an_example_that_prints_something_else():
+def test_refuses_example_with_wrong_output():
+    """The check fails for an example whose documented output is wrong."""
     runner = doctest.DocTestRunner()
     parser = doctest.DocTestParser()
     runner.run(parser.get_doctest(">>> 1 + 1\n3\n", {}, "a", None, None), out=lambda text: None)

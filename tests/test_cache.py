@@ -1,4 +1,4 @@
-"""Compiled code on disk: reused by the next process, never by an edited law, and never in the way."""
+"""The cache of compiled code: shared by processes, renewed for an edited law, and never a cause of failure."""
 
 import json
 import os
@@ -24,7 +24,7 @@ from patchfem import compiled
 from patchfem.compiled import cache_files, hook, prebuilt
 from patchfem.disk import user_cache
 
-# a slide that is given: the smallest loop with a law in it to compile
+# A prescribed slide has the smallest time loop that contains a friction law.
 SCENE = POINT + PLASTIC + TRIANGLE
 BENCH = """\
 import json, sys
@@ -38,8 +38,8 @@ print(json.dumps({"work": result.measures["loop_area"].value,
 """
 
 
-def copied(folder: Path) -> Path:
-    """A copy of the package under `folder` without what Python compiled."""
+def copy_package(folder: Path) -> Path:
+    """Copy the package into `folder` without bytecode, and return `folder`."""
     shutil.copytree(
         Path(patchfem.__file__).parent,
         folder / "patchfem",
@@ -48,8 +48,8 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def slid(home: Path, cache: Path) -> dict:
-    """A short slide by the package in `home`, in a process of its own with its own cache of compiled code."""
+def run_slide(home: Path, cache: Path) -> dict:
+    """Run a short prescribed slide with the package in `home` in a new process with its own cache."""
     environment = os.environ | {"PYTHONPATH": str(home), "PATCHFEM_CACHE": str(cache)}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(
@@ -66,8 +66,8 @@ def slid(home: Path, cache: Path) -> dict:
     return answer
 
 
-def begun(cache: Path, code: str = BENCH) -> subprocess.Popen:
-    """A process that slides as `slid` does, or that runs other code."""
+def start_process(cache: Path, code: str = BENCH) -> subprocess.Popen:
+    """Start a process that runs a prescribed slide or other code."""
     return subprocess.Popen(
         [sys.executable, "-c", code, SCENE],
         stdout=subprocess.PIPE,
@@ -77,77 +77,83 @@ def begun(cache: Path, code: str = BENCH) -> subprocess.Popen:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory):
-    """The cache of `answers`."""
+def shared_cache(tmp_path_factory):
+    """Return the cache folder of the two processes of `parallel_results`."""
     return tmp_path_factory.mktemp("empty")
 
 
 @pytest.fixture(scope="module")
-def answers(place):
-    """What two processes answer that begin at once on an empty cache, first the one that compiled."""
-    both = [begun(place) for _ in range(2)]
+def parallel_results(shared_cache):
+    """Return the results of two processes started at once on an empty cache; the one that compiled comes first."""
+    both = [start_process(shared_cache) for _ in range(2)]
     return sorted(
         (json.loads(one.communicate(timeout=300)[0]) for one in both),
         key=lambda one: not one["numba"],
     )
 
 
-def test_exact_of_two_processes_on_an_empty_cache_one_compiles(answers):
-    assert [one["numba"] for one in answers] == [True, False]
-    assert len({(one["work"], one["peak"]) for one in answers}) == 1
+def test_exact_only_first_of_two_processes_compiles(parallel_results):
+    """Of two processes started at once on an empty cache, only one compiles, and both give the same loop."""
+    assert [one["numba"] for one in parallel_results] == [True, False]
+    assert len({(one["work"], one["peak"]) for one in parallel_results}) == 1
 
 
-def test_always_another_takes_over_from_a_process_that_is_killed_while_it_compiles(tmp_path):
+def test_always_waiting_process_compiles_after_kill(tmp_path):
+    """If the process that compiles is killed, the process that waits for it compiles the code."""
     (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
     calls = CALLS.format(tmp_path / "some_kernels.py")
-    mark = tmp_path / "compiles"
-    stuck = begun(
+    started_file = tmp_path / "compiles"
+    first = start_process(
         tmp_path,
         f"""
 import pathlib, time
 from patchfem.compiled import machine
 def compile_and_store(*arguments):
-    pathlib.Path({str(mark)!r}).touch()
+    pathlib.Path({str(started_file)!r}).touch()
     time.sleep(600)
 machine.compile_and_store = compile_and_store
 """
         + calls,
     )
-    end = time.monotonic() + 120
-    while not mark.exists() and time.monotonic() < end:
+    deadline = time.monotonic() + 120
+    while not started_file.exists() and time.monotonic() < deadline:
         time.sleep(0.05)
-    waits = tmp_path / "waits"
-    other = begun(
+    waiting_file = tmp_path / "waits"
+    second = start_process(
         tmp_path,
         f"""
 import pathlib, time
 from patchfem import compiled
 def sleep(seconds):
-    pathlib.Path({str(waits)!r}).touch()
+    pathlib.Path({str(waiting_file)!r}).touch()
     time.sleep(seconds)
 compiled.sleep = sleep
 """
         + calls,
     )
-    while not waits.exists() and time.monotonic() < end:
+    while not waiting_file.exists() and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert waits.exists() and other.poll() is None and not list(tmp_path.rglob("*.code"))
-    stuck.kill()
-    assert other.communicate(timeout=300)[0].split()[:2] == ["6.0", "True"]
+    assert waiting_file.exists() and second.poll() is None and not list(tmp_path.rglob("*.code"))
+    first.kill()
+    assert second.communicate(timeout=300)[0].split()[:2] == ["6.0", "True"]
     assert list(tmp_path.rglob("*.code"))
-    stuck.communicate()
+    first.communicate()
 
 
-def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, place, answers):
-    home = copied(tmp_path / "home")
-    cache = shutil.copytree(place, tmp_path / "cache")
-    first = answers[0]
+def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_results):
+    """An edited law is compiled again, and its stiffness factor of 0.8 changes the peak force by 0.8.
+
+    Before the edit, a second run takes the code from the cache.
+    """
+    package = copy_package(tmp_path / "home")
+    cache = shutil.copytree(shared_cache, tmp_path / "cache")
+    first = parallel_results[0]
     assert first["numba"] and len(first["said"]) == 1 and "compiling" in first["said"][0]
-    again = slid(home, cache)
+    again = run_slide(package, cache)
     assert not again["numba"] and again["said"] == []
     assert (again["work"], again["peak"]) == (first["work"], first["peak"])
 
-    law = home / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
+    law = package / "patchfem" / "friction" / "laws" / "elastic_plastic_kernels.py"
     text, count = re.subn(
         r"(def update_memory\(.*?stiffness = )(?=numbers\[2 \+ j\])",
         r"\g<1>0.8 * ",
@@ -157,84 +163,93 @@ def test_exact_an_edited_law_changes_the_answer_of_a_cached_bench(tmp_path, plac
     )
     assert count == 1
     law.write_text(text, "utf-8")
-    edited = slid(home, cache)
+    edited = run_slide(package, cache)
     assert edited["numba"]
     assert edited["peak"] == pytest.approx(0.8 * first["peak"], rel=1e-12)
     assert len(list((cache / "patchfem").iterdir())) == 2
 
 
-def smallest(place: Path):
-    (place / "slide.toml").write_text(SCENE, "utf-8")
-    yield "run", place / "slide.toml", "--no-page"
+def one_run(shared_cache: Path):
+    """Yield the arguments of one run without a page."""
+    (shared_cache / "slide.toml").write_text(SCENE, "utf-8")
+    yield "run", shared_cache / "slide.toml", "--no-page"
 
 
-def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, answers):
-    """Nothing is compiled, nothing is said; kernels with another text leave it alone."""
-    home = copied(tmp_path / "home")
-    hook.build_machine_code(home / "patchfem" / "compiled" / "generic", smallest)
-    first = slid(home, tmp_path / "cache")
-    native = answers[0]
+def test_exact_prebuilt_code_serves_first_run(tmp_path, parallel_results):
+    """A package with prebuilt machine code compiles nothing at its first run; edited kernels do not use this code."""
+    package = copy_package(tmp_path / "home")
+    hook.build_machine_code(package / "patchfem" / "compiled" / "generic", one_run)
+    first = run_slide(package, tmp_path / "cache")
+    compiled_run = parallel_results[0]
     assert not first["numba"]
     assert first["said"] == []
     assert not list((tmp_path / "cache").rglob("*.code"))
-    assert native["numba"] and native["said"]
+    assert compiled_run["numba"] and compiled_run["said"]
     assert (first["work"], first["peak"]) == pytest.approx(
-        (native["work"], native["peak"]), rel=1e-9
+        (compiled_run["work"], compiled_run["peak"]), rel=1e-9
     )
-    for law in (home / "patchfem" / "friction" / "laws").glob("*kernels.py"):
+    for law in (package / "patchfem" / "friction" / "laws").glob("*kernels.py"):
         law.write_text(law.read_text("utf-8") + "# edited\n", "utf-8")
-    asked = "from patchfem import compiled; print(compiled.prebuilt.find_folder(compiled.hash_sources), compiled.__file__)"
-    said = subprocess.run(
-        [sys.executable, "-c", asked],
-        cwd=home,
-        env=os.environ | {"PYTHONPATH": str(home)},
+    code = "from patchfem import compiled; print(compiled.prebuilt.find_folder(compiled.hash_sources), compiled.__file__)"
+    output = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=package,
+        env=os.environ | {"PYTHONPATH": str(package)},
         text=True,
         capture_output=True,
         check=True,
     ).stdout
-    assert said.startswith(f"None {home}")
+    assert output.startswith(f"None {package}")
 
 
-def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monkeypatch):
+def test_exact_prebuilt_code_needs_matching_machine(tmp_path, monkeypatch):
+    """Prebuilt code is used only on the machine type for which it was built.
+
+    Processor, instruction set, versions and sources must agree.
+    """
     monkeypatch.setattr(prebuilt, "COMPILED_FOLDER", tmp_path)
     (tmp_path / "machine.py").touch()
 
-    def found():
+    def find_prebuilt():
+        """Return the folder of prebuilt code, or None."""
         return prebuilt.find_folder.__wrapped__(compiled.hash_sources)
 
-    assert found() is None
-    own = tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)
-    own.mkdir(parents=True)
-    can = dict.fromkeys(prebuilt.COMMON_CPUS["x86_64"].instruction_sets, True)
-    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: can)
-    assert found() == own
+    assert find_prebuilt() is None
+    folder = tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)
+    folder.mkdir(parents=True)
+    features = dict.fromkeys(prebuilt.COMMON_CPUS["x86_64"].instruction_sets, True)
+    monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: features)
+    assert find_prebuilt() == folder
     with monkeypatch.context() as more:
         more.setenv("NUMBA_BOUNDSCHECK", "1")
-        assert found() is None
+        assert find_prebuilt() is None
     for lacking, name in (({"avx2": False}, "x86_64"), ({}, "riscv64")):
         with monkeypatch.context() as more:
             more.setattr(
-                "llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: can | lacking
+                "llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: features | lacking
             )
             more.setattr("platform.machine", lambda name=name: name)
             (tmp_path / "generic" / prebuilt.compute_key(compiled.hash_sources)).mkdir(
                 exist_ok=True
             )
-            assert found() is None
+            assert find_prebuilt() is None
     with monkeypatch.context() as more:
         more.setattr(prebuilt, "find_package_version", lambda name: "0.0")
-        assert found() is None
+        assert find_prebuilt() is None
     (tmp_path / "machine.py").write_text("# edited")
-    assert found() is None
+    assert find_prebuilt() is None
 
 
-def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
+def test_exact_wheel_has_machine_code_only_on_request(monkeypatch):
+    """A wheel contains machine code only if PATCHFEM_MACHINE_CODE is 1 and the build is not editable."""
     monkeypatch.setitem(
         sys.modules,
         "hatchling.builders.hooks.plugin.interface",
         SimpleNamespace(BuildHookInterface=object),
     )
-    monkeypatch.setattr(hook, "build_machine_code", lambda place: (place / "KEY").mkdir())
+    monkeypatch.setattr(
+        hook, "build_machine_code", lambda shared_cache: (shared_cache / "KEY").mkdir()
+    )
     for asked, version, has in (
         ("", "standard", False),
         ("0", "standard", False),
@@ -249,8 +264,8 @@ def test_exact_a_wheel_has_no_machine_code_unless_it_is_asked_for(monkeypatch):
         assert data.get("tag", "").startswith("py3-none-") is has
 
 
-def wheel(folder: Path, **more) -> Path:
-    """A wheel of this checkout, unpacked in a folder."""
+def build_wheel(folder: Path, **more) -> Path:
+    """Build a wheel of this checkout, unpack it in a folder, and return its path."""
     done = subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", folder],
         text=True,
@@ -266,9 +281,13 @@ def wheel(folder: Path, **more) -> Path:
 
 
 @pytest.mark.slow
-def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
-    bare = wheel(tmp_path / "bare")
-    full = wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
+def test_exact_wheel_with_machine_code_compiles_nothing(tmp_path):
+    """The first run of the rig from a wheel with machine code compiles nothing.
+
+    Its measures agree with those of a wheel without machine code within 1e-9.
+    """
+    bare = build_wheel(tmp_path / "bare")
+    full = build_wheel(tmp_path / "full", PATCHFEM_MACHINE_CODE="1")
     assert bare.name.endswith("-py3-none-any.whl")
     assert not (bare.parent / "patchfem/compiled/generic").exists()
     assert not full.name.endswith("-any.whl")
@@ -300,7 +319,9 @@ def test_exact_the_first_run_of_the_rig_from_a_wheel_compiles_nothing(tmp_path):
         measures[one] = {
             name: each["value"] for name, each in found.items() if each["value"] is not None
         }
-        assert measures[one].pop("energy_balance") < 1e-11  # of what cancels
+        assert (
+            measures[one].pop("energy_balance") < 1e-11
+        )  # it is the round-off of a sum that cancels
     assert not list((full.parent / "cache").rglob("*.code"))
     assert measures[full] == pytest.approx(measures[bare], rel=1e-9, abs=1e-30)
 
@@ -323,11 +344,15 @@ print(json.dumps(keys))
 """
 
 
-def test_exact_key_follows_the_kernels_only(tmp_path):
-    """In a copy of the package: one key for each kernel that is edited or new, and one for another numba."""
-    home = copied(tmp_path)
+def test_exact_cache_key_depends_on_kernels(tmp_path):
+    """The cache key changes with each edited or new kernel and with the version of numba.
 
-    def keys_of_copy() -> list:
+    Other edits of the package do not change the key.
+    """
+    home = copy_package(tmp_path)
+
+    def compute_keys() -> list:
+        """Return the keys that the copy of the package computes in a new process."""
         done = subprocess.run(
             [sys.executable, "-c", KEYS],
             capture_output=True,
@@ -338,7 +363,7 @@ def test_exact_key_follows_the_kernels_only(tmp_path):
         )
         return json.loads(done.stdout)
 
-    own, after_core, *others = keys_of_copy()
+    own, after_core, *others = compute_keys()
     assert own == after_core == compiled.compute_kernel_key()
     n_kernels = len(list((home / "patchfem").rglob("*kernels.py")))
     assert len(others) == n_kernels + len(compiled.TUPLE_MODULES) > 40
@@ -346,21 +371,23 @@ def test_exact_key_follows_the_kernels_only(tmp_path):
     metadata = home / "numba-0.0.dist-info" / "METADATA"
     metadata.parent.mkdir()
     metadata.write_text("Metadata-Version: 2.1\nName: numba\nVersion: 0.0\n", "utf-8")
-    assert keys_of_copy()[-1] not in others
+    assert compute_keys()[-1] not in others
 
 
-def test_exact_key_follows_the_machine(monkeypatch):
+def test_exact_cache_key_depends_on_machine(monkeypatch):
+    """The cache key changes with the type of the processor."""
     own = compiled.compute_kernel_key()
     monkeypatch.setattr(platform, "machine", lambda: "riscv64")
     assert compiled.compute_kernel_key() != own
 
 
-def test_exact_cache_folder(tmp_path, monkeypatch):
+def test_exact_cache_folder_follows_environment(tmp_path, monkeypatch):
+    """The cache folder lies in PATCHFEM_CACHE, else in XDG_CACHE_HOME, else in ~/.cache."""
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "mine"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "theirs"))
-    found = compiled.cache_folder()
-    assert found == tmp_path / "mine" / "patchfem" / compiled.compute_kernel_key()
-    assert found.is_dir() and not list(found.iterdir())
+    folder = compiled.cache_folder()
+    assert folder == tmp_path / "mine" / "patchfem" / compiled.compute_kernel_key()
+    assert folder.is_dir() and not list(folder.iterdir())
     monkeypatch.delenv("PATCHFEM_CACHE")
     assert compiled.cache_folder().is_relative_to(tmp_path / "theirs")
     monkeypatch.delenv("XDG_CACHE_HOME")
@@ -368,8 +395,11 @@ def test_exact_cache_folder(tmp_path, monkeypatch):
     assert compiled.cache_folder().is_relative_to(tmp_path / "home" / ".cache")
 
 
-def test_exact_a_later_process_knows_which_kinds_of_runs_came_to_their_end(tmp_path):
-    def python(code: str) -> str:
+def test_exact_completed_kinds_of_runs_are_recorded(tmp_path):
+    """A later process knows which kinds of runs were completed before with this cache."""
+
+    def run_python(code: str) -> str:
+        """Run Python code in a new process and return its output."""
         return subprocess.run(
             [sys.executable, "-c", f"from patchfem import compiled; {code}"],
             env=os.environ | {"PATCHFEM_CACHE": str(tmp_path)},
@@ -379,16 +409,20 @@ def test_exact_a_later_process_knows_which_kinds_of_runs_came_to_their_end(tmp_p
         ).stdout.strip()
 
     question = "print(compiled.has_run('march'), compiled.has_run('other march'))"
-    assert python(question) == "False False"
-    python("compiled.record_run('march')")
-    assert python(question) == "True False"
+    assert run_python(question) == "False False"
+    run_python("compiled.record_run('march')")
+    assert run_python(question) == "True False"
 
 
 @pytest.mark.parametrize(
     "obstacle", ["a file in the way", "no right to write", "others may write", "of another user"]
 )
-def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obstacle):
-    """No folder of a common name in the temporary folder either: who was there first could have put code into it."""
+def test_exact_untrusted_cache_folder_is_avoided(tmp_path, monkeypatch, obstacle):
+    """A cache folder that is not writable, or that other users can write, is replaced by a private one.
+
+    A fixed name in the temporary folder is not used, since another user could have placed code
+    there.
+    """
     base = tmp_path / "base"
     temporary = tmp_path / "temporary"
     temporary.mkdir()
@@ -436,30 +470,31 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
         user_cache.make_process_folder.cache_clear()
 
 
-def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
+def test_exact_cache_folder_permissions_are_restricted(tmp_path, monkeypatch):
+    """Write permission of the group is removed from the cache folder, and without a home folder the cache is temporary."""
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path))
     (tmp_path / "patchfem").mkdir()
-    (tmp_path / "patchfem").chmod(0o775)  # as an umask of 002 makes it
+    (tmp_path / "patchfem").chmod(0o775)  # permissions that an umask of 002 gives
     assert compiled.cache_folder().parent == tmp_path / "patchfem"
     assert os.stat(tmp_path / "patchfem").st_mode & 0o777 == 0o755
     assert os.stat(compiled.cache_folder()).st_mode & 0o777 == 0o700
     monkeypatch.delenv("PATCHFEM_CACHE")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("no home")))
-    # a number without a name
+    # a user without an entry in the password file has no home folder
     assert user_cache.find_cache_base() == user_cache.make_process_folder()
 
 
 @pytest.fixture
 def code_folder(tmp_path, monkeypatch):
-    """The folder in which this process keeps its compiled code."""
+    """Return the folder in which this process stores its compiled code."""
     folder = tmp_path / "code"
     monkeypatch.setattr(compiled, "_set_cache_folder", lambda: folder)
     return folder
 
 
-def toy(code_folder: Path):
-    """Return a new dispatcher of one function, kept in the folder of compiled code."""
+def make_dispatcher(code_folder: Path):
+    """Return a new dispatcher of one function that is stored in the folder of compiled code."""
     space = {}
     source = code_folder.with_name("toy.py")
     if not source.exists():
@@ -468,8 +503,8 @@ def toy(code_folder: Path):
     return cache_files.store_on_disk(numba.njit(space["toy"]))
 
 
-def missed(found) -> tuple:
-    """(Compiled, loaded) at a call."""
+def count_cache_misses(found) -> tuple:
+    """Call the function and return the numbers of compilations and of loads from the cache."""
     assert found(20) == 41
     return sum(found.stats.cache_misses.values()), sum(found.stats.cache_hits.values())
 
@@ -477,8 +512,11 @@ def missed(found) -> tuple:
 @pytest.mark.share(0, 3, 5, 9)
 @pytest.mark.parametrize("ending", ["nbi", "nbc"])
 @pytest.mark.parametrize("harm", ["cut", "emptied", "a bit", "gone", "a folder"])
-def test_always_a_damaged_cache_is_rebuilt_by_itself(code_folder, ending, harm):
-    assert missed(toy(code_folder)) == (1, 0) and missed(toy(code_folder)) == (0, 1)
+def test_always_damaged_cache_is_rebuilt(code_folder, ending, harm):
+    """A truncated, emptied, changed, deleted or replaced cache file is compiled again."""
+    assert count_cache_misses(make_dispatcher(code_folder)) == (1, 0) and count_cache_misses(
+        make_dispatcher(code_folder)
+    ) == (0, 1)
     [path] = code_folder.rglob(f"*.{ending}")
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
@@ -487,24 +525,28 @@ def test_always_a_damaged_cache_is_rebuilt_by_itself(code_folder, ending, harm):
         path.unlink()
     if harm == "a folder":
         path.mkdir()
-    assert missed(toy(code_folder)) == (1, 0)
+    assert count_cache_misses(make_dispatcher(code_folder)) == (1, 0)
     if harm != "a folder":
-        assert missed(toy(code_folder)) == (0, 1)
+        assert count_cache_misses(make_dispatcher(code_folder)) == (0, 1)
 
 
 @pytest.mark.parametrize("obstacle", ["no room", "a file in the way"])
-def test_always_a_cache_that_cannot_be_written_is_no_fault(code_folder, obstacle):
+def test_always_unwritable_cache_does_not_stop_run(code_folder, obstacle):
+    """A function is compiled in memory if the disk is full or a file blocks the folder."""
     if obstacle == "a file in the way":
         code_folder.write_text("mine")
-    found = toy(code_folder)
+    found = make_dispatcher(code_folder)
     with limited(0 if obstacle == "no room" else 1 << 30):
-        assert missed(found) == (1, 0)
+        assert count_cache_misses(found) == (1, 0)
     assert not [path for path in code_folder.rglob("*") if path.is_file()]
     if obstacle == "no room":
-        assert missed(toy(code_folder)) == (1, 0) and missed(toy(code_folder)) == (0, 1)
+        assert count_cache_misses(make_dispatcher(code_folder)) == (1, 0) and count_cache_misses(
+            make_dispatcher(code_folder)
+        ) == (0, 1)
 
 
-def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(code_folder):
+def test_always_generated_module_needs_no_file(code_folder):
+    """A generated kernel module works from memory on a full disk, and a damaged file of it is written again."""
     text = "WIDE = 3\nfrom . import jit as part\n\n\ndef wide(x):\n    return WIDE * x\n"
     with limited(0):
         found = compiled.write_kernel_module("compiled.without_file", text)
@@ -523,14 +565,15 @@ def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_ag
 
 
 @pytest.mark.usefixtures("code_folder")
-def test_exact_what_is_said_of_a_cache_without_room():
-    said = []
+def test_exact_message_on_full_cache():
+    """The message on compilation says that code is compiled at every command if the cache has no room, else once."""
+    messages = []
     with limited(1000):
-        compiled._report_once.__wrapped__(said.append)
-    compiled._report_once.__wrapped__(said.append)
+        compiled._report_once.__wrapped__(messages.append)
+    compiled._report_once.__wrapped__(messages.append)
     if compiled.IS_JIT_DISABLED:
-        assert not said
+        assert not messages
     else:
-        assert "at every command" in said[0]
-        assert "is the limit on the size" in said[0]
-        assert "once" in said[1]
+        assert "at every command" in messages[0]
+        assert "is the limit on the size" in messages[0]
+        assert "once" in messages[1]

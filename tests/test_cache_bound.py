@@ -1,4 +1,4 @@
-"""Compiled code of old kernels: the longest unused goes, never what a process has used in the last hour."""
+"""Removal of compiled code of old kernels: the least recently used first, never code used in the last hour."""
 
 import os
 import subprocess
@@ -13,8 +13,8 @@ from patchfem.compiled import cache_limit
 HOUR = 3600.0
 
 
-def states(base: Path, ages: list) -> list:
-    """A folder of compiled code for each age [h], with files in two folders."""
+def make_code_folders(base: Path, ages: list) -> list:
+    """Make one folder of compiled code for each age [h], and return the folders."""
     out = []
     for number, age in enumerate(ages):
         folder = base / f"{number:016x}"
@@ -26,112 +26,130 @@ def states(base: Path, ages: list) -> list:
     return out
 
 
-def own(base: Path) -> Path:
+def make_current_folder(base: Path) -> Path:
+    """Make the folder of the current kernels and return it."""
     folder = base / ("f" * 16)
     folder.mkdir(parents=True)
     return folder
 
 
-def test_exact_the_longest_unused_go_and_those_of_the_last_hour_stay(tmp_path):
+def test_exact_least_recently_used_folders_are_removed(tmp_path):
+    """The folders unused for longest are removed down to the limit, except for those used in the last hour."""
     ages = [30, 2, 50, 0.5, 3, 0.1, 40, 0.9]
-    made = states(tmp_path, ages)
-    mine = own(tmp_path)
-    cache_limit.remove_old_folders(mine, 4)
-    # the last four are of 0.1, 0.5, 0.9 and 2 hours
-    assert {one.name for one in tmp_path.iterdir()} == {
-        mine.name,
-        *(made[k].name for k in (5, 3, 7, 1)),
+    folders = make_code_folders(tmp_path, ages)
+    current = make_current_folder(tmp_path)
+    cache_limit.remove_old_folders(current, 4)
+    # the four folders used last have ages of 0.1, 0.5, 0.9 and 2 hours
+    assert {path.name for path in tmp_path.iterdir()} == {
+        current.name,
+        *(folders[k].name for k in (5, 3, 7, 1)),
     }
-    cache_limit.remove_old_folders(mine, 0)
-    assert {one.name for one in tmp_path.iterdir()} == {
-        mine.name,
-        *(made[k].name for k in (5, 3, 7)),
+    cache_limit.remove_old_folders(current, 0)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        current.name,
+        *(folders[k].name for k in (5, 3, 7)),
     }
 
 
-def test_exact_code_put_into_a_folder_counts_as_its_use(tmp_path):
-    (old,), mine = states(tmp_path, [30]), own(tmp_path)
+def test_exact_new_code_counts_as_use(tmp_path):
+    """A folder into which code was just written counts as used and is not removed."""
+    (old,), current = make_code_folders(tmp_path, [30]), make_current_folder(tmp_path)
     os.utime(old / "code")
-    cache_limit.remove_old_folders(mine, 0)
+    cache_limit.remove_old_folders(current, 0)
     assert (old / "code" / "a.code").is_file()
 
 
-def test_exact_nothing_else_is_touched(tmp_path):
-    """Operators, files, links, names that are no hash, and what a killed process left half removed."""
-    mine = own(tmp_path)
+def test_exact_other_files_are_not_removed(tmp_path):
+    """Other folders, files, links and names that are no hash are kept; the remains of a killed process are removed."""
+    current = make_current_folder(tmp_path)
     for name in ("operators", "0123456789abcde", "0123456789abcdeg"):
         (tmp_path / name).mkdir()
     (tmp_path / ("1" * 16)).write_text("a file")
     target = tmp_path / "elsewhere"
     target.mkdir()
     (tmp_path / ("2" * 16)).symlink_to(target)
-    half = tmp_path / f".{'3' * 16}.77.gone"
-    (half / "code").mkdir(parents=True)
-    for one in tmp_path.iterdir():
-        os.utime(one, (time() - 99 * HOUR,) * 2, follow_symlinks=False)
-    cache_limit.remove_old_folders(mine, 0)
-    assert not half.exists() and target.is_dir()
+    partly_removed = tmp_path / f".{'3' * 16}.77.gone"
+    (partly_removed / "code").mkdir(parents=True)
+    for path in tmp_path.iterdir():
+        os.utime(path, (time() - 99 * HOUR,) * 2, follow_symlinks=False)
+    cache_limit.remove_old_folders(current, 0)
+    assert not partly_removed.exists() and target.is_dir()
     assert len(list(tmp_path.iterdir())) == 7
 
 
-def test_exact_room_is_made_where_a_folder_is_new_and_uses_are_marked(tmp_path):
-    made = states(tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)])
-    mine = own(tmp_path)
-    cache_limit.mark_used(mine)
-    assert [one.exists() for one in made] == [True] * cache_limit.MAX_OTHER_FOLDERS + [False] * 3
-    (mine / "code").mkdir()
-    old = states(tmp_path / "more", [99])[0]
-    cache_limit.mark_used(old)  # there is code in it: it is marked, and nobody is looked at
+def test_exact_new_folder_removes_old_ones(tmp_path):
+    """A new folder removes the oldest folders beyond the limit, and each use updates the time of a folder."""
+    folders = make_code_folders(
+        tmp_path, [30 + k for k in range(cache_limit.MAX_OTHER_FOLDERS + 3)]
+    )
+    current = make_current_folder(tmp_path)
+    cache_limit.mark_used(current)
+    assert [folder.exists() for folder in folders] == [True] * cache_limit.MAX_OTHER_FOLDERS + [
+        False
+    ] * 3
+    (current / "code").mkdir()
+    old = make_code_folders(tmp_path / "more", [99])[0]
+    cache_limit.mark_used(
+        old
+    )  # the folder contains code: it is marked as used and no other is checked
     assert time() - cache_limit.find_last_use(old) < 60
-    os.utime(mine, (time() - HOUR,) * 2)
-    cache_limit.mark_used(mine)
-    assert time() - mine.stat().st_mtime < 60
+    os.utime(current, (time() - HOUR,) * 2)
+    cache_limit.mark_used(current)
+    assert time() - current.stat().st_mtime < 60
 
 
-def test_always_a_folder_marked_while_it_goes_is_put_back(tmp_path, monkeypatch):
-    (old,), mine = states(tmp_path, [30]), own(tmp_path)
+def test_always_folder_used_during_removal_is_restored(tmp_path, monkeypatch):
+    """A folder that another process begins to use while it is removed is restored."""
+    (old,), current = make_code_folders(tmp_path, [30]), make_current_folder(tmp_path)
     rename = os.rename
 
-    def marked(source, target):
+    def use_then_rename(source, target):
+        """Mark the folder as used just before it is renamed."""
         if Path(source) == old:
-            os.utime(old)  # a process began to work with it after it was looked at
+            os.utime(old)  # a process begins to use the folder after its age was checked
         rename(source, target)
 
-    monkeypatch.setattr(os, "rename", marked)
-    cache_limit.remove_old_folders(mine, 0)
+    monkeypatch.setattr(os, "rename", use_then_rename)
+    cache_limit.remove_old_folders(current, 0)
     assert (old / "code" / "a.code").is_file() and len(list(tmp_path.iterdir())) == 2
 
 
-def test_always_what_cannot_be_removed_is_no_fault(tmp_path, monkeypatch):
-    (old,), mine = states(tmp_path, [30]), own(tmp_path)
+def test_always_permission_errors_are_ignored(tmp_path, monkeypatch):
+    """A folder that cannot be removed or marked because of missing permission causes no error."""
+    (old,), current = make_code_folders(tmp_path, [30]), make_current_folder(tmp_path)
 
-    def refused(*given):
+    def raise_permission_error(*given):
+        """Raise PermissionError."""
         raise PermissionError
 
-    monkeypatch.setattr(os, "rename", refused)
-    cache_limit.remove_old_folders(mine, 0)
+    monkeypatch.setattr(os, "rename", raise_permission_error)
+    cache_limit.remove_old_folders(current, 0)
     cache_limit.mark_used(tmp_path / "nowhere")
     assert old.is_dir()
 
 
 @pytest.mark.parametrize("rounds", [3])
-def test_always_processes_that_make_room_at_once_leave_what_is_young(tmp_path, rounds):
+def test_always_parallel_removal_keeps_recent_folders(tmp_path, rounds):
+    """Three processes that remove folders at once keep those used in the last hour, without errors."""
     code = (
         "import sys; from pathlib import Path; from patchfem.compiled import cache_limit\n"
         "sys.stdin.readline(); cache_limit.remove_old_folders(Path(sys.argv[1]), 2)"
     )
     base = tmp_path / "base"
-    made = states(base, [0.1, 0.2, 0.3, *range(2, 40)])
-    mine = own(base)
+    folders = make_code_folders(base, [0.1, 0.2, 0.3, *range(2, 40)])
+    current = make_current_folder(base)
     workers = [
         subprocess.Popen(
-            [sys.executable, "-c", code, mine],
+            [sys.executable, "-c", code, current],
             stdin=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
         )
         for _ in range(rounds)
     ]
-    said = [one.communicate("now\n", timeout=60)[1] for one in workers]
-    assert said == [""] * rounds
-    assert {one.name for one in base.iterdir()} == {mine.name, *(one.name for one in made[:3])}
+    errors = [one.communicate("now\n", timeout=60)[1] for one in workers]
+    assert errors == [""] * rounds
+    assert {one.name for one in base.iterdir()} == {
+        current.name,
+        *(one.name for one in folders[:3]),
+    }

@@ -1,4 +1,4 @@
-"""Docstrings name only what exists, so that a rename reaches them as well: classes, quoted names."""
+"""Docstrings name only classes and quoted names that exist, so that renaming reaches them too."""
 
 import ast
 import builtins
@@ -60,7 +60,7 @@ def find_types(docstring: str):
 
 
 def find_unknown(modules: dict) -> list:
-    """Return (module, function, name) of the classes in docstrings that nothing defines."""
+    """Return (module, function, name) of the classes named in docstrings that nothing defines."""
     known = set.union(*map(find_definitions, modules.values())) | OTHER_NAMES | set(dir(builtins))
     return [
         (module, getattr(node, "name", "module"), name)
@@ -78,10 +78,12 @@ def parse_modules() -> dict:
 
 
 def test_always_docstrings_name_classes_that_exist():
+    """Every class named as a type in a docstring of the package exists."""
     assert find_unknown(parse_modules()) == []
 
 
-def test_exact_an_old_name_is_found():
+def test_exact_unknown_class_in_docstring_is_found():
+    """The check finds two classes that do not exist in the docstring of an example."""
     text = (
         'def move(path):\n    """Move.\n\n    Parameters\n    ----------\n'
         '    path : Slide\n\n    Returns\n    -------\n    Motion or None\n    """\n'
@@ -134,10 +136,12 @@ def find_unknown_quoted(modules: dict) -> list:
 
 
 def test_always_docstrings_quote_names_that_exist():
+    """Every name in backquotes in a docstring of the package occurs in its code."""
     assert find_unknown_quoted(parse_modules()) == []
 
 
-def test_exact_an_old_quoted_name_is_found():
+def test_exact_unknown_quoted_name_is_found():
+    """The check finds a quoted name that does not exist in the docstring of an example."""
     text = (
         'def move(path):\n    """Move along a path (`slide.old`, `path`)."""\n    return "slide"\n'
     )

@@ -1,4 +1,4 @@
-"""The size and the style of the sources do not get worse, and the checker sees every breach."""
+"""The counts of tokens and style breaches do not rise, and the checker finds a breach of every rule."""
 
 from pathlib import Path
 
@@ -62,28 +62,33 @@ OFFERED = frozenset({"patchfem.contact.gaps.crown"})
 
 
 def broken_rules(text: str) -> set:
+    """Return the rules that a text of a module breaks."""
     source = parse_source(text, Path("module.py"))
     found = (*style_rules(source), *border_rules(source.nodes, OFFERED))
     return {rule for rule, _, _ in found}
 
 
-def test_always_no_count_exceeds_the_baseline():
+def test_always_counts_are_within_baseline():
+    """No count of tokens or of style breaches exceeds the baseline in house.toml."""
     assert not (messages := exceeded_counts(count_sources(), read_baseline())), "\n".join(messages)
 
 
-def test_exact_a_clean_module_breaks_no_rule():
+def test_exact_clean_module_breaks_no_rule():
+    """A module without breaches passes, and there is an example of a breach for every rule."""
     assert broken_rules(CLEAN) == set()
     assert set(PLANTED) == set(RULES) - {"tokens"}
 
 
 @pytest.mark.parametrize("rule", PLANTED)
-def test_exact_a_planted_breach_is_seen(rule):
-    # an import from behind a border is a deep import too
+def test_exact_breach_of_each_rule_is_found(rule):
+    """The checker finds the breach in the example of each rule, and no other."""
+    # a breach of `inner` is a deep import too
     implied = {"deep"} if rule == "inner" else set()
     assert broken_rules(PLANTED[rule]) == {rule} | implied
 
 
-def test_exact_a_folder_offers_the_names_that_other_folders_use():
+def test_exact_names_used_by_other_folders_are_offered():
+    """The names that a folder offers are those that other folders import or read."""
     root = Path("/checkout")
     modules = {
         "patchfem/contact/gaps.py": "from .edges import closed_length\n",
@@ -102,14 +107,16 @@ def test_exact_a_folder_offers_the_names_that_other_folders_use():
     }
 
 
-def test_exact_comments_and_docstrings_are_no_tokens():
+def test_exact_comments_and_docstrings_are_not_counted():
+    """Comments and docstrings do not count as tokens."""
     text = (
         '"""A module."""\n\nx = [1]  # a list\n\ndef f():\n    """Return."""\n    return "text"\n'
     )
     assert count_tokens(parse_source(text, Path("module.py"))) == 5 + 5 + 2
 
 
-def test_refuses_a_count_above_the_baseline_and_names_the_line(tmp_path):
+def test_refuses_count_above_baseline(tmp_path):
+    """A count above the baseline is reported with the file and the line of the new breach."""
     module = tmp_path / "patchfem" / "contact" / "gaps.py"
     module.parent.mkdir(parents=True)
     (tmp_path / "tests").mkdir()
@@ -122,8 +129,12 @@ def test_refuses_a_count_above_the_baseline_and_names_the_line(tmp_path):
     assert "N1 2, allowed 1" in names and f"{module}:{CLEAN.count(chr(10)) + 2}: glued" in names
 
 
-def test_exact_the_baseline_only_falls():
+def test_exact_baseline_is_only_lowered():
+    """`--lower` lowers the counts of the baseline and raises none."""
+
     class Present:
+        """Counts of a checkout with one higher and one lower value than the baseline."""
+
         values = {"patchfem/contact": {"tokens": 90, "N1": 3}}  # noqa: RUF012
 
     lowered = lower_baseline(Present, {"patchfem/contact": {"tokens": 100, "N1": 2, "N2": 5}})

@@ -1,4 +1,4 @@
-"""Functions that compiled code calls: compiled with their callers, the same answers, callable from Python still."""
+"""Kernel functions compiled into their callers give the same results, and stay callable from Python."""
 
 import os
 import re
@@ -49,70 +49,80 @@ print(kernels.lengthened(3), *compiled.UNCACHED_FUNCTIONS)
 ALIKE = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "arcp"}}
 
 
-def nearest(values, here):
-    """Number of the value next to a place, and how far it is."""
+def find_nearest(values, place):
+    """Return the index of the value nearest to `place`, and its distance."""
     best = np.inf
-    who = -1
+    index = -1
     for k in range(values.size):
-        if abs(values[k] - here) < best:
-            best = abs(values[k] - here)
-            who = k
-    return who, best
+        if abs(values[k] - place) < best:
+            best = abs(values[k] - place)
+            index = k
+    return index, best
 
 
-def made(decorate):
-    """A function and one that calls it, both by this decorator."""
-    called = decorate(nearest)
+def compile_pair(decorate):
+    """Return a function and its caller, both compiled by the decorator."""
+    called = decorate(find_nearest)
 
-    def total(values, places):
+    def sum_distances(values, places):
+        """Return the sum over all places of the index of the nearest value and a bounded distance."""
         out = 0.0
         for here in places:
             who, far = called(values, here)
             out += who + far / (1 + abs(here))
         return out
 
-    return called, decorate(total)
+    return called, decorate(sum_distances)
 
 
-def test_exact_a_caller_takes_the_code_in_and_answers_as_python():
+def test_exact_inlined_function_agrees_with_python():
+    """A caller with an inlined function agrees with plain Python within 1e-14.
+
+    The inlined function has no machine code of its own until Python calls it.
+    """
     values, places = np.random.default_rng(3).normal(size=(2, 50))
-    called, total = made(njit(**ALIKE))
-    truth = made(lambda function: function)[1](values, places)
+    inner, total = compile_pair(njit(**ALIKE))
+    truth = compile_pair(lambda function: function)[1](values, places)
     assert total(values, places) == pytest.approx(truth, rel=1e-14)
-    asked = called.overloads[next(iter(called.overloads))]
-    # no machine code of its own
-    assert asked.library.get_pointer_to_function(asked.fndesc.llvm_func_name) == 0
-    assert not called._standalone.overloads and len(total._standalone.overloads) == 1
-    assert called(values, 0.1) == nearest(values, 0.1)  # compiled inside another one before
-    assert len(called._standalone.overloads) == 1
-    # nothing of an inner one to keep
+    compiled = inner.overloads[next(iter(inner.overloads))]
+    # the inlined function has no machine code of its own
+    assert compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) == 0
+    assert not inner._standalone.overloads and len(total._standalone.overloads) == 1
+    assert inner(values, 0.1) == find_nearest(
+        values, 0.1
+    )  # the function was compiled only inside another one so far
+    assert len(inner._standalone.overloads) == 1
+    # no code of the inner function is cached
     assert total(values.astype("f4"), places) == pytest.approx(truth, rel=1e-5)
 
 
-def test_always_this_numba_has_what_inner_functions_need():
-    """Else all of them are compiled for themselves and inside all others: the same answers at three times the wait."""
-    called, total = made(njit())
+def test_always_installed_numba_supports_inlining():
+    """The installed numba has the methods that inlining needs; without them compilation takes three times as long."""
+    called, total = compile_pair(njit())
     assert isinstance(called, InlinedDispatcher) and isinstance(total, InlinedDispatcher)
 
 
-def test_exact_without_its_hooks_it_is_numba_s(monkeypatch):
+def test_exact_missing_hooks_fall_back_to_numba(monkeypatch):
+    """If numba lacks the methods that inlining needs, its own dispatcher is used and gives the same sum."""
     monkeypatch.setattr("patchfem.compiled.jit.LIBRARY_METHODS", ("something_else",))
-    called, total = made(njit(**ALIKE))
+    called, total = compile_pair(njit(**ALIKE))
     assert type(called) is type(total) is CPUDispatcher
     assert total(np.arange(3.0), np.array([0.5, 1.75])) == 0 + 0.5 / 1.5 + 2 + 0.25 / 2.75
 
 
-def test_always_kernels_are_compiled_by_it():
-    """numba's own `njit` would compile a function for itself, inside each that calls it, and again per constant."""
+def test_always_kernels_use_inlining_decorator():
+    """No kernel module uses numba's `njit`, which would compile each function again inside every caller."""
     kernels = list(Path(jit.__file__).parents[1].rglob("*kernels.py"))
     assert len(kernels) > 50
     own = re.compile(r"(?m)^(from numba import .*\bn?jit\b|@numba\b)")
     assert not [str(path) for path in kernels if own.search(path.read_text("utf-8"))]
 
 
-def test_exact_calls_from_python_are_kept(tmp_path):
-    """A function that compiled code alone is meant to call is compiled once, not in every process, where Python does;
-    one that allocates is told, for numba must come up for it each time. Damaged code is compiled again."""
+def test_exact_inner_functions_called_from_python_are_cached(tmp_path):
+    """An inner function that Python calls is compiled once and cached for later processes.
+
+    A function that allocates is reported as not cached, and damaged code is compiled again.
+    """
     (tmp_path / "some_kernels.py").write_text(KERNELS, "utf-8")
     code = CALLS.format(tmp_path / "some_kernels.py")
     environment = os.environ | {

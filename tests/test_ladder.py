@@ -1,4 +1,4 @@
-"""The shape of the package, read from its sources: a file imports its own rung of the reading order and those before.
+"""Layers of the package, checked in its sources: a file imports only its own and earlier entries of the reading order.
 
 The reading order is the numbered list in the docstring of the package; that of a folder in ORDERED, the list in the
 docstring of its own `__init__`, binds inside it. Every import counts, inside functions too.
@@ -23,14 +23,14 @@ from patchfem.scene.keys.types import find_inner_table, is_array_attribute, list
 from patchfem.scene.text import EFFECT_KEYS
 
 HERE = Path(__file__).parents[1]
-# may know a Scene
+# modules that may use a Scene
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")
-# one scene asked again with other values of its keys
+# modules that run one scene repeatedly with other values of its keys
 SCENE_ALSO = (
-    "campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
+    "campaigns.fits.*",  # a scene with other values of its keys or with another patch
     "export.fits.request",
     "export.fits.wear",
-    "export.fits.patch",  # the fitted scene, which they write
+    "export.fits.patch",  # they write the fitted scene
     "campaigns.sweeps.case_models",
     "campaigns.rows.condition_models",
 )
@@ -39,16 +39,16 @@ OUTSIDE = {
     "pyvista": ("export.drawing.view", "export.fields.multiblock"),
     "meshio": ("mesh.files", "export.*"),
 }
-# must be read in this order
+# folders of the physics in their reading order
 PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]
 ORDERED = ("dynamics", "runs", "export")  # folders with a reading order of their own
-FUNCTION_LINES = 120  # longest: a command whose options take a line each
-# these name a thing
+FUNCTION_LINES = 120  # the longest functions are commands with one line per option
+# syntax nodes that can name an object
 KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *FUNCTIONS)
 
 
 def reading_order(tree: dict, folder: str = "") -> list:
-    """(number, name) of each entry of the numbered list in the docstring of a folder, "" the package."""
+    """Return (number, name) of each entry of the numbered list in the docstring of a folder; "" is the package."""
     listed = ast.get_docstring(syntax_nodes(tree.get(folder, ""))[0]) or ""
     return [
         (int(number), name.rstrip("/"))
@@ -56,12 +56,12 @@ def reading_order(tree: dict, folder: str = "") -> list:
     ]
 
 
-def of_the_order(tree: dict, folder: str = "") -> list:
-    """Where a reading order does not tell the truth: numbers 1, 2, 3, ..., every folder and flat module once."""
+def check_reading_order(tree: dict, folder: str = "") -> list:
+    """Return the faults of a reading order: wrong numbers, missing, repeated or unknown entries."""
     order = reading_order(tree, folder)
     the = f"the reading order{folder and ' of '}{folder}"
     named = Counter(name for _, name in order)
-    there = {inside(name, folder) for name in tree} - {"", "__main__"}
+    there = {entry_of(name, folder) for name in tree} - {"", "__main__"}
     out = [f"{the} names {name}, which does not exist" for name in named if name not in there]
     out += [f"{the} names {name} {count} times" for name, count in named.items() if count > 1]
     out += [f"{the} does not name {name}" for name in sorted(there - set(named))]
@@ -71,28 +71,28 @@ def of_the_order(tree: dict, folder: str = "") -> list:
     )
 
 
-def inside(name: str, folder: str) -> str:
-    """The entry of a folder, "" the package, that a dotted name belongs to; "" of what is not in it."""
+def entry_of(name: str, folder: str) -> str:
+    """Return the entry of a folder that contains a dotted name, or "" if the name lies outside the folder."""
     whole = f"{folder}." if folder else ""
     return name.removeprefix(whole).split(".")[0] if name.startswith(whole) else ""
 
 
-def of_a_folder(folder: str, tree: dict, found: dict) -> list:
-    """Imports against the reading order of a folder, and where that order does not tell the truth."""
+def check_folder(folder: str, tree: dict, found: dict) -> list:
+    """Return the faults of the reading order of a folder, and the imports that violate it."""
     rungs = {name: number for number, name in reading_order(tree, folder)}
     out = set()
     for name, all_of_it in found.items():
-        own = rungs.get(inside(name, folder))
+        own = rungs.get(entry_of(name, folder))
         out |= {
             f"{name} imports {one.target} upward"
             for one in all_of_it
-            if one.is_own and own is not None and rungs.get(inside(one.target, folder), own) > own
+            if one.is_own and own is not None and rungs.get(entry_of(one.target, folder), own) > own
         }
-    return of_the_order(tree, folder) + sorted(out)
+    return check_reading_order(tree, folder) + sorted(out)
 
 
-def of_imports(name: str, found: list, rungs: dict) -> list:
-    """Imports of later rungs; what the order does not name is no rung, and `of_the_order` tells of such importers."""
+def check_imports(name: str, found: list, rungs: dict) -> list:
+    """Return the imports of a module from later entries, or from modules that the order does not list."""
     own = rungs.get(name.split(".")[0])
     out = set()
     for one in found:
@@ -106,8 +106,8 @@ def of_imports(name: str, found: list, rungs: dict) -> list:
     return sorted(out)
 
 
-def of_outside(found: dict) -> list:
-    """Packages of others imported where they have no place, and more than one exporter that writes meshes."""
+def check_external_packages(found: dict) -> list:
+    """Return the imports of external packages in modules that may not use them, and a second exporter of meshes."""
     out = []
     exporters = []
     for name, all_of_it in found.items():
@@ -118,27 +118,31 @@ def of_outside(found: dict) -> list:
     return out + ([f"meshio in {' and '.join(sorted(exporters))}"] if len(exporters) > 1 else [])
 
 
-def of_scene(name: str, nodes) -> list:
-    """The lines on which a file that should not knows a Scene: by its name, as a parameter, in an annotation."""
+def check_scene_use(name: str, nodes) -> list:
+    """Return the lines on which a module that may not use a Scene names one, takes it as a parameter or annotates it."""
     if any(fnmatch(name, place) for place in (*SCENE, *SCENE_ALSO)):
         return []
-    lines = {node.lineno for node in nodes if isinstance(node, KNOWING) and _knows(node)}
+    lines = {node.lineno for node in nodes if isinstance(node, KNOWING) and names_scene(node)}
     return [f"{name} knows a Scene (line {', '.join(map(str, sorted(lines)))})"] if lines else []
 
 
-def _knows(node) -> bool:
+def names_scene(node) -> bool:
+    """Return whether a syntax node names a Scene."""
     if isinstance(node, (ast.Name, ast.Attribute, ast.alias, ast.ClassDef)):
         return "Scene" in [getattr(node, key, None) for key in ("id", "attr", "name")]
     called = getattr(node, "arg" if isinstance(node, ast.arg) else "target", None)
     if isinstance(node, (ast.arg, ast.AnnAssign)) and getattr(called, "id", called) == "scene":
         return True
-    # a text too: "Scene | None"
+    # an annotation may be a text, e.g. "Scene | None"
     noted = getattr(node, "annotation", None) or getattr(node, "returns", None)
     return noted is not None and "Scene" in re.findall(r"\w+", ast.unparse(noted))
 
 
-def of_functions(parsed: dict) -> list:
-    """Functions that have grown too long. The size of a module follows its idea, so nothing counts it."""
+def check_function_lengths(parsed: dict) -> list:
+    """Return the functions that are longer than the limit.
+
+    The length of a module is not limited.
+    """
     sizes = [
         (f"{name}.{node.name}", node.end_lineno - node.lineno + 1)
         for name, nodes in parsed.items()
@@ -148,8 +152,8 @@ def of_functions(parsed: dict) -> list:
     return [f"{name} has {count} lines" for name, count in sizes if count > FUNCTION_LINES]
 
 
-def of_effects(tree: dict) -> list:
-    """Modules that the table of effects names and that do not exist."""
+def check_effects(tree: dict) -> list:
+    """Return the modules that the table of effects names and that do not exist."""
     nodes = syntax_nodes(tree.get("effects", ""))
     texts = [
         node.value
@@ -162,8 +166,8 @@ def of_effects(tree: dict) -> list:
     return [f"effects names {name}, which does not exist" for name in sorted(named - set(tree))]
 
 
-def faults(tree: dict) -> list:
-    """Every breach of the ladder in a dict {dotted name: source}, as sentences."""
+def find_faults(tree: dict) -> list:
+    """Return all breaches of the layering in {dotted name: source}, as sentences."""
     parsed = {name: syntax_nodes(text) for name, text in tree.items()}
     found = {name: imports(name, text, tree) for name, text in tree.items()}
     order = reading_order(tree)
@@ -171,18 +175,20 @@ def faults(tree: dict) -> list:
         "": len(order) + 1,
         "__main__": len(order) + 1,
     }
-    out = of_the_order(tree) + [
+    out = check_reading_order(tree) + [
         f"cycle of files: {', '.join(group)}" for group in import_cycles(import_graph(tree))
     ]
     for name in tree:
-        out += of_imports(name, found[name], rungs) + of_scene(name, parsed[name])
+        out += check_imports(name, found[name], rungs) + check_scene_use(name, parsed[name])
     for folder in ORDERED:
         if reading_order(tree, folder):
-            out += of_a_folder(folder, tree, found)
-    return out + of_outside(found) + of_functions(parsed) + of_effects(tree)
+            out += check_folder(folder, tree, found)
+    return (
+        out + check_external_packages(found) + check_function_lengths(parsed) + check_effects(tree)
+    )
 
 
-SMALL = {  # a house without a fault, into which the tests plant one each
+SMALL = {  # a small package without a fault, into which each test inserts one
     "": '"""Read\n\n1. `core`  nouns\n2. `effects`\n3. `compiled`\n4. `scene`\n5. `mesh`\n6. `friction`\n'
         '7. `dynamics`\n8. `model`\n9. `runs`\n10. `export`\n"""\ndef __getattr__(name):\n    from .runs import run',
     "__main__": "from . import runs\nfrom .scene.reader import Scene\ndef check(scene: Scene): pass",
@@ -201,13 +207,15 @@ SMALL = {  # a house without a fault, into which the tests plant one each
 }  # fmt: skip
 
 
-def test_exact_the_package_is_a_ladder():
+def test_exact_package_obeys_reading_order():
+    """The package has no fault, and the folders of the physics stand in the documented order."""
     tree = sources(HERE)
-    assert faults(tree) == []
+    assert find_faults(tree) == []
     assert [name for _, name in reading_order(tree) if name in PHYSICS] == PHYSICS
 
 
-def test_exact_the_checker_sees_what_there_is():
+def test_exact_checker_finds_modules_and_imports():
+    """The checker finds more than 100 modules and 500 imports of the package, imports in strings included."""
     tree = sources(HERE)
     found = [one for name, text in tree.items() for one in imports(name, text, tree)]
     assert len(tree) > 100
@@ -215,11 +223,14 @@ def test_exact_the_checker_sees_what_there_is():
     assert sum(one.is_own for one in found) > 500
     assert {"numpy", "core"} <= {one.target for one in found}
     assert any(one.is_text and one.target.endswith("kernels") for one in found)
-    assert re.search(r"patchfem(\.\w+)+", tree["effects"])  # else `of_effects` looks at nothing
+    assert re.search(
+        r"patchfem(\.\w+)+", tree["effects"]
+    )  # otherwise the check of effects has nothing to check
 
 
-def test_exact_a_small_house_has_no_fault():
-    assert faults(SMALL) == []
+def test_exact_small_package_has_no_fault():
+    """The small package of the examples has no fault."""
+    assert find_faults(SMALL) == []
 
 
 @pytest.mark.parametrize("name, text, fault", [
@@ -254,11 +265,13 @@ def test_exact_a_small_house_has_no_fault():
     ("runs.run", "def f():" + "\n    a = 1" * 120, "runs.run.f has 121 lines"),
     ("effects", "A = 'patchfem.friction.laws.tan'", "effects names friction.laws.tan, which does not exist"),
 ])  # fmt: skip
-def test_refuses_a_breach(name, text, fault):
-    assert fault in faults(SMALL | {name: text})
+def test_refuses_breach_of_layering(name, text, fault):
+    """Each breach inserted into the small package is reported in the expected words."""
+    assert fault in find_faults(SMALL | {name: text})
 
 
-def test_exact_effects_name_modules_that_exist():
+def test_exact_effects_name_existing_modules():
+    """Every module that the table of effects names can be found."""
     from patchfem.effects import EFFECTS
 
     for name, effect in EFFECTS.items():
@@ -266,7 +279,7 @@ def test_exact_effects_name_modules_that_exist():
 
 
 def effect_names(model, key):
-    """Names of the effects that a table of a scene can ask for."""
+    """Yield the names of the effects that a table of a scene can request."""
     selectors = [name for name in EFFECT_KEYS if name in model.model_fields]
     if not selectors:
         yield key
@@ -277,21 +290,21 @@ def effect_names(model, key):
         inner = find_inner_table(model, name)
         if inner is not None and not issubclass(inner, Material):
             for effect in effect_names(inner, f"{key}.{name}"):
-                # an array of tables names the values of its selectors alone
+                # an array of tables has effects only for the values of its selectors
                 if not is_array_attribute(model, name) or (
                     "=" in effect and ".contact" not in effect
                 ):
                     yield effect
 
 
-def test_always_every_table_of_a_scene_has_an_effect():
-    """Else `check` accepts a scene with this table, and `plan` cannot say what it computes."""
+def test_always_scene_tables_have_effects():
+    """Every table of a scene and every value of its selectors has an entry in the table of effects, which `plan` prints."""
     from patchfem.effects import EFFECTS, list_absent_effects
 
     tables = [key for key in Tables.model_fields if find_inner_table(Tables, key)]
     names = {name for key in tables for name in effect_names(find_inner_table(Tables, key), key)}
     assert len(names) > 50
-    # the default of these is no effect, see scene.text
+    # the defaults of these keys have no effect, see patchfem/scene/text.py
     missing = names - set(EFFECTS) - {"accuracy", "measured.reading=peak"}
     assert not missing, f"add entries to patchfem/effects.py: {sorted(missing)}"
     with pytest.raises(PatchfemError, match=r"contact\.ripple: .* no entry in EFFECTS"):
@@ -299,11 +312,11 @@ def test_always_every_table_of_a_scene_has_an_effect():
 
 
 if __name__ == "__main__":
-    found = faults(sources(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
+    found = find_faults(sources(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
     print(*found, f"{len(found)} faults", sep="\n")
 
 
-def test_always_no_two_files_of_tests_share_a_name():
-    """Else pytest takes one for the other and collects none of it."""
+def test_always_test_files_have_unique_names():
+    """No two test files have the same name, because pytest would skip one of them."""
     names = [one.name for one in Path(__file__).parent.rglob("test_*.py")]
     assert sorted(names) == sorted(set(names))

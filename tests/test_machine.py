@@ -1,4 +1,4 @@
-"""Machine code in files of its own: the same bits as through numba, and nothing for what could not run without it."""
+"""Machine code stored in files gives the same bits as numba; code that cannot run without numba is refused."""
 
 import json
 import subprocess
@@ -18,11 +18,15 @@ from patchfem.compiled import KernelModule, jit, load, machine
 
 
 class Inner(NamedTuple):
+    """Argument tuple that is nested in another one."""
+
     places: np.ndarray
     scale: float
 
 
 class Outer(NamedTuple):
+    """Argument tuple with arrays of two layouts, a count and a nested tuple."""
+
     first: np.ndarray
     inner: Inner
     count: int
@@ -30,12 +34,14 @@ class Outer(NamedTuple):
 
 
 class Column(IntEnum):
+    """Columns of a table of floats."""
+
     FORCE = 0
     SLIDE = 1
 
 
-def weighed(first, outer, step, out):
-    """Sums with calls of the C library in them; writes, counts and returns one of each kind."""
+def weighted_sum(first, outer, step, out):
+    """Write weighted sums that call the C library into `out`; return a count and a nested tuple."""
     total = 0.0
     for i in range(outer.count):
         total += exp(-outer.inner.places[i] * outer.inner.scale) * tan(outer.first[i])
@@ -45,94 +51,109 @@ def weighed(first, outer, step, out):
     return outer.count + first, (total, outer.inner.places.size)
 
 
-def filled(out, value):
+def fill(out, value):
+    """Fill an array with a value and return nothing."""
     for i in range(out.size):
         out[i] = value
 
 
-def refusing(value):
+def double_positive(value):
+    """Return twice the value, or raise ValueError if it is negative."""
     if value < 0:
         raise ValueError("negative")
     return value * 2
 
 
-def above(value, out):
+def exceeds_one(value, out):
+    """Store a value and return whether it exceeds one."""
     out[0] = value
     return value > 1
 
 
-def lengthened(count):
+def allocated_size(count):
+    """Return the size of a newly allocated array."""
     return np.zeros(count).size
 
 
-def some_arguments():
+def make_arguments():
+    """Return arguments of `weighted_sum` with a grid whose rows and columns are not contiguous."""
     rng = np.random.default_rng(3)
-    grid = rng.normal(size=(9, 14))[::2, 1::3]  # neither rows nor columns lie together
+    grid = rng.normal(size=(9, 14))[::2, 1::3]  # neither rows nor columns are contiguous
     return 3, Outer(rng.normal(size=5), Inner(rng.normal(size=7), 0.7), 5, grid), 1e-3, np.zeros(5)
 
 
-def kept(path, function, *arguments):
-    """(what numba answers, the function read back from its file or None)."""
-    made = njit(error_model="numpy", _nrt=function is lengthened)(function)
+def compile_and_reload(path, function, *arguments):
+    """Return the result of numba, and the function read back from its file or None."""
+    made = njit(error_model="numpy", _nrt=function is allocated_size)(function)
     answer = made(*arguments)
     return answer, machine.load_file(path) if machine.store_code(path, made, arguments) else None
 
 
-def words_of(*arguments) -> bytes:
+def pack_arguments(*arguments) -> bytes:
+    """Return the arguments as the machine words of a call."""
     words = machine.ArgumentConverter()
     return b"".join(words.convert(one)[1] for one in arguments)
 
 
 @pytest.fixture(scope="module")
-def weighing(tmp_path_factory):
+def stored_sum(tmp_path_factory):
+    """Return path, arguments, result and both versions of the stored function `weighted_sum`."""
     path = tmp_path_factory.mktemp("code") / "weighed.code"
-    given = some_arguments()
-    made = njit(error_model="numpy", _nrt=False)(weighed)
+    given = make_arguments()
+    made = njit(error_model="numpy", _nrt=False)(weighted_sum)
     answer = made(*given)
     assert machine.store_code(path, made, given)
     return path, given, answer, machine.load_file(path), made
 
 
-def test_exact_the_same_bits_from_the_file(weighing):
-    _, (first, outer, step, out), answer, code, made = weighing
-    mine = np.zeros(5)
-    assert code(words_of(first, outer, step, mine)) == answer == (8, (answer[1][0], 7))
-    assert np.array_equal(mine, out) and answer[1][0] == out[-1] != 0
-    # other words, not those of the first call
+def test_exact_stored_code_gives_same_bits(stored_sum):
+    """The function read from its file returns the same bits as numba's, also for other arguments."""
+    _, (first, outer, step, out), answer, code, numba_sum = stored_sum
+    result = np.zeros(5)
+    assert code(pack_arguments(first, outer, step, result)) == answer == (8, (answer[1][0], 7))
+    assert np.array_equal(result, out) and answer[1][0] == out[-1] != 0
+    # arguments other than those of the first call
     other = outer._replace(count=2, inner=Inner(-outer.inner.places, 1.5))
     assert (
-        code(words_of(-1, other, 2.0, mine))
-        == made(-1, other, 2.0, np.zeros(5))
-        == (1, (mine[1], 7))
+        code(pack_arguments(-1, other, 2.0, result))
+        == numba_sum(-1, other, 2.0, np.zeros(5))
+        == (1, (result[1], 7))
     )
-    assert mine[1] == pytest.approx(weighed(-1, other, 2.0, out)[1][0], rel=1e-13)
+    assert result[1] == pytest.approx(weighted_sum(-1, other, 2.0, out)[1][0], rel=1e-13)
 
 
-def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
-    """Numbers, arrays of each layout and a tuple inside are read where they lie, those of each call; a function inside
-    is given the address as well."""
-    _, (first, outer, step, _), answer, _, made = weighing
-    within = jit.njit(error_model="numpy", _nrt=False)(weighed)
+def test_exact_tuples_are_passed_by_address(stored_sum, tmp_path):
+    """Tuples are passed by address, to inner functions too, and the sums agree with numba's within 1e-14.
+
+    The tuples contain numbers, arrays of any layout and nested tuples.
+    """
+    _, (first, outer, step, _), answer, _, numba_sum = stored_sum
+    inner = jit.njit(error_model="numpy", _nrt=False)(weighted_sum)
 
     @jit.njit(error_model="numpy", _nrt=False)
-    def called(first, outer, step, out):
-        return within(first, outer, step, out)
+    def call_inlined(first, outer, step, out):
+        """Return the result of the inlined function."""
+        return inner(first, outer, step, out)
 
-    for function in (within, called):
+    for function in (inner, call_inlined):
         code = machine.compile_and_store(
             tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.compile_optimised
         )
-        mine = np.zeros(5)
-        assert code(words_of(first, outer, step, mine)) == (8, (mine[-1], 7))
-        assert mine[-1] == pytest.approx(answer[1][0], rel=1e-14)
+        result = np.zeros(5)
+        assert code(pack_arguments(first, outer, step, result)) == (8, (result[-1], 7))
+        assert result[-1] == pytest.approx(answer[1][0], rel=1e-14)
         other = outer._replace(
             first=2 * outer.first, count=2, inner=Inner(-outer.inner.places, 1.5)
         )
-        theirs = np.zeros(5)
-        assert code(words_of(-1, other, 2.0, mine))[0] == made(-1, other, 2.0, theirs)[0] == 1
-        assert mine[:2] == pytest.approx(theirs[:2], rel=1e-14)
-    [taken] = within.overloads.values()  # for `called`
-    assert taken.signature.args[1].tuple_type.fields == Outer._fields
+        expected = np.zeros(5)
+        assert (
+            code(pack_arguments(-1, other, 2.0, result))[0]
+            == numba_sum(-1, other, 2.0, expected)[0]
+            == 1
+        )
+        assert result[:2] == pytest.approx(expected[:2], rel=1e-14)
+    [compiled] = inner.overloads.values()  # compiled inside `call_inlined`
+    assert compiled.signature.args[1].tuple_type.fields == Outer._fields
 
 
 @pytest.mark.parametrize(
@@ -148,51 +169,61 @@ def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
     ],
     ids=["cut", "cut early", "empty", "no head", "one bit", "no such function", "Python's"],
 )
-def test_refuses_a_damaged_file(weighing, tmp_path, damage):
-    text = weighing[0].read_bytes()
+def test_refuses_damaged_code_file(stored_sum, tmp_path, damage):
+    """A damaged or missing code file is not loaded."""
+    text = stored_sum[0].read_bytes()
     assert json.loads(text.partition(b"\n")[0])["calls"] == ["tan"]
     (tmp_path / "a.code").write_bytes(damage(text))
     assert machine.load_file(tmp_path / "a.code") is None
     assert machine.load_file(tmp_path / "none.code") is None
 
 
-def test_exact_nothing_returned_and_what_was_raised(tmp_path):
+def test_exact_none_and_exceptions_are_passed_on(tmp_path):
+    """A stored function without a return value returns None, and one that raises ends in RuntimeError."""
     out = np.zeros(3)
-    answer, code = kept(tmp_path / "filled.code", filled, out, 2.5)
+    answer, code = compile_and_reload(tmp_path / "filled.code", fill, out, 2.5)
     other = np.zeros(4)
-    assert code(words_of(other, -1.5)) is answer is None and other.tolist() == [-1.5] * 4
-    answer, code = kept(tmp_path / "refusing.code", refusing, 2.0)
-    assert answer == code(words_of(2.0)) == 4.0
+    assert code(pack_arguments(other, -1.5)) is answer is None and other.tolist() == [-1.5] * 4
+    answer, code = compile_and_reload(tmp_path / "refusing.code", double_positive, 2.0)
+    assert answer == code(pack_arguments(2.0)) == 4.0
     with pytest.raises(RuntimeError, match="status"):
-        code(words_of(-1.0))
+        code(pack_arguments(-1.0))
 
 
-def test_exact_yes_and_no(tmp_path):
+def test_exact_booleans_are_returned(tmp_path):
+    """A stored function returns True and False as Python booleans."""
     out = np.zeros(1)
-    answer, code = kept(tmp_path / "above.code", above, 2.0, out)
-    assert answer is True is code(words_of(3.0, out))
-    assert code(words_of(1.0, out)) is False
+    answer, code = compile_and_reload(tmp_path / "above.code", exceeds_one, 2.0, out)
+    assert answer is True is code(pack_arguments(3.0, out))
+    assert code(pack_arguments(1.0, out)) is False
     assert out[0] == 1
 
 
-def test_refuses_what_numba_alone_can_run(tmp_path):
-    assert kept(tmp_path / "a.code", lengthened, 3) == (3, None)  # it allocates
-    for unfit in (True, "text", 1j, [1.0], None, np.float32(1), (1.0, None)):
+def test_refuses_code_that_needs_numba(tmp_path):
+    """Functions that allocate and arguments of unsupported types are not stored."""
+    assert compile_and_reload(tmp_path / "a.code", allocated_size, 3) == (
+        3,
+        None,
+    )  # the function allocates memory
+    for unsupported in (True, "text", 1j, [1.0], None, np.float32(1), (1.0, None)):
         with pytest.raises(machine.UnsupportedError):
-            machine.ArgumentConverter().convert(unfit)
-    made = njit(refusing)
-    made(1.0)
-    # nowhere to write to
-    assert not machine.store_code(tmp_path / "none" / "folder" / "a.code", made, (1.0,))
-    assert not machine.store_code(tmp_path / "a.code", made, (1,))  # never compiled for these
+            machine.ArgumentConverter().convert(unsupported)
+    dispatcher = njit(double_positive)
+    dispatcher(1.0)
+    # the folder does not exist
+    assert not machine.store_code(tmp_path / "none" / "folder" / "a.code", dispatcher, (1.0,))
+    assert not machine.store_code(
+        tmp_path / "a.code", dispatcher, (1,)
+    )  # the function was never compiled for an integer
     assert not list(tmp_path.iterdir())
 
 
-def test_always_kinds_tell_types_apart():
+def test_always_argument_kinds_distinguish_types():
+    """Arguments that differ in type, layout, precision or writability have different kinds."""
     words = machine.ArgumentConverter()
     grid = np.zeros((4, 4))
-    still = np.zeros(4)
-    still.flags.writeable = False
+    read_only = np.zeros(4)
+    read_only.flags.writeable = False
     kinds = [
         words.convert(one)[0]
         for one in (
@@ -203,7 +234,7 @@ def test_always_kinds_tell_types_apart():
             grid[::2, ::2],
             grid[0],
             grid.astype(np.float32),
-            still,
+            read_only,
             (1.0, 1),
             (1, 1),
             Inner(grid[0], 1.0),
@@ -216,19 +247,20 @@ def test_always_kinds_tell_types_apart():
     ) == words.convert(7)
 
 
-def test_always_a_tuple_is_remembered_as_itself(weighing):
-    """Tuples come and go at the same addresses; one that is remembered is kept alive, so none is taken for another."""
-    _, (first, outer, step, _), _, code, made = weighing
+def test_always_cached_tuples_are_not_confused(stored_sum):
+    """Tuples that are created one after another at the same address are not confused, since cached tuples stay alive."""
+    _, (first, outer, step, _), _, code, numba_sum = stored_sum
     words = machine.ArgumentConverter()
-    mine = np.zeros(5)
+    result = np.zeros(5)
     for k in range(20):
         other = outer._replace(inner=Inner(outer.inner.places * k, 0.1 * k))
-        row = b"".join(words.convert(one)[1] for one in (first, other, step, mine))
-        assert code(row) == made(first, other, step, np.zeros(5))
+        row = b"".join(words.convert(one)[1] for one in (first, other, step, result))
+        assert code(row) == numba_sum(first, other, step, np.zeros(5))
     assert len(words.known_tuples) <= machine.MAX_CACHED_TUPLES
 
 
-def test_exact_constants_are_read_without_the_module(tmp_path):
+def test_exact_constants_are_read_without_import(tmp_path):
+    """Simple constants of a kernel module are read from its source; only other names import the module."""
     path = tmp_path / "some_kernels.py"
     path.write_text(
         '"""Text."""\nimport nothing_there\nSTILL, MOVES = 0, 1\nNAME = "a"\nFAR = 1e-3\n'
@@ -236,8 +268,8 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
         "LEFT, RIGHT = range(MOVES + 1)\nUP, = range(STILL + 5, 6)\n"
         "OTHER = len(NAME)\nWORSE = [missing.remove() for missing in NAME]\n"
     )
-    brought = []
-    module = KernelModule("patchfem.some_kernels", path, lambda: brought.append(1))
+    imports = []
+    module = KernelModule("patchfem.some_kernels", path, lambda: imports.append(1))
     assert (module.STILL, module.MOVES, module.NAME, module.FAR, module.WIDE) == (
         0,
         1,
@@ -247,10 +279,10 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
     )
     assert (module.HALF, module.PLACES) == (0.5, (1, ("a", -2)))
     assert (module.LEFT, module.RIGHT, module.UP) == (0, 1, 5)
-    assert not brought
+    assert not imports
     with pytest.raises(AttributeError):
         module.OTHER  # noqa: B018
-    assert brought
+    assert imports
 
 
 MOTIONS = """
@@ -270,36 +302,41 @@ print(json.dumps([out, "numba" in sys.modules]))
 """
 
 
-def test_always_threads_that_call_first_at_once_bring_code_once(monkeypatch):
-    """Two that loaded the same function at once ended the process in 1 of 2 first sweeps of Iwan cases."""
-    entry = kernels_of_its_own("dynamics.events.series_kernels").find_highest_power
-    brought = []
-    at_once = Barrier(2)
+def test_always_parallel_first_calls_load_code_once(monkeypatch):
+    """Two threads that call a kernel for the first time at once load its code once.
 
-    def slow(path):
-        brought.append(path)
+    Loading it twice ended the process in half of the first sweeps of Iwan cases.
+    """
+    entry = fresh_kernel_module("dynamics.events.series_kernels").find_highest_power
+    loaded_paths = []
+    barrier = Barrier(2)
+
+    def load_slowly(path):
+        """Record the path, and return a function after a delay."""
+        loaded_paths.append(path)
         sleep(0.05)
         return lambda words: 7.0
 
-    monkeypatch.setattr(machine, "load_file", slow)
+    monkeypatch.setattr(machine, "load_file", load_slowly)
 
-    def call(_):
-        at_once.wait()
+    def call_with_other_thread(_):
+        """Call the kernel at the same time as the other thread."""
+        barrier.wait()
         return entry(1.5)
 
     with ThreadPoolExecutor(2) as pool:
-        assert list(pool.map(call, range(2))) == [7.0, 7.0]
-    assert len(brought) == 1
+        assert list(pool.map(call_with_other_thread, range(2))) == [7.0, 7.0]
+    assert len(loaded_paths) == 1
 
 
-def kernels_of_its_own(module: str) -> KernelModule:
-    """The kernel module of which nothing has been called yet."""
+def fresh_kernel_module(module: str) -> KernelModule:
+    """Return a new handle of a kernel module of which no function has been called."""
     known = load(module)
     return KernelModule(known.__name__, known._source, known._importer)
 
 
-def test_exact_without_compiled_code_the_same_motions(monkeypatch):
-    """Numba's own switch makes every kernel the Python that it is written in, and no index leaves its array."""
+def test_exact_motions_agree_without_compilation(monkeypatch):
+    """With NUMBA_DISABLE_JIT=1, where Python checks every index, the motions agree with compiled code within 1e-9."""
     answers = []
     for switch in "0", "1":
         monkeypatch.setenv("NUMBA_DISABLE_JIT", switch)
@@ -307,12 +344,13 @@ def test_exact_without_compiled_code_the_same_motions(monkeypatch):
             [sys.executable, "-c", MOTIONS], capture_output=True, text=True, timeout=300, check=True
         )
         answers.append(json.loads(done.stdout))
-    (compiled, _), (plain, numba) = answers
+    (compiled, _), (interpreted, numba) = answers
     assert numba and all(np.ravel(compiled))
-    np.testing.assert_allclose(plain, compiled, rtol=1e-9)
+    np.testing.assert_allclose(interpreted, compiled, rtol=1e-9)
 
 
-def compare_members(table):
+def sum_with_enum_indices(table):
+    """Return a sum over a table that is indexed by members of an enumeration."""
     total = 0.5 if Column.SLIDE > 0.5 else 0.0
     for i in range(Column.FORCE, Column.SLIDE + 1):
         table[Column.SLIDE, i] = Column.SLIDE
@@ -320,9 +358,12 @@ def compare_members(table):
     return total
 
 
-def test_members_of_an_integer_enum_are_integers_in_kernels():
-    """Kernels compare members with floats and store them in arrays of floats, which numba alone rejects."""
+def test_exact_integer_enum_members_are_integers_in_kernels():
+    """Members of an IntEnum can be compared with floats and stored in arrays of floats in a kernel.
+
+    Numba alone rejects both.
+    """
     compiled_table, table = np.zeros((2, 2, 2))
-    result = jit.njit(cache=False)(compare_members).get_standalone()(compiled_table)
-    assert result == compare_members(table) == 1.5
+    result = jit.njit(cache=False)(sum_with_enum_indices).get_standalone()(compiled_table)
+    assert result == sum_with_enum_indices(table) == 1.5
     np.testing.assert_array_equal(compiled_table, table)

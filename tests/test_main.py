@@ -1,4 +1,4 @@
-"""A command as a process of its own: how it ends, and how many threads it brings."""
+"""The command line as a process: exit codes, signals, pipes and number of threads."""
 
 import os
 import re
@@ -86,14 +86,15 @@ THREADS = "import os, patchfem.__main__, numpy; numpy.ones((9, 9)) @ numpy.ones(
 
 @pytest.fixture
 def scene(tmp_path):
+    """Return the path of a scene with a mistake."""
     path = tmp_path / "a.toml"
     path.write_text(WRONG, "utf-8")
     return path
 
 
 @pytest.mark.parametrize("kind", ["alone", "thread"])
-def test_exact_a_command_ends_with_its_code_and_all_it_said(scene, tmp_path, kind):
-    """Its process is left early where nothing else works in it; what was registered for the end runs in any case."""
+def test_exact_process_flushes_output_before_early_exit(scene, tmp_path, kind):
+    """A command ends with its exit code, its whole output and its atexit functions, although the process ends early."""
     done = subprocess.run(
         [sys.executable, "-c", LEAVING, kind, "check", scene, tmp_path / "end"],
         text=True,
@@ -108,9 +109,11 @@ def test_exact_a_command_ends_with_its_code_and_all_it_said(scene, tmp_path, kin
 
 
 @pytest.mark.parametrize("words, code", [(["--version"], 40), (["check"], 42)])
-def test_exact_a_process_is_left_early_by_a_verb_that_is_done_too(words, code):
-    """Taking apart what a run of the rig has imported took 0.1 s of its CPU: cyclopts ends what goes well by
-    SystemExit."""
+def test_exact_successful_command_exits_early(words, code):
+    """A successful command ends the process without freeing imported modules.
+
+    Freeing them took 0.1 s of CPU after a run of the rig.
+    """
     assert (
         subprocess.run(
             [sys.executable, "-c", LEFT, *words], capture_output=True, timeout=60
@@ -123,8 +126,11 @@ def test_exact_a_process_is_left_early_by_a_verb_that_is_done_too(words, code):
     os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
 )
 @pytest.mark.parametrize("when, code, said", [("begin", 130, ""), ("end", 2, "drive.kind")])
-def test_exact_a_command_that_is_asked_to_end_shows_no_traceback(scene, when, code, said):
-    """Before it has begun it just leaves; when all is done it ends as it would have."""
+def test_exact_signal_shows_no_traceback(scene, when, code, said):
+    """A signal to end the command prints no traceback.
+
+    Before the start it ends the process with code 130; after the end it changes nothing.
+    """
     done = subprocess.run(
         [sys.executable, "-c", ASKED_TO_END, "check", scene, when],
         text=True,
@@ -138,10 +144,11 @@ def test_exact_a_command_that_is_asked_to_end_shows_no_traceback(scene, when, co
 @pytest.mark.skipif(
     os.name != "posix", reason="signals that end a process elsewhere cannot be caught"
 )
-def test_exact_an_interrupt_in_a_callback_of_the_compiler_is_not_lost():
-    """Python takes a signal in whatever it runs next; where that is called by LLVM, through ctypes, the exception was
-    dropped with a word on stderr, and the run went on. A signal that is ignored here (nohup, a job in the background)
-    is ignored there."""
+def test_exact_interrupt_in_compiler_callback_is_kept():
+    """An interrupt during a callback of LLVM (ctypes) ends the run instead of being printed and dropped.
+
+    Signals that this process ignores, as under nohup, are ignored there.
+    """
     done = subprocess.run(
         [sys.executable, "-c", SWALLOWED], text=True, capture_output=True, timeout=60
     )
@@ -153,7 +160,8 @@ def test_exact_an_interrupt_in_a_callback_of_the_compiler_is_not_lost():
     assert done.stdout.split() == taken and taken and not done.stderr
 
 
-def test_always_a_profiler_has_its_say(scene):
+def test_always_profiler_prints_its_table(scene):
+    """Python's profiler prints its table although the process ends early."""
     done = subprocess.run(
         [sys.executable, "-m", "cProfile", "-m", "patchfem", "check", scene],
         text=True,
@@ -166,23 +174,25 @@ def test_always_a_profiler_has_its_say(scene):
 @pytest.mark.skipif(
     not os.path.isdir("/proc/self/task"), reason="threads are counted where Linux lists them"
 )
-def test_exact_a_command_has_one_thread_unless_it_is_told_otherwise():
+def test_exact_blas_uses_one_thread_by_default():
+    """A command uses one BLAS thread, or the number in OPENBLAS_NUM_THREADS."""
     environment = {
         name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")
     }
-    for told, most in ({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2):
+    for variables, n_threads in ({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2):
         done = subprocess.run(
             [sys.executable, "-c", THREADS.format("/proc/self/task")],
             text=True,
             check=True,
             capture_output=True,
-            env=environment | told,
+            env=environment | variables,
         )
-        assert int(done.stdout) == min(most, os.cpu_count())
+        assert int(done.stdout) == min(n_threads, os.cpu_count())
 
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])
-def test_exact_a_pipe_that_nobody_reads_ends_a_command_quietly(words):
+def test_exact_closed_pipe_gives_no_error(words):
+    """A command whose output pipe is closed ends with code 0 and without a message."""
     reads, writes = os.pipe()
     os.close(reads)
     try:
@@ -198,8 +208,11 @@ def test_exact_a_pipe_that_nobody_reads_ends_a_command_quietly(words):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_always_an_internal_fault_names_file_and_line(tmp_path):
-    """Two lines without a traceback: the innermost line of the package, which is that of the call, and what to send."""
+def test_always_internal_error_names_file_and_line(tmp_path):
+    """An internal error prints two lines without a traceback.
+
+    They give the innermost line of the package and the advice to run `patchfem doctor`.
+    """
     (tmp_path / "rig.toml").write_text(RIG, "utf-8")
     done = subprocess.run(
         [sys.executable, "-c", FAULTY, "plan", "rig.toml"],

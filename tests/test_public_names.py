@@ -12,7 +12,8 @@ FOLDERS = sorted({name.partition(".")[0] for name in SOURCES if "." in name})
 
 
 @pytest.mark.parametrize("folder", FOLDERS)
-def test_always_a_folder_offers_names_that_other_folders_use(folder):
+def test_always_public_names_are_used_by_other_folders(folder):
+    """Every name in PUBLIC of a folder is used by another folder and is the object of the module that defines it."""
     package = import_module(f"patchfem.{folder}")
     text_of_others = "\n".join(
         text for module, text in SOURCES.items() if module.partition(".")[0] != folder

@@ -1,4 +1,4 @@
-"""The pages for readers: the README stays short, every link leads somewhere, and what they show works."""
+"""The pages for users: lengths, links, and the numbers and commands that they print."""
 
 import ast
 import csv
@@ -47,8 +47,8 @@ PAGES = (
 )
 
 
-def test_citation_changes_commands_and_files_give_the_version_of_the_package(tmp_path):
-    """The citation file, the newest entry of the changes, `--version`, `doctor`, a summary and a page agree."""
+def test_exact_version_agrees_in_all_documents(tmp_path):
+    """Citation file, change log, `--version`, `doctor`, summary and report give the version of the package."""
     citation = (ROOT / "CITATION.cff").read_text()
     changes = (ROOT / "patchfem" / "CHANGES.md").read_text()
     released = re.search(r"^date-released: (\S+)$", citation, re.M).group(1)
@@ -62,12 +62,12 @@ def test_citation_changes_commands_and_files_give_the_version_of_the_package(tmp
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists() or shutil.which("git") is None, reason="no clone")
-def test_always_the_top_level_holds_what_it_should():
-    """No file that a program left there is committed."""
-    kept = subprocess.run(
+def test_always_top_level_has_no_stray_files():
+    """The top level of the repository contains only the listed files and folders."""
+    tracked = subprocess.run(
         ["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
     ).stdout.split("\n")
-    assert {name.partition("/")[0] for name in kept if name} == {
+    assert {name.partition("/")[0] for name in tracked if name} == {
         ".ci",
         ".gitignore",
         "CITATION.cff",
@@ -81,21 +81,24 @@ def test_always_the_top_level_holds_what_it_should():
     }
 
 
-def text(page: str) -> str:
+def read_page(page: str) -> str:
+    """Return the text of a page."""
     return (ROOT / page).read_text("utf-8")
 
 
-def anchors(page: str) -> set:
-    """Names under which the headings of a page can be linked, as code hosts make them."""
-    heads = re.findall(r"^#+ (.*)$", text(page), re.M)
+def heading_anchors(page: str) -> set:
+    """Return the link targets that code hosts derive from the headings of a page."""
+    heads = re.findall(r"^#+ (.*)$", read_page(page), re.M)
     return {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
 
 
-def test_always_the_readme_is_short():
-    assert len(text("README.md").splitlines()) <= 150
+def test_always_readme_has_at_most_150_lines():
+    """The README has at most 150 lines."""
+    assert len(read_page("README.md").splitlines()) <= 150
 
 
-def test_always_the_guide_is_short_and_each_page_begins_with_its_question_and_ends_with_links():
+def test_always_guide_pages_are_short():
+    """The guide has at most 8000 words and each page at most 1500; a page begins with its question and ends with links."""
     pages = {path.name: path.read_text("utf-8").rstrip("\n") for path in GUIDE.glob("*.md")}
     words = {name: len(page.split()) for name, page in pages.items()}
     assert max(words.values()) <= 1500 and sum(words.values()) <= 8000, words
@@ -106,8 +109,9 @@ def test_always_the_guide_is_short_and_each_page_begins_with_its_question_and_en
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_always_every_link_leads_somewhere(page):
-    for link in re.findall(r"\]\(([^)]+)\)|<img src=\"([^\"]+)\"", text(page)):
+def test_always_links_have_targets(page):
+    """Every relative link of a page leads to an existing file and heading."""
+    for link in re.findall(r"\]\(([^)]+)\)|<img src=\"([^\"]+)\"", read_page(page)):
         link = "".join(link)
         target, _, anchor = link.partition("#")
         if not target.startswith("http"):
@@ -115,12 +119,12 @@ def test_always_every_link_leads_somewhere(page):
                 os.path.normpath(os.path.join(os.path.dirname(page), target)) if target else page
             )
             assert (ROOT / place).exists(), link
-            assert not anchor or anchor in anchors(place), link
+            assert not anchor or anchor in heading_anchors(place), link
 
 
-def test_always_the_gallery_names_every_study_with_a_page():
-    """A study is a script with a run of its own; its question stands in the gallery."""
-    pages = text("studies/README.md")
+def test_always_gallery_lists_every_study():
+    """The gallery of studies links every script that can be run as a study."""
+    pages = read_page("studies/README.md")
     runs = [
         path
         for path in (ROOT / "studies").glob("*/*.py")
@@ -136,8 +140,9 @@ def test_always_the_gallery_names_every_study_with_a_page():
     assert lost == []
 
 
-def test_always_every_picture_of_the_studies_is_linked():
-    pages = "".join(text(page) for page in ("README.md", "studies/README.md"))
+def test_always_study_pictures_are_linked():
+    """Every picture of the studies is linked in the README or in the gallery."""
+    pages = "".join(read_page(page) for page in ("README.md", "studies/README.md"))
     assert [
         path.name
         for path in (ROOT / "studies").glob("*/*.svg")
@@ -146,54 +151,60 @@ def test_always_every_picture_of_the_studies_is_linked():
 
 
 @cache
-def shipped_rig():
-    """Return the measures of the shipped rig, which several tests ask about."""
+def run_shipped_rig():
+    """Return the measures of the shipped rig, computed once for several tests."""
     return pf.run(ROOT / "studies/rig/rig.toml").measures
 
 
-def test_exact_the_scene_and_the_keys_of_the_readme():
+def test_exact_readme_scene_and_settings_are_valid():
+    """The scene of the README and the settings of its examples can be loaded."""
     from patchfem.scene import loads
 
-    scene = loads(re.search(r"```toml\n(.*?)```", text("README.md"), re.S)[1])
+    scene = loads(re.search(r"```toml\n(.*?)```", read_page("README.md"), re.S)[1])
     assert scene.kind == "rig" and scene.contact.tilt.angle == pytest.approx(1e-4)
-    sets = dict(re.findall(r'\*\*\{"([\w.]+)": "([^"]+)"\}', text("README.md")))
+    sets = dict(re.findall(r'\*\*\{"([\w.]+)": "([^"]+)"\}', read_page("README.md")))
     assert sets and all(
         loads(scene.text, sets=[f"{key}={value}"]).kind == "rig" for key, value in sets.items()
     )
 
 
-def test_exact_the_amplitude_of_the_readme_is_that_of_the_shipped_scene():
-    """The README once went on with an error that runs no longer stated; both are held to their last digit."""
-    every = shipped_rig()
-    found = every["relative_displacement_amplitude"]
-    steady = every["relative_displacement_amplitude_steady"]
-    value, error, settles, about, late = re.search(
+def test_exact_readme_amplitude_equals_shipped_rig():
+    """Amplitude, error and steady amplitude in the README equal those of the shipped rig in all printed digits."""
+    measures = run_shipped_rig()
+    amplitude = measures["relative_displacement_amplitude"]
+    steady = measures["relative_displacement_amplitude_steady"]
+    value, error, steady_value, steady_error, value_after_800_cycles = re.search(
         r"amplitude after 200 cycles is ([\d.]+) um with an estimated error of ([\d.]+) um;.*?a steady "
         r"amplitude of ([\d.]+) ± ([\d.]+) um; after 800 cycles it is ([\d.]+) um",
-        " ".join(text("README.md").split()),
+        " ".join(read_page("README.md").split()),
     ).groups()
     assert (value, error) == (
-        f"{1e6 * found.value:.{len(value) - 3}f}",
-        f"{1e6 * found.error:.{len(error) - 2}f}",
+        f"{1e6 * amplitude.value:.{len(value) - 3}f}",
+        f"{1e6 * amplitude.error:.{len(error) - 2}f}",
     )
-    assert f"Amplitude {value} ± {error} um" in text("studies/README.md")
-    assert (settles, about) == tuple(f"{1e6 * one:.3f}" for one in (steady.value, steady.error))
-    assert abs(float(late) - 1e6 * steady.value) < 1e6 * steady.error
-    (other,) = re.findall(r"alone(?:, )? gives ([\d.]+) um", text("README.md"))
-    assert abs(float(other) - 1e6 * found.value) < 1e6 * found.error
+    assert f"Amplitude {value} ± {error} um" in read_page("studies/README.md")
+    assert (steady_value, steady_error) == tuple(
+        f"{1e6 * one:.3f}" for one in (steady.value, steady.error)
+    )
+    assert abs(float(value_after_800_cycles) - 1e6 * steady.value) < 1e6 * steady.error
+    (value_alone,) = re.findall(r"alone(?:, )? gives ([\d.]+) um", read_page("README.md"))
+    assert abs(float(value_alone) - 1e6 * amplitude.value) < 1e6 * amplitude.error
 
 
-def comparison() -> str:
+def comparison_paragraph() -> str:
     """Return the paragraph of the README that compares the model with the measured rig."""
-    found = re.search(r"- \*A real rig\..*?(?=^## )", text("README.md"), re.S | re.M)
+    found = re.search(r"- \*A real rig\..*?(?=^## )", read_page("README.md"), re.S | re.M)
     return " ".join(found[0].split())
 
 
-def test_exact_the_readme_compares_the_measured_rig_at_5_g_with_what_its_commands_compute():
-    """Each number for and against the model is that of the command beside it, to its last digit."""
-    bullet = comparison()
+def test_exact_readme_comparison_at_5_g_is_reproduced():
+    """The displacements at 5 g in the README are reproduced in all printed digits.
+
+    So are their ratios to the measured 0.23 mil.
+    """
+    bullet = comparison_paragraph()
     amplitude = "relative_displacement_amplitude"
-    at_5_g = shipped_rig()[amplitude].value / MIL
+    at_5_g = run_shipped_rig()[amplitude].value / MIL
     assert (
         f"displacement is {at_5_g:.3f} mil, {at_5_g / 0.23:.2f} times the measured 0.23 mil"
         in bullet
@@ -206,14 +217,18 @@ def test_exact_the_readme_compares_the_measured_rig_at_5_g_with_what_its_command
 
 
 @pytest.mark.slow
-def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compute():
-    bullet = comparison()
+def test_exact_readme_comparison_is_reproduced():
+    """The displacements and accelerations of the README at 4 to 6 g are reproduced in all printed digits.
+
+    So are the rms deviations from the measured rows.
+    """
+    bullet = comparison_paragraph()
     unfitted = study("table_1/unfitted.py")
     amplitude = "relative_displacement_amplitude"
     peak = "absolute_acceleration_peak"
 
     def compute(frequency: float, level: float) -> tuple[float, float]:
-        """Return displacement [mil] and acceleration [g] of the shipped rig as `unfitted.py` prints them."""
+        """Return displacement [mil] and acceleration [g] of the shipped rig at a frequency [Hz] and level [g]."""
         measures = unfitted.answer("patch", frequency, level * G_N, 800, estimate=False)
         return measures[amplitude].value / MIL, measures[peak].value / G_N
 
@@ -240,15 +255,21 @@ def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compu
     assert 100 * scores["acceleration"] == pytest.approx(float(rms[2]), abs=1)
 
 
-def test_exact_the_sweep_of_a_patch_in_the_guide(tmp_path, monkeypatch):
-    """Pressure falls off with the tilt and rises with the load, at each of the guide's nine points."""
+def test_exact_guide_sweep_of_patch_runs(tmp_path, monkeypatch):
+    """In the sweep of the guide, the peak pressure rises with load and tilt and the contact fraction falls with the tilt.
+
+    One case agrees with a single run within 1e-3.
+    """
     monkeypatch.chdir(tmp_path)
-    rig = text("studies/rig/rig.toml")
+    rig = read_page("studies/rig/rig.toml")
     names = {}
     (tmp_path / "patch.toml").write_text(
         rig[rig.index("[contact]") : rig.index("[contact.shear]")], "utf-8"
     )
-    exec(re.search(r"```python\n(.*?)```", text("patchfem/scene/guide/patch.md"), re.S)[1], names)
+    exec(
+        re.search(r"```python\n(.*?)```", read_page("patchfem/scene/guide/patch.md"), re.S)[1],
+        names,
+    )
     fraction = names["answer"].contact_fraction.values
     peak = names["answer"].pressure_peak.values
     assert fraction.shape == (3, 3)
@@ -262,19 +283,26 @@ def test_exact_the_sweep_of_a_patch_in_the_guide(tmp_path, monkeypatch):
     assert alone.error < 1e-4 * alone.value
 
 
-def test_always_the_python_of_the_guide_runs(tmp_path, monkeypatch):
+def test_always_guide_python_example_runs(tmp_path, monkeypatch):
+    """The Python example of the guide runs, gives a friction ratio of 0.4 and writes its files."""
     monkeypatch.chdir(tmp_path)
     names = {}
-    exec(re.search(r"```python\n(.*?)```", text("patchfem/scene/guide/python.md"), re.S)[1], names)
+    exec(
+        re.search(r"```python\n(.*?)```", read_page("patchfem/scene/guide/python.md"), re.S)[1],
+        names,
+    )
     assert names["result"].measures.friction_ratio_peak.value == pytest.approx(0.4, rel=1e-6)
     assert {path.name for path in tmp_path.iterdir()} == {"loop.png", "out"}
     assert len(names["axes"].lines) == 2 and (tmp_path / "out" / "mine" / "summary.json").is_file()
 
 
-def test_exact_the_page_on_results_gives_the_arrays_that_it_names():
-    """Its first block runs; the load is the sum over the nodes, and the grids have the numbers of the arrays."""
+def test_exact_results_page_arrays_agree():
+    """The arrays of the page on results have the described shapes and agree with the grids.
+
+    The load is the sum over the nodes.
+    """
     names = {}
-    page = text("patchfem/scene/guide/results.md")
+    page = read_page("patchfem/scene/guide/results.md")
     exec(re.search(r"```python\n(.*?)```", page, re.S)[1], names)
     sigma_n = names["sigma_n"]
     assert names["load"] == pytest.approx(names["result"].plan.model.nominal_load, rel=1e-9)
@@ -286,10 +314,13 @@ def test_exact_the_page_on_results_gives_the_arrays_that_it_names():
 
 
 @pytest.fixture
-def recipes(tmp_path, monkeypatch):
-    """question -> what its recipe prints as it stands, in a folder with the files of a bare clone that it names."""
+def run_recipe(tmp_path, monkeypatch):
+    """Return a function that runs the README's recipe for a question and returns its output.
+
+    The folder contains only the files that the recipes name.
+    """
     monkeypatch.chdir(tmp_path)
-    lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", text("README.md"), re.S)[
+    lines = re.search(r"## Three recipes\n\n```bash\n(.*?)```", read_page("README.md"), re.S)[
         1
     ].splitlines()
     commands = {
@@ -301,18 +332,20 @@ def recipes(tmp_path, monkeypatch):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, tmp_path / name)
 
-    def said(question: str) -> str:
+    def run_commands(question: str) -> str:
+        """Run the commands of a recipe and return the output of the last."""
         for words in commands[question].split("&&"):
             answer = cli(*shlex.split(words)[1:])
             assert answer.code == 0, answer.err
         return answer.out
 
-    return said
+    return run_commands
 
 
 @pytest.mark.slow
-def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(recipes):
-    tilt = recipes("how much tilt may I allow")
+def test_always_tilt_limit_agrees_on_all_pages(run_recipe):
+    """The recipe of tilts runs, all pages quote its tilt limit, and a run at this limit changes the loop area by 5 %."""
+    tilt = run_recipe("how much tilt may I allow")
     angle, gap = re.search(
         r"^Tilt may reach (\S+ mrad) \((\S+ um over the patch); interpolated between the cases "
         r"at 0.1 and 0.32 mrad\) before relative displacement amplitude, absolute acceleration "
@@ -321,7 +354,7 @@ def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(reci
         tilt,
     ).groups()
     doubling = re.search(r"the pressure peak doubles at about (\S+ mrad)", tilt)[1]
-    allowed_everywhere(f"{angle} ({gap})", f"the pressure peak doubles at {doubling}")
+    assert_pages_quote_limit(f"{angle} ({gap})", f"the pressure peak doubles at {doubling}")
     with open("out/tilts-sweep/sweep.csv", encoding="utf-8") as file:
         first = float(next(csv.DictReader(file))["loop_area"])
     scene = (
@@ -334,41 +367,46 @@ def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(reci
     assert at_limit / first - 1 == pytest.approx(-0.05, abs=0.003)
 
 
-def test_always_the_recipes_of_a_joint_and_of_a_pad_run(recipes):
-    joint = recipes("how stiff is my joint, what does it damp")
+def test_always_joint_and_pad_recipes_run(run_recipe):
+    """The recipes of the joint and of the pad run without error.
+
+    The interval of the worn depth covers the difference of the mean heights.
+    """
+    joint = run_recipe("how stiff is my joint, what does it damp")
     assert "secant_stiffness" in joint and "loop_area" in joint and "dissipated per cycle" in joint
     depth, low, high = map(
         float,
         re.search(
-            r"Worn along x: (\S+) nm \((\S+) nm to (\S+) nm\) on average", recipes("is my pad worn")
+            r"Worn along x: (\S+) nm \((\S+) nm to (\S+) nm\) on average",
+            run_recipe("is my pad worn"),
         ).groups(),
     )
     before, after = (
         [
             float(row["z [um]"])
-            for row in csv.DictReader(text(f"studies/wear/{name}.csv").splitlines())
+            for row in csv.DictReader(read_page(f"studies/wear/{name}.csv").splitlines())
         ]
         for name in ("before", "after")
     )
     assert low < 1e3 * (sum(before) - sum(after)) / len(before) < high and high - low < 0.05 * depth
 
 
-def allowed_everywhere(limit: str, peak: str) -> None:
-    """README, the gallery, the notebook and the studies allow the same tilt by the same criterion."""
-    rows = text("studies/README.md").splitlines()
+def assert_pages_quote_limit(limit: str, peak: str) -> None:
+    """Assert that README, gallery, notebook and studies quote the same tilt limit and pressure criterion."""
+    rows = read_page("studies/README.md").splitlines()
     book, tilted, moving = (
         next(row for row in rows if f"({name})" in row)
         for name in ("notebooks/misalignment.ipynb", "rig/tilt.py", "misalignment/in_motion.py")
     )
-    cells = json.loads(text("studies/notebooks/misalignment.ipynb"))["cells"]
+    cells = json.loads(read_page("studies/notebooks/misalignment.ipynb"))["cells"]
     notebook = "".join(
         line for cell in cells if cell["cell_type"] == "markdown" for line in cell["source"]
     )
     study, other = (
-        ast.get_docstring(ast.parse(text(f"studies/{path}")))
+        ast.get_docstring(ast.parse(read_page(f"studies/{path}")))
         for path in ("rig/tilt.py", "misalignment/in_motion.py")
     )
-    for told in (text("README.md"), book, tilted, moving, notebook, study, other):
-        assert limit in " ".join(told.split()), told[:80]
-    for told in (book, notebook, study):
-        assert peak in " ".join(told.split()), told[:80]
+    for page in (read_page("README.md"), book, tilted, moving, notebook, study, other):
+        assert limit in " ".join(page.split()), page[:80]
+    for page in (book, notebook, study):
+        assert peak in " ".join(page.split()), page[:80]

@@ -1,4 +1,4 @@
-"""What patchfem 1.0 removed is refused with one sentence, which names what to use instead."""
+"""Each feature removed in patchfem 1.0 is refused with one sentence that names its replacement."""
 
 from functools import partial
 from importlib.util import find_spec
@@ -23,21 +23,24 @@ BONDS = POINT + NONLOCAL + MODE + DRIVE
 
 
 def load(text: str, keys: dict, folder) -> None:
+    """Load a scene with settings; `folder` is unused."""
     pf.load(text, **keys)
 
 
-def command(words: tuple, folder) -> None:
-    """Run a command, and raise what it prints where it ends with exit code 2."""
+def run_failing_command(words: tuple, folder) -> None:
+    """Run a command that fails with exit code 2, and raise its message."""
     answer = cli(*words)
     assert answer.code == 2
     raise pf.PatchfemError(answer.err)
 
 
 def call(function, name: str, folder) -> None:
+    """Call a function with one keyword argument that was removed."""
     function(folder, **{name: "5 um"})
 
 
 def read_file(reader, name: str, folder) -> None:
+    """Write a file with the given name and read it."""
     path = folder / name
     path.write_text("    -1\n", "utf-8")
     reader(path)
@@ -55,7 +58,7 @@ def match_inverted(folder) -> None:
     )
 
 
-TRIED = {  # what was removed -> (how a user tries it, what the sentence says to use instead)
+TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
     **{
         f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'")
         for name in removed.REMOVED_METHODS
@@ -89,23 +92,23 @@ TRIED = {  # what was removed -> (how a user tries it, what the sentence says to
         "leave one of the two out",
     ),
     "profile --level": (
-        partial(command, ("profile", "a.csv", "--level=1 um")),
+        partial(run_failing_command, ("profile", "a.csv", "--level=1 um")),
         "Abbott curve of the page",
     ),
     "profile --ratios": (
-        partial(command, ("profile", "a.csv", "--ratios", "5,50")),
+        partial(run_failing_command, ("profile", "a.csv", "--ratios", "5,50")),
         "Abbott curve of the page",
     ),
     "profile --tip": (
-        partial(command, ("profile", "a.csv", "--tip", "5 um")),
+        partial(run_failing_command, ("profile", "a.csv", "--tip", "5 um")),
         "compare the tip radius with",
     ),
     "report --measured": (
-        partial(command, ("report", "out", "--measured", "a.csv")),
+        partial(run_failing_command, ("report", "out", "--measured", "a.csv")),
         "`patchfem import FILE",
     ),
     "sweep --device": (
-        partial(command, ("sweep", "a.toml", "--device=cuda")),
+        partial(run_failing_command, ("sweep", "a.toml", "--device=cuda")),
         "-j N or --executor dask",
     ),
     "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
@@ -116,7 +119,8 @@ TRIED = {  # what was removed -> (how a user tries it, what the sentence says to
 
 
 @pytest.mark.parametrize("name", TRIED)
-def test_refuses_what_was_removed(tmp_path, name):
+def test_refuses_removed_feature(tmp_path, name):
+    """A removed feature is refused with one sentence that names version and replacement."""
     attempt, instead = TRIED[name]
     with pytest.raises(pf.PatchfemError) as refused:
         attempt(tmp_path)
@@ -125,7 +129,8 @@ def test_refuses_what_was_removed(tmp_path, name):
     assert len(sentence.strip().splitlines()) == 1
 
 
-def test_always_every_removed_option_is_tried():
+def test_always_all_removed_features_are_tested():
+    """Every removed option, key and quadrature rule is among the tested features."""
     assert {" ".join(pair) for pair in removed.REMOVED_OPTIONS} | set(removed.REMOVED_KEYS) <= set(
         TRIED
     )
@@ -135,7 +140,8 @@ def test_always_every_removed_option_is_tried():
 @pytest.mark.skipif(
     find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed"
 )
-def test_refuses_an_sdf_file_without_the_extra(tmp_path):
+def test_refuses_sdf_file_without_extra(tmp_path):
+    """An SDF file is refused with the name of the extra to install."""
     path = tmp_path / "scan.sdf"
     path.write_bytes(surfaces.sdf_binary(surfaces.scan()))
     with pytest.raises(

@@ -1,4 +1,4 @@
-"""A number as people read it: read back, it holds the true one within the bar that stands beside it."""
+"""Printed numbers: a value read back from its text lies within the printed error."""
 
 import re
 
@@ -19,8 +19,8 @@ SCALE = {name: 1 / scale for ladder in UNIT_LADDERS.values() for name, scale in 
 UGLY = re.compile(r"± 0(?![.\d])|(?<![\d.])-0(?![.\d])|\de[-+]?0|nan|inf|\d\.\d{11}")
 
 
-def drawn(count: int, seed: int) -> list:
-    """(value, bar, unit): sizes over twelve decades of people's units, bars from round-off to many times the value."""
+def random_values(count: int, seed: int) -> list:
+    """Return random (value, error, unit): sizes over twelve decades, errors from round-off to many times the value."""
     rng = np.random.default_rng(seed)
     units = [*UNIT_LADDERS, "1"]
     out = []
@@ -36,8 +36,8 @@ def drawn(count: int, seed: int) -> list:
     return out
 
 
-def read(text: str) -> tuple:
-    """(value, bar, unit in the last place of the value) in SI as they are printed; a bar that is not there is 0."""
+def parse_printed(text: str) -> tuple:
+    """Return value, error (0 if absent) and unit of the last digit of a printed number, in SI units."""
     value, bar, unit = re.fullmatch(r"(\S+)(?: ± (\S+))?(?: (.+))?", text).groups()
     scale = SCALE[unit] if unit else 1.0
     mantissa, _, power = value.partition("e")
@@ -46,16 +46,19 @@ def read(text: str) -> tuple:
 
 
 @pytest.mark.parametrize("seed", [7])
-def test_always_the_printed_value_lies_within_the_printed_bar(seed):
-    """300 of them: no bar is understated by more than its rounding, and one that is not printed hides in the digits."""
+def test_always_printed_value_lies_within_printed_error(seed):
+    """The printed value of 300 random numbers lies within the printed error of the true one.
+
+    An error that is not printed is less than the last digit.
+    """
     bars = 0
-    for value, bar, unit in drawn(300, seed):
+    for value, bar, unit in random_values(300, seed):
         text = format_value(value, bar, 0.0, unit)
         assert not UGLY.search(text), text
-        said, beside, last = read(text)
-        if beside:
+        printed, printed_bar, last_digit = parse_printed(text)
+        if printed_bar:
             bars += 1
-            assert abs(said - value) <= beside and abs(beside - bar) <= 0.0501 * bar, (
+            assert abs(printed - value) <= printed_bar and abs(printed_bar - bar) <= 0.0501 * bar, (
                 text,
                 value,
                 bar,
@@ -63,10 +66,10 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
         else:
             assert bar <= 1.5e-5 * abs(value), (text, value, bar)
             digits = len(re.sub(r"e.*|\D", "", text.split(" ")[0]).lstrip("0"))
-            assert digits <= MAX_SIGNIFICANT_DIGITS and abs(said - value) <= max(
-                0.501 * last, 1e-13 * abs(value)
+            assert digits <= MAX_SIGNIFICANT_DIGITS and abs(printed - value) <= max(
+                0.501 * last_digit, 1e-13 * abs(value)
             ), (text, value, bar)
-            assert bar <= last or digits < MAX_SIGNIFICANT_DIGITS, (text, value, bar)
+            assert bar <= last_digit or digits < MAX_SIGNIFICANT_DIGITS, (text, value, bar)
         assert unit == "1" or "e" not in text.split(" ")[0], text
     assert bars > 100
 
@@ -98,7 +101,8 @@ def test_always_the_printed_value_lies_within_the_printed_bar(seed):
         (None, None, 0.0, "N", "- N"),
     ],
 )
-def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
+def test_exact_value_with_error_is_formatted(value, error, least, unit, text):
+    """A value with its error is printed with a suitable unit prefix and number of digits."""
     assert format_value(value, error, least, unit) == text
 
 
@@ -115,12 +119,13 @@ def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
         ("out/1e-05 and .1e-05", "out/1e-05 and .1e-05"),
     ],
 )
-def test_exact_a_sentence_has_no_powers_of_ten_that_a_unit_saves(text, tidy):
+def test_exact_powers_of_ten_become_unit_prefixes(text, tidy):
+    """Powers of ten in a sentence are replaced by unit prefixes."""
     assert rewrite_powers_of_ten(text) == tidy
 
 
-def test_exact_a_value_ends_where_its_error_does():
-    """At the second digit of the error; at its own seventh, or where its digits are no longer known, without one."""
+def test_exact_value_is_rounded_to_error():
+    """A value is rounded to the second digit of its error, or to seven digits without a visible error."""
     assert round_to_error(7.60859, 4.8e-4) == ("7.60859", "0.00048") and round_to_error(
         1.0, 9.96
     ) == ("1", "10")

@@ -1,4 +1,4 @@
-"""The full text of the sentences that a user meets most, in one list that a person reviews: `tests/sentences.toml`.
+"""The sentences that a user meets most often, compared with the reviewed list `tests/sentences.toml`.
 
 Other tests ask what a sentence must contain. Here its words are compared, with `#` in place of each number. After a
 change of words, `python tests/test_sentences.py` writes the list anew; read the difference before you commit it.
@@ -28,7 +28,7 @@ STATIC = ("--over", "friction.static=0.1,0.2")
 TILTS = ("--over", "contact.tilt.angle=0.001 mrad,0.003 mrad,0.01 mrad,0.03 mrad,0.1 mrad")
 DRAWN = ("--over", "friction.static=0.2..0.4", "--over", "normal.load=90 N..110 N", "--sobol", "64")
 
-SCREENS = {  # runs and sweeps whose first lines are the answer
+SCREENS = {  # runs and sweeps whose first lines are compared
     "patch": ("run", "patch.toml"),
     "bench": ("run", "bench.toml"),
     "block_steady": ("run", "block.toml"),
@@ -75,8 +75,8 @@ WARNINGS = {
 }
 
 
-def sentences(folder: Path) -> dict:
-    """Make every sentence of the list: {group: {name: text}}."""
+def collect_sentences(folder: Path) -> dict:
+    """Return all sentences of the list: {group: {name: text}}."""
     for name, text in FILES.items():
         (folder / name).write_text(text, "utf-8")
     out = {"outcome": {outcome.value: outcome.sentence for outcome in pf.Outcome}}
@@ -97,19 +97,20 @@ def sentences(folder: Path) -> dict:
         )
     for texts in out.values():
         for name, text in texts.items():
-            texts[name] = without_numbers(text, folder)
+            texts[name] = replace_numbers(text, folder)
     return out
 
 
 def first_lines(text: str) -> str:
-    """Return the answer of a run: what stands above its table, without the title."""
+    """Return the lines of a run's output between the title and the table."""
     lines = text.splitlines()
     begin = next(k for k, line in enumerate(lines) if re.match(r"[a-z_]+: ", line))
     end = next(k for k, line in enumerate(lines) if k > begin and re.fullmatch(r"\w+", line))
     return "\n".join(lines[begin:end])
 
 
-def without_numbers(text: str, folder: Path) -> str:
+def replace_numbers(text: str, folder: Path) -> str:
+    """Return a text with # for every number and FOLDER for the folder."""
     return NUMBER.sub("#", text.replace(str(folder), "FOLDER")).strip()
 
 
@@ -125,19 +126,21 @@ def write_list(found: dict) -> None:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def current_sentences(tmp_path_factory):
+    """Return the sentences that the program prints now."""
     folder = tmp_path_factory.mktemp("sentences")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        return sentences(folder)
+        return collect_sentences(folder)
 
 
 @pytest.mark.parametrize("group", ["outcome", "answer", "refusal", "warning"])
-def test_exact_sentences_are_those_of_the_reviewed_list(made, group):
-    assert made[group] == tomllib.loads(LIST.read_text("utf-8"))[group]
+def test_exact_sentences_equal_reviewed_list(current_sentences, group):
+    """The sentences of each group equal those of the reviewed list, numbers aside."""
+    assert current_sentences[group] == tomllib.loads(LIST.read_text("utf-8"))[group]
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as place, pytest.MonkeyPatch.context() as context:
         context.chdir(place)
-        write_list(sentences(Path(place)))
+        write_list(collect_sentences(Path(place)))

@@ -1,4 +1,4 @@
-"""pf.sweep and pf.run_many: many runs from Python, each as a single run."""
+"""`pf.sweep` and `pf.run_many`: every case equals a single run."""
 
 import numpy as np
 import pytest
@@ -11,39 +11,46 @@ RIG = POINT + COULOMB + SHORT
 OVER = {"friction.static": [0.1, 0.3], "drive.acceleration": ["1 g", "5 g"]}
 
 
-def alike(found, single, one) -> None:
-    """The number of a single run to 1e-12 of it or of what it is a part of; nothing where that has none."""
-    # a distortion is a share, a drift that of an amplitude
-    size = {"1": 1.0, "m": 1e-3}.get(one.unit, 0.0)
+def assert_equals_single_run(found, expected, measure) -> None:
+    """Assert that a number equals that of a single run within 1e-12 of the value or of its scale."""
+    # scale of the measures: 1 for a distortion, 1 mm for the drift of an amplitude
+    size = {"1": 1.0, "m": 1e-3}.get(measure.unit, 0.0)
     np.testing.assert_allclose(
-        found, np.nan if single is None else single, rtol=1e-12, atol=1e-12 * size
+        found, np.nan if expected is None else expected, rtol=1e-12, atol=1e-12 * size
     )
 
 
 @pytest.fixture(scope="module")
-def swept():
+def swept_rig():
+    """Return a sweep of a rig over friction coefficient and acceleration."""
     return pf.sweep(RIG, OVER)
 
 
-def test_exact_numbers_texts_ranges_and_the_table_say_the_same(swept):
+def test_exact_sweep_axes_in_numbers_texts_and_table_agree(swept_rig):
+    """A sweep gives the same Dataset for axes given as numbers, as texts and ranges, or as the table [sweep]."""
     table = '[sweep]\n"friction.static" = "0.1,0.3"\n"drive.acceleration" = "1 g..5 g:2"\n'
     numbers = {
         "friction.static": np.array([0.1, 0.3]),
-        "drive.acceleration": swept.drive_acceleration.values,
+        "drive.acceleration": swept_rig.drive_acceleration.values,
     }
     for found in (pf.sweep(pf.load(RIG), numbers), pf.sweep(RIG + table)):
-        xr.testing.assert_equal(found, swept)
+        xr.testing.assert_equal(found, swept_rig)
 
 
-def test_exact_a_folder_holds_the_same(swept, tmp_path):
+def test_exact_sweep_folder_has_same_data(swept_rig, tmp_path):
+    """The folder of a sweep contains the same Dataset, and a resumed sweep returns it unchanged."""
     found = pf.sweep(RIG, OVER, out=tmp_path / "a")
-    xr.testing.assert_equal(found.drop_vars("folder"), swept)
-    with xr.open_dataset(tmp_path / "a" / "sweep.nc") as kept:
-        xr.testing.assert_equal(kept, found)
+    xr.testing.assert_equal(found.drop_vars("folder"), swept_rig)
+    with xr.open_dataset(tmp_path / "a" / "sweep.nc") as stored:
+        xr.testing.assert_equal(stored, found)
     xr.testing.assert_equal(pf.sweep(RIG, OVER, out=tmp_path / "a", resume=True), found)
 
 
-def test_exact_drawn_cases_lie_in_their_ranges_and_come_again():
+def test_exact_random_cases_are_reproducible():
+    """Random cases lie within their ranges and repeat with the same seed.
+
+    Eight Sobol points lie in eight different eighths of each range.
+    """
     ranges = {
         "friction.static": "0.1..0.5",
         "normal.load": "1 N..1 kN",
@@ -60,7 +67,7 @@ def test_exact_drawn_cases_lie_in_their_ranges_and_come_again():
     xr.testing.assert_equal(first, found[1])
     assert not (first.friction_static == found[2].friction_static).any()
     assert not (first.friction_static == found[3].friction_static).any()
-    # eight points of Sobol's sequence have one value in each eighth of every range, the load in its logarithm
+    # eight Sobol points have one value in each eighth of every range; the load is sampled in its logarithm
     eighths = np.floor(8 * np.log(first.normal_load) / np.log(1e3)).astype(int)
     assert sorted(eighths.values) == list(range(8))
     assert sorted(np.floor(8 * (first.friction_static.values - 0.1) / 0.4).astype(int)) == list(
@@ -71,7 +78,8 @@ def test_exact_drawn_cases_lie_in_their_ranges_and_come_again():
     )
 
 
-def test_refuses_what_is_no_sweep():
+def test_refuses_invalid_sweep():
+    """A sweep without axes, with an unknown unit or with a negative seed is refused."""
     with pytest.raises(pf.SceneError, match="no key to sweep is given"):
         pf.sweep(RIG)
     with pytest.raises(pf.SceneError, match=r"--over normal.load: .*'lbf'"):
@@ -81,8 +89,8 @@ def test_refuses_what_is_no_sweep():
             pf.sweep(RIG, {"normal.load": "1 N..2 N"}, **draw)
 
 
-def test_exact_one_scene_is_a_list_of_one(tmp_path):
-    """A text was read sign by sign: "[: not valid TOML"."""
+def test_exact_run_many_accepts_single_scene(tmp_path):
+    """`pf.run_many` accepts a single text, path, Scene or Model in place of a list."""
     path = tmp_path / "bench.toml"
     path.write_text(BENCH, encoding="utf-8")
     peak = pf.run(BENCH).measures["friction_force_peak"].value
@@ -90,17 +98,18 @@ def test_exact_one_scene_is_a_list_of_one(tmp_path):
         assert pf.run_many(one).values["friction_force_peak"].tolist() == [peak]
 
 
-def test_exact_many_models_are_single_runs():
+def test_exact_run_many_equals_single_runs():
+    """Every measure of `pf.run_many` equals that of a single run within 1e-12."""
     found = pf.run_many([RIG, pf.build(BENCH)])
     for case, text in enumerate((RIG, BENCH)):
         single = pf.run(text)
         assert found.outcome[case] == single.outcome
-        for name, one in single.measures.items():
-            alike(found.values[name][case], one.value, one)
+        for name, measure in single.measures.items():
+            assert_equals_single_run(found.values[name][case], measure.value, measure)
 
 
-def test_exact_many_patches_of_one_geometry_are_those_of_a_sweep():
-    """They share its mesh, so that they are alike to round-off; a patch alone chooses its own."""
+def test_exact_run_many_patches_equal_sweep():
+    """Patches that differ only in tilt share one mesh, and equal those of a sweep to round-off."""
     angles = [2e-5, 2e-4]
     text = PATCH + "[accuracy]\ntolerance = 1e-2\n"
     swept = pf.sweep(text, {"contact.tilt.angle": angles})
@@ -109,15 +118,15 @@ def test_exact_many_patches_of_one_geometry_are_those_of_a_sweep():
     for (
         name,
         values,
-    ) in found.values.items():  # the digits of a pressure at an end are those of a cell of a micron
-        near = 1e-9 if name in ("pressure_peak", "loaded_fraction") else 1e-12
+    ) in found.values.items():  # the pressure at an end depends on a cell of 1 um
+        tolerance = 1e-9 if name in ("pressure_peak", "loaded_fraction") else 1e-12
         np.testing.assert_allclose(
-            values, swept[name].values, rtol=near, atol=near * found.floors[name].max()
+            values, swept[name].values, rtol=tolerance, atol=tolerance * found.floors[name].max()
         )
 
 
-def test_exact_a_picture_of_a_sweep_is_hollow_where_the_tolerance_is_missed():
-    """Values over three decades, the first two known to 100 and 5 %, a line for each of two loads."""
+def test_exact_sweep_plot_has_hollow_markers_above_tolerance():
+    """The plot of a sweep has hollow markers where the error exceeds the tolerance, and one line for each of two loads."""
     values = np.array([[1e-6, 1e-5, 1e-4, 1e-3], [2e-6, 2e-5, 2e-4, 2e-3]])
     errors = values * [1.0, 0.05, 1e-3, 0.0]
     found = xr.Dataset(

@@ -1,4 +1,4 @@
-"""The verbs of the command line from Python, and scenes that are dicts."""
+"""The commands of the command line as Python functions, and scenes given as dicts."""
 
 import numpy as np
 import pytest
@@ -29,24 +29,27 @@ substrate = "Ti-8Al-1Mo-1V"
 """
 
 
-def test_exact_a_scene_from_a_dict_is_that_of_its_text():
+def test_exact_scene_from_dict_equals_text():
+    """A scene given as a dict equals the scene of its text, in its resolved form and in its measures."""
     assert pf.load(BLOCK).resolved() == pf.load(TEXT).resolved()
-    one = pf.run(BLOCK, **{"normal.load": "90 N"})
-    other = pf.run(TEXT, **{"normal.load": "90 N"})
-    assert {name: m.value for name, m in one.measures.items()} == {
-        name: m.value for name, m in other.measures.items()
+    from_dict = pf.run(BLOCK, **{"normal.load": "90 N"})
+    from_text = pf.run(TEXT, **{"normal.load": "90 N"})
+    assert {name: m.value for name, m in from_dict.measures.items()} == {
+        name: m.value for name, m in from_text.measures.items()
     }
     assert pf.sweep(BLOCK, {"normal.load": ["90 N", "100 N"]})["outcome"].size == 2
 
 
-def test_refuses_a_dict_with_its_mistakes():
+def test_refuses_dict_with_mistakes():
+    """A dict with an unknown key or an unsuitable value is refused with the name of the key."""
     with pytest.raises(pf.SceneError, match=r"normal\.lod: unknown key; did you mean 'load'"):
         pf.load({"normal": {"lod": 1.0}})
     with pytest.raises(pf.SceneError, match="cannot be a value of a scene"):
         pf.load({"normal": {"load": object()}})
 
 
-def test_exact_the_table_of_a_result_has_its_measures():
+def test_exact_result_table_lists_measures():
+    """`Result.table` lists all measures with their values."""
     result = pf.run(BLOCK)
     found = result.table()
     rows = found if isinstance(found, list) else found.reset_index().to_dict("records")
@@ -54,7 +57,8 @@ def test_exact_the_table_of_a_result_has_its_measures():
     assert rows[0]["value"] == result.measures[rows[0]["measure"]].value
 
 
-def test_exact_a_fit_finds_the_friction_of_its_own_loop(tmp_path):
+def test_exact_fit_recovers_friction_of_computed_loop(tmp_path):
+    """A fit to a computed loop recovers the friction coefficient within 1e-6, with options given in any form."""
     bench = pf.new("bench")
     run = pf.run(bench)
     loop = np.column_stack([run.response.time, run.response.slide * 1e6, run.response.force])
@@ -83,8 +87,8 @@ def test_exact_a_fit_finds_the_friction_of_its_own_loop(tmp_path):
         pf.fit(bench, path, {"hold": ()}, free=free)
 
 
-def test_a_verb_and_a_folder_of_one_name_stand_beside_each_other(tmp_path):
-    """`pf.mesh` and `pf.export` are verbs, before and after their folders have been imported."""
+def test_exact_functions_are_not_hidden_by_subpackages(tmp_path):
+    """`pf.mesh` and `pf.export` stay functions after the subpackages of the same names are imported."""
     for _ in range(2):
         assert pf.mesh(PIECES, tmp_path / "pieces.vtu").is_file()
         import patchfem.export.results
@@ -100,17 +104,18 @@ def test_a_verb_and_a_folder_of_one_name_stand_beside_each_other(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def saved(tmp_path_factory):
-    """Results folders of a rig, `block`, and of pressed pieces, which have fields, `pieces`."""
+def results_folder(tmp_path_factory):
+    """Return a folder with the results of a rig (`block`) and of pressed pieces with fields (`pieces`)."""
     folder = tmp_path_factory.mktemp("saved")
     pf.run(BLOCK).save(folder / "block")
     pf.run(PIECES).save(folder / "pieces")
     return folder
 
 
-def test_a_report_lays_the_folders_of_a_list_side_by_side(saved, tmp_path):
-    one = saved / "block"
-    page = pf.report([one, saved / "pieces"], tmp_path / "both.html")
+def test_exact_report_shows_several_results(results_folder, tmp_path):
+    """A report of two results folders shows both side by side, and a report of one equals that of a list of one."""
+    one = results_folder / "block"
+    page = pf.report([one, results_folder / "pieces"], tmp_path / "both.html")
     assert page == tmp_path / "both.html"
     assert all(f">{name}<" in page.read_text("utf-8") for name in ("block", "pieces"))
     alone = pf.report(one, tmp_path / "one.html").read_text("utf-8")
@@ -134,26 +139,29 @@ def test_a_report_lays_the_folders_of_a_list_side_by_side(saved, tmp_path):
         ("block", "a.xyz", {}, []),
     ],
 )
-def test_exact_an_export_is_that_of_the_command_line(saved, tmp_path, folder, name, given, words):
-    answer = cli("export", saved / folder, "-o", tmp_path / f"shell_{name}", *words)
+def test_exact_export_equals_command_line(results_folder, tmp_path, folder, name, given, words):
+    """`pf.export` writes the same bytes as the command line, or raises its error message."""
+    answer = cli("export", results_folder / folder, "-o", tmp_path / f"shell_{name}", *words)
     if answer.code:
-        with pytest.raises(pf.PatchfemError) as refused:
-            pf.export(saved / folder, tmp_path / name, **given)
-        assert str(refused.value) in answer.err.replace("shell_", "")
+        with pytest.raises(pf.PatchfemError) as error:
+            pf.export(results_folder / folder, tmp_path / name, **given)
+        assert str(error.value) in answer.err.replace("shell_", "")
         return
     assert (
-        pf.export(saved / folder, tmp_path / name, **given).read_bytes()
+        pf.export(results_folder / folder, tmp_path / name, **given).read_bytes()
         == (tmp_path / f"shell_{name}").read_bytes()
     )
 
 
-def test_refuses_settings_that_a_page_does_not_have(saved, tmp_path):
+def test_refuses_view_settings_of_other_formats(results_folder, tmp_path):
+    """`pf.view` refuses a magnification for an HTML page, which has a slider for it."""
     with pytest.raises(pf.PatchfemError, match="sliders for frame and magnification"):
-        pf.view(saved / "pieces", tmp_path / "a.html", magnify=2.0)
+        pf.view(results_folder / "pieces", tmp_path / "a.html", magnify=2.0)
 
 
 @pytest.mark.parametrize("amplitudes", [1e-6, "1 um", np.array([1e-6]), ["1 um"]])
-def test_exact_amplitudes_are_one_or_many_numbers_or_a_text(amplitudes):
+def test_exact_backbone_accepts_amplitudes_in_any_form(amplitudes):
+    """`pf.backbone` accepts amplitudes as a number, a text, an array or a list."""
     found = pf.backbone(PLASTIC_BLOCK, amplitudes=amplitudes, method="quasi-static")
     assert found["quasi_static_amplitude"].values == pytest.approx([1e-6], rel=1e-12)
 
@@ -169,7 +177,8 @@ def test_exact_amplitudes_are_one_or_many_numbers_or_a_text(amplitudes):
         ("1 um..9 um", "number of values"),
     ],
 )
-def test_refuses_amplitudes_that_are_no_lengths(amplitudes, said):
+def test_refuses_invalid_amplitudes(amplitudes, said):
+    """Amplitudes that are not positive lengths are refused."""
     with pytest.raises(pf.PatchfemError, match=said):
         pf.backbone(PLASTIC_BLOCK, amplitudes=amplitudes, method="quasi-static")
 
@@ -185,9 +194,10 @@ def test_refuses_amplitudes_that_are_no_lengths(amplitudes, said):
         ({"friction.static": "0.5..0.1"}, "must lie below"),
     ],
 )
-def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
+def test_refuses_free_keys_without_range(tmp_path, free, said):
+    """A free key of a fit without a lower and an upper limit is refused."""
     with pytest.raises(pf.PatchfemError, match=said):
-        pf.fit(BLOCK, to=rows_in(tmp_path), free=free)
+        pf.fit(BLOCK, to=write_rows(tmp_path), free=free)
 
 
 @pytest.mark.parametrize(
@@ -211,14 +221,14 @@ def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
         (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: none of the rows"),
     ],
 )
-def test_refuses_options_that_a_fit_does_not_have_before_anything_is_read(
-    tmp_path, scene, given, said
-):
+def test_refuses_unsuitable_fit_options(tmp_path, scene, given, said):
+    """Options that do not apply to the kind of fit are refused before any file is read."""
     with pytest.raises(pf.PatchfemError, match=said):
-        pf.fit(scene, to=rows_in(tmp_path), free={"friction.static": "0.1..0.5"}, **given)
+        pf.fit(scene, to=write_rows(tmp_path), free={"friction.static": "0.1..0.5"}, **given)
 
 
-def rows_in(folder):
+def write_rows(folder):
+    """Write a table of two measured rows and return its path."""
     path = folder / "rows.csv"
     path.write_text(
         "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n100,5,20,1,\n100,6,22,2,\n",
@@ -240,7 +250,8 @@ def rows_in(folder):
     ],
     ids=["loop", "rows", "wear", "backbone"],
 )
-def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatch, scene, words):
+def test_refuses_folder_with_foreign_files(tmp_path, monkeypatch, scene, words):
+    """An output folder with foreign files is refused before the computation, and the files stay."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine", "utf-8")
@@ -254,7 +265,8 @@ def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatc
 @pytest.mark.parametrize(
     "given", [{"cutoff": 0.25e-3}, {"cutoff": "0.25 mm"}, {"cutoff": np.float64(2.5e-4)}]
 )
-def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
+def test_exact_profile_accepts_cutoff_in_any_form(tmp_path, given):
+    """`pf.profile` accepts a cutoff as a number or a text, and refuses an invalid one."""
     path = tmp_path / "trace.csv"
     path.write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(2000)), "utf-8")
     one = pf.profile(path, **given)
@@ -278,17 +290,19 @@ def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
         ),
     ],
 )
-def test_refuses_a_bare_length_that_nobody_means(given, said):
+def test_refuses_implausible_length_without_unit(given, said):
+    """A number without a unit that would be an implausible length in metres is refused, and accepted with its unit."""
     scene = pf.load(pf.new("joint"))
     other = {key: f"{value!r} m" for key, value in given.items() if key != "contact"}
     for load in (lambda sets: scene.with_(**sets), lambda sets: pf.load(pf.new("joint"), **sets)):
         with pytest.raises(pf.SceneError, match=said):
             load({key: value for key, value in given.items() if key != "contact"})
-        assert load(other).kind == "bench"  # with its unit it is meant
+        assert load(other).kind == "bench"  # a length with its unit is accepted
     assert scene.with_(**{"contact.crown.radius": 3.0}).contact.crown.radius == 3.0
 
 
-def test_exact_a_scene_with_other_values_is_that_of_load():
+def test_exact_with_equals_load_with_settings():
+    """`Scene.with_` gives the same scene as `pf.load` with the same settings and leaves the original unchanged."""
     scene = pf.load(BLOCK)
     sets = {"normal.load": 90.0, "structure.mode.axial.damping": 0.01}
     assert scene.with_(**sets).resolved() == pf.load(BLOCK, **sets).resolved() != scene.resolved()
@@ -298,7 +312,8 @@ def test_exact_a_scene_with_other_values_is_that_of_load():
         scene.with_(**{"drive.waveform": "file", "drive.file": "none.csv"})
 
 
-def test_exact_an_import_is_that_of_the_command_line(tmp_path):
+def test_exact_import_equals_command_line(tmp_path):
+    """`pf.import_` writes the same bytes as the command line, and refuses unsuitable settings."""
     path = tmp_path / "run.csv"
     path.write_text("time [ms],force [lbf]\n0,1\n1,2\n2,-1\n", "utf-8")
     found = pf.import_(path, tmp_path / "python.csv", zero=True)
@@ -321,7 +336,8 @@ def test_exact_an_import_is_that_of_the_command_line(tmp_path):
     [None, 3, True, object(), [], b"x", np.zeros(2), float("nan"), [None]],
     ids=["none", "number", "truth", "object", "list", "bytes", "array", "nan", "list of none"],
 )
-def test_refuses_what_is_no_scene_file_word_or_dataset(odd):
+def test_refuses_arguments_of_wrong_type(odd):
+    """Every public function refuses an argument of a wrong type with a PatchfemError."""
     verbs = [
         pf.load,
         pf.plan,
@@ -345,7 +361,7 @@ def test_refuses_what_is_no_scene_file_word_or_dataset(odd):
         lambda one: pf.compare("a.csv", "b.csv", shift=[one]),
         lambda one: pf.cost(BLOCK, over=[one]),
     ]
-    # a sweep without axes takes those of its table
+    # pf.sweep accepts None: it takes the axes of the table [sweep]
     verbs = verbs[:10] + verbs[11:] if odd is None else verbs
     for verb in verbs:
         with pytest.raises(
@@ -355,7 +371,8 @@ def test_refuses_what_is_no_scene_file_word_or_dataset(odd):
             verb(odd)
 
 
-def test_exact_a_backbone_and_stresses_are_drawn_with_their_values():
+def test_exact_backbone_and_stress_plots_show_values():
+    """The plot of a backbone has its frequencies on the axis, and the plot of stresses shows positive values."""
     found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5", method="quasi-static")
     axes = pf.plot.backbone(found)
     assert axes.lines[0].get_ydata() == pytest.approx(found["quasi_static_frequency"].values)
