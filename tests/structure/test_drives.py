@@ -1,4 +1,4 @@
-"""Drives: their signals, the march under each of them against closed forms and DOP853, scenes that name them."""
+"""Drives: their signals, the march under each drive against closed forms, and scenes."""
 
 import numpy as np
 import pytest
@@ -14,10 +14,11 @@ from patchfem.scene import loads
 from patchfem.structure import make_release
 from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels, make_step
 
-W = 2 * np.pi * 143
+OMEGA = 2 * np.pi * 143
 
 
-def one(omega=W, zeta=0.003, base=1.0):
+def sdof_basis(omega=OMEGA, zeta=0.003, base=1.0):
+    """Return the basis of a single mode."""
     return basis_of(omega, zeta, [1.0], [base], mass=0.9)
 
 
@@ -26,32 +27,35 @@ def one(omega=W, zeta=0.003, base=1.0):
 
 @pytest.mark.parametrize("logarithmic", [False, True])
 @pytest.mark.parametrize("low, high", [(50.0, 200.0), (200.0, 50.0)])
-def test_exact_the_phase_of_a_sweep_is_the_integral_of_its_frequency(low, high, logarithmic):
+def test_exact_sweep_phase_is_integral_of_frequency(low, high, logarithmic):
+    """The phase of a linear or logarithmic sweep is the integral of its frequency."""
     sweep = SweepDrive(low, high, 2.0, 3.0, None, logarithmic)
     for t in (0.3, 1.7, 2.0, 2.4):
-        turns = (
+        cycles = (
             quad(lambda s: float(sweep.frequency(s)), 0, min(t, 2.0), epsabs=1e-12)[0]
             + max(t - 2.0, 0) * high
         )
-        assert sweep.phase(t) == pytest.approx(2 * np.pi * turns, rel=1e-12)
+        assert sweep.phase(t) == pytest.approx(2 * np.pi * cycles, rel=1e-12)
     assert sweep.frequency(np.array([0.0, 2.0, 9.0])) == pytest.approx([low, high, high])
-    middle = np.sqrt(low * high) if logarithmic else (low + high) / 2
-    assert sweep.frequency(1.0) == pytest.approx(middle)
-    other = SweepDrive(low, high, 2.0, 0.0, 1e-3, logarithmic)
-    assert other.values(1.0) == pytest.approx(
-        1e-3 * (2 * np.pi * middle) ** 2 * np.sin(other.phase(1.0))
+    middle_frequency = np.sqrt(low * high) if logarithmic else (low + high) / 2
+    assert sweep.frequency(1.0) == pytest.approx(middle_frequency)
+    displacement_sweep = SweepDrive(low, high, 2.0, 0.0, 1e-3, logarithmic)
+    assert displacement_sweep.values(1.0) == pytest.approx(
+        1e-3 * (2 * np.pi * middle_frequency) ** 2 * np.sin(displacement_sweep.phase(1.0))
     )
 
 
-def test_exact_levels_go_on_in_phase():
-    drive = make_levels([2.0, 3.0], W, 2.5)
-    sine = SineDrive(1.0, W)
+def test_exact_level_change_preserves_phase():
+    """A change of the amplitude level preserves the phase of the signal."""
+    drive = make_levels([2.0, 3.0], OMEGA, 2.5)
+    sine = SineDrive(1.0, OMEGA)
     t = np.linspace(0, 5 * sine.period, 101)[:-1]
-    size = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
-    assert drive.values(t) == pytest.approx(size * np.sin(W * t), abs=1e-12)
+    amplitude = np.where(t < 2.5 * sine.period - 1e-12, 2.0, 3.0)
+    assert drive.values(t) == pytest.approx(amplitude * np.sin(OMEGA * t), abs=1e-12)
 
 
-def test_refuses_a_signal_without_a_rising_time():
+def test_refuses_recorded_signal_without_increasing_time():
+    """A recorded signal whose time does not increase from 0 is refused."""
     for time in ([0.0], [0.0, 0.0], [1.0, 2.0]):
         with pytest.raises(PatchfemError, match=r"drive\.file"):
             RecordedDrive(np.array(time), np.zeros(len(time)), 1.0)
@@ -60,48 +64,57 @@ def test_refuses_a_signal_without_a_rising_time():
 # ---- the march
 
 
-def free(modes, drive, cycles, steps=200, start=None):
+def march_without_friction(modes, drive, cycles, steps=200, start=None):
+    """Return a march of a basis under a drive without friction."""
     return march(modes, drive, coulomb_model(0.0, 0.0), cycles, steps, window=1000, start=start)
 
 
-def test_exact_a_step_overshoots_and_settles():
-    """-a/w^2 (1 - exp(-z w t)(cos + z/sqrt(1 - z^2) sin)); the accelerometer reads 0 - a + a at first, then w^2 z."""
-    drive = make_step(9.0, 2 * np.pi / W)
+def test_exact_step_response_agrees_with_closed_form():
+    """Displacement and acceleration after a step of the base agree with the damped closed form."""
+    drive = make_step(9.0, 2 * np.pi / OMEGA)
     zeta = 0.05
-    r = free(one(zeta=zeta), drive, 20, 40).response
-    own = W * np.sqrt(1 - zeta**2)
-    shape = 1 - np.exp(-zeta * W * r.time) * (
-        np.cos(own * r.time) + zeta * W / own * np.sin(own * r.time)
+    response = march_without_friction(sdof_basis(zeta=zeta), drive, 20, 40).response
+    damped_omega = OMEGA * np.sqrt(1 - zeta**2)
+    expected = 1 - np.exp(-zeta * OMEGA * response.time) * (
+        np.cos(damped_omega * response.time)
+        + zeta * OMEGA / damped_omega * np.sin(damped_omega * response.time)
     )
-    assert r.slide == pytest.approx(-9.0 / W**2 * shape, rel=1e-10, abs=1e-17)
-    assert r.acceleration == pytest.approx(-2 * zeta * W * r.slide_rate - W**2 * r.slide, abs=1e-9)
-    assert r.base_acceleration == pytest.approx(9.0)
+    assert response.slide == pytest.approx(-9.0 / OMEGA**2 * expected, rel=1e-10, abs=1e-17)
+    assert response.acceleration == pytest.approx(
+        -2 * zeta * OMEGA * response.slide_rate - OMEGA**2 * response.slide, abs=1e-9
+    )
+    assert response.base_acceleration == pytest.approx(9.0)
 
 
-def test_exact_a_release_decays_and_its_energy_counts_as_work():
-    """Free viscous decay in closed form; with friction the released energy is what is lost, to round-off."""
-    got = free(
-        one(), make_release(2 * np.pi / W), 30, 50, InitialState(np.array([1e-3]), np.array([0.2]))
+def test_exact_release_response_and_energy_balance():
+    """A release decays as the closed form, and with friction the released energy equals the energy dissipated and stored."""
+    marched = march_without_friction(
+        sdof_basis(),
+        make_release(2 * np.pi / OMEGA),
+        30,
+        50,
+        InitialState(np.array([1e-3]), np.array([0.2])),
     )
-    r = got.response
-    own = W * np.sqrt(1 - 0.003**2)
-    d = 0.003 * W
-    truth = np.exp(-d * r.time) * (
-        1e-3 * np.cos(own * r.time) + (0.2 + d * 1e-3) / own * np.sin(own * r.time)
+    response = marched.response
+    damped_omega = OMEGA * np.sqrt(1 - 0.003**2)
+    decay_rate = 0.003 * OMEGA
+    expected = np.exp(-decay_rate * response.time) * (
+        1e-3 * np.cos(damped_omega * response.time)
+        + (0.2 + decay_rate * 1e-3) / damped_omega * np.sin(damped_omega * response.time)
     )
-    assert r.slide == pytest.approx(truth, abs=1e-13)
-    got = march(
-        one(),
-        make_release(2 * np.pi / W),
+    assert response.slide == pytest.approx(expected, abs=1e-13)
+    marched = march(
+        sdof_basis(),
+        make_release(2 * np.pi / OMEGA),
         jenkins_model([39.0 / 1e-6], [1e-6]),
         60,
         100,
         start=InitialState(np.array([3e-4]), np.zeros(1)),
     )
-    book = got.ledger
-    assert book["work_in"] == pytest.approx(0.45 * (W * 3e-4) ** 2, rel=1e-12)
-    assert book["friction"] + book["viscous"] + book["stored"] == pytest.approx(
-        book["work_in"], rel=1e-11
+    ledger = marched.ledger
+    assert ledger["work_in"] == pytest.approx(0.45 * (OMEGA * 3e-4) ** 2, rel=1e-12)
+    assert ledger["friction"] + ledger["viscous"] + ledger["stored"] == pytest.approx(
+        ledger["work_in"], rel=1e-11
     )
 
 
@@ -110,15 +123,17 @@ def test_exact_a_release_decays_and_its_energy_counts_as_work():
 RIG = POINT + PLASTIC + MODE + "[accuracy]\ntolerance = 1e-2\n"
 
 
-def measured(drive, head=RIG):
-    result = run(plan(loads(f"{head}[drive]\n{drive}")))
+def run_drive(drive, scene_text=RIG):
+    """Return the result and the values of its measures for the text of a drive."""
+    result = run(plan(loads(f"{scene_text}[drive]\n{drive}")))
     assert result.outcome is not Outcome.NOT_CONVERGED
     return result, {name: m.value for name, m in result.measures.items()}
 
 
-def test_exact_a_force_scene_is_the_base_scene_seen_from_outside():
-    _, force = measured('kind = "force"\nfrequency = "143 Hz"\nforce = "39 N"\ncycles = 30')
-    _, base = measured(
+def test_exact_force_drive_equals_base_drive_in_relative_motion():
+    """A force of mass times base acceleration gives the same relative motion and another absolute acceleration."""
+    _, force = run_drive('kind = "force"\nfrequency = "143 Hz"\nforce = "39 N"\ncycles = 30')
+    _, base = run_drive(
         f'kind = "base"\nfrequency = "143 Hz"\nacceleration = "{39 / 0.884!r} m/s^2"\ncycles = 30'
     )
     for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
@@ -128,24 +143,25 @@ def test_exact_a_force_scene_is_the_base_scene_seen_from_outside():
     )
 
 
-def test_exact_a_recorded_scene_follows_its_file(tmp_path):
+def test_exact_recorded_drive_equals_sine_drive(tmp_path):
+    """A recorded sine gives the amplitude of the sine drive within 0.2 %."""
     t = np.arange(0, 0.1, 2e-5)
     table = tmp_path / "shake.csv"
     table.write_text(
         "time [ms],acceleration [g]\n"
-        + "\n".join(f"{1e3 * s!r},{5 * float(np.sin(W * s))!r}" for s in t.tolist()),
+        + "\n".join(f"{1e3 * s!r},{5 * float(np.sin(OMEGA * s))!r}" for s in t.tolist()),
         "utf-8",
     )
     scene = loads(
         RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n',
         tmp_path / "scene.toml",
     )
-    got = {name: m.value for name, m in run(plan(scene)).measures.items()}
-    _, want = measured(
+    recorded = {name: m.value for name, m in run(plan(scene)).measures.items()}
+    _, expected = run_drive(
         f'kind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\nduration = "{float(t[-1])!r} s"'
     )
-    assert got["relative_displacement_amplitude"] == pytest.approx(
-        want["relative_displacement_amplitude"], rel=2e-3
+    assert recorded["relative_displacement_amplitude"] == pytest.approx(
+        expected["relative_displacement_amplitude"], rel=2e-3
     )
 
 
@@ -175,7 +191,8 @@ def test_exact_a_recorded_scene_follows_its_file(tmp_path):
         ('kind = "base"\nwaveform = "file"', "drive.file"),
     ],
 )
-def test_refuses_a_drive_that_is_not_whole(drive, key):
+def test_refuses_incomplete_drive(drive, key):
+    """A drive with a missing, superfluous or invalid key is refused with the name of the key."""
     with pytest.raises(SceneError, match=key.replace(".", r"\.")):
         loads(f"{RIG}[drive]\n{drive}")
 
@@ -189,7 +206,8 @@ def test_refuses_a_drive_that_is_not_whole(drive, key):
         ("time [s],acceleration\n0,1\n1,2\n", "acceleration"),
     ],
 )
-def test_refuses_a_broken_signal(tmp_path, text, word):
+def test_refuses_invalid_signal_file(tmp_path, text, word):
+    """A signal file without motion, without the right columns or without increasing time is refused."""
     (tmp_path / "shake.csv").write_text(text, "utf-8")
     scene = loads(
         RIG + '[drive]\nkind = "base"\nwaveform = "file"\nfile = "shake.csv"\n',

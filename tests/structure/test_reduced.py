@@ -1,4 +1,4 @@
-"""Reduced structures: exact where no mode is left out, statics and rigid motions always, orders of the rest."""
+"""Reduced structures: exact without truncation, exact statics and rigid motions, and orders of convergence."""
 
 import mpmath
 import numpy as np
@@ -12,161 +12,181 @@ METHODS = ("craig-bampton", "free-interface")
 BOUNDARY = np.array([11, 4])
 
 
-def chain(n=12, held=True, seed=1):
-    """K, M, C (n, n) of a chain with unequal masses and springs, held at its first mass or loose."""
+def chain_matrices(n=12, is_fixed=True, seed=1):
+    """Return K, M, C (n, n) of a chain with unequal masses and springs, fixed at its first mass or free."""
     rng = np.random.default_rng(seed)
     k = 1e6 * rng.uniform(0.5, 2, n)
     m = 0.01 * rng.uniform(0.5, 2, n)
     K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
-    K[0, 0] -= 0 if held else k[0]
+    K[0, 0] -= 0 if is_fixed else k[0]
     return K, np.diag(m), 1e-5 * K + 3 * np.diag(m)
 
 
-def made(K, M, C=None, modes=3, method=METHODS[0], boundary=BOUNDARY, moved=None):
+def reduce_dense(K, M, C=None, n_modes=3, method=METHODS[0], boundary=BOUNDARY, base_motion=None):
+    """Return the reduction of dense matrices to boundary coordinates and modes."""
     return reduced.reduce_matrices(
-        *(None if one is None else sparse.csr_array(one) for one in (K, M, C)),
+        *(None if matrix is None else sparse.csr_array(matrix) for matrix in (K, M, C)),
         boundary,
-        modes,
+        n_modes,
         method,
-        moved,
+        base_motion,
     )
 
 
-@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("is_fixed", [True, False])
 @pytest.mark.parametrize("method", METHODS)
-def test_exact_where_no_mode_is_left_out(method, held):
-    """Frequencies, participation, output and slides are those of the full matrices, dampers and rigid motion too."""
-    K, M, C = chain(held=held)
+def test_exact_full_set_of_modes_equals_full_matrices(method, is_fixed):
+    """A reduction that keeps all modes has the frequencies, rows and damping of the full matrices."""
+    K, M, C = chain_matrices(is_fixed=is_fixed)
     ones = np.ones(12)
-    found = made(K, M, C, 5, method, moved=ones)
-    assert found.modes.is_complete
-    small = reduced.build_basis(found, found.modes.omega.size, [(1, 0), (1, 2)])
-    row = np.zeros((2, 12))
-    row[:, 11] = 1
-    row[1, 4] = -1
-    full = matrices.build_basis(M, K, C, faces=row, output=row[0], base=ones)
+    reduction = reduce_dense(K, M, C, 5, method, base_motion=ones)
+    assert reduction.modes.is_complete
+    basis = reduced.build_basis(reduction, reduction.modes.omega.size, [(1, 0), (1, 2)])
+    rows = np.zeros((2, 12))
+    rows[:, 11] = 1
+    rows[1, 4] = -1
+    full = matrices.build_basis(M, K, C, faces=rows, output=rows[0], base=ones)
     scale = full.omega[-1]
-    np.testing.assert_allclose(small.omega, full.omega, atol=1e-10 * scale)
-    assert (small.omega[0] == 0) == (not held)
+    np.testing.assert_allclose(basis.omega, full.omega, atol=1e-10 * scale)
+    assert (basis.omega[0] == 0) == (not is_fixed)
     for name in ("base", "output", "faces", "damping_matrix"):
-        true = getattr(full, name)
+        expected = getattr(full, name)
         np.testing.assert_allclose(
-            getattr(small, name), true, atol=1e-7 * np.abs(true).max(), err_msg=name
+            getattr(basis, name), expected, atol=1e-7 * np.abs(expected).max(), err_msg=name
         )
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_exact_statics_of_the_boundary_however_few_the_modes(method):
-    """Flexibilities between boundary coordinates, and what a steady acceleration of the base moves them by."""
-    K, M, _ = chain()
-    found = made(K, M, None, 1, method, moved=np.ones(12))
+def test_exact_boundary_statics_for_any_number_of_modes(method):
+    """Flexibility of the boundary and response to a steady base acceleration are exact for any number of modes."""
+    K, M, _ = chain_matrices()
+    reduction = reduce_dense(K, M, None, 1, method, base_motion=np.ones(12))
     inverse = np.linalg.inv(K)
-    for modes in (0, 1, 3):
-        for out, at in ((1, 1), (1, 2), (2, 2)):
-            one = reduced.build_basis(found, modes, output=out, driven_mass=at)
-            static = -(one.output * one.base / one.omega**2).sum() / one.mass
-            np.testing.assert_allclose(
-                static, inverse[BOUNDARY[out - 1], BOUNDARY[at - 1]], rtol=1e-9
+    for n_modes in (0, 1, 3):
+        for output_mass, driven_mass in ((1, 1), (1, 2), (2, 2)):
+            basis = reduced.build_basis(
+                reduction, n_modes, output=output_mass, driven_mass=driven_mass
             )
-        one = reduced.build_basis(found, modes)
+            static = -(basis.output * basis.base / basis.omega**2).sum() / basis.mass
+            np.testing.assert_allclose(
+                static, inverse[BOUNDARY[output_mass - 1], BOUNDARY[driven_mass - 1]], rtol=1e-9
+            )
+        basis = reduced.build_basis(reduction, n_modes)
         np.testing.assert_allclose(
-            (one.output * one.base / one.omega**2).sum(), (inverse @ M).sum(axis=1)[11], rtol=1e-9
+            (basis.output * basis.base / basis.omega**2).sum(),
+            (inverse @ M).sum(axis=1)[11],
+            rtol=1e-9,
         )
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_exact_rigid_motion_takes_the_whole_mass(method):
-    K, M, _ = chain(held=False)
-    one = reduced.build_basis(made(K, M, None, 2, method, moved=np.ones(12)), 2)
-    assert one.omega[0] == 0 and (one.omega[1:] > 0).all()
-    np.testing.assert_allclose(one.base[0] ** 2, M.sum(), rtol=1e-9)
+def test_exact_rigid_mode_carries_total_mass(method):
+    """The squared participation factor of the rigid mode equals the total mass."""
+    K, M, _ = chain_matrices(is_fixed=False)
+    basis = reduced.build_basis(reduce_dense(K, M, None, 2, method, base_motion=np.ones(12)), 2)
+    assert basis.omega[0] == 0 and (basis.omega[1:] > 0).all()
+    np.testing.assert_allclose(basis.base[0] ** 2, M.sum(), rtol=1e-9)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_always_fewer_modes_are_the_reduction_to_fewer(method):
-    """What `kept` takes out of more modes is what a reduction to so many finds itself; Ritz values fall."""
-    K, M, _ = chain(30)
-    many, few = (
-        made(K, M, None, modes, method, np.array([29, 10]), np.ones(30)) for modes in (6, 1)
+def test_always_truncated_reduction_equals_smaller_reduction(method):
+    """Truncating a reduction equals a reduction to fewer modes, and the frequencies decrease with more modes."""
+    K, M, _ = chain_matrices(30)
+    large, small = (
+        reduce_dense(K, M, None, n_modes, method, np.array([29, 10]), np.ones(30))
+        for n_modes in (6, 1)
     )
-    ours, own = (reduced.build_basis(one, 1) for one in (many, few))
-    np.testing.assert_allclose(ours.omega, own.omega, rtol=1e-8)
-    omegas = np.array([reduced.build_basis(many, modes).omega[:3] for modes in (2, 4, 8, 16)])
+    truncated, expected = (reduced.build_basis(reduction, 1) for reduction in (large, small))
+    np.testing.assert_allclose(truncated.omega, expected.omega, rtol=1e-8)
+    omegas = np.array([reduced.build_basis(large, n_modes).omega[:3] for n_modes in (2, 4, 8, 16)])
     full = matrices.build_basis(M, K).omega[:3]
     assert (np.diff(omegas, axis=0) <= 1e-9 * full).all() and (omegas >= full * (1 - 1e-9)).all()
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("links", [40, 12])
-def test_exact_frequencies_of_a_slender_beam_keep_their_digits(method, links):
-    """A beam of rigid links and equal hinges, by 40 digits; its frequencies span a factor of 260 or 3000. Eigenvalues
-    of both reduced matrices erred by 5e-10 behind free modes."""
-    n = links
+@pytest.mark.parametrize("n_links", [40, 12])
+def test_exact_slender_beam_frequencies_agree_with_mpmath(method, n_links):
+    """The frequencies of a slender beam agree with a computation of 40 digits.
+
+    They span a factor of 260 or 3000. Eigenvalues of both reduced matrices had errors of 5e-10 with
+    free-interface modes.
+    """
+    n = n_links
     D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
     K = D.T @ D
     M = np.diag(np.random.default_rng(4).integers(1, 9, n) / 4.0)
     with mpmath.workdps(40):
-        root = mpmath.diag([1 / mpmath.sqrt(one) for one in np.diag(M)])
+        root = mpmath.diag([1 / mpmath.sqrt(value) for value in np.diag(M)])
         square = mpmath.eigsy(root * mpmath.matrix(K.tolist()) * root, eigvals_only=True)
-        true = np.array([float(mpmath.sqrt(one)) for one in square])
-    small = reduced.build_basis(made(K, M, None, n, method, np.array([n - 1, 4])), n, driven_mass=1)
-    np.testing.assert_allclose(small.omega, true, rtol=2e-16 * (true[-1] / true[0]) ** 1.5)
+        expected = np.array([float(mpmath.sqrt(value)) for value in square])
+    basis = reduced.build_basis(
+        reduce_dense(K, M, None, n, method, np.array([n - 1, 4])), n, driven_mass=1
+    )
+    np.testing.assert_allclose(
+        basis.omega, expected, rtol=2e-16 * (expected[-1] / expected[0]) ** 1.5
+    )
 
 
-def test_order_of_a_free_interface_reduction_is_that_of_its_residuals():
-    """Of a string of many masses the lowest frequency errs by the fourth power of the modes and more, against the
-    third of fixed-interface modes behind an end that is free."""
+def test_order_of_reduction_methods():
+    """The error of the lowest frequency falls with the third power of the number of fixed-interface modes.
+
+    For free-interface modes it is at least a thousand times smaller.
+    """
     n = 400
     K, M = (
-        sparse.csr_array(one)
-        for one in (
+        sparse.csr_array(matrix)
+        for matrix in (
             sparse.diags_array(
                 [np.full(n, 2.0), np.full(n - 1, -1.0), np.full(n - 1, -1.0)], offsets=[0, 1, -1]
             ),
             sparse.eye_array(n),
         )
     )
-    true = 2 * np.sin(np.pi / (2 * (n + 1)))
+    expected = 2 * np.sin(np.pi / (2 * (n + 1)))
     errors = {}
     for method in METHODS:
-        found = reduced.reduce_matrices(K, M, None, np.array([150]), 20, method)
+        reduction = reduced.reduce_matrices(K, M, None, np.array([150]), 20, method)
         errors[method] = [
-            reduced.build_basis(found, modes, driven_mass=1).omega[0] / true - 1
-            for modes in (5, 10, 20)
+            reduced.build_basis(reduction, n_modes, driven_mass=1).omega[0] / expected - 1
+            for n_modes in (5, 10, 20)
         ]
     slope = np.log2(errors["craig-bampton"][0] / errors["craig-bampton"][2]) / 2
     assert 2.5 < slope < 3.5 and max(errors["free-interface"]) < 1e-3 * max(errors["craig-bampton"])
 
 
-def test_always_modes_of_large_matrices_are_those_of_full_ones():
-    """Shifted and inverted Lanczos steps against full matrices, and the same answer again."""
-    K, M, _ = chain(700, seed=3)
-    found = made(K, M, None, 6, boundary=np.array([699]))
-    again = made(K, M, None, 6, boundary=np.array([699]))
+def test_always_lanczos_modes_equal_dense_modes():
+    """Modes of a large matrix by shift-invert Lanczos equal those of the dense matrices, and are reproducible."""
+    K, M, _ = chain_matrices(700, seed=3)
+    reduction = reduce_dense(K, M, None, 6, boundary=np.array([699]))
+    repeated = reduce_dense(K, M, None, 6, boundary=np.array([699]))
     full = matrices.build_basis(M[:-1, :-1], K[:-1, :-1])
-    np.testing.assert_allclose(found.modes.omega, full.omega[:16], rtol=1e-9)
-    assert np.array_equal(found.stiffness, again.stiffness)
+    np.testing.assert_allclose(reduction.modes.omega, full.omega[:16], rtol=1e-9)
+    assert np.array_equal(reduction.stiffness, repeated.stiffness)
 
 
-def test_exact_massless_coordinates_are_carried_statically():
-    """A coordinate without mass between two springs is their sum in series."""
+def test_exact_massless_coordinate_is_condensed_statically():
+    """A massless coordinate between two springs is condensed to the springs in series."""
     K = np.array([[3.0, -2.0, 0], [-2.0, 3.0, -1.0], [0, -1.0, 1.0]])
-    one = reduced.build_basis(
-        made(K, np.diag([1.0, 0, 2.0]), None, 2, boundary=np.array([2]), moved=np.ones(3)), 5
+    basis = reduced.build_basis(
+        reduce_dense(
+            K, np.diag([1.0, 0, 2.0]), None, 2, boundary=np.array([2]), base_motion=np.ones(3)
+        ),
+        5,
     )
     full = matrices.build_basis(
         np.diag([1.0, 2.0]), np.array([[1 + 2 / 3, -2 / 3], [-2 / 3, 2 / 3]])
     )
-    np.testing.assert_allclose(one.omega, full.omega, rtol=1e-12)
+    np.testing.assert_allclose(basis.omega, full.omega, rtol=1e-12)
 
 
-def test_exact_ratio_is_that_of_every_mode():
-    K, M, _ = chain(held=False)
-    one = reduced.build_basis(made(K, M, moved=np.ones(12)), 3, ratio=0.02)
-    assert one.damping is None and one.zeta[0] == 0 and (one.zeta[1:] == 0.02).all()
+def test_exact_damping_ratio_applies_to_elastic_modes():
+    """A given damping ratio applies to every elastic mode and not to the rigid mode."""
+    K, M, _ = chain_matrices(is_fixed=False)
+    basis = reduced.build_basis(reduce_dense(K, M, base_motion=np.ones(12)), 3, ratio=0.02)
+    assert basis.damping is None and basis.zeta[0] == 0 and (basis.zeta[1:] == 0.02).all()
 
 
-REFUSED = {
+INVALID_CHANGES = {
     "the mass matrix is not positive semidefinite: the diagonal entry of coordinate 3": lambda K, M: (
         M.__setitem__((2, 2), -1.0)
     ),
@@ -182,51 +202,55 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("says", REFUSED)
+@pytest.mark.parametrize("message", INVALID_CHANGES)
 @pytest.mark.parametrize("method", METHODS)
-def test_refuses_matrices_that_are_not_positive(says, method):
-    K, M, _ = chain()
-    REFUSED[says](K, M)
+def test_refuses_matrices_not_positive_definite(message, method):
+    """Matrices that are not positive definite are refused with the coordinates concerned."""
+    K, M, _ = chain_matrices()
+    INVALID_CHANGES[message](K, M)
     with pytest.raises(PatchfemError) as caught:
-        found = made(K, M, None, 3, method)
-        reduced.build_basis(found, 3, driven_mass=1)
-    wanted = (
-        says
-        if "negative energy" not in says or "energy" in str(caught.value)
+        reduction = reduce_dense(K, M, None, 3, method)
+        reduced.build_basis(reduction, 3, driven_mass=1)
+    expected = (
+        message
+        if "negative energy" not in message or "energy" in str(caught.value)
         else "the stiffness matrix is not positive"
     )
-    assert wanted in str(caught.value) and caught.value.key.startswith("structure.reduced."), (
+    assert expected in str(caught.value) and caught.value.key.startswith("structure.reduced."), (
         caught.value
     )
 
 
-def test_refuses_a_part_that_moves_beside_a_held_boundary():
-    """A loose part takes no strain; free-interface modes take it as a rigid motion."""
-    K, M, _ = chain()
+def test_refuses_loose_part_in_fixed_interface_method():
+    """A part that is not connected to the boundary is refused by the fixed-interface method.
+
+    Free-interface modes include its rigid motion.
+    """
+    K, M, _ = chain_matrices()
     K[6, 6] += K[6, 7]
     K[7, 7] += K[6, 7]
     K[6, 7] = K[7, 6] = 0
     with pytest.raises(PatchfemError, match="add a coordinate of each loose part"):
-        made(K, M, boundary=np.array([4]))
-    one = reduced.build_basis(
-        made(K, M, None, 4, "free-interface", np.array([4])), 4, driven_mass=1
+        reduce_dense(K, M, boundary=np.array([4]))
+    basis = reduced.build_basis(
+        reduce_dense(K, M, None, 4, "free-interface", np.array([4])), 4, driven_mass=1
     )
-    assert (one.omega == 0).sum() == 1
+    assert (basis.omega == 0).sum() == 1
 
 
-def test_refuses_attachment_modes_of_a_boundary_that_moves_as_one():
-    """A spring 1e10 times as stiff as the others joins the boundary coordinates: their shapes are equal."""
-    spring = np.full(12, 1e6)
-    spring[-1] *= 1e10
+def test_refuses_dependent_attachment_modes():
+    """Boundary coordinates joined by a very stiff spring are refused, because their attachment modes are equal."""
+    springs = np.full(12, 1e6)
+    springs[-1] *= 1e10
     stiffness = (
-        np.diag(spring + np.append(spring[1:], 0))
-        - np.diag(spring[1:], 1)
-        - np.diag(spring[1:], -1)
+        np.diag(springs + np.append(springs[1:], 0))
+        - np.diag(springs[1:], 1)
+        - np.diag(springs[1:], -1)
     )
     mass = sparse.csr_array(0.01 * np.eye(12))
-    found = reduced.reduce_matrices(
+    reduction = reduced.reduce_matrices(
         sparse.csr_array(stiffness), mass, None, np.array([10, 11]), 2, "free-interface"
     )
     with pytest.raises(PatchfemError, match="use method = 'craig-bampton'") as refusal:
-        reduced.build_basis(found, 2)
+        reduced.build_basis(reduction, 2)
     assert refusal.value.key == "structure.reduced.modes"

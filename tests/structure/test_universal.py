@@ -1,4 +1,4 @@
-"""Universal files written by pyuff and read back: shapes with their scale, responses with their modes."""
+"""Universal files written by pyuff and read back: mode shapes with their scale, and modes from responses."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import pyuff
 from patchfem.core import PatchfemError
 from patchfem.structure import compute_receptance, masses, places, universal
 
-SIX = 2e-5  # dataset 55 and the frequencies of 58 have six digits
+FILE_RTOL = 2e-5  # dataset 55 and the frequencies of 58 have six digits
 RIG = masses.build_basis(
     [1.0, 2.0, 0.5], [((1, 0), 4e5), ((2, 1), 3e5), ((3, 2), 2e5)], [], [(3, 0)], 1
 )
@@ -15,22 +15,24 @@ ZETA = np.array([0.01, 0.02, 0.005])
 NODES = [11, 12, 13]
 
 
-def damped():
+def damped_basis():
+    """Return the basis of the rig with modal damping."""
     return type(RIG)(
         RIG.names, RIG.omega, ZETA, RIG.slide, RIG.base, RIG.output, 1.0, shapes=RIG.shapes
     )
 
 
-def write(path, sets):
-    pyuff.UFF(str(path)).write_sets(sets, mode="overwrite")
+def write_universal(path, datasets):
+    """Write datasets to a universal file and return its path."""
+    pyuff.UFF(str(path)).write_sets(datasets, mode="overwrite")
     return path
 
 
-def normal_modes(masses_of=(1.0, 4.0, 0.25), **change):
-    """Dataset 55 of the rig along y, each shape with its own scale and modal mass."""
+def normal_modes(modal_masses=(1.0, 4.0, 0.25), **change):
+    """Return datasets 55 of the normal modes along y, each with its own scale and modal mass."""
     sets = []
-    for k, m in enumerate(masses_of):
-        still = np.zeros(3)
+    for k, modal_mass in enumerate(modal_masses):
+        zeros = np.zeros(3)
         sets.append(
             {
                 "type": 55,
@@ -40,10 +42,10 @@ def normal_modes(masses_of=(1.0, 4.0, 0.25), **change):
                 "load_case": 1,
                 "mode_n": k + 1,
                 "node_nums": NODES,
-                "r1": still,
-                "r2": RIG.shapes[:, k] * np.sqrt(m),
-                "r3": still,
-                "modal_m": m,
+                "r1": zeros,
+                "r2": RIG.shapes[:, k] * np.sqrt(modal_mass),
+                "r3": zeros,
+                "modal_m": modal_mass,
                 "freq": RIG.omega[k] / 2 / np.pi,
                 "modal_damp_vis": ZETA[k],
                 "modal_damp_his": 0.0,
@@ -54,11 +56,11 @@ def normal_modes(masses_of=(1.0, 4.0, 0.25), **change):
 
 
 def complex_modes(scales=(1.0, 2j, 0.8 + 0.6j)):
-    """Complex modes of the same rig: v = c phi, modal A = c^2 2i w_d, and a poor phase on one entry."""
+    """Return datasets 55 of the complex modes c phi, with modal A = c^2 2i w_d."""
     sets = []
-    for k, c in enumerate(scales):
+    for k, scale in enumerate(scales):
         damped_omega = RIG.omega[k] * np.sqrt(1 - ZETA[k] ** 2)
-        shape = complex(c) * RIG.shapes[:, k]
+        shape = complex(scale) * RIG.shapes[:, k]
         sets.append(
             {
                 "type": 55,
@@ -72,19 +74,20 @@ def complex_modes(scales=(1.0, 2j, 0.8 + 0.6j)):
                 "r2": shape + 0j,
                 "r3": 0 * shape,
                 "eig": complex(-ZETA[k] * RIG.omega[k], damped_omega),
-                "modal_a": c**2 * 2j * damped_omega,
+                "modal_a": scale**2 * 2j * damped_omega,
                 "modal_b": 0j,
             }
         )
     return sets
 
 
-def responses(kind=12, noise=0.0, sign=(1, 1, 1), every=0.5, **change):
-    f = np.arange(20.0, 250.0, every)
-    w = 2 * np.pi * f
+def make_responses(response_type=12, noise=0.0, signs=(1, 1, 1), spacing=0.5, **change):
+    """Return datasets 58 of the responses of the rig to a force at node 13."""
+    frequency = np.arange(20.0, 250.0, spacing)
+    omega = 2 * np.pi * frequency
     H = (
-        compute_receptance(damped(), w, RIG.shapes, RIG.shapes[2])[:, :, 0]
-        * ((1j * w) ** {8: 0, 11: 1, 12: 2}[kind])[:, None]
+        compute_receptance(damped_basis(), omega, RIG.shapes, RIG.shapes[2])[:, :, 0]
+        * ((1j * omega) ** {8: 0, 11: 1, 12: 2}[response_type])[:, None]
     )
     rng = np.random.default_rng(5)
     H = H * (1 + noise * (rng.normal(size=H.shape) + 1j * rng.normal(size=H.shape)) / np.sqrt(2))
@@ -93,47 +96,52 @@ def responses(kind=12, noise=0.0, sign=(1, 1, 1), every=0.5, **change):
             "type": 58,
             "func_type": 4,
             "rsp_node": NODES[k],
-            "rsp_dir": 2 * sign[k],
+            "rsp_dir": 2 * signs[k],
             "ref_node": 13,
             "ref_dir": 2,
             "abscissa_spacing": 1,
             "abscissa_spec_data_type": 18,
-            "ordinate_spec_data_type": kind,
+            "ordinate_spec_data_type": response_type,
             "orddenom_spec_data_type": 13,
-            "x": f,
-            "data": H[:, k] * sign[k],
+            "x": frequency,
+            "data": H[:, k] * signs[k],
             **change,
         }
         for k in range(3)
     ]
 
 
-def check(found, rtol, shape_tol):
-    np.testing.assert_allclose(2 * np.pi * found.frequency, RIG.omega, rtol=rtol)
-    got = np.stack([found.motion[node, 1] for node in NODES])
-    want = RIG.shapes * np.sign(RIG.shapes[0] * got[0])
-    np.testing.assert_allclose(got, want, atol=shape_tol)
+def check_modes(modes, rtol, shape_tol):
+    """Check frequencies and shapes of the modes that were read."""
+    np.testing.assert_allclose(2 * np.pi * modes.frequency, RIG.omega, rtol=rtol)
+    shapes = np.stack([modes.motion[node, 1] for node in NODES])
+    expected = RIG.shapes * np.sign(RIG.shapes[0] * shapes[0])
+    np.testing.assert_allclose(shapes, expected, atol=shape_tol)
 
 
-def test_exact_normal_modes(tmp_path):
-    found = universal.read_universal(write(tmp_path / "a.uff", normal_modes()))
-    check(found, SIX, SIX)
-    np.testing.assert_allclose(found.zeta, ZETA, rtol=SIX)
-    assert not found.notes
+def test_exact_normal_modes_are_read_with_scale(tmp_path):
+    """Frequencies, damping and mass-normalised shapes of normal modes are read back to six digits."""
+    modes = universal.read_universal(write_universal(tmp_path / "a.uff", normal_modes()))
+    check_modes(modes, FILE_RTOL, FILE_RTOL)
+    np.testing.assert_allclose(modes.zeta, ZETA, rtol=FILE_RTOL)
+    assert not modes.notes
 
 
-def test_exact_complex_modes_are_turned_and_said(tmp_path):
-    found = universal.read_universal(write(tmp_path / "a.uff", complex_modes()))
-    check(found, SIX, SIX)
-    np.testing.assert_allclose(found.zeta, ZETA, rtol=1e-4)
-    assert len(found.notes) == 3 and "mode 1 is complex" in found.notes[0]
+def test_exact_complex_modes_are_made_real_with_note(tmp_path):
+    """Complex modes are rotated to real shapes, with a note for each mode and for what the rotation leaves out."""
+    modes = universal.read_universal(write_universal(tmp_path / "a.uff", complex_modes()))
+    check_modes(modes, FILE_RTOL, FILE_RTOL)
+    np.testing.assert_allclose(modes.zeta, ZETA, rtol=1e-4)
+    assert len(modes.notes) == 3 and "mode 1 is complex" in modes.notes[0]
     sets = complex_modes()
     sets[1]["r2"] = sets[1]["r2"] * np.array([1, np.exp(0.1j), 1])
-    assert "leaves out" in universal.read_universal(write(tmp_path / "b.uff", sets)).notes[1]
+    assert (
+        "leaves out" in universal.read_universal(write_universal(tmp_path / "b.uff", sets)).notes[1]
+    )
 
 
-def test_exact_units_of_dataset_164(tmp_path):
-    """In mm and mN (kg as mass unit: mN s^2/mm): shapes per sqrt(kg) stay; responses in mm/mN are m/N."""
+def test_exact_units_of_dataset_164_are_applied(tmp_path):
+    """The units of dataset 164 scale shapes and responses, for mm and mN and for inches."""
     units = {
         "type": 164,
         "units_code": 5,
@@ -144,46 +152,55 @@ def test_exact_units_of_dataset_164(tmp_path):
         "temp": 1.0,
         "temp_offset": 0.0,
     }
-    check(universal.read_universal(write(tmp_path / "a.uff", [units, *normal_modes()])), SIX, SIX)
+    check_modes(
+        universal.read_universal(write_universal(tmp_path / "a.uff", [units, *normal_modes()])),
+        FILE_RTOL,
+        FILE_RTOL,
+    )
     # mass unit lbf s^2/in = 175.1268 kg
     inches = units | {
         "length": 39.37007874,
         "force": 0.2248089431,
     }
-    found = universal.read_universal(write(tmp_path / "b.uff", [inches, *normal_modes()]))
+    modes = universal.read_universal(write_universal(tmp_path / "b.uff", [inches, *normal_modes()]))
     np.testing.assert_allclose(
-        np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=SIX
+        np.abs(modes.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=FILE_RTOL
     )
-    found = universal.read_universal(write(tmp_path / "c.uff", [inches, *responses(8)]))
+    modes = universal.read_universal(
+        write_universal(tmp_path / "c.uff", [inches, *make_responses(8)])
+    )
     np.testing.assert_allclose(
-        np.abs(found.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5
+        np.abs(modes.motion[11, 1]), np.abs(RIG.shapes[0]) / np.sqrt(175.126835), rtol=1e-5
     )
 
 
-@pytest.mark.parametrize("kind", [8, 11, 12])
-def test_exact_modes_from_written_responses(tmp_path, kind):
-    """Receptance, mobility and accelerance with a turned accelerometer give the modes back to 1e-6."""
-    found = universal.read_universal(write(tmp_path / "a.uff", responses(kind, sign=(1, -1, 1))))
-    check(found, 1e-6, 1e-6)
-    np.testing.assert_allclose(found.zeta, ZETA, rtol=1e-6)
-    assert not found.notes
-
-
-def test_exact_accelerometer_in_g(tmp_path):
-    sets = responses(12, ordinate_axis_units_lab="g")
-    for one in sets:
-        one["data"] = one["data"] / 9.80665
-    check(universal.read_universal(write(tmp_path / "a.uff", sets)), 1e-6, 1e-6)
-    odd = universal.read_universal(
-        write(tmp_path / "b.uff", responses(12, ordinate_axis_units_lab="furlong"))
+@pytest.mark.parametrize("response_type", [8, 11, 12])
+def test_exact_modes_are_identified_from_responses(tmp_path, response_type):
+    """Receptance, mobility and accelerance with a reversed accelerometer give the modes within 1e-6."""
+    modes = universal.read_universal(
+        write_universal(tmp_path / "a.uff", make_responses(response_type, signs=(1, -1, 1)))
     )
-    assert any("'furlong' is not known" in note for note in odd.notes)
+    check_modes(modes, 1e-6, 1e-6)
+    np.testing.assert_allclose(modes.zeta, ZETA, rtol=1e-6)
+    assert not modes.notes
 
 
-def test_exact_places_give_the_basis(tmp_path):
-    """Scaled to a moving mass of 2 kg at node 12: slide of 13 against 11, base by the share of the block."""
-    shapes = universal.read_universal(write(tmp_path / "a.uff", normal_modes()))
-    found = places.build_basis(
+def test_exact_acceleration_in_g_is_converted(tmp_path):
+    """Accelerations in g are converted, and an unknown unit gives a note."""
+    datasets = make_responses(12, ordinate_axis_units_lab="g")
+    for dataset in datasets:
+        dataset["data"] = dataset["data"] / 9.80665
+    check_modes(universal.read_universal(write_universal(tmp_path / "a.uff", datasets)), 1e-6, 1e-6)
+    with_unknown_unit = universal.read_universal(
+        write_universal(tmp_path / "b.uff", make_responses(12, ordinate_axis_units_lab="furlong"))
+    )
+    assert any("'furlong' is not known" in note for note in with_unknown_unit.notes)
+
+
+def test_exact_basis_from_node_directions(tmp_path):
+    """The rows of the basis are those of the node directions in the scene, scaled to the moving mass."""
+    shapes = universal.read_universal(write_universal(tmp_path / "a.uff", normal_modes()))
+    basis = places.build_basis(
         shapes,
         2.0,
         {"slide_at": "13:+y, 11:-y", "output_at": "12:y", "base_at": "12:+y"},
@@ -191,28 +208,28 @@ def test_exact_places_give_the_basis(tmp_path):
     )
     sign = np.sign(RIG.shapes[1])
     np.testing.assert_allclose(
-        found.slide, np.sqrt(2) * (RIG.shapes[2] - RIG.shapes[0]) * sign, atol=2 * SIX
+        basis.slide, np.sqrt(2) * (RIG.shapes[2] - RIG.shapes[0]) * sign, atol=2 * FILE_RTOL
     )
-    np.testing.assert_allclose(found.output, np.sqrt(2) * RIG.shapes[1] * sign, atol=2 * SIX)
-    np.testing.assert_allclose(found.base, found.output, rtol=0, atol=0)
-    assert np.sum(found.base**2) == pytest.approx(1, abs=1e-4), (
+    np.testing.assert_allclose(basis.output, np.sqrt(2) * RIG.shapes[1] * sign, atol=2 * FILE_RTOL)
+    np.testing.assert_allclose(basis.base, basis.output, rtol=0, atol=0)
+    assert np.sum(basis.base**2) == pytest.approx(1, abs=1e-4), (
         "node 12 carries 2 kg: the modes contain all of it"
     )
     forced = places.build_basis(
         shapes, 2.0, {"slide_at": "13:+y", "force_at": "11:-y"}, is_forced=True
     )
     np.testing.assert_allclose(
-        forced.base * forced.slide, 2 * RIG.shapes[0] * RIG.shapes[2], atol=3 * SIX
+        forced.base * forced.slide, 2 * RIG.shapes[0] * RIG.shapes[2], atol=3 * FILE_RTOL
     )
-    # the modes answer a force as the rig itself does
-    w = np.array([300.0, 700.0])
-    ours = compute_receptance(found, w, found.output, found.slide)
+    # the modes respond to a force as the structure itself does
+    omega = np.array([300.0, 700.0])
+    receptance = compute_receptance(basis, omega, basis.output, basis.slide)
     np.testing.assert_allclose(
-        ours,
-        compute_receptance(damped(), w, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]),
+        receptance,
+        compute_receptance(damped_basis(), omega, RIG.shapes[1], RIG.shapes[2] - RIG.shapes[0]),
         rtol=1e-3,
     )
-    assert not places.note_missing_mass(found)
+    assert not places.note_missing_mass(basis)
     assert (
         "contain"
         in places.note_missing_mass(
@@ -221,7 +238,7 @@ def test_exact_places_give_the_basis(tmp_path):
     )
 
 
-@pytest.mark.parametrize("where, says", [
+@pytest.mark.parametrize("places_of, message", [
     ({"slide_at": "99:+y"}, "structure.slide_at: the file has no motion of 99:y; the file has 11:x, 11:y, 11:z"),
     ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is not a node with a direction; write node:direction"),
     ({"slide_at": "12:+x"}, "structure.slide_at: no mode of the file moves '12:+x'"),
@@ -230,33 +247,36 @@ def test_exact_places_give_the_basis(tmp_path):
     ({"slide_at": "12:+y", "base_at": "13:y"}, "structure.base_at: at this place the modes contain 4 times "
                                                "structure.moving_mass"),
 ])  # fmt: skip
-def test_refuses_places_that_are_not_there(tmp_path, where, says):
-    shapes = universal.read_universal(write(tmp_path / "a.uff", normal_modes()))
+def test_refuses_unknown_node_directions(tmp_path, places_of, message):
+    """A node or direction that the file does not contain is refused with the key."""
+    shapes = universal.read_universal(write_universal(tmp_path / "a.uff", normal_modes()))
     with pytest.raises(PatchfemError) as caught:
-        places.build_basis(shapes, 2.0, where, is_forced=False)
-    assert says in str(caught.value)
+        places.build_basis(shapes, 2.0, places_of, is_forced=False)
+    assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("sets, says", [
+@pytest.mark.parametrize("datasets, message", [
     (normal_modes((1.0, 0.0, 1.0)), "mode 2 ("), (normal_modes(modal_m=0.0), "has no modal mass"),
     (normal_modes(modal_damp_vis=-0.01), "both must be >= 0"),
-    (responses(12, orddenom_spec_data_type=12), "is a response of type 12 per input of type 12; displacement (8)"),
-    (responses(8, func_type=1), "dataset 58 contains no frequency response function"),
-    (responses(12, ref_node=99), "a response at the driven point itself (99:y)"),
-    (responses(12)[:2] + responses(12, every=0.25)[2:], "is given at other frequencies than the first"),
+    (make_responses(12, orddenom_spec_data_type=12), "is a response of type 12 per input of type 12; displacement (8)"),
+    (make_responses(8, func_type=1), "dataset 58 contains no frequency response function"),
+    (make_responses(12, ref_node=99), "a response at the driven point itself (99:y)"),
+    (make_responses(12)[:2] + make_responses(12, spacing=0.25)[2:], "is given at other frequencies than the first"),
     ([{"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1, "length": 1.0, "force": 1.0,
        "temp": 1.0, "temp_offset": 0.0}], "has neither mode shapes (dataset 55"),
 ])  # fmt: skip
-def test_refuses_files_without_what_is_needed(tmp_path, sets, says):
+def test_refuses_universal_file_without_required_data(tmp_path, datasets, message):
+    """A universal file without usable shapes or responses is refused with the reason."""
     with pytest.raises(PatchfemError) as caught:
-        universal.read_universal(write(tmp_path / "a.uff", sets))
-    assert says in str(caught.value)
+        universal.read_universal(write_universal(tmp_path / "a.uff", datasets))
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(
     "content", [b"", b"no universal file\n", b"    -1\n    55\nbroken\n    -1\n"]
 )
-def test_refuses_what_is_no_universal_file(tmp_path, content):
+def test_refuses_invalid_universal_file(tmp_path, content):
+    """A file that is not a universal file is refused."""
     (tmp_path / "a.uff").write_bytes(content)
     with pytest.raises(PatchfemError, match=r"cannot be read|no dataset 55"):
         universal.read_universal(tmp_path / "a.uff")
