@@ -338,7 +338,8 @@ def _report_error(error: Exception) -> int:
         return 2
     code = getattr(error, "code", None)
     if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-        print_message(make_printable(rewrite_powers_of_ten(str(error))))
+        for line in str(error).split("\n"):  # tables to paste follow some messages
+            print_message(make_printable(rewrite_powers_of_ten(line)))
         return code
     message = " ".join(f"{type(error).__name__}: {error}".split())
     print_message(make_printable(f"patchfem: internal fault{_locate_fault(error)}: {message}"))

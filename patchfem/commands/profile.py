@@ -1,11 +1,23 @@
 """The command that reads measured surfaces and prints their roughness."""
 
 import json
+import os
+import re
+from dataclasses import asdict
 from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
 
 from .. import __version__
+from ..disk.atomic_write import write_text
 from ..export import results, summary
 from ..export.surfaces import roughness
+from ..model import model
+from ..model.source import locate_errors
+from ..runs.patch import trace_split
+from ..scene import scene, toml_text
+from ..scene.files import require_files
 from ..surface.files import read
 from ..surface.roughness import form as forms
 from ..surface.roughness import report as roughness_report
@@ -18,7 +30,13 @@ from .shared import (
     out_option,
     parse_quantity,
     parse_units,
+    refuse_existing,
     text_option,
+)
+
+# tables [contact.profile] and [contact.asperities] of a scene, each up to the next table
+SPLIT_TABLES = re.compile(
+    r"^[ \t]*\[contact\.(?:profile|asperities)\].*?(?=^[ \t]*\[|\Z)", re.MULTILINE | re.DOTALL
 )
 
 
@@ -41,6 +59,13 @@ def profile(
         "positions, first the two in x, then the two in y"
     ) = "",
     units: Units = "",
+    split: Annotated[
+        Path | None,
+        Parameter(
+            help="scene with a patch, such as scene.toml: print the tables that divide FILE between its mesh and a layer "
+            "of asperities, at --cutoff or at the shortest wave that mesh and load resolve; -o names the new scene"
+        ),
+    ] = None,
     out: out_option(
         "folder for a page, a table of the parameters and the levelled heights, such as out/trace"
     ) = None,
@@ -57,6 +82,13 @@ def profile(
         options[key] = parse_quantity(text, "length", f"profile --{name}")
         if options[key] is not None and options[key] <= 0:
             raise UsageError(f"profile --{name} {text}: a length above zero is needed")
+    if split is not None:
+        if more or form != "1" or s_filter or window or units:
+            raise UsageError(
+                "profile --split: takes one FILE, without --form, --s-filter, --window and --units"
+            )
+        _print_split(file, split, options["cutoff"], out, json_=json_)
+        return
     options["form"] = forms.parse_form(form)
     reports = [
         roughness_report.make_report(read.read_surface(path, parse_units(units)), **options)
@@ -84,6 +116,33 @@ def profile(
         print(json.dumps(data, ensure_ascii=False, allow_nan=False))
     elif out is not None:
         print(f"results: {out}")
+
+
+def _print_split(
+    trace: Path, scene_path: Path, cutoff: float | None, out: Path | None, *, json_: bool
+):
+    """Print the tables that divide a trace between the mesh of a scene and a layer; write the new scene."""
+    target = scene_path if out is None else out
+    refuse_existing(out)
+    place = Path(os.path.relpath(trace, target.parent)).as_posix()
+    text = toml_text.read_text(scene_path)
+    given = require_files(scene.loads(text, target, [f"contact.profile.file={place}"]))
+    built = model.build(given)
+    if built.patch is None:
+        raise UsageError(f"profile --split: {scene_path} has no [contact]")
+    with locate_errors(given):
+        divided = trace_split.split_trace(built.patch, cutoff)
+    if out is not None:
+        kept = SPLIT_TABLES.sub("", text).rstrip()
+        text = f"{kept}\n\n{divided.tables}"
+        scene.loads(text, out)
+        write_text(out, text)
+    if json_:
+        print(json.dumps({"patchfem": __version__, "split": asdict(divided)}, ensure_ascii=False))
+        return
+    print(f"{trace}: {divided.describe()}")
+    if out is not None:
+        print(f"scene: {out}")
 
 
 def _window(text: str) -> tuple:

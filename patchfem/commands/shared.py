@@ -60,6 +60,12 @@ def choose_folder(out: Path | None, name: str) -> Path:
     return out if out is not None else Path("out") / name
 
 
+def refuse_existing(out: Path | None) -> None:
+    """Raise UsageError if the file to write exists."""
+    if out is not None and out.exists():
+        raise UsageError(f"{out}: already exists; choose another file with -o, or remove it")
+
+
 def parse_quantity(text: str, kind: str, option: str) -> float | None:
     """Return the value of an option as a quantity in SI; None if it is "".
 

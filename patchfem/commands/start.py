@@ -19,6 +19,7 @@ from .shared import (
     flag_option,
     out_option,
     print_message,
+    refuse_existing,
     text_option,
 )
 
@@ -58,23 +59,17 @@ def _write_scene(text: str, out: Path | None, description: list[str], verb: str)
     if out is None:
         print(text, end="")
         return
-    _refuse_existing(out)
+    refuse_existing(out)
     atomic_write.write_text(out, text)
     lines = "\n".join(description)
     print(f"{out}: {lines}\nnext: patchfem {verb} {out}")
-
-
-def _refuse_existing(out: Path | None) -> None:
-    """Raise UsageError if the file to write exists."""
-    if out is not None and out.exists():
-        raise UsageError(f"{out}: already exists; choose another file with -o, or remove it")
 
 
 def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
     """Write the scene of a joint for the answers to two questions; an answer that is "" is asked for."""
     if kind != "joint":
         raise UsageError("--ask, --know and --want are for a joint: patchfem new joint --ask")
-    _refuse_existing(out)
+    refuse_existing(out)
     known = known or _ask("--know", "What do you know about the joint?", joint_laws.KNOWLEDGE)
     wanted = wanted or _ask("--want", "What do you want to compute?", joint_laws.WISHES)
     choice = joint_laws.choose_law(known, wanted)

@@ -58,6 +58,7 @@ class Gap:
     - side: piece that carries the shapes, ``"upper"`` or ``"lower"``.
     - material: whether the heights of the profile are those of a surface, so that a peak closes the
       gap.
+    - file: name of the profile in the scene.
     """
 
     shapes: tuple
@@ -67,6 +68,7 @@ class Gap:
     is_rough: bool
     side: str
     material: bool = False
+    file: str = ""
 
     @property
     def angle(self) -> float:
@@ -181,6 +183,7 @@ def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable)
         is_rough=contact.asperities is not None,
         side=find_shape_side(contact),
         material=profile is not None and profile.heights == "surface",
+        file=profile.file if profile is not None else "",
     )
 
 

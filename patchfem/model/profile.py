@@ -9,7 +9,7 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 from ..surface.files.read import read_profile
-from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
+from ..surface.fine import ELEMENTS_PER_WAVE, UnresolvedTrace, describe_lost_waves, fine_fraction
 from ..surface.nodes import average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
@@ -74,19 +74,20 @@ def compute_profile_gap(
 
     Raises
     ------
+    UnresolvedTrace
+        If too much of the profile is finer than the limit.
     PatchfemError
-        If too much of the profile is finer than the limit, or the cut-off is longer than the
-        interface.
+        If the cut-off is longer than the interface.
     """
     average, limit = lengths
     resolution = average or cell
     if is_rough:
         resolution = min(average, cell)
-    trace, notes, is_straight = _level_profile(path, x, resolution, is_material=is_material)
+    trace, notes, is_straight = level_profile(path, x, resolution, is_material=is_material)
     if limit is not None and not is_straight:
         lost_waves = describe_lost_waves(trace, limit or float(np.diff(x).max()))
         if lost_waves is not None:
-            raise PatchfemError(lost_waves, "contact.profile.file")
+            raise UnresolvedTrace(lost_waves, "contact.profile.file")
     if is_rough:
         cutoff = ELEMENTS_PER_WAVE * average
         shape = _filter_waviness(trace, cutoff)
@@ -149,7 +150,7 @@ def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
     )
 
 
-def _level_profile(path: Path, x, cell: float, *, is_material: bool) -> _LevelledProfile:
+def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _LevelledProfile:
     """Level the profile in a file over the nodes x (m,) [m].
 
     Half a cell [m] may be missing at either end, and two cells in between.

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..effects import law_has_trait
 from ..formatting import format_number
 from ..response import rows
-from .patch import faces, ladder, press
+from .patch import faces, ladder, press, trace_split
 from .results import notes, patch_rows
 from .rig import costs, engines
 
@@ -123,6 +123,8 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
             )
             meshes = still[1:] or coarse
         warnings = [_format_warning(finding, static, _static_remedy(at_rest, static, meshes))]
+        if isinstance(finding.patch, press.Patch):
+            warnings += trace_split.advise_split(model.patch)
     if moving:
         warnings.append(_format_warning(finding, moving, _motion_remedy(finding, moving, coarse)))
     return warnings

@@ -37,6 +37,36 @@ class WaveSpectrum(NamedTuple):
         needed = np.flatnonzero(lost > (1 - kept) ** 2)
         return float(self.waves[needed[-1]]) / ELEMENTS_PER_WAVE
 
+    def shortest_resolved_wave(self, element: float, strain: float) -> float:
+        """Return the shortest wave [m] on which the contact is at least one element long.
+
+        The contact on a wave is that on a sine with the rms slope of this and all longer waves
+        (Westergaard 1939): the fraction 2/pi asin sqrt(p/p*) of a wave touches under the mean pressure
+        p, and p* = E* slope/sqrt(2) closes the wave.
+
+        Parameters
+        ----------
+        element : float [m]
+        strain : float
+            Mean pressure over combined modulus, p/E*.
+
+        Returns
+        -------
+        float
+            inf if no wave is resolved.
+        """
+        slope = np.sqrt(np.cumsum(self.power * (2 * np.pi / self.waves) ** 2))
+        ratio = np.divide(np.sqrt(2) * strain, slope, out=np.ones(slope.size), where=slope > 0)
+        touching = 2 / np.pi * np.arcsin(np.sqrt(np.minimum(ratio, 1.0)))
+        is_resolved = (self.waves * touching >= element) & (
+            self.waves >= ELEMENTS_PER_WAVE * element
+        )
+        return float(self.waves[is_resolved].min(initial=np.inf))
+
+
+class UnresolvedTrace(PatchfemError):
+    """Error of a trace with waves that are too short for the elements."""
+
 
 def wave_spectrum(profile: Profile) -> WaveSpectrum:
     """Compute the spectrum of a levelled trace by a discrete cosine transform.

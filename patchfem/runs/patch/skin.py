@@ -29,12 +29,18 @@ def make_skin_law(patch_model):
         if skin.normal_stiffness is not None:
             pressure = skin.normal_stiffness * skin.decay_length
         return asperity_laws.ExponentialAsperities(skin.decay_length, pressure)
+    return asperity_laws.HertzAsperities(
+        skin.radius, skin.density, skin.height_deviation, combined_modulus(patch_model)
+    )
+
+
+def combined_modulus(patch_model) -> float:
+    """Return the combined modulus E* [Pa] of the faces, 1/E* = sum of (1 - nu^2)/E."""
     faces = [
         piece.coating.material if piece.coating else piece.substrate
         for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
     ]
-    modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
-    return asperity_laws.HertzAsperities(skin.radius, skin.density, skin.height_deviation, modulus)
+    return 1 / sum((1 - face.poisson**2) / face.young for face in faces)
 
 
 def mean_layer_stiffness(patch_model, pressure: float) -> float:

@@ -1,0 +1,132 @@
+"""Split of a measured trace between the mesh and a layer of asperities.
+
+In: a `PatchModel` with a profile that its elements do not resolve. Out: the wavelength that divides
+the trace, and two tables of a scene. A wave is left to the mesh if the contact on it, by
+Westergaard's solution under the mean pressure, is at least one element long. Shorter waves become a
+layer with the stiffness of Persson's theory. Read `split_trace` first.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...formatting import format_length, format_quantity
+from ...model import profile
+from ...surface.fine import wave_spectrum
+from ...surface.roughness.peaks import PERSSON, trace_moments
+from .skin import combined_modulus
+
+KEY = "contact.profile.file"
+
+
+@dataclass(frozen=True)
+class TraceSplit:
+    """Wavelength that divides a trace, and the layer of its shorter waves.
+
+    - cutoff: wavelength [m]; longer waves belong to the gap.
+    - decay_length: of the layer [m].
+    - closing_pressure: mean pressure [Pa] that presses the shorter waves flat.
+    - element: length of the elements [m] along the interface.
+    - pressure: mean pressure of the load [Pa].
+    - tables: text of the tables [contact.profile] and [contact.asperities].
+    """
+
+    cutoff: float
+    decay_length: float
+    closing_pressure: float
+    element: float
+    pressure: float
+    tables: str
+
+    def describe(self) -> str:
+        """Describe the split, what it can compute, and its tables in a text of several lines."""
+        cutoff = format_length(self.cutoff)
+        table_lines = self.tables.replace("\n", "\n    ").rstrip()
+        return (
+            f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; "
+            f"under {format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
+            f"({format_length(self.element, 3)}). Use the stiffnesses of the split; its pressure is a mean over the short "
+            "waves, and its contact_fraction counts where the layer carries, not where peaks touch. The layer is too soft "
+            f"where the pressure approaches {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves "
+            "flat. The change at twice the cutoff shows the error of the split (`patchfem profile TRACE --split SCENE -o "
+            f"NEW_SCENE` writes the scene, for any --cutoff). Tables:\n    {table_lines}"
+        )
+
+
+def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
+    """Split the trace of a `PatchModel`, by default where its elements cease to resolve the contact.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    cutoff : float, optional
+        Wavelength [m] that divides the trace.
+
+    Returns
+    -------
+    TraceSplit
+
+    Raises
+    ------
+    PatchfemError
+        If the scene has no such trace, or no wavelength divides it.
+    """
+    loading = patch_model.loading
+    gap = patch_model.gap
+    interface = patch_model.interface
+    if gap.profile is None or gap.is_rough or loading.load is None or interface.strips is not None:
+        raise PatchfemError(
+            "a split needs [contact.profile] and contact.load, without [contact.asperities] and [contact.strips]",
+            KEY,
+        )
+    pieces = patch_model.pieces
+    element = patch_model.uniform_element_size
+    ends = np.array([-0.5, 0.5]) * pieces.length
+    trace = profile.level_profile(gap.profile, ends, element, is_material=False).profile
+    pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
+    modulus = combined_modulus(patch_model)
+    if cutoff is None:
+        spectrum = wave_spectrum(trace)
+        cutoff = float(f"{spectrum.shortest_resolved_wave(element, pressure / modulus):.3g}")
+    if not cutoff < trace.length:
+        raise PatchfemError(
+            f"{trace.source}: under this load the contact on every wave is shorter than an element of "
+            f"{format_length(element, 3)}; reduce contact.element_size",
+            KEY,
+        )
+    waves = trace_moments(trace, cutoff).fine
+    # Westergaard: a sine of this rms slope closes completely
+    closing_pressure = modulus * waves.slope / sqrt(2)
+    if closing_pressure <= pressure:
+        raise PatchfemError(
+            f"{trace.source}: the mean pressure presses all waves shorter than {format_length(cutoff)} flat, so that no "
+            "layer represents them; reduce contact.element_size",
+            KEY,
+        )
+    decay_length = sum(PERSSON) / 2 * waves.height
+    tables = [
+        "[contact.profile]",
+        f'file = "{gap.file}"',
+        f'heights = "{"surface" if gap.material else "gap"}"',
+        *(['on = "lower"'] if gap.side == "lower" else []),
+        "[contact.asperities]",
+        'law = "exponential"',
+        f'decay_length = "{format_length(decay_length)}"',
+        f'cutoff = "{format_length(cutoff)}"',
+    ]
+    if interface.has_shear:
+        # ridges of like half planes are as stiff along x as across
+        tables.append("tangential_ratio = 1.0")
+    return TraceSplit(
+        cutoff, decay_length, closing_pressure, element, pressure, "\n".join(tables) + "\n"
+    )
+
+
+def advise_split(patch_model) -> list[str]:
+    """Return the advice to split the trace of a patch, as a list; [] if it cannot be split."""
+    try:
+        return [split_trace(patch_model).describe()]
+    except PatchfemError:
+        return []

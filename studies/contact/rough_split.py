@@ -1,0 +1,293 @@
+"""What does a rough contact lose if its short waves become a layer of asperities?
+
+Recipe, fixed before the numbers were computed. The traces of seeds 0 to 19 are self-affine, 12.7 mm long, with 800
+steps and no wave below 318 um, so that `patchfem run` resolves them. The load is random, 0.3 to 10 % of the pressure
+E* times slope. Each trace is pressed unsplit, split where `patchfem profile --split` splits it for an even mesh of 200
+elements, and by `own_patch`, which shares no code with patchfem. Tamaas presses one period of the same trace, and of
+its short waves alone.
+
+Measures of both kinds of model: the normal stiffness; and, at the scale of the split, the peak of the pressure averaged
+over the cut-off with the weights of the Gaussian filter, and the fraction of the length that carries nine tenths of the
+load after this average. The contact fraction and peak pressure as reported are printed beside them. The error of a
+split is that of its mesh plus the change at twice the cut-off plus half the change over the range of Persson's factor
+(0.4 to 0.5). Split and unsplit agree if they differ by at most the sum of their errors; the errors of averaged pressures
+are relative, those of `pressure_peak` as reported.
+
+Run: python studies/contact/rough_split.py [--seeds 20]; with Tamaas: PATCHFEM_TAMAAS_PYTHON=INTERPRETER
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
+import own_patch
+from peer import Peer, run
+from synthetic import self_affine
+
+import patchfem as pf
+from patchfem.core import Missing
+from patchfem.runs.patch.trace_split import split_trace
+
+LENGTH, HEIGHT = 12.7e-3, 6.35e-3  # m
+YOUNG, POISSON = 206e9, 0.3  # Pa, 1
+MODULUS = YOUNG / (1 - POISSON**2) / 2  # Pa
+STEPS = 800  # of a trace
+SHORTEST = LENGTH / 40  # m
+N_SEEDS = 20
+ELEMENTS = (100, 200, 400)  # of the even meshes
+CARRIED = 0.9  # fraction of the load
+MEASURES = ("stiffness", "mean peak", "bearing length")
+SCENE = f"""
+[contact]
+length = "12.7 mm"
+width = "1 m"
+height = "6.35 mm"
+load = "{{load!r}} N"
+substrate = {{{{young = "{YOUNG!r} Pa", poisson = {POISSON}, density = "7800 kg/m^3"}}}}
+{{size}}
+[contact.profile]
+file = "{{file}}"
+heights = "surface"
+"""
+LAYER = """
+[contact.asperities]
+law = "exponential"
+decay_length = "{decay!r} m"
+cutoff = "{cutoff!r} m"
+"""
+
+
+class Trace(NamedTuple):
+    """Positions (n,) [m] and heights (n,) [m] of a trace, and a load [N] per metre of width."""
+
+    x: np.ndarray
+    z: np.ndarray
+    load: float
+
+
+class Answer(NamedTuple):
+    """Values of MEASURES with their errors, and contact fraction and peak pressure as reported."""
+
+    values: np.ndarray
+    errors: np.ndarray
+    fraction: float
+    peak: float
+
+
+def draw_trace(seed: int) -> Trace:
+    """Return the trace of a seed with its load."""
+    draw = np.random.default_rng(seed)
+    profile = self_affine(
+        LENGTH,
+        STEPS,
+        rms=10 ** draw.uniform(-6.7, -6),
+        hurst=draw.uniform(0.5, 1),
+        longest=draw.uniform(0.2, 1) * LENGTH,
+        shortest=SHORTEST,
+        seed=seed,
+    )
+    x = np.array(profile.x)
+    z = np.array(profile.z)
+    slope = np.sqrt(np.mean(np.gradient(z, x) ** 2))
+    load = 10 ** draw.uniform(-2.5, -1) * MODULUS * slope * LENGTH
+    return Trace(x, z, float(load))
+
+
+def average_pressure(x, pressure, cutoff: float) -> tuple:
+    """Return the peak [Pa] of the averaged pressure and the fraction of the length that carries CARRIED of the load.
+
+    The average over a cut-off [m] has Gaussian weights; nothing presses beyond the ends.
+    """
+    places = np.linspace(-LENGTH / 2, LENGTH / 2, 4001)
+    even = np.interp(places, x, pressure)
+    step = places[1] - places[0]
+    width = cutoff * np.sqrt(np.log(2) / np.pi)
+    offsets = np.arange(-np.ceil(1.25 * cutoff / step), np.ceil(1.25 * cutoff / step) + 1) * step
+    weights = np.exp(-np.pi * (offsets / width) ** 2)
+    mean = np.convolve(even, weights / weights.sum(), mode="same")
+    carried = np.cumsum(np.sort(mean)[::-1]) / mean.sum()
+    return float(mean.max()), float(np.searchsorted(carried, CARRIED) / mean.size)
+
+
+def compute(text: str, cutoff: float) -> Answer:
+    """Run a scene of patchfem."""
+    result = pf.run(text)
+    measures = result.measures
+    x = result.patch.x
+    peak, bearing = average_pressure(x, result.patch.normal_stress, cutoff)
+    stiffness = measures["normal_stiffness"]
+    ratio = measures["pressure_peak"].error / measures["pressure_peak"].value
+    return Answer(
+        np.array([stiffness.value, peak, bearing]),
+        np.array([stiffness.error, ratio * peak, ratio * bearing]),
+        measures["contact_fraction"].value,
+        measures["pressure_peak"].value,
+    )
+
+
+def compute_split(text: str, cutoff: float, decay: float, decay_at_twice: float) -> Answer:
+    """Run the scene of a split, with the errors of its model."""
+
+    def press(divided: float, length: float) -> Answer:
+        return compute(text + LAYER.format(decay=length, cutoff=divided), cutoff)
+
+    answer = press(cutoff, decay)
+    twice = press(2 * cutoff, decay_at_twice)
+    soft, stiff = (press(cutoff, decay * factor / 0.45).values for factor in (0.5, 0.4))
+    errors = answer.errors + np.abs(twice.values - answer.values) + np.abs(soft - stiff) / 2
+    return answer._replace(errors=errors)
+
+
+def press_own(trace: Trace, matrices: list, cutoff: float) -> Answer:
+    """Press a trace by the other program, on its samples and on every second one."""
+    answers = []
+    for matrix, every in matrices:
+        x = trace.x[::every]
+        areas = np.full(x.size, x[1] - x[0])
+        areas[[0, -1]] /= 2
+        solution = own_patch.press(matrix, -trace.z[::every], areas, trace.load)
+        values = [solution.stiffness, *average_pressure(x, solution.pressure, cutoff)]
+        answers.append((np.array(values), solution))
+    (fine, solution), (coarse, _) = answers
+    return Answer(fine, np.abs(fine - coarse), solution.fraction, float(solution.pressure.max()))
+
+
+def ask_tamaas(peer: Peer, trace: Trace, cutoff: float) -> tuple:
+    """Return the answers of Tamaas for one period of a trace and of its short waves."""
+    heights = trace.z[:-1]
+    waves = np.fft.rfftfreq(STEPS, LENGTH / STEPS)
+    kept = 1 - 2.0 ** -((cutoff * waves) ** 2)
+    short = np.fft.irfft(kept * np.fft.rfft(heights), STEPS)
+    # a rigid flat face and a half plane with the combined modulus of both pieces
+    request = {"length": LENGTH, "material": [MODULUS, 0.0], "pressure": trace.load / LENGTH}
+    fine = np.linspace(0, STEPS, 8 * STEPS, endpoint=False)
+    both = []
+    for z in (heights, short):
+        # eight times the points, by the Fourier series of the samples
+        refined = np.fft.irfft(np.fft.rfft(z), fine.size) * fine.size / STEPS
+        both.append(peer.ask(heights=(refined - refined.mean()).tolist(), **request))
+    return (*both, float(short.std()))
+
+
+def compare(seed: int, folder: Path, matrices: list, peer: Peer | None) -> dict:
+    """Return the answers of all programs for the trace of a seed."""
+    trace = draw_trace(seed)
+    file = folder / f"trace_{seed}.csv"
+    np.savetxt(file, np.c_[trace.x, trace.z], delimiter=",", header="x [m],z [m]", comments="")
+
+    def write(elements: int | None) -> str:
+        size = f'element_size = "{LENGTH / elements!r} m"' if elements else ""
+        return SCENE.format(load=trace.load, size=size, file=file)
+
+    patch = pf.build(write(None)).patch
+    split = split_trace(patch)
+    cutoff = split.cutoff
+    twice = split_trace(patch, 2 * cutoff)
+    out = {"cutoff": cutoff, "unsplit": compute(write(None), cutoff)}
+    out["split"] = compute_split(write(None), cutoff, split.decay_length, twice.decay_length)
+    out["own"] = press_own(trace, matrices, cutoff)
+    layer = LAYER.format(decay=split.decay_length, cutoff=cutoff)
+    out["meshes"] = []
+    for elements in ELEMENTS:
+        unsplit = compute(write(elements), cutoff)
+        out["meshes"].append((unsplit, compute(write(elements) + layer, cutoff)))
+    if peer is not None:
+        whole, short, rms = ask_tamaas(peer, trace, cutoff)
+        law = trace.load / LENGTH / split.decay_length
+        out["tamaas"] = (whole["fraction"], whole["peak"], short["stiffness"] / law, rms)
+    return out
+
+
+def is_within(first: Answer, second: Answer) -> np.ndarray:
+    """Return whether the values of two answers differ by at most the sum of their errors."""
+    return np.abs(first.values - second.values) <= first.errors + second.errors
+
+
+def print_trace(seed: int, answers: dict) -> None:
+    """Print the answers for a trace."""
+    print(f"trace {seed}, cut-off {1e6 * answers['cutoff']:.0f} um")
+    for name in ("unsplit", "own", "split"):
+        answer = answers[name]
+        print(
+            f"  {name:8}"
+            + "".join(
+                f" {value:11.4g} ± {error:8.2g}"
+                for value, error in zip(answer.values, answer.errors)
+            )
+            + f"  fraction {answer.fraction:.4f}  peak {answer.peak / 1e6:.1f} MPa"
+        )
+    if "tamaas" in answers:
+        fraction, peak, ratio, _ = answers["tamaas"]
+        print(
+            f"  Tamaas, periodic: fraction {fraction:.4f}, peak {peak / 1e6:.1f} MPa; stiffness of the short waves over "
+            f"that of the layer {ratio:.2f}",
+            flush=True,
+        )
+
+
+def print_summary(found: list) -> None:
+    """Print how many traces agree, and the median differences."""
+    for one, other in (("split", "unsplit"), ("split", "own"), ("unsplit", "own")):
+        within = np.sum([is_within(answers[one], answers[other]) for answers in found], axis=0)
+        ratios = np.array([answers[one].values / answers[other].values - 1 for answers in found])
+        print(f"{one} against {other}, {len(found)} traces:")
+        for k, name in enumerate(MEASURES):
+            middle = np.median(np.abs(ratios[:, k]))
+            worst = np.abs(ratios[:, k]).max()
+            print(
+                f"  {name:15} {within[k]} within errors; difference: median {100 * middle:.2g} %, largest "
+                f"{100 * worst:.2g} %, mean {100 * ratios[:, k].mean():+.2g} %"
+            )
+    for k, elements in enumerate(ELEMENTS):
+        for m, name in enumerate(("unsplit", "split")):
+            answers = [one["meshes"][k][m] for one in found]
+            references = [one["unsplit"].values for one in found]
+            errors = np.array([a.values / b - 1 for a, b in zip(answers, references)])
+            stated = np.array([answer.errors[0] / answer.values[0] for answer in answers])
+            print(
+                f"{elements} elements, {name:7}: difference from the resolved trace, median: "
+                + ", ".join(
+                    f"{name} {100 * value:.2g} %"
+                    for name, value in zip(MEASURES, np.median(np.abs(errors), axis=0))
+                )
+                + f"; stated error of the stiffness {100 * np.median(stated):.2g} %"
+            )
+
+
+def main() -> list:
+    """Compare all traces and print the answers."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=N_SEEDS)
+    options = parser.parse_args()
+    matrices = [
+        (own_patch.compliance(LENGTH, HEIGHT, STEPS // every, YOUNG, POISSON), every)
+        for every in (1, 2)
+    ]
+    found = []
+    peer = None
+    try:
+        peer = Peer(
+            "Tamaas",
+            "contact/tamaas_child.py",
+            "PATCHFEM_TAMAAS_PYTHON",
+            sys.executable,
+            "pip install tamaas",
+        )
+    except Missing as error:
+        print(error)
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(options.seeds):
+            found.append(compare(seed, Path(folder), matrices, peer))
+            print_trace(seed, found[-1])
+    print_summary(found)
+    return found
+
+
+if __name__ == "__main__":
+    raise SystemExit(run(main))
