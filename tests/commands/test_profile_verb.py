@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from command_line import ALWAYS, FROM_SHELL, cli, loaded
 
+import patchfem as pf
+from patchfem.closed_forms import contact as closed_forms
 from patchfem.export.results import FILES
 from patchfem.surface import make_report, read_surface
 
@@ -221,3 +223,106 @@ def test_exact_the_flatness_of_the_brake_reuss_beam():
     )
     assert sorted(answer["shape"]) == [54, 246]
     assert "596 of 13284 heights are missing" in answer["notes"][-1]
+
+
+SPLIT_SCENE = """\
+# two waves
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "2 kN"
+substrate = "steel"
+element_size = "63.5 um"  # even
+[contact.shear]
+[contact.profile] # measured
+file = "waves.csv"
+heights = "surface"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "triangle"
+amplitude = "1 um"
+speed = "1 mm/s"
+cycles = 1
+"""
+LONG, SHORT = 1.27e-3, 12.7e-3 / 130  # m; the mesh resolves contact on the first only
+HIGH, LOW = 0.5e-6, 0.1e-6  # m, their amplitudes
+
+
+@pytest.fixture
+def split_scene(tmp_path, monkeypatch) -> Path:
+    """A scene with a trace of two waves, in the working folder."""
+    x = np.linspace(0, 12.7e-3, 6501)
+    z = HIGH * np.cos(2 * np.pi * x / LONG) + LOW * np.cos(2 * np.pi * x / SHORT)
+    rows = "".join(f"{a!r},{b!r}\n" for a, b in zip(x.tolist(), z.tolist()))
+    (tmp_path / "waves.csv").write_text(f"x [m],z [m]\n{rows}", "utf-8")
+    (tmp_path / "scene.toml").write_text(SPLIT_SCENE, "utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "scene.toml"
+
+
+def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
+    """Truth: Persson's 0.45 times the rms height of the short wave; Westergaard's pressure that closes it."""
+    split = json.loads(
+        cli("profile", "waves.csv", "--split", split_scene, "--cutoff", "400 um", "--json").out
+    )["split"]
+    young, poisson = pf.load(split_scene).contact.substrate.young, 0.3
+    modulus = closed_forms.combined_modulus(young, pf.load(split_scene).contact.substrate.poisson)
+    closing = closed_forms.westergaard_full_pressure(SHORT, LOW, modulus)
+    assert poisson and split["cutoff"] == pytest.approx(400e-6)
+    assert split["decay_length"] == pytest.approx(0.45 * LOW / np.sqrt(2), rel=0.01)
+    assert split["closing_pressure"] == pytest.approx(closing, rel=0.02)
+    assert split["pressure"] == pytest.approx(2e3 / 12.7e-3**2)
+
+
+def test_the_split_scene_keeps_the_rest_of_the_text_and_runs(split_scene):
+    answer = cli("profile", "waves.csv", "--split", "scene.toml", "-o", "split.toml")
+    assert answer.code == 0 and answer.err == ""
+    assert "split the trace: waves longer than " in answer.out
+    text = Path("split.toml").read_text("utf-8")
+    for line in SPLIT_SCENE.split("[contact.profile]")[0].splitlines():
+        assert line in text
+    assert text.index("[slide]") < text.index("[contact.profile]")
+    tables = text[text.index("[contact.profile]") :]
+    assert all(f"    {line}" in answer.out.splitlines() for line in tables.splitlines())
+    contact = pf.load("split.toml").contact
+    assert SHORT < contact.asperities.cutoff < LONG
+    assert contact.asperities.tangential_ratio == 1.0 and contact.profile.heights == "surface"
+    assert cli("run", "split.toml", "--no-page").code == 0
+    # the name of the trace is relative to the new scene
+    Path("other").mkdir()
+    assert cli("profile", "waves.csv", "--split", "scene.toml", "-o", "other/split.toml").code == 0
+    assert pf.load("other/split.toml").contact.profile.file == "../waves.csv"
+
+
+def test_refuses_a_split_that_cannot_be(split_scene):
+    point = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
+    slide = SPLIT_SCENE[SPLIT_SCENE.index("[slide]") :]
+    Path("point.toml").write_text(point + slide, "utf-8")
+    skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
+    Path("skin.toml").write_text(SPLIT_SCENE + skin, "utf-8")
+    for words, said in (
+        (("scene.toml", "-o", "scene.toml"), "already exists"),
+        (("point.toml",), "contact"),
+        (("skin.toml",), "without [contact.asperities]"),
+        (("scene.toml", "--form", "2"), "--form"),
+        (("scene.toml", "--set", "contact.load=1 N"), "--set"),
+        (("scene.toml", "--cutoff", "50 mm"), "reduce contact.element_size"),
+    ):
+        answer = cli("profile", "waves.csv", "--split", *words)
+        assert answer.code == 2 and said in answer.err, words
+    assert Path("scene.toml").read_text("utf-8") == SPLIT_SCENE
+
+
+def test_run_refuses_or_warns_of_such_a_trace_with_both_tables(split_scene):
+    """A refusal of coarse elements and a warning of errors above the tolerance both print them, ready to paste."""
+    static = SPLIT_SCENE[: SPLIT_SCENE.index("[friction]")].replace("[contact.shear]\n", "")
+    tables = ["    [contact.profile]", "    [contact.asperities]", '    law = "exponential"']
+    for size, code in (("635 um", 2), ("63.5 um", 0)):
+        split_scene.write_text(static.replace("63.5 um", size), "utf-8")
+        answer = cli("run", "scene.toml", "--no-page")
+        lines = answer.err.splitlines()
+        assert answer.code == code and set(tables) <= set(lines), size
+        assert sum("split the trace: waves longer than" in line for line in lines) == 1

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import self_affine, sine, waves
 
+from patchfem.closed_forms.contact import westergaard_full_pressure, westergaard_half_width
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, describe_lost_waves, fine_fraction, level
 from patchfem.surface.fine import wave_spectrum
@@ -88,3 +89,25 @@ def test_refuses_missing_heights_and_no_share():
     with pytest.raises(PatchfemError, match="must lie between 0 and 1, but is 1"):
         wave_spectrum(sine(X, 1.0, LENGTH)).element_length(1.0)
     assert wave_spectrum(Profile(X, 0 * X, "a")).element_length(0.9) == np.inf
+
+
+@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
+def test_exact_a_wave_is_resolved_if_its_contact_spans_an_element(share):
+    """Truth: Westergaard's contact of one sine. Waves longer than it have no height and touch everywhere."""
+    amplitude = 1e-6
+    wavelength = 2 * LENGTH / 40
+    spectrum = wave_spectrum(cosines([40], [amplitude]))
+    closing = westergaard_full_pressure(wavelength, amplitude, 1.0)
+    width = 2 * float(westergaard_half_width(share * closing, wavelength, amplitude, 1.0))
+    largest = min(width, wavelength / 2)
+    assert spectrum.shortest_resolved_wave(0.99 * largest, share * closing) == pytest.approx(
+        wavelength
+    )
+    assert spectrum.shortest_resolved_wave(1.01 * largest, share * closing) > wavelength
+
+
+def test_exact_under_full_contact_two_elements_resolve_a_wave_and_no_load_resolves_none():
+    spectrum = wave_spectrum(cosines([2, 40, 300], [1e-6, 1e-6, 1e-6]))
+    assert spectrum.shortest_resolved_wave(LENGTH / 300.01, 1.0) == pytest.approx(LENGTH / 150)
+    assert spectrum.shortest_resolved_wave(LENGTH / 299.99, 1.0) == pytest.approx(2 * LENGTH / 299)
+    assert spectrum.shortest_resolved_wave(1e-5, 1e-12) == np.inf

@@ -50,7 +50,7 @@ class TraceSplit:
             f"({format_length(self.element, 3)}). Use the stiffnesses of the split; its pressure is a mean over the short "
             "waves, and its contact_fraction counts where the layer carries, not where peaks touch. The layer is too soft "
             f"where the pressure approaches {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves "
-            "flat. The change at twice the cutoff shows the error of the split (`patchfem profile TRACE --split SCENE -o "
+            "flat. The changes at twice the cutoff and at a hundredth of the decay_length show the error of the split (`patchfem profile TRACE --split SCENE -o "
             f"NEW_SCENE` writes the scene, for any --cutoff). Tables:\n    {table_lines}"
         )
 
