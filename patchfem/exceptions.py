@@ -22,6 +22,10 @@ class PatchfemError(Exception):
         self.key = key
 
 
+class UnresolvedTrace(PatchfemError):
+    """Error of a trace with waves that are too short for the elements."""
+
+
 class NotConverged(PatchfemError):
     """Error of a numerical method that misses its residual, also with every fallback.
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
+from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
 from ..surface.files.read import read_profile
-from ..surface.fine import ELEMENTS_PER_WAVE, UnresolvedTrace, describe_lost_waves, fine_fraction
+from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
 from ..surface.nodes import average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
@@ -151,9 +152,21 @@ def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
 
 
 def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _LevelledProfile:
-    """Level the profile in a file over the nodes x (m,) [m].
+    """Level the profile in a file over the nodes of an interface.
 
-    Half a cell [m] may be missing at either end, and two cells in between.
+    Parameters
+    ----------
+    path : Path
+    x : (m,) ndarray
+        Coordinates of the nodes [m].
+    cell : float
+        Length [m]; half of it may be missing at either end, and twice of it in between.
+    is_material : bool
+        Whether the heights are those of a surface.
+
+    Returns
+    -------
+    _LevelledProfile
     """
     length = float(x[-1] - x[0])
     nodes = np.linspace(x[0], x[-1], max(1, round(length / cell)) + 1)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ..effects import law_has_trait
 from ..formatting import format_number
 from ..response import rows
-from .patch import faces, ladder, press, trace_split
+from .patch import faces, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
@@ -123,7 +123,9 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
             )
             meshes = still[1:] or coarse
         warnings = [_format_warning(finding, static, _static_remedy(at_rest, static, meshes))]
-        if isinstance(finding.patch, press.Patch):
+        if isinstance(finding.patch, press.Patch) and model.patch.gap.profile is not None:
+            from .patch import trace_split
+
             warnings += trace_split.advise_split(model.patch)
     if moving:
         warnings.append(_format_warning(finding, moving, _motion_remedy(finding, moving, coarse)))

@@ -64,10 +64,6 @@ class WaveSpectrum(NamedTuple):
         return float(self.waves[is_resolved].min(initial=np.inf))
 
 
-class UnresolvedTrace(PatchfemError):
-    """Error of a trace with waves that are too short for the elements."""
-
-
 def wave_spectrum(profile: Profile) -> WaveSpectrum:
     """Compute the spectrum of a levelled trace by a discrete cosine transform.
 

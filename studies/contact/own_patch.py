@@ -22,7 +22,7 @@ class OwnContact(NamedTuple):
     stiffness: float
 
 
-def element_stiffness(dx: float, dy: float, young: float, poisson: float) -> np.ndarray:
+def _element_stiffness(dx: float, dy: float, young: float, poisson: float) -> np.ndarray:
     """Return the stiffness (8, 8) of a bilinear rectangle in plane strain, for unit width."""
     factor = young / ((1 + poisson) * (1 - 2 * poisson))
     law = factor * np.array(
@@ -44,7 +44,22 @@ def element_stiffness(dx: float, dy: float, young: float, poisson: float) -> np.
 
 
 def compliance(length: float, height: float, columns: int, young: float, poisson: float):
-    """Return the normal compliance (m, m) [m2/N] of the interface nodes of one piece, for unit width."""
+    """Compute the normal compliance of the interface nodes of one piece, for unit width.
+
+    Parameters
+    ----------
+    length, height : float
+        Of the piece [m].
+    columns : int
+        Number of elements along the interface.
+    young, poisson : float
+        Young's modulus [Pa] and Poisson's ratio.
+
+    Returns
+    -------
+    (m, m) ndarray
+        [m2/N]
+    """
     dx = length / columns
     rows = [dx]
     while sum(rows) < height:
@@ -55,13 +70,12 @@ def compliance(length: float, height: float, columns: int, young: float, poisson
     banded = np.zeros((band, 2 * depth * (columns + 1)))
     column = np.arange(columns)
     for row, dy in enumerate(rows):
-        matrix = element_stiffness(dx, dy, young, poisson)
+        matrix = _element_stiffness(dx, dy, young, poisson)
         corners = [(0, row), (1, row), (1, row + 1), (0, row + 1)]
-        places = [
-            (2 * ((column + side) * depth + level) + axis, level < depth)
-            for side, level in corners
-            for axis in range(2)
-        ]
+        places = []
+        for side, level in corners:
+            first = 2 * ((column + side) * depth + level)
+            places += [(first, level < depth), (first + 1, level < depth)]
         for i, (first, is_free) in enumerate(places):
             for k, (second, is_other_free) in enumerate(places):
                 if is_free and is_other_free and first[0] >= second[0]:
@@ -78,7 +92,21 @@ def compliance(length: float, height: float, columns: int, young: float, poisson
 
 
 def press(matrix: np.ndarray, gap: np.ndarray, areas: np.ndarray, load: float) -> OwnContact:
-    """Press two pieces with the compliance `matrix` (m, m) each; load [N] per unit width."""
+    """Press two alike pieces together.
+
+    Parameters
+    ----------
+    matrix : (m, m) ndarray
+        Compliance of each piece [m2/N].
+    gap, areas : (m,) ndarray
+        Gap [m] and length [m] of each node.
+    load : float
+        Load [N/m].
+
+    Returns
+    -------
+    OwnContact
+    """
     both = 2 * matrix
     force = load * areas / areas.sum()
     direction = np.zeros(gap.size)

@@ -38,14 +38,15 @@ from patchfem.core import Missing
 from patchfem.runs.patch.trace_split import split_trace
 from patchfem.surface import level
 
-LENGTH, HEIGHT = 12.7e-3, 6.35e-3  # m
-YOUNG, POISSON = 206e9, 0.3  # Pa, 1
+LENGTH = 12.7e-3  # m
+HEIGHT = 6.35e-3  # m
+YOUNG = 206e9  # Pa
+POISSON = 0.3
 MODULUS = YOUNG / (1 - POISSON**2) / 2  # Pa
-STEPS = 800  # of a trace
+STEPS = 800  # number of steps of a trace
 SHORTEST = LENGTH / 40  # m
-N_SEEDS = 20
-ELEMENTS = (100, 200, 400)  # of the even meshes
-CARRIED = 0.9  # fraction of the load
+ELEMENTS = (100, 200, 400)  # numbers of elements of the even meshes
+LOAD_FRACTION = 0.9  # the bearing length carries this fraction of the load
 MEASURES = ("stiffness", "mean peak", "bearing length")
 SCENE = f"""
 [contact]
@@ -109,8 +110,8 @@ def draw_trace(seed: int) -> Trace:
     return Trace(x, z, np.array(profile.z)[:-1], float(load))
 
 
-def average_pressure(x, pressure, cutoff: float) -> tuple:
-    """Return the peak [Pa] of the averaged pressure and the fraction of the length that carries CARRIED of the load.
+def _average_pressure(x, pressure, cutoff: float) -> tuple:
+    """Return the peak [Pa] of the averaged pressure and the fraction of the length that carries LOAD_FRACTION of the load.
 
     The average over a cut-off [m] has Gaussian weights; nothing presses beyond the ends.
     """
@@ -122,7 +123,7 @@ def average_pressure(x, pressure, cutoff: float) -> tuple:
     weights = np.exp(-np.pi * (offsets / width) ** 2)
     mean = np.convolve(even, weights / weights.sum(), mode="same")
     carried = np.cumsum(np.sort(mean)[::-1]) / mean.sum()
-    return float(mean.max()), float(np.searchsorted(carried, CARRIED) / mean.size)
+    return float(mean.max()), float(np.searchsorted(carried, LOAD_FRACTION) / mean.size)
 
 
 def compute(text: str, cutoff: float) -> Answer:
@@ -130,7 +131,7 @@ def compute(text: str, cutoff: float) -> Answer:
     result = pf.run(text)
     measures = result.measures
     x = result.patch.x
-    peak, bearing = average_pressure(x, result.patch.normal_stress, cutoff)
+    peak, bearing = _average_pressure(x, result.patch.normal_stress, cutoff)
     stiffness = measures["normal_stiffness"]
     ratio = measures["pressure_peak"].error / measures["pressure_peak"].value
     return Answer(
@@ -141,7 +142,7 @@ def compute(text: str, cutoff: float) -> Answer:
     )
 
 
-def compute_split(text: str, cutoff: float, decay: float, decay_at_twice: float) -> Answer:
+def _compute_split(text: str, cutoff: float, decay: float, decay_at_twice: float) -> Answer:
     """Run the scene of a split, with the errors of its model."""
 
     def press(divided: float, length: float) -> Answer:
@@ -156,7 +157,7 @@ def compute_split(text: str, cutoff: float, decay: float, decay_at_twice: float)
     return answer._replace(errors=errors)
 
 
-def press_own(trace: Trace, matrices: list, cutoff: float) -> Answer:
+def _press_own(trace: Trace, matrices: list, cutoff: float) -> Answer:
     """Press a trace by the other program, on its samples and on every second one."""
     answers = []
     for matrix, every in matrices:
@@ -164,7 +165,7 @@ def press_own(trace: Trace, matrices: list, cutoff: float) -> Answer:
         areas = np.full(x.size, x[1] - x[0])
         areas[[0, -1]] /= 2
         solution = own_patch.press(matrix, -trace.z[::every], areas, trace.load)
-        values = [solution.stiffness, *average_pressure(x, solution.pressure, cutoff)]
+        values = [solution.stiffness, *_average_pressure(x, solution.pressure, cutoff)]
         answers.append((np.array(values), solution))
     (fine, solution), (coarse, _) = answers
     return Answer(fine, np.abs(fine - coarse), solution.fraction, float(solution.pressure.max()))
@@ -195,7 +196,21 @@ def ask_tamaas(trace: Trace, cutoff: float) -> list:
 
 
 def compare(seed: int, folder: Path, matrices: list) -> dict:
-    """Return the answers of all programs for the trace of a seed."""
+    """Press the trace of a seed by all programs.
+
+    Parameters
+    ----------
+    seed : int
+    folder : Path
+        Folder for the file of the trace.
+    matrices : list
+        Compliances for `own_patch`, each with the number of samples between its nodes.
+
+    Returns
+    -------
+    dict
+        Answers by name.
+    """
     trace = draw_trace(seed)
     file = folder / f"trace_{seed}.csv"
     np.savetxt(file, np.c_[trace.x, trace.z], delimiter=",", header="x [m],z [m]", comments="")
@@ -209,8 +224,8 @@ def compare(seed: int, folder: Path, matrices: list) -> dict:
     cutoff = split.cutoff
     twice = split_trace(patch, 2 * cutoff)
     out = {"cutoff": cutoff, "unsplit": compute(write(None), cutoff)}
-    out["split"] = compute_split(write(None), cutoff, split.decay_length, twice.decay_length)
-    out["own"] = press_own(trace, matrices, cutoff)
+    out["split"] = _compute_split(write(None), cutoff, split.decay_length, twice.decay_length)
+    out["own"] = _press_own(trace, matrices, cutoff)
     layer = LAYER.format(decay=split.decay_length, cutoff=cutoff)
     out["meshes"] = []
     for elements in ELEMENTS:
@@ -235,14 +250,10 @@ def print_trace(seed: int, answers: dict) -> None:
     print(f"trace {seed}, cut-off {1e6 * answers['cutoff']:.0f} um")
     for name in ("unsplit", "own", "split"):
         answer = answers[name]
-        print(
-            f"  {name:8}"
-            + "".join(
-                f" {value:11.4g} ± {error:8.2g}"
-                for value, error in zip(answer.values, answer.errors)
-            )
-            + f"  fraction {answer.fraction:.4f}  peak {answer.peak / 1e6:.1f} MPa"
-        )
+        text = f"  {name:8}"
+        for value, error in zip(answer.values, answer.errors):
+            text += f" {value:11.4g} ± {error:8.2g}"
+        print(f"{text}  fraction {answer.fraction:.4f}  peak {answer.peak / 1e6:.1f} MPa")
     if "tamaas" in answers:
         fraction, peak, ratio = answers["tamaas"]
         print(
@@ -271,26 +282,22 @@ def print_summary(found: list) -> None:
             references = [one["unsplit"].values for one in found]
             errors = np.array([a.values / b - 1 for a, b in zip(answers, references)])
             stated = np.array([answer.errors[0] / answer.values[0] for answer in answers])
-            print(
-                f"{elements} elements, {name:7}: difference from the resolved trace, median: "
-                + ", ".join(
-                    f"{name} {100 * value:.2g} %"
-                    for name, value in zip(MEASURES, np.median(np.abs(errors), axis=0))
-                )
-                + f"; stated error of the stiffness {100 * np.median(stated):.2g} %"
-            )
+            text = f"{elements} elements, {name:7}: median difference from the resolved trace: "
+            for measure, value in zip(MEASURES, np.median(np.abs(errors), axis=0)):
+                text += f"{measure} {100 * value:.2g} %, "
+            print(f"{text}stated error of the stiffness {100 * np.median(stated):.2g} %")
 
 
 def main() -> list:
     """Compare all traces and print the answers."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=N_SEEDS)
+    parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
-    matrices = [
-        (own_patch.compliance(LENGTH, HEIGHT, STEPS // every, YOUNG, POISSON), every)
-        for every in (1, 2)
-    ]
+    matrices = []
+    for every in (1, 2):
+        matrix = own_patch.compliance(LENGTH, HEIGHT, STEPS // every, YOUNG, POISSON)
+        matrices.append((matrix, every))
     seeds = range(options.seeds)
     found = []
     with tempfile.TemporaryDirectory() as folder, ProcessPoolExecutor(options.jobs) as pool:

@@ -10,11 +10,11 @@ import sys
 
 import numpy as np
 
-TOLERANCE = 1e-8  # of the solver's own residual
+TOLERANCE = 1e-8  # the residual of the solver at which a solution is accepted
 PRESSURE_STEP = 0.02  # relative change of the mean pressure for the stiffness
 
 
-def press(tm, ask: dict, pressure: float) -> tuple:
+def _press(tm, ask: dict, pressure: float) -> tuple:
     """Return the tractions (n,) [Pa] and the distance [m] of the mean planes."""
     heights = np.array(ask["heights"])
     model = tm.Model(tm.model_type.basic_1d, [ask["length"]], [heights.size])
@@ -31,8 +31,8 @@ def press(tm, ask: dict, pressure: float) -> tuple:
 
 def answer(tm, ask: dict) -> dict:
     """Return contact fraction, peak pressure and stiffness of the interface."""
-    traction, distance = press(tm, ask, ask["pressure"])
-    _, closer = press(tm, ask, (1 + PRESSURE_STEP) * ask["pressure"])
+    traction, distance = _press(tm, ask, ask["pressure"])
+    _, closer = _press(tm, ask, (1 + PRESSURE_STEP) * ask["pressure"])
     return {
         "fraction": float((traction > 0).mean()),
         "peak": float(traction.max()),

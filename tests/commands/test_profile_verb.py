@@ -264,15 +264,17 @@ def split_scene(tmp_path, monkeypatch) -> Path:
 
 
 def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
-    """Truth: Persson's 0.45 times the rms height of the short wave; Westergaard's pressure that closes it."""
-    split = json.loads(
-        cli("profile", "waves.csv", "--split", split_scene, "--cutoff", "400 um", "--json").out
-    )["split"]
-    young, poisson = pf.load(split_scene).contact.substrate.young, 0.3
-    modulus = closed_forms.combined_modulus(young, pf.load(split_scene).contact.substrate.poisson)
-    closing = closed_forms.westergaard_full_pressure(SHORT, LOW, modulus)
-    assert poisson and split["cutoff"] == pytest.approx(400e-6)
-    assert split["decay_length"] == pytest.approx(0.45 * LOW / np.sqrt(2), rel=0.01)
+    """Truth: 0.45 times the rms height beyond the Gaussian filter; the pressure that closes a sine of this slope."""
+    words = ("profile", "waves.csv", "--split", split_scene, "--cutoff", "250 um", "--json")
+    split = json.loads(cli(*words).out)["split"]
+    waves = np.array([LONG, SHORT])
+    heights = np.array([HIGH, LOW]) * (1 - 2 ** -((250e-6 / waves) ** 2))
+    assert split["cutoff"] == pytest.approx(250e-6)
+    rms = np.hypot(*heights) / np.sqrt(2)
+    assert split["decay_length"] == pytest.approx(0.45 * rms, rel=0.01)
+    steel = pf.load(split_scene).contact.substrate
+    modulus = closed_forms.combined_modulus(steel.young, steel.poisson)
+    closing = closed_forms.westergaard_full_pressure(1.0, np.hypot(*(heights / waves)), modulus)
     assert split["closing_pressure"] == pytest.approx(closing, rel=0.02)
     assert split["pressure"] == pytest.approx(2e3 / 12.7e-3**2)
 
@@ -320,7 +322,7 @@ def test_run_refuses_or_warns_of_such_a_trace_with_both_tables(split_scene):
     """A refusal of coarse elements and a warning of errors above the tolerance both print them, ready to paste."""
     static = SPLIT_SCENE[: SPLIT_SCENE.index("[friction]")].replace("[contact.shear]\n", "")
     tables = ["    [contact.profile]", "    [contact.asperities]", '    law = "exponential"']
-    for size, code in (("635 um", 2), ("63.5 um", 0)):
+    for size, code in (("635 um", 2), ("40 um", 3)):
         split_scene.write_text(static.replace("63.5 um", size), "utf-8")
         answer = cli("run", "scene.toml", "--no-page")
         lines = answer.err.splitlines()

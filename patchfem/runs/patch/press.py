@@ -15,12 +15,11 @@ from ...contact import edges
 from ...contact.strip_compliance import WarmStart
 from ...contact.unilateral import press, press_to_approach
 from ...core import Compliance, ContactState, PatchfemError, frozen_array
-from ...surface.fine import UnresolvedTrace
+from ...exceptions import UnresolvedTrace
 from . import skin as skin_press
 from . import strips as strip_press
 from .approach import press_to_approach_with_rotation
 from .condensed import Pair, condense
-from .trace_split import advise_split
 
 # Smallest ripple of the pressure over its peak, on pieces with non-matching nodes, that a note
 # states.
@@ -232,6 +231,8 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
     try:
         heights, notes, seconds = patch_model.gap.evaluate(x)
     except UnresolvedTrace as error:
+        from .trace_split import advise_split
+
         advice = "".join(f"; or {text}" for text in advise_split(patch_model))
         raise PatchfemError(f"{error}{advice}", error.key) from None
     gap = heights + pair.rise if worn is None else heights + pair.rise + worn

@@ -45,13 +45,14 @@ class TraceSplit:
         cutoff = format_length(self.cutoff)
         table_lines = self.tables.replace("\n", "\n    ").rstrip()
         return (
-            f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; "
-            f"under {format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
-            f"({format_length(self.element, 3)}). Use the stiffnesses of the split; its pressure is a mean over the short "
+            f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; under "
+            f"{format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
+            f"({format_length(self.element, 3)}). Use the stiffnesses of the split. Its pressure is a mean over the short "
             "waves, and its contact_fraction counts where the layer carries, not where peaks touch. The layer is too soft "
-            f"where the pressure approaches {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves "
-            "flat. The changes at twice the cutoff and at a hundredth of the decay_length show the error of the split (`patchfem profile TRACE --split SCENE -o "
-            f"NEW_SCENE` writes the scene, for any --cutoff). Tables:\n    {table_lines}"
+            f"where the pressure exceeds {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves flat, "
+            "and too stiff where few of them carry. The changes at twice the cutoff and at a hundredth of the decay_length "
+            "show the error. `patchfem profile TRACE --split SCENE -o NEW_SCENE` writes the scene. Tables:\n"
+            f"    {table_lines}"
         )
 
 
