@@ -1,4 +1,4 @@
-"""The share of a trace's height in waves too short for the elements."""
+"""Fraction of the height of a trace in waves that are too short for the elements."""
 
 from __future__ import annotations
 
@@ -17,48 +17,51 @@ LENGTH = 12.7e-3
 X = np.linspace(0, LENGTH, 4001)
 
 
-def cosines(orders, heights) -> Profile:
-    """Even half-waves of the trace, orthogonal to each other; even orders are orthogonal to a line as well."""
+def make_cosines(orders, heights) -> Profile:
+    """Return a sum of half-waves of the trace, which are orthogonal to each other and, if even, to a line."""
     return waves(X, heights, [2 * LENGTH / k for k in orders], [np.pi / 2] * len(orders))
 
 
 @given(st.integers(0, 10**6), st.integers(3, 300))
-def test_exact_mean_squares_add_up(seed, count):
-    """Parseval by the trapezoidal rule, and the waves sum to the levelled trace."""
+def test_exact_wave_powers_sum_to_mean_square(seed, count):
+    """The powers of the waves sum to the mean square of the levelled trace (Parseval)."""
     z = np.random.default_rng(seed).normal(size=count)
     profile = Profile(np.linspace(-1, 1, count), z, "a")
     weight = np.full(count, 1.0)
     weight[[0, -1]] = 0.5
     flat = level(profile).z
     mean = weight @ flat / weight.sum()
-    waves_, power = wave_spectrum(profile)
+    wavelengths, power = wave_spectrum(profile)
     assert power.sum() == pytest.approx(weight @ (flat - mean) ** 2 / weight.sum(), rel=1e-10)
-    assert waves_ == pytest.approx(4 / np.arange(1, count))
+    assert wavelengths == pytest.approx(4 / np.arange(1, count))
 
 
-@pytest.mark.parametrize("length, share", [
+@pytest.mark.parametrize("length, fraction", [
     (2 * LENGTH / 1999, 0.0), (2 * LENGTH / 300, 0.0), (2 * LENGTH / 299, 1.0), (2 * LENGTH / 40, 1.0),
     (2 * LENGTH / 39, np.sqrt(5.0)), (2 * LENGTH / 6, np.sqrt(5.0)), (2 * LENGTH / 5, np.sqrt(14.0)),
     (2 * LENGTH, np.sqrt(14.0))])  # fmt: skip
-def test_exact_share_of_three_waves(length, share):
-    assert fine_fraction(cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(
-        share / np.sqrt(14), abs=1e-9
+def test_exact_fine_fraction_of_three_waves(length, fraction):
+    """The fine fraction of three waves is the root of the squares of the waves shorter than the given length."""
+    assert fine_fraction(make_cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(
+        fraction / np.sqrt(14), abs=1e-9
     )
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 0.95))
-def test_always_the_element_just_keeps_what_was_asked(seed, kept):
+def test_always_element_length_keeps_requested_fraction(seed, fraction):
+    """The returned element length keeps the requested fraction of the height, and a longer one does not."""
     profile = self_affine(LENGTH, 1000, 2e-6, 0.6, 3e-3, 40e-6, seed)
-    element = wave_spectrum(profile).element_length(kept)
-    assert fine_fraction(profile, 2 * element) <= 1 - kept + 1e-12
+    element = wave_spectrum(profile).element_length(fraction)
+    assert fine_fraction(profile, 2 * element) <= 1 - fraction + 1e-12
     assert (
         fine_fraction(profile, 2 * element * 1.3)
         >= fine_fraction(profile, 2 * element * 1.001)
-        > 1 - kept
+        > 1 - fraction
     )
 
 
-def test_exact_uneven_samples_give_the_same_share():
+def test_exact_uneven_samples_give_same_fine_fraction():
+    """Unevenly spaced samples give the same fine fraction within 0.1 %."""
     rng = np.random.default_rng(5)
     x = np.unique(np.concatenate([[0, LENGTH], rng.uniform(0, LENGTH, 20000)]))
     parts = [(np.pi / 2, 3.0, 6), (np.pi / 2, 1.0, 80)]
@@ -68,20 +71,25 @@ def test_exact_uneven_samples_give_the_same_share():
     assert fine_fraction(profile, 2 * LENGTH / 40) == pytest.approx(1 / np.sqrt(10), rel=1e-3)
 
 
-def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
-    profile = Profile(X, cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
+def test_exact_lost_waves_are_reported_with_remedy():
+    """The message about waves that the mesh does not resolve states their fraction and suitable element sizes.
+
+    Without such waves there is no message.
+    """
+    profile = Profile(X, make_cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
     assert describe_lost_waves(profile, 100e-6) == (
         "profile.csv has 45 % of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot "
         'resolve: add [contact.asperities], or set element_size = "25 um", which keeps 90 % of the height '
         '("25 um" keeps 99 %)'
     )
     assert describe_lost_waves(profile, 25e-6) is None
-    assert describe_lost_waves(cosines([20, 500], [2.0, 0.1]), 100e-6) is None
+    assert describe_lost_waves(make_cosines([20, 500], [2.0, 0.1]), 100e-6) is None
     assert describe_lost_waves(Profile(X, 0 * X, "flat.csv"), 1.0) is None
     assert describe_lost_waves(profile, 100e-6, max_lost=0.5) is None
 
 
-def test_refuses_missing_heights_and_no_share():
+def test_refuses_missing_heights_and_invalid_fraction():
+    """Missing heights and a fraction outside 0 to 1 are refused; a flat trace allows any element."""
     with pytest.raises(
         PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"
     ):

@@ -1,4 +1,4 @@
-"""Measured traces: the numbers of three independent codes, from reading to levelling. Needs PATCHFEM_DATA."""
+"""Measured traces, compared with three independent codes from reading to levelling; needs PATCHFEM_DATA."""
 
 from __future__ import annotations
 
@@ -30,26 +30,30 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture
-def data() -> Path:
+def data_folder() -> Path:
+    """Return the folder of measured data."""
     return Path(os.environ["PATCHFEM_DATA"])
 
 
 @pytest.fixture
-def truth(data) -> dict:
-    return json.loads((data / "truth.json").read_text())
+def reference_values(data_folder) -> dict:
+    """Return the reference values of the measured data."""
+    return json.loads((data_folder / "truth.json").read_text())
 
 
-def mitutoyo(data) -> Profile:
+def read_mitutoyo_trace(data) -> Profile:
+    """Return the measured trace of a Mitutoyo instrument."""
     return read_surface(data / "mitutoyo-2.csv.gz")
 
 
-def dektak(data) -> Profile:
+def read_dektak_trace(data) -> Profile:
+    """Return the measured trace of a Dektak instrument."""
     return read_surface(data / "dektak-1.csv")
 
 
-def test_exact_the_step_of_the_stylus_is_length_over_points(data):
-    """The export prints x to 0.1 um; 1500 um over 9600 points is 0.15625 um."""
-    profile = dektak(data)
+def test_exact_dektak_step_is_length_over_points(data_folder):
+    """The step of a Dektak trace is 1500 um over 9600 points, although the export prints x to 0.1 um."""
+    profile = read_dektak_trace(data_folder)
     assert np.diff(profile.x) == pytest.approx(np.full(9599, 1500e-6 / 9600), rel=1e-9)
     assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
     assert profile.notes[0].endswith(
@@ -58,70 +62,81 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
 
 
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
-def test_exact_the_plane_of_three_codes(data, truth, name):
-    known = truth[name]
-    scan = read_surface(data / name, ("mm", "um"))
-    assert scan.z.shape == tuple(known["shape"])
+def test_exact_plane_agrees_with_three_codes(data_folder, reference_values, name):
+    """The slopes of the plane of a scan agree with three other codes within 1e-6."""
+    expected = reference_values[name]
+    scan = read_surface(data_folder / name, ("mm", "um"))
+    assert scan.z.shape == tuple(expected["shape"])
     assert np.diff(scan.x) == pytest.approx(np.full(100, 5e-6), rel=1e-9)
-    off = scan.z - level_plane(scan).z
-    slopes = [(off[0, -1] - off[0, 0]) / 5e-4, (off[-1, 0] - off[0, 0]) / 5e-4]
-    assert slopes == pytest.approx(known["plane_slope_per_um"], rel=1e-6)
+    plane = scan.z - level_plane(scan).z
+    slopes = [(plane[0, -1] - plane[0, 0]) / 5e-4, (plane[-1, 0] - plane[0, 0]) / 5e-4]
+    assert slopes == pytest.approx(expected["plane_slope_per_um"], rel=1e-6)
 
 
-def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
-    """A gap map in metres: 246 x 54 places, each at the height that SciPy reads there."""
-    known = truth["brb_surface_data.mat"]
-    scan = read_surface(data / "brb_surface_data.mat", ("m", "m"))
-    assert scan.z.shape == tuple(reversed(known["grid"]))
-    assert np.isfinite(scan.z).sum() == known["finite"]
+def test_exact_gap_map_of_bolted_beam(data_folder, reference_values):
+    """The gap map of a bolted beam has the grid, extent and flatness of the reference.
+
+    Each height is the one that SciPy reads.
+    """
+    expected = reference_values["brb_surface_data.mat"]
+    scan = read_surface(data_folder / "brb_surface_data.mat", ("m", "m"))
+    assert scan.z.shape == tuple(reversed(expected["grid"]))
+    assert np.isfinite(scan.z).sum() == expected["finite"]
     assert [scan.x[-1] - scan.x[0], scan.y[-1] - scan.y[0]] == pytest.approx(
-        [known["extent_mm"][0] * 1e-3, known["extent_mm"][1] * 1e-3], rel=1e-6
+        [expected["extent_mm"][0] * 1e-3, expected["extent_mm"][1] * 1e-3], rel=1e-6
     )
     assert np.nanmax(scan.z) - np.nanmin(scan.z) == pytest.approx(
-        known["gap_PV_um"] * 1e-6, rel=1e-6
+        expected["gap_PV_um"] * 1e-6, rel=1e-6
     )
     flat = level_plane(scan)
     assert np.nanmax(flat.z) - np.nanmin(flat.z) == pytest.approx(
-        known["flatness_PV_um"] * 1e-6, rel=1e-6
+        expected["flatness_PV_um"] * 1e-6, rel=1e-6
     )
-    points = loadmat(data / "brb_surface_data.mat")["mesoscale_xygap"]
+    points = loadmat(data_folder / "brb_surface_data.mat")["mesoscale_xygap"]
     column = np.searchsorted(scan.x, points[:, 0] - 1e-9)
     row = np.searchsorted(scan.y, points[:, 1] - 1e-9)
     assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
 
 
-def test_exact_measured_traces_hold_few_spikes(data):
-    assert not find_spikes(mitutoyo(data)).any() and not find_spikes(dektak(data)).any()
+def test_exact_measured_traces_have_few_spikes(data_folder):
+    """Measured traces have no spikes, and scans at most 10 of 10201 heights; pits do not count as spikes."""
+    assert (
+        not find_spikes(read_mitutoyo_trace(data_folder)).any()
+        and not find_spikes(read_dektak_trace(data_folder)).any()
+    )
     for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):
-        z = np.loadtxt(data / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
+        z = np.loadtxt(data_folder / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
         found = sum(int(find_spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
-        # of 10201, where 379 heights lie beyond 8 deviations of the whole scan: pits, not spikes
+        # 379 of the 10201 heights lie beyond 8 deviations of the whole scan, but they are pits
         assert found <= 10
 
 
-def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
-    """Rq behind a Gaussian filter from another code: the spectrum with each wave less the 2^-(cut/wave)^2 let by."""
-    profile = mitutoyo(data)
-    known = truth["mitutoyo-2.csv.gz"]
+def test_exact_spectrum_agrees_with_filtered_rms(data_folder, reference_values):
+    """Rq after a Gaussian filter, from the spectrum, agrees with another code within 1 to 5 %.
+
+    Each wave is reduced by the part 2^-(cut/wave)^2 that the filter passes.
+    """
+    profile = read_mitutoyo_trace(data_folder)
+    expected = reference_values["mitutoyo-2.csv.gz"]
     waves, power = wave_spectrum(profile)
-    assert np.sqrt(power.sum()) == pytest.approx(known["Pq"] * 1e-6, rel=1e-4)
-    for cut, name, near in (
+    assert np.sqrt(power.sum()) == pytest.approx(expected["Pq"] * 1e-6, rel=1e-4)
+    for cut, name, tolerance in (
         (80e-6, "own_gauss_lc80", 0.01),
         (250e-6, "own_gauss_lc250", 0.01),
         (800e-6, "own_gauss_lc800", 0.05),
     ):
         rough = np.sqrt((power * (1 - 2.0 ** -((cut / waves) ** 2)) ** 2).sum())
-        assert rough == pytest.approx(known[name]["Rq"] * 1e-6, rel=near)
+        assert rough == pytest.approx(expected[name]["Rq"] * 1e-6, rel=tolerance)
     assert (
         "% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add "
         '[contact.asperities], or set element_size = "20 um"'
     ) in str(describe_lost_waves(profile, 100e-6))
 
 
-def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
-    """Coarse nodes see the means: their variance is what the waves keep after a box of one element."""
+def test_exact_measured_trace_is_averaged_at_nodes(data_folder):
+    """The heights at coarse nodes agree within 20 nm with means of the trace over the length of an element."""
     nodes = np.linspace(-4.9e-3, 4.9e-3, 197)
-    trace = level(clean(place_over_patch(mitutoyo(data), nodes), 1e-4))
+    trace = level(clean(place_over_patch(read_mitutoyo_trace(data_folder), nodes), 1e-4))
     assert "the trace is centred on the patch, which adds -4.997 mm to x" in trace.notes[0]
     gap = average_at_nodes(trace, nodes)
     fine = np.interp(np.linspace(nodes[0], nodes[-1], 196 * 50 + 1), trace.x, trace.z)
@@ -139,15 +154,17 @@ def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
         "friction-damper-1hz.csv",
     ],
 )
-def test_refuses_files_that_name_no_units_or_are_no_surface(data, name):
+def test_refuses_files_without_units_or_surface(data_folder, name):
+    """Files without units, or without a surface, are refused with the header that is needed."""
     with pytest.raises(PatchfemError, match=r"header (as )?`x \[um\],z \[um\]`"):
-        read_surface(data / name)
+        read_surface(data_folder / name)
 
 
-def test_exact_a_digitised_uneven_trace_without_a_header(data):
-    profile = read_surface(data / "xy-1.txt", ("um", "um"))
-    known = np.loadtxt(data / "xy-1.txt") * 1e-6
-    assert profile.x == pytest.approx(known[:, 0], rel=1e-14) and profile.z == pytest.approx(
-        known[:, 1], rel=1e-14
+def test_exact_trace_without_header_is_read_with_given_units(data_folder):
+    """An uneven trace without a header is read with given units to the last digits."""
+    profile = read_surface(data_folder / "xy-1.txt", ("um", "um"))
+    expected = np.loadtxt(data_folder / "xy-1.txt") * 1e-6
+    assert profile.x == pytest.approx(expected[:, 0], rel=1e-14) and profile.z == pytest.approx(
+        expected[:, 1], rel=1e-14
     )
     assert profile.notes == ()

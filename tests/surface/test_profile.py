@@ -1,4 +1,4 @@
-"""Levelling and cleaning of a trace: lines vanish, good traces stay untouched, planted faults are all found."""
+"""Levelling and cleaning of traces: lines are removed, good traces are unchanged, added faults are all detected."""
 
 from __future__ import annotations
 
@@ -17,47 +17,51 @@ from patchfem.surface import Profile, clean, level
 from patchfem.surface.profile import SPIKE_DEVIATIONS, find_spikes
 
 
-def rough(count=4000, seed=0) -> Profile:
+def make_rough_trace(count=4000, seed=0) -> Profile:
+    """Return a self-affine trace."""
     return self_affine(12.7e-3, count, 4e-6, 0.8, 2e-3, 20e-6, seed)
 
 
 @given(st.floats(-0.5, 0.5), st.floats(-1e-3, 1e-3), st.integers(0, 99))
-def test_exact_a_line_is_taken_out_and_nothing_else(slope, offset, seed):
+def test_exact_levelling_removes_only_the_line(slope, offset, seed):
+    """Levelling removes the least-squares line and nothing else, also with missing heights."""
     x, z = (values * UM for values in bumpy(seed=seed))
     z = np.where(np.arange(x.size) % 7 == 3, np.nan, z)
-    there = ~np.isnan(z)
-    tilted = level(Profile(x, z + slope * x + offset, "a"))
-    fit = np.polynomial.Polynomial.fit(x[there], z[there], 1)
-    assert tilted.z[there] == pytest.approx(
-        z[there] - fit(x[there]), abs=1e-15 + 1e-13 * abs(offset)
+    present = ~np.isnan(z)
+    levelled = level(Profile(x, z + slope * x + offset, "a"))
+    fit = np.polynomial.Polynomial.fit(x[present], z[present], 1)
+    assert levelled.z[present] == pytest.approx(
+        z[present] - fit(x[present]), abs=1e-15 + 1e-13 * abs(offset)
     )
-    assert np.array_equal(tilted.missing, ~there)
-    assert level(tilted).z[there] == pytest.approx(tilted.z[there], abs=1e-18)
+    assert np.array_equal(levelled.missing, ~present)
+    assert level(levelled).z[present] == pytest.approx(levelled.z[present], abs=1e-18)
 
 
-def test_exact_a_good_trace_is_not_touched():
-    trace = rough()
+def test_exact_good_trace_is_unchanged():
+    """Cleaning returns a trace without faults itself."""
+    trace = make_rough_trace()
     assert clean(trace, 100e-6) is trace
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_exact_planted_spikes_are_found_all_and_only(seed):
-    trace = rough(seed=seed)
+def test_exact_added_spikes_are_all_detected(seed):
+    """All added spikes and no other samples are detected, and straight lines replace them, with a note."""
+    trace = make_rough_trace(seed=seed)
     rng = np.random.default_rng(seed)
     z = trace.z.copy()
-    at = np.sort(rng.choice(np.arange(10, 3900, 20), 40, replace=False))
-    for k, place in enumerate(at):
-        z[place : place + 1 + k % 3] += rng.choice([-1, 1]) * 20e-6
+    indices = np.sort(rng.choice(np.arange(10, 3900, 20), 40, replace=False))
+    for k, index in enumerate(indices):
+        z[index : index + 1 + k % 3] += rng.choice([-1, 1]) * 20e-6
     hit = np.flatnonzero(z != trace.z)
     spiked = replace(trace, z=z)
     assert np.array_equal(np.flatnonzero(find_spikes(spiked)), hit)
-    back = clean(spiked, 100e-6)
-    assert np.array_equal(back.x, trace.x)
-    smooth = np.abs(
+    cleaned = clean(spiked, 100e-6)
+    assert np.array_equal(cleaned.x, trace.x)
+    deviation = np.abs(
         trace.z[hit] - np.interp(trace.x[hit], np.delete(trace.x, hit), np.delete(trace.z, hit))
     )
-    assert np.abs(back.z - trace.z).max() == pytest.approx(smooth.max(), rel=1e-12)
-    assert back.notes == (
+    assert np.abs(cleaned.z - trace.z).max() == pytest.approx(deviation.max(), rel=1e-12)
+    assert cleaned.notes == (
         f"self-affine trace (seed {seed}): {hit.size} of 4001 heights are spikes (the first at x = "
         f"{format_length(trace.x[hit[0]])}), which lie more than 8 robust standard deviations from the median of 7 samples; "
         "straight lines replace these heights",
@@ -65,15 +69,15 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_always_real_surfaces_hold_no_spikes(seed):
-    """Noise, self-affine heights, smooth waves, ramps, steps, coarse digits."""
+def test_always_regular_surfaces_have_no_spikes(seed):
+    """Noise, self-affine heights, waves, ramps, steps and rounded heights have no spikes."""
     rng = np.random.default_rng(seed)
     x = np.linspace(0, 1e-2, 2000)
     coarse = np.round(rng.normal(0, 0.4, x.size))
     for z in (
         rng.normal(size=x.size),
         rng.uniform(size=x.size),
-        rough(1999, seed).z,
+        make_rough_trace(1999, seed).z,
         sine(x, 1, 3e-3).z,
         sine(x, 1, 20e-6).z,
         x * rng.normal(),
@@ -86,40 +90,45 @@ def test_always_real_surfaces_hold_no_spikes(seed):
         assert not find_spikes(Profile(x, z, "a")).any()
 
 
-def test_exact_the_threshold_is_the_stated_one():
+def test_exact_spike_threshold_is_as_stated():
+    """A height is a spike if its distance to the median exceeds SPIKE_DEVIATIONS robust standard deviations."""
     x = np.arange(200.0) * 1e-6
     noise = np.random.default_rng(4).normal(size=200)
-    for factor, found in ((0.999, False), (1.001, True)):
+    for factor, is_spike in ((0.999, False), (1.001, True)):
         z = noise.copy()
-        high = 0.5 + factor * SPIKE_DEVIATIONS * 1.4826 * 1.5
-        z[90:97] = [-2.0, -1.0, 0.5, high, -0.5, 1.0, 2.0]  # median 0.5, deviation 1.5
-        assert find_spikes(Profile(x, z, "a"))[93] == found
+        height = 0.5 + factor * SPIKE_DEVIATIONS * 1.4826 * 1.5
+        # the median is 0.5, and the median deviation 1.5
+        z[90:97] = [-2.0, -1.0, 0.5, height, -0.5, 1.0, 2.0]
+        assert find_spikes(Profile(x, z, "a"))[93] == is_spike
 
 
 @given(st.floats(-1, 1), st.integers(0, 10**6))
-def test_exact_missing_runs_on_a_line_come_back(slope, seed):
+def test_exact_missing_heights_on_line_are_restored(slope, seed):
+    """Missing heights on a straight line are restored exactly, with a note."""
     rng = np.random.default_rng(seed)
     x = np.cumsum(rng.uniform(0.5, 1.5, 60)) * UM
-    lost = rng.random(60) < 0.4
-    lost[[0, -1]] = False
-    back = clean(Profile(x, np.where(lost, np.nan, slope * x), "a"), 1.0)
-    assert np.array_equal(back.x, x) and back.z == pytest.approx(slope * x, abs=1e-18)
-    assert len(back.notes) == bool(lost.any())
+    is_missing = rng.random(60) < 0.4
+    is_missing[[0, -1]] = False
+    cleaned = clean(Profile(x, np.where(is_missing, np.nan, slope * x), "a"), 1.0)
+    assert np.array_equal(cleaned.x, x) and cleaned.z == pytest.approx(slope * x, abs=1e-18)
+    assert len(cleaned.notes) == bool(is_missing.any())
 
 
-def test_exact_missing_ends_are_cut_off_and_counted():
+def test_exact_missing_ends_are_trimmed():
+    """Missing heights at the ends are trimmed and counted in the note."""
     x = np.arange(12.0) * UM
     z = np.array([np.nan, np.nan, 1, 2, 3, np.nan, np.nan, 6, 7, 8, 9, np.nan]) * UM
-    back = clean(Profile(x, z, "before.csv", ("first",)), 3 * UM)
-    assert back.x == pytest.approx(x[2:11]) and back.z == pytest.approx((x - UM)[2:11])
-    assert back.notes == (
+    cleaned = clean(Profile(x, z, "before.csv", ("first",)), 3 * UM)
+    assert cleaned.x == pytest.approx(x[2:11]) and cleaned.z == pytest.approx((x - UM)[2:11])
+    assert cleaned.notes == (
         "first",
         "before.csv: 5 of 12 heights are missing; the gaps are bridged by straight lines, "
         "of which the longest spans 3 um",
     )
 
 
-def test_refuses_a_long_hole_and_an_empty_trace():
+def test_refuses_long_gap_and_empty_trace():
+    """A gap longer than the limit and a trace without heights are refused."""
     x = np.arange(12.0) * UM
     z = np.where((x > 2.5 * UM) & (x < 8.5 * UM), np.nan, 0.0)
     with pytest.raises(PatchfemError) as caught:
@@ -135,7 +144,7 @@ def test_refuses_a_long_hole_and_an_empty_trace():
 
 
 @pytest.mark.parametrize(
-    "length, words",
+    "length, text",
     [
         (12.7e-3, "12.7 mm"),
         (200e-6, "200 um"),
@@ -146,5 +155,6 @@ def test_refuses_a_long_hole_and_an_empty_trace():
         (1e-6, "1 um"),
     ],
 )
-def test_exact_lengths_in_messages(length, words):
-    assert format_length(length) == words
+def test_exact_lengths_are_formatted_in_suitable_units(length, text):
+    """Lengths in messages are formatted in suitable units."""
+    assert format_length(length) == text

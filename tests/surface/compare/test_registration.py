@@ -1,6 +1,6 @@
-"""Registration of two traces on their unworn valleys, and the worn depth that it leaves, on made pairs of known wear.
+"""Alignment of two traces on their unworn valleys, and the worn depth from it, for made pairs of known wear.
 
-The recipe was tuned on seeds 0 to 150; the seeds here are others.
+The method was tuned on seeds 0 to 150; the seeds of these tests are others.
 """
 
 import numpy as np
@@ -20,60 +20,66 @@ from patchfem.surface.compare.verdict import compose_verdict
 HELD_OUT = 80000
 
 
-def scored(seed: int) -> tuple:
-    """Errors of shift, mean and largest depth [m] of a pair, whether their intervals hold the truth, the reference."""
+def score_pair(seed: int) -> tuple:
+    """Return errors of shift, mean and largest depth [m], whether their intervals cover the truth, and the basis."""
     p = pair(seed)
     found = compare_traces(p.before, p.after)
     worn = np.interp(found.alignment.x, p.after.x, p.worn)
-    truths = (
+    quantities = (
         (found.motion.shift, p.shift),
         (found.worn.mean, worn.mean()),
         (found.worn.largest, worn.max()),
     )
     return (
-        [one.value - truth for one, truth in truths],
-        [one.low <= truth <= one.high for one, truth in truths],
+        [quantity.value - truth for quantity, truth in quantities],
+        [quantity.low <= truth <= quantity.high for quantity, truth in quantities],
         found.basis,
     )
 
 
-def scores(count: int) -> tuple:
-    errors, held, places = zip(*(scored(HELD_OUT + k) for k in range(count)))
-    assert set(places) == {"place"}
-    return np.sqrt(np.mean(np.square(errors), axis=0)), np.mean(held, axis=0)
+def score_pairs(count: int) -> tuple:
+    """Return the rms errors and the fractions of covering intervals over a number of pairs."""
+    errors, covers, bases = zip(*(score_pair(HELD_OUT + k) for k in range(count)))
+    assert set(bases) == {"place"}
+    return np.sqrt(np.mean(np.square(errors), axis=0)), np.mean(covers, axis=0)
 
 
-def test_always_a_pair_of_one_place_is_registered_within_the_targets():
-    """Asked for: 0.05 um of shift and 0.06 um of depth, sigma 6 um, tilt 10 mrad, shift 25 um, noise 20 nm. Of four
-    pairs at 95 % two or more misses have a chance of 1.4 %."""
-    rms, held = scores(4)
+def test_always_pair_is_aligned_within_targets():
+    """The rms errors of four pairs are within the targets of 0.01 um for the shift and 0.06 um for the depth.
+
+    Of four 95 % intervals, two or more misses have a chance of 1.4 %.
+    """
+    rms, coverage = score_pairs(4)
     assert rms[0] < 0.01 * UM and rms[1] < 0.003 * UM and rms[2] < 0.06 * UM, rms
-    assert (held >= 3 / 4).all(), held
+    assert (coverage >= 3 / 4).all(), coverage
 
 
 @pytest.mark.slow
-def test_always_200_pairs_hold_the_truth_in_95_of_100_intervals():
-    rms, held = scores(200)
+def test_always_intervals_of_200_pairs_cover_truth():
+    """Over 200 pairs 92 to 98 % of the intervals cover the truth, and the rms error of the mean depth is below 1.5 nm."""
+    rms, coverage = score_pairs(200)
     assert rms[0] < 0.005 * UM and rms[1] < 0.0015 * UM and rms[2] < 0.04 * UM, rms
-    assert (abs(held - 0.95) <= 0.03 + 1e-9).all(), held
+    assert (abs(coverage - 0.95) <= 0.03 + 1e-9).all(), coverage
 
 
 @pytest.mark.share(0, 2)
 @pytest.mark.parametrize("seed", range(4))
-def test_exact_without_noise(seed):
+def test_exact_alignment_without_noise(seed):
+    """Without noise shift, tilt, offset and depth agree with the truth within 0.05 nm."""
     p = pair(seed, noise=0.0)
     found = align(p.before, p.after, search_shift(p.before, p.after).shift)
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
     assert abs(found.depth.mean() - worn.mean()) < 2e-11
-    # the interpolation between samples errs by 0.1 nm
+    # the interpolation between samples has an error of 0.1 nm
     error = found.error_of(Parameter.SLOPE) / found.half
     assert abs(found.slope - p.slope) <= 2 * error < 1.2e-7
     offset = found.state[Parameter.OFFSET] - found.slope * found.middle
     assert offset == pytest.approx(p.offset, abs=1e-11)
 
 
-def test_exact_a_trace_on_itself_shows_no_change():
+def test_exact_identical_traces_show_no_change():
+    """A trace compared with itself has no shift, tilt or wear, ratios of 1, and the verdict "no change"."""
     p = pair(1)
     found = compare_traces(p.before, p.before)
     assert found.motion.shift.value == pytest.approx(0.0, abs=1e-15)
@@ -91,19 +97,22 @@ def test_exact_a_trace_on_itself_shows_no_change():
     )
 
 
-def test_always_levelling_both_traces_takes_the_wear_away():
-    """The trap: each trace less its own least-squares line, one less the other, has a mean of zero whatever wore off;
-    the one-sided registration of the same traces finds the depth."""
+def test_always_levelling_both_traces_hides_wear():
+    """The difference of two levelled traces has zero mean whatever the wear is.
+
+    The alignment on unworn valleys finds a depth within 5 nm.
+    """
     p = pair(30001, shift=0.0)
     levelled = float((level(p.before).z - level(p.after).z).mean())
-    found = compare_traces(p.before, p.after).worn.mean.value
+    mean_depth = compare_traces(p.before, p.after).worn.mean.value
     assert p.worn.mean() > 1 * UM
     assert abs(levelled) < 1e-12
-    assert found == pytest.approx(p.worn.mean(), abs=0.005 * UM)
+    assert mean_depth == pytest.approx(p.worn.mean(), abs=0.005 * UM)
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(24, marks=pytest.mark.slow)])
-def test_always_traces_of_two_places_have_no_depth(count):
+def test_always_traces_of_different_places_have_no_depth(count):
+    """Traces of two different places have no shift and no depth, and the reason states why."""
     for seed in range(count):
         found = compare_traces(
             pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after
@@ -116,7 +125,8 @@ def test_always_traces_of_two_places_have_no_depth(count):
 
 
 @pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
-def test_always_unworn_traces_of_one_place_show_no_wear(count):
+def test_always_unworn_traces_show_no_wear(count):
+    """Unworn traces of one place are aligned with a mean difference below 4 nm, and no wear is reported."""
     for seed in range(30050, 30050 + count):
         p = pair(seed, share=0.0)
         found = compare_traces(p.before, p.after)
@@ -126,19 +136,23 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         assert "at most" not in compose_verdict([found])[1][0]
 
 
-@pytest.mark.parametrize("high, rows", [(128, 2), pytest.param(512, 8, marks=pytest.mark.slow)])
-def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(high, rows):
-    """Wear by 3 um leaves valleys that both traces share; by 6 um hardly any, and no depth may be claimed. The wear
-    runs out slowly between worn and unworn heights here, and only about half of the intervals hold the truth."""
+@pytest.mark.parametrize(
+    "n_rows, n_traces", [(128, 2), pytest.param(512, 8, marks=pytest.mark.slow)]
+)
+def test_always_mutually_worn_surfaces_have_depth_or_none(n_rows, n_traces):
+    """Surfaces that wear each other by 3 um are aligned on common valleys, with a depth error below 20 nm.
+
+    With 6 um hardly any valley remains, and no depth is given.
+    """
     step = 2 * UM
     count = 512
-    pieces = [report_area((high, count), step, seed)[2] for seed in (0, 1)]
+    pieces = [report_area((n_rows, count), step, seed)[2] for seed in (0, 1)]
     x = np.arange(count) * step
     random = np.random.default_rng(1)
-    for worn, registered in ((3 * UM, True), (6 * UM, False)):
-        lower = rub(*pieces, step, 3 * step, 2 * worn, bite=0.05 * UM).lower
+    for wear_depth, is_aligned in ((3 * UM, True), (6 * UM, False)):
+        lower = rub(*pieces, step, 3 * step, 2 * wear_depth, bite=0.05 * UM).lower
         errors = []
-        for k in range(0, high, high // rows):
+        for k in range(0, n_rows, n_rows // n_traces):
             noise = 0.02 * UM * random.standard_normal((2, count))
             found = compare_traces(
                 Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
@@ -147,13 +161,14 @@ def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(high, row
             if found.basis == "place":
                 errors.append(found.worn.mean.value - float((pieces[0][k] - lower[k]).mean()))
         assert (
-            (len(errors) >= 0.75 * rows and max(map(abs, errors)) < 0.02 * UM)
-            if registered
+            (len(errors) >= 0.75 * n_traces and max(map(abs, errors)) < 0.02 * UM)
+            if is_aligned
             else not errors
         )
 
 
-def test_always_a_turned_surface_has_no_place():
+def test_always_periodic_surface_is_not_aligned():
+    """A turned surface is not aligned, because it is periodic, and the reason states this."""
     x = np.arange(1001) * UM
     noise = 0.02 * UM * np.random.default_rng(0).standard_normal((2, x.size))
     z = 5 * UM * np.sin(2 * np.pi * x / (80 * UM))
@@ -164,10 +179,11 @@ def test_always_a_turned_surface_has_no_place():
     assert found.basis != "place" and "surface is periodic" in found.motion.shift.reason
 
 
-def test_always_a_stretched_x_is_found_and_taken_out():
+def test_always_stretch_along_x_is_corrected():
+    """A stretch of x by 0.4 % is estimated within 3e-5 and corrected."""
     p = pair(5)
-    long = Profile(frozen_array(p.after.x * 1.004), p.after.z, "after")
-    found = compare_traces(p.before, long)
+    stretched = Profile(frozen_array(p.after.x * 1.004), p.after.z, "after")
+    found = compare_traces(p.before, stretched)
     assert found.motion.stretch.value == pytest.approx(1.004, abs=3e-5)
     assert found.motion.stretch.low < 1.004 < found.motion.stretch.high
     assert found.worn.mean.value == pytest.approx(
@@ -176,20 +192,22 @@ def test_always_a_stretched_x_is_found_and_taken_out():
     assert any("this difference in length is corrected" in text for text in found.notes)
 
 
-def test_always_deposits_do_not_count_as_less_wear():
+def test_always_deposits_do_not_reduce_wear():
+    """Deposits are reported with their area and do not reduce the mean worn depth."""
     p = pair(5)
     z = np.array(p.after.z)
-    bare = np.interp(p.after.x, p.after.x, p.worn) == 0
-    place = np.flatnonzero(bare)[100:140]
-    z[place] += 3 * UM
+    is_unworn = np.interp(p.after.x, p.after.x, p.worn) == 0
+    indices = np.flatnonzero(is_unworn)[100:140]
+    z[indices] += 3 * UM
     found = compare_traces(p.before, Profile(p.after.x, frozen_array(z), "after")).worn
-    assert found.deposited == pytest.approx(3 * UM * place.size * UM, rel=0.01)
+    assert found.deposited == pytest.approx(3 * UM * indices.size * UM, rel=0.01)
     assert found.mean.value == pytest.approx(
         compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM
     )
 
 
-def test_always_gaps_in_both_traces_do_no_harm():
+def test_always_traces_with_gaps_are_aligned():
+    """Traces with gaps are aligned with the same shift within 20 nm."""
     p = pair(5)
     before = np.array(p.before.z)
     after = np.array(p.after.z)
@@ -204,11 +222,11 @@ def test_always_gaps_in_both_traces_do_no_harm():
     )
 
 
-def groove(seed: int, depth: float, rough: float) -> tuple:
-    """A rough trace elsewhere, one with a parabolic groove of 0.6 mm in its middle, and the area of the groove."""
+def make_groove_pair(seed: int, depth: float, roughness: float) -> tuple:
+    """Return a rough trace, another one with a parabolic groove of 0.6 mm, and the area of the groove."""
     x = np.arange(1001) * 2 * UM
     t = (x - 1e-3) / 0.3e-3
-    sides = [surface(seed + each, rough)(0.4 * x) for each in (0, 3000)]
+    sides = [surface(seed + offset, roughness)(0.4 * x) for offset in (0, 3000)]
     cut = np.where(abs(t) < 1, depth * (1 - t**2), 0.0)
     noise = 0.02 * UM * np.random.default_rng(seed).standard_normal((2, x.size))
     return (
@@ -220,23 +238,27 @@ def groove(seed: int, depth: float, rough: float) -> tuple:
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("count", [1, pytest.param(10, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("depth, rough, rms", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)])
-def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, count):
-    held = []
+@pytest.mark.parametrize(
+    "depth, roughness, max_rms_error", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)]
+)
+def test_always_area_of_groove_between_flanks(depth, roughness, max_rms_error, count):
+    """At least 80 % of the intervals cover the area of a groove between unworn flanks of another place."""
+    covers = []
     errors = []
     for seed in range(count):
-        before, after, area = groove(60000 + seed, depth, rough)
+        before, after, area = make_groove_pair(60000 + seed, depth, roughness)
         found = compare_traces(before, after)
         assert found.basis == "flanks" and found.motion.shift.value is None
-        held.append(found.worn.area.low <= area <= found.worn.area.high)
+        covers.append(found.worn.area.low <= area <= found.worn.area.high)
         errors.append(found.worn.area.value / area - 1)
         assert found.worn.largest.low <= depth <= found.worn.largest.high
         assert found.worn.mean.value == pytest.approx(found.worn.area.value / found.flanks.width)
-    assert sum(held) >= 0.8 * count and np.sqrt(np.mean(np.square(errors))) < rms
+    assert sum(covers) >= 0.8 * count and np.sqrt(np.mean(np.square(errors))) < max_rms_error
 
 
 @pytest.mark.slow
-def test_exact_a_groove_in_a_straight_line():
+def test_exact_groove_in_straight_line():
+    """The area and depth of a groove in a straight line agree within 1e-5."""
     x = np.arange(4001) * 0.5 * UM
     t = (x - 0.9e-3) / 0.3e-3
     cut = np.where(abs(t) < 1, 10 * UM * (1 - t**2), 0.0)
@@ -250,7 +272,8 @@ def test_exact_a_groove_in_a_straight_line():
     assert found.flanks.start == pytest.approx(0.6e-3, abs=25 * UM)
 
 
-def test_refuses_a_few_samples():
+def test_refuses_trace_with_few_samples():
+    """Traces of fewer than 16 samples are refused."""
     short = Profile(np.arange(5.0), np.zeros(5), "short")
     with pytest.raises(PatchfemError, match="16 samples"):
         search_shift(short, short)

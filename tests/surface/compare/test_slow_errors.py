@@ -1,4 +1,4 @@
-"""Drift of a datum: what is taken out of the depth, and whether the drawn errors of a gap are large enough."""
+"""Drift of a datum: the part that is removed from the depth, and the size of the sampled errors of a gap."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ MIDDLE = abs(PLACE - 0.5) < 0.15
 END = PLACE > 0.75
 
 
-def errors_of_gap(gap, walk: float, seeds: range) -> np.ndarray:
-    """Return the errors of the mean over a gap, in standard deviations of the drawn errors."""
+def gap_errors(gap, walk: float, seeds: range) -> np.ndarray:
+    """Return the errors of the mean over a gap, in standard deviations of the sampled errors."""
     errors = []
     for seed in seeds:
         random = np.random.default_rng(seed)
@@ -28,32 +28,36 @@ def errors_of_gap(gap, walk: float, seeds: range) -> np.ndarray:
 
 @pytest.mark.share(1, 2)
 @pytest.mark.parametrize(
-    ("gap", "walk", "least"),
+    ("gap", "walk", "min_count"),
     [
         pytest.param(MIDDLE, 0.0, 35, id="between"),
         pytest.param(END, 0.0, 35, id="beyond"),
         pytest.param(MIDDLE, 3.0, 35, id="between, with a random walk"),
-        pytest.param(END, 3.0, 32, id="beyond, with a random walk"),  # 53 of 60 other walks hold
+        # in 53 of 60 other random walks the error lies within two deviations
+        pytest.param(END, 3.0, 32, id="beyond, with a random walk"),
     ],
 )
-def test_95_of_100_errors_of_a_gap_lie_within_two_deviations(gap, walk, least):
-    errors = errors_of_gap(gap, walk, range(40))
+def test_always_gap_errors_follow_normal_law(gap, walk, min_count):
+    """About 95 % of the errors of a gap lie within 1.96 standard deviations, with and without a random walk."""
+    errors = gap_errors(gap, walk, range(40))
     assert (
         np.abs(errors) <= 1.96
-    ).sum() >= least  # fewer than 35 are seen in 1 of 100 tests if 95 % hold
-    assert np.abs(errors).mean() > 0.2  # errors that are stated ten times too large are useless
+    ).sum() >= min_count  # with a true fraction of 95 %, fewer than 35 occur in 1 of 100 tests
+    assert np.abs(errors).mean() > 0.2  # overestimated errors would make this mean small
 
 
 @pytest.mark.parametrize("degree", [1, 2])
-def test_datum_is_taken_out_with_the_drift(degree):
+def test_exact_polynomial_datum_is_removed_with_drift(degree):
+    """A datum that is a polynomial of the given degree is removed within 2e-3."""
     random = np.random.default_rng(1)
     model = model_drift(random.standard_normal(COUNT), ~MIDDLE, degree, 10, random)
     datum = 5.0 - 3.0 * PLACE + (4.0 * PLACE**2 if degree == 2 else 0.0)
-    inner = slice(30, -30)  # beyond the middles of the outermost parts the drift stays as it is
+    inner = slice(30, -30)  # beyond the centres of the outermost parts the drift is constant
     assert np.abs(model.remove(datum)[inner]).max() < 2e-3
 
 
-def test_too_few_parts_show_no_drift():
+def test_exact_few_unworn_samples_give_no_drift_model():
+    """With four unworn samples there is no model of the drift."""
     unworn = np.zeros(60, bool)
     unworn[:4] = True
     assert model_drift(np.ones(60), unworn, 1, 10, np.random.default_rng(1)) is None

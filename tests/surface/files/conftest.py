@@ -1,4 +1,4 @@
-"""Limits and interpreters of the readers of files."""
+"""Limits and interpreters of the file readers."""
 
 import pytest
 
@@ -9,13 +9,14 @@ from patchfem.surface.files import instruments, raw
 def use_interpreter(monkeypatch):
     """Return a function that sets the interpreter in which SurfaceTopography reads a file."""
 
-    def use(path) -> None:
+    def set_interpreter(path) -> None:
+        """Set the interpreter."""
         monkeypatch.setattr(instruments, "PYTHON", str(path))
 
-    return use
+    return set_interpreter
 
 
 @pytest.fixture
-def one_mebibyte_of_text(monkeypatch):
-    """A text may have 1 MiB."""
+def small_text_limit(monkeypatch):
+    """Limit the size of a text file to 1 MiB."""
     monkeypatch.setattr(raw, "MAX_TEXT_BYTES", 1 << 20)

@@ -1,4 +1,4 @@
-"""Files of instruments: every variant that a format allows gives the heights that were written, bit for bit."""
+"""Files of instruments: all variants of a format give the written heights, to the last bit if stored exactly."""
 
 import gzip
 import os
@@ -20,14 +20,16 @@ STEPS = (0.5e-6, 0.75e-6)
 UM = ("um", "um")
 
 
-def read(tmp_path, data: bytes, name="scan.x3p", units=None):
+def read_bytes(tmp_path, data: bytes, name="scan.x3p", units=None):
+    """Write the bytes to a file and return the surface that it contains."""
     (tmp_path / name).write_bytes(data)
     return read_surface(tmp_path / name, units)
 
 
-def same(found, z, near=0.0, steps=STEPS) -> None:
+def assert_scan_equal(found, z, tolerance=0.0, steps=STEPS) -> None:
+    """Assert that a surface is a scan with the given heights and steps, within a tolerance."""
     assert isinstance(found, Areal) and found.z.shape == z.shape
-    assert found.z == pytest.approx(z, abs=near, rel=0, nan_ok=True)
+    assert found.z == pytest.approx(z, abs=tolerance, rel=0, nan_ok=True)
     assert found.x == pytest.approx(np.arange(z.shape[1]) * steps[0], rel=1e-15, abs=1e-22)
     assert found.y == pytest.approx(np.arange(z.shape[0]) * steps[1], rel=1e-15, abs=1e-22)
     assert not found.z.flags.writeable
@@ -44,13 +46,13 @@ TRACE = np.column_stack([np.arange(24) * 0.5, Z.ravel() * 1e6])
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
 
 
-def x3p(record=None, axes=AXES, raw=RAW, feature="SUR", **more) -> bytes:
+def make_x3p(record=None, axes=AXES, raw=RAW, feature="SUR", **more) -> bytes:
     """Return an X3P file of a third record, by default a matrix with its heights in a binary file."""
     record = MATRIX + write.link(raw) if record is None else record
     return write.x3p(write.main_xml(axes, record, feature), raw, **more)
 
 
-def listed(rows) -> str:
+def make_data_list(rows) -> str:
     """Return the list of the third record whose entries are joined rows of numbers; NaN is an empty entry."""
     entries = [";".join(repr(float(value)) for value in np.atleast_1d(row)) for row in rows]
     return (
@@ -60,13 +62,13 @@ def listed(rows) -> str:
     )
 
 
-def columns(head: str, separator=",", order="xyz", z=Z) -> bytes:
+def make_columns(header: str, separator=",", order="xyz", z=Z) -> bytes:
     """Return a text of three columns without the missing heights."""
-    rows = ["".join(head)]
+    rows = ["".join(header)]
     for (x, y, _), height in zip(POINTS, z.ravel()):
-        words = {"x": f"{x:.2f}", "y": f"{y:.2f}", "z": repr(float(height * 1e6))}
+        texts = {"x": f"{x:.2f}", "y": f"{y:.2f}", "z": repr(float(height * 1e6))}
         if np.isfinite(height):
-            rows.append(separator.join(words[name] for name in order))
+            rows.append(separator.join(texts[name] for name in order))
     return "\n".join(rows).encode()
 
 
@@ -77,8 +79,9 @@ ABSOLUTE = "".join(write.axis(name, "A") for name in ("CX", "CY", "CZ"))
 LIST = "<ListDimension>24</ListDimension>"
 COLUMNS = dict(zip("XYZ", (POINTS[:, k].reshape(4, 6) for k in range(3))))
 EXACT = [("D", 1.0, 0), ("F", 1.0, 1e-12), ("I", 2e-10, 1.01e-10), ("L", 1e-14, 0.51e-14)]
-# Variants of a format: bytes, name of the file, units that are given, heights, largest error of a height.
-# Sixteen bits are signed: half of these heights are below zero. Missing are NaN, or what valid.bin leaves out.
+# Variants of a format: bytes, file name, given units, heights, and largest error of a height.
+# Sixteen-bit heights are signed, and half of them are negative. Missing heights are NaN or excluded
+# by valid.bin.
 SCANS = {
     **{
         f"x3p of type {kind}, {name}": (write.x3p_of(z, kind, increment), "a.x3p", None, z, near)
@@ -94,16 +97,16 @@ SCANS = {
     "x3p with an offset": (write.x3p_of(Z, "I", 2e-10, 3e-6), "a.x3p", None, Z, 1.01e-10),
     "x3p without a prefix": (write.x3p_of(Z, prefix=""), "a.x3p", None, Z, 0),
     "x3p with a long dash": (write.x3p_of(Z, revision="ISO5436 – 2000"), "a.x3p", None, Z, 0),
-    "x3p in a folder": (x3p(folder="sample/"), "a.x3p", None, Z, 0),
-    "x3p in gzip": (gzip.compress(x3p()), "a.x3p.gz", None, Z, 0),
-    "x3p with heights in the xml": (x3p(MATRIX + listed(Z.ravel())), "a.x3p", None, Z, 0),
-    "x3p with holes in the xml": (x3p(MATRIX + listed(HOLES.ravel())), "a.x3p", None, HOLES, 0),
+    "x3p in a folder": (make_x3p(folder="sample/"), "a.x3p", None, Z, 0),
+    "x3p in gzip": (gzip.compress(make_x3p()), "a.x3p.gz", None, Z, 0),
+    "x3p with heights in the xml": (make_x3p(MATRIX + make_data_list(Z.ravel())), "a.x3p", None, Z, 0),
+    "x3p with holes in the xml": (make_x3p(MATRIX + make_data_list(HOLES.ravel())), "a.x3p", None, HOLES, 0),
     "x3p with absolute places": (
-        x3p(MATRIX + write.link(PLACES.tobytes()), ABSOLUTE, PLACES.tobytes(), "PCL"), "a.x3p", None, Z, 0),
+        make_x3p(MATRIX + write.link(PLACES.tobytes()), ABSOLUTE, PLACES.tobytes(), "PCL"), "a.x3p", None, Z, 0),
     "x3p with points in any order": (
-        x3p(LIST + write.link(SHUFFLED.tobytes()), ABSOLUTE, SHUFFLED.tobytes(), "PCL"), "a.x3p", None, Z, 0),
-    "x3p with absolute places in the xml": (x3p(MATRIX + listed(PLACES), ABSOLUTE), "a.x3p", None, Z, 0),
-    "x3p with points in the xml": (x3p(LIST + listed(SHUFFLED), ABSOLUTE), "a.x3p", None, Z, 0),
+        make_x3p(LIST + write.link(SHUFFLED.tobytes()), ABSOLUTE, SHUFFLED.tobytes(), "PCL"), "a.x3p", None, Z, 0),
+    "x3p with absolute places in the xml": (make_x3p(MATRIX + make_data_list(PLACES), ABSOLUTE), "a.x3p", None, Z, 0),
+    "x3p with points in the xml": (make_x3p(LIST + make_data_list(SHUFFLED), ABSOLUTE), "a.x3p", None, Z, 0),
     "npy": (write.npy(POINTS), "a.npy", UM, Z, 1e-20),
     "npy from the far end": (write.npy(POINTS[::-1]), "a.npy", UM, Z, 1e-20),
     "mat beside a row": (write.mat(points=POINTS, note=np.arange(9.0)[None]), "a.mat", UM, Z, 1e-20),
@@ -113,64 +116,69 @@ SCANS = {
     "mat of three columns": (
         write.mat(x=POINTS[:, 0], y=POINTS[:, 1], gap=POINTS[:, 2]), "a.mat", UM, Z, 1e-20),
     "mat of three matrices": (write.mat(**COLUMNS, text="scan"), "a.mat", UM, Z, 1e-20),
-    "text": (columns("x [um],y [um],z [um]"), "a.txt", None, Z, 1e-20),
-    "text with a comment": (columns("# x_um,y_um,z_um"), "a.txt", None, Z, 1e-20),
-    "text without a header": (columns("")[1:], "a.txt", UM, Z, 1e-20),
-    "text without units": (columns("x,y,z"), "a.txt", UM, Z, 1e-20),
+    "text": (make_columns("x [um],y [um],z [um]"), "a.txt", None, Z, 1e-20),
+    "text with a comment": (make_columns("# x_um,y_um,z_um"), "a.txt", None, Z, 1e-20),
+    "text without a header": (make_columns("")[1:], "a.txt", UM, Z, 1e-20),
+    "text without units": (make_columns("x,y,z"), "a.txt", UM, Z, 1e-20),
     "text with decimal commas": (
-        columns("y (um);z (um);x (um)", ";", "yzx").replace(b".", b","), "a.txt", None, Z, 1e-20),
-    "text with holes": (columns("x [um],y [um],z [um]", z=HOLES), "a.txt", None, HOLES, 1e-20),
+        make_columns("y (um);z (um);x (um)", ";", "yzx").replace(b".", b","), "a.txt", None, Z, 1e-20),
+    "text with holes": (make_columns("x [um],y [um],z [um]", z=HOLES), "a.txt", None, HOLES, 1e-20),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("data, name, units, z, near", SCANS.values(), ids=SCANS)
-def test_exact_a_scan_of_every_format(tmp_path, data, name, units, z, near):
-    same(read(tmp_path, data, name, units), z, near)
+@pytest.mark.parametrize("data, name, units, z, tolerance", SCANS.values(), ids=SCANS)
+def test_exact_scan_in_each_format_agrees(tmp_path, data, name, units, z, tolerance):
+    """A scan in each variant of the formats gives the written heights within its resolution."""
+    assert_scan_equal(read_bytes(tmp_path, data, name, units), z, tolerance)
 
 
-def test_exact_x3p_of_a_profile(tmp_path):
+def test_exact_x3p_profile_agrees(tmp_path):
+    """An X3P file of a profile gives a trace with the written heights."""
     axes = write.axis("CX", increment=STEPS[0]) + write.axis("CZ", "A")
-    found = read(tmp_path, x3p(write.matrix(24, 1) + write.link(Z.tobytes()), axes, feature="PRF"))
+    found = read_bytes(
+        tmp_path, make_x3p(write.matrix(24, 1) + write.link(Z.tobytes()), axes, feature="PRF")
+    )
     assert isinstance(found, Profile) and np.array_equal(found.z, Z.ravel())
     assert found.x == pytest.approx(np.arange(24) * STEPS[0], abs=1e-20)
 
 
-def test_always_a_changed_description_is_told(tmp_path):
-    assert read(tmp_path, x3p()).notes == ()
-    assert read(tmp_path, x3p(checksum="0" * 32)).notes == (
+def test_always_wrong_checksum_gives_note(tmp_path):
+    """An X3P file whose main.xml does not match its checksum is read with a note."""
+    assert read_bytes(tmp_path, make_x3p()).notes == ()
+    assert read_bytes(tmp_path, make_x3p(checksum="0" * 32)).notes == (
         f"{tmp_path / 'scan.x3p'}: main.xml does not match its checksum in md5checksum.hex: "
         "main.xml was changed after it was written",
     )
 
 
-def plain(kind="A", data="D") -> str:
+def plain_axes(kind="A", data="D") -> str:
     """Return axes without increments, and heights of a kind and a type."""
     return write.axis("CX") + write.axis("CY") + write.axis("CZ", kind, data)
 
 
-REFUSED = {  # bytes, name of the file, units that are given, the sentence
+REFUSED = {  # bytes, file name, given units, and the expected message
     "wrong checksum": (
-        x3p(MATRIX + write.link(Z.tobytes()), raw=HOLES.tobytes()), "a.x3p", None,
+        make_x3p(MATRIX + write.link(Z.tobytes()), raw=HOLES.tobytes()), "a.x3p", None,
         "the checksum of bindata/data.bin is wrong: the heights were changed"),
-    "two layers": (x3p(write.matrix(6, 2, 2), plain()), "a.x3p", None,
+    "two layers": (make_x3p(write.matrix(6, 2, 2), plain_axes()), "a.x3p", None,
                    "SizeZ is 2; a surface must have one layer"),
-    "too few bytes": (x3p(write.matrix(7, 4) + write.link(Z.tobytes()), plain()), "a.x3p", None,
+    "too few bytes": (make_x3p(write.matrix(7, 4) + write.link(Z.tobytes()), plain_axes()), "a.x3p", None,
                       "192 bytes of heights, but 28 heights of type D are needed"),
     "sixteen bits called 64": (
-        x3p(MATRIX + write.link(bytes(48)), plain(), bytes(48)), "a.x3p", None,
+        make_x3p(MATRIX + write.link(bytes(48)), plain_axes(), bytes(48)), "a.x3p", None,
         "48 bytes of heights, but 24 heights of type D are needed"),
-    "an unknown type": (x3p(MATRIX, plain(data="Q")), "a.x3p", None,
+    "an unknown type": (make_x3p(MATRIX, plain_axes(data="Q")), "a.x3p", None,
                         "DataType of CZ is 'Q'; one of I, L, F, D is needed"),
-    "sizes of a bomb": (x3p(write.matrix(2 * 10**9, 1), plain()), "a.x3p", None,
+    "sizes of a bomb": (make_x3p(write.matrix(2 * 10**9, 1), plain_axes()), "a.x3p", None,
                         r"SizeX is '2000000000'; a whole number from 1 to 5e\+07 is needed"),
-    "heights that climb": (x3p(MATRIX + "<DataList/>", plain("I")), "a.x3p", None,
+    "heights that climb": (make_x3p(MATRIX + "<DataList/>", plain_axes("I")), "a.x3p", None,
                            r"the heights \(CZ\) are incremental; export the surface anew"),
-    "no axes": (x3p(MATRIX, ""), "a.x3p", None, "main.xml lacks Record1/Axes/CX"),
-    "no heights": (x3p(MATRIX + write.link(b"", name="other.bin"), plain()), "a.x3p", None,
+    "no axes": (make_x3p(MATRIX, ""), "a.x3p", None, "main.xml lacks Record1/Axes/CX"),
+    "no heights": (make_x3p(MATRIX + write.link(b"", name="other.bin"), plain_axes()), "a.x3p", None,
                    "no other.bin inside it"),
     "broken xml": (write.x3p(b"<a><b></a>"), "a.x3p", None, "main.xml is damaged"),
     "a number that is none": (
-        x3p(MATRIX, write.axis("CX", increment="1_0") + write.axis("CY") + write.axis("CZ", "A")), "a.x3p", None,
+        make_x3p(MATRIX, write.axis("CX", increment="1_0") + write.axis("CY") + write.axis("CZ", "A")), "a.x3p", None,
         "Increment of CX is '1_0'; a number is needed"),
     "no raster": (b"x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n", "a.txt", None,
                   "7 different x and 7 different y do"),
@@ -217,23 +225,28 @@ REFUSED = {  # bytes, name of the file, units that are given, the sentence
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("data, name, units, sentence", REFUSED.values(), ids=REFUSED)
-def test_refuses_a_faulty_file_by_name(tmp_path, data, name, units, sentence):
-    with pytest.raises(PatchfemError, match=sentence):
-        read(tmp_path, data, name, units)
+@pytest.mark.parametrize("data, name, units, message", REFUSED.values(), ids=REFUSED)
+def test_refuses_faulty_file(tmp_path, data, name, units, message):
+    """A faulty file is refused with a message that states the fault."""
+    with pytest.raises(PatchfemError, match=message):
+        read_bytes(tmp_path, data, name, units)
 
 
 @pytest.mark.parametrize("data", [write.sdf_binary(Z), write.sdf_ascii(Z)], ids=["binary", "text"])
 @pytest.mark.skipif(
     find_spec("SurfaceTopography") is None, reason="the extra `profiles` is not installed"
 )
-def test_exact_sdf_is_read_by_the_extra_profiles(tmp_path, data):
-    assert read(tmp_path, data, "scan.sdf").z == pytest.approx(Z, rel=1e-9)
+def test_exact_sdf_is_read_by_surface_topography(tmp_path, data):
+    """Binary and text SDF files are read with the optional package SurfaceTopography."""
+    assert read_bytes(tmp_path, data, "scan.sdf").z == pytest.approx(Z, rel=1e-9)
 
 
-def test_always_steep_heights_in_a_file_that_says_metres_are_told(tmp_path):
-    """The samples of the standard hold heights of a metre."""
-    found = read(tmp_path, write.x3p_of(Z * 1e6), "a.x3p")
+def test_always_steep_heights_in_metres_give_note(tmp_path):
+    """An X3P file whose heights exceed its length is read with a note.
+
+    The samples of the standard have heights of a metre.
+    """
+    found = read_bytes(tmp_path, write.x3p_of(Z * 1e6), "a.x3p")
     assert found.z == pytest.approx(Z * 1e6, rel=1e-14)
     assert found.notes[0].startswith(f"{tmp_path / 'a.x3p'}: heights span ")
     assert found.notes[0].endswith(
@@ -244,31 +257,38 @@ def test_always_steep_heights_in_a_file_that_says_metres_are_told(tmp_path):
 @pytest.mark.parametrize(
     "table", [TRACE, TRACE.T, TRACE.astype("f4"), TRACE.astype(">f8"), np.asfortranarray(TRACE)]
 )
-def test_exact_npy_columns_are_a_trace(tmp_path, table):
-    found = read(tmp_path, write.npy(table), "scan.npy", UM)
+def test_exact_npy_columns_give_trace(tmp_path, table):
+    """The two columns of a .npy file give a trace, for all orders and types of its array."""
+    found = read_bytes(tmp_path, write.npy(table), "scan.npy", UM)
     assert isinstance(found, Profile) and found.x == pytest.approx(TRACE[:, 0] * 1e-6)
     assert found.z == pytest.approx(Z.ravel(), rel=1e-6 if table.dtype == "f4" else 1e-14)
 
 
-def test_exact_a_dektak_export(tmp_path):
-    """The step is 50 um over 320 points, 0.15625 um, where the file prints 0.2, 0.3, 0.5."""
+def test_exact_dektak_export_agrees(tmp_path):
+    """A Dektak export gives the heights and the exact step of 50 um over 320 points, although it prints rounded x."""
     z = np.random.default_rng(1).normal(size=320)
-    found = read(tmp_path, write.dektak(z), "scan.csv")
+    found = read_bytes(tmp_path, write.dektak(z), "scan.csv")
     assert found.x == pytest.approx(np.arange(320) * 0.15625e-6, rel=1e-14)
     assert found.z == pytest.approx(np.round(z, 5) * 1e-6, rel=1e-14)
-    assert np.array_equal(read(tmp_path, write.dektak(z, results=False), "scan.csv").z, found.z)
-    again = read(tmp_path, write.dektak(z).decode("latin-1").encode("utf-16"), "scan.csv")
-    assert np.array_equal(again.z, found.z)
+    assert np.array_equal(
+        read_bytes(tmp_path, write.dektak(z, results=False), "scan.csv").z, found.z
+    )
+    utf16_trace = read_bytes(
+        tmp_path, write.dektak(z).decode("latin-1").encode("utf-16"), "scan.csv"
+    )
+    assert np.array_equal(utf16_trace.z, found.z)
 
 
-def test_always_a_dektak_export_that_was_cut_keeps_its_printed_places(tmp_path):
+def test_always_truncated_dektak_export_keeps_printed_x(tmp_path):
+    """A truncated Dektak export keeps its printed x, with a note that its length does not fit the header."""
     z = np.random.default_rng(1).normal(size=320)
-    found = read(tmp_path, b"\n".join(write.dektak(z).split(b"\n")[:200]), "scan.csv")
+    found = read_bytes(tmp_path, b"\n".join(write.dektak(z).split(b"\n")[:200]), "scan.csv")
     assert "the length of 50 um in the header does not fit" in found.notes[0]
     assert found.x == pytest.approx(np.arange(found.x.size) * 0.15625e-6, abs=0.06e-6)
 
 
-def test_exact_one_trace_of_any_format_and_no_scan(tmp_path):
+def test_exact_read_profile_accepts_traces_only(tmp_path):
+    """The function read_profile reads a trace of any format, also from a .zip, and refuses a scan."""
     (tmp_path / "a.x3p").write_bytes(write.x3p_of(Z))
     with pytest.raises(
         PatchfemError, match="scan of 4 x 6 heights, but a single trace is needed; write one row of"
@@ -282,8 +302,8 @@ def test_exact_one_trace_of_any_format_and_no_scan(tmp_path):
     "PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
     reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography",
 )
-def test_exact_other_instruments_through_surface_topography(tmp_path, use_interpreter):
-    """A NetCDF file, in the process of another interpreter."""
+def test_exact_netcdf_scan_through_surface_topography(tmp_path, use_interpreter):
+    """A NetCDF scan is read by SurfaceTopography in another interpreter, and a damaged file is refused."""
     from scipy.io import netcdf_file
 
     use_interpreter(os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
@@ -298,7 +318,7 @@ def test_exact_other_instruments_through_surface_topography(tmp_path, use_interp
         heights[:] = Z.T * 1e6
         heights.unit = "um"
     found = read_surface(tmp_path / "scan.nc")
-    same(found, Z, 1e-18)
+    assert_scan_equal(found, Z, 1e-18)
     assert "read as NC by SurfaceTopography 1." in found.notes[0]
     assert (
         read_surface(tmp_path / "scan.nc", ("mm", "mm"))
@@ -310,19 +330,19 @@ def test_exact_other_instruments_through_surface_topography(tmp_path, use_interp
         read_surface(tmp_path / "scan.opdx")
 
 
-def test_refuses_instruments_without_the_library_with_the_remedy(tmp_path, use_interpreter):
-    """An interpreter that has no packages at all stands for one without SurfaceTopography."""
+def test_refuses_instrument_file_without_surface_topography(tmp_path, use_interpreter):
+    """Without SurfaceTopography a file of an instrument is refused, and the message names the package to install."""
     (tmp_path / "python").write_text("#!/bin/sh\nexit 3\n")
     (tmp_path / "python").chmod(0o755)
     use_interpreter(tmp_path / "python")
     with pytest.raises(
         Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"
     ):
-        read(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
+        read_bytes(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
 
 
 @pytest.mark.parametrize(
-    "answer, said",
+    "answer, message",
     [
         (
             {"error": "CorruptFile: bad"},
@@ -336,7 +356,8 @@ def test_refuses_instruments_without_the_library_with_the_remedy(tmp_path, use_i
         (None, "failed to read this file; export"),
     ],
 )
-def test_refuses_what_the_other_process_could_not_read(tmp_path, use_interpreter, answer, said):
+def test_refuses_unusable_answer_of_reader_process(tmp_path, use_interpreter, answer, message):
+    """An error, an empty or no answer of the reader process is refused with a message."""
     (tmp_path / "answer").write_bytes(b"")
     if answer is not None:
         with open(tmp_path / "answer", "wb") as file:
@@ -344,8 +365,8 @@ def test_refuses_what_the_other_process_could_not_read(tmp_path, use_interpreter
     (tmp_path / "python").write_text(f"#!/bin/sh\ncat {tmp_path}/answer\n")
     (tmp_path / "python").chmod(0o755)
     use_interpreter(tmp_path / "python")
-    with pytest.raises(PatchfemError, match=said):
-        read(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
+    with pytest.raises(PatchfemError, match=message):
+        read_bytes(tmp_path, b"\x00\x01\x02" * 99, "scan.opdx")
 
 
 STAND_IN = """
@@ -376,23 +397,25 @@ def open_topography(path):
 
 
 @pytest.mark.slow
-def test_always_a_fault_of_the_library_ends_with_its_process(tmp_path, monkeypatch):
-    """A stand-in for SurfaceTopography: what works on and on, sleeps, ends, fails or takes all memory is refused by
-    name, and the next file is read."""
+def test_always_fault_of_reader_library_is_contained(tmp_path, monkeypatch):
+    """A reader library that fails, ends, sleeps, runs forever or exhausts memory leads to a refusal.
+
+    The next file is read as usual.
+    """
     (tmp_path / "SurfaceTopography").mkdir()
     (tmp_path / "SurfaceTopography" / "__init__.py").write_text("__version__ = '1.2'")
     (tmp_path / "SurfaceTopography" / "IO.py").write_text(STAND_IN)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     data = b"\x00\x01\x02" * 99
-    for name, said in (
+    for name, message in (
         ("fails.opdx", r"cannot read this file \(ValueError: bad\)"),
         ("fills.opdx", r"cannot read this file \(MemoryError"),
         ("ends.opdx", "failed to read this file; export the surface as text or X3P"),
         ("works.opdx", r"did not finish reading this file in 60 s of CPU time; export"),
     ):
-        with pytest.raises(PatchfemError, match=said):
-            read(tmp_path, data, name)
-    found = read(tmp_path, data, "good.opdx")
+        with pytest.raises(PatchfemError, match=message):
+            read_bytes(tmp_path, data, name)
+    found = read_bytes(tmp_path, data, "good.opdx")
     assert found.z == pytest.approx(np.array([[7e-9, 0.0, 0.0], [1.0, 1.0, 2.0]]))
     assert found.x[1] == 1.0
     assert "read as  by SurfaceTopography 1.2" in found.notes[0]
@@ -401,11 +424,11 @@ def test_always_a_fault_of_the_library_ends_with_its_process(tmp_path, monkeypat
         PatchfemError,
         match=r"did not finish reading this file in 0\.5 s; export the surface as text",
     ):
-        read(tmp_path, data, "sleeps.opdx")
+        read_bytes(tmp_path, data, "sleeps.opdx")
 
 
-def test_exact_mat_files_of_scipy_give_what_scipy_wrote(tmp_path):
-    """Every numeric class, small and large, beside text, cells and complex numbers, which are passed over."""
+def test_exact_mat_files_of_scipy_agree(tmp_path):
+    """MAT files of SciPy give the written columns in all numeric classes; other variables are ignored."""
     for kind in ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"):
         table = np.column_stack([np.arange(20), np.arange(20) % 3]).astype(kind)
         savemat(

@@ -1,7 +1,7 @@
-"""Texts as programs write them: matrices under a head, columns with names and units in lines of their own.
+"""Text files of instrument programs: matrices under a header, and columns with names and units in separate lines.
 
-The layouts are those of the ASCII exports of Gwyddion, SPIP, Attocube, Nova and HFM files; every refusal that names a
-remedy is read once the remedy is done.
+The layouts are those of ASCII exports of Gwyddion, SPIP, Attocube, Nova and HFM. A file that is
+refused with a remedy is read after the remedy is applied.
 """
 
 import os
@@ -21,12 +21,14 @@ ROWS = "1 2 3 4\n5 6 7 8\n9 10 11 12\n"
 LONG = np.random.default_rng(3).normal(size=(4, 300))
 
 
-def read(tmp_path, text, units=None, name="scan.txt", encoding="utf-8"):
+def read_text(tmp_path, text, units=None, name="scan.txt", encoding="utf-8"):
+    """Write the text to a file and return the surface that it contains."""
     (tmp_path / name).write_text(text, encoding=encoding)
     return read_surface(tmp_path / name, units)
 
 
-def is_scan(found, steps, z) -> None:
+def assert_scan_equal(found, steps, z) -> None:
+    """Assert that a surface is a scan with the given steps and heights."""
     assert isinstance(found, Areal) and found.z == pytest.approx(z, rel=1e-14, nan_ok=True)
     assert found.x == pytest.approx(np.arange(z.shape[1]) * steps[0], rel=1e-14)
     assert found.y == pytest.approx(np.arange(z.shape[0]) * steps[1], rel=1e-14)
@@ -38,7 +40,7 @@ GWYDDION = {
 }
 
 
-@pytest.mark.parametrize("words", GWYDDION.values(), ids=GWYDDION)
+@pytest.mark.parametrize("keywords", GWYDDION.values(), ids=GWYDDION)
 @pytest.mark.parametrize(
     "rows, encoding",
     [
@@ -47,27 +49,30 @@ GWYDDION = {
         (ROWS.replace(" ", "\t").replace("\n", "\t\n"), "latin-1"),
     ],
 )
-def test_exact_gwyddion_text_in_two_languages(tmp_path, words, rows, encoding):
-    text = (
-        f"# {words[0]} Topo\n# {words[1]} 4.000 µm\n# {words[2]} 6.000 µm\n# {words[3]} nm\n{rows}"
-    )
-    found = read(tmp_path, text, encoding=encoding)
-    is_scan(found, (1e-6, 2e-6), Z * 1e-9)
+def test_exact_gwyddion_text_in_english_and_german(tmp_path, keywords, rows, encoding):
+    """A Gwyddion text gives the same scan in English and German, for all encodings, separators and decimal signs."""
+    text = f"# {keywords[0]} Topo\n# {keywords[1]} 4.000 µm\n# {keywords[2]} 6.000 µm\n# {keywords[3]} nm\n{rows}"
+    found = read_text(tmp_path, text, encoding=encoding)
+    assert_scan_equal(found, (1e-6, 2e-6), Z * 1e-9)
     assert found.notes == ()
-    comma = text.replace("4.000", "4,000").replace("6.000", "6,000").replace("\n1", "\n1,5", 1)
-    is_scan(read(tmp_path, comma, encoding=encoding), (1e-6, 2e-6), np.where(Z == 1, 1.5, Z) * 1e-9)
+    with_comma = text.replace("4.000", "4,000").replace("6.000", "6,000").replace("\n1", "\n1,5", 1)
+    assert_scan_equal(
+        read_text(tmp_path, with_comma, encoding=encoding),
+        (1e-6, 2e-6),
+        np.where(Z == 1, 1.5, Z) * 1e-9,
+    )
 
 
-def test_exact_a_matrix_of_long_rows_with_missing_heights(tmp_path):
-    """Rows of more than a thousand characters, missing heights as nan, Bad, stars and nothing."""
+def test_exact_matrix_of_long_rows_with_missing_heights(tmp_path):
+    """A matrix with rows of more than a thousand characters is read, with missing heights as nan, Bad, *** or empty."""
     z = np.where(np.arange(LONG.size).reshape(LONG.shape) % 97 == 5, np.nan, LONG)
-    head = "# Width: 300 µm\n# Height: 8 µm\n# Value units: um\n"
-    rows = ["\t".join(repr(float(one)) for one in row) for row in z]
-    for lost in ("nan", "Bad", "***", ""):
-        text = head + "\n".join(rows).replace("nan", lost) + "\n"
-        is_scan(read(tmp_path, text), (1e-6, 2e-6), z * 1e-6)
-    is_scan(
-        read(tmp_path, head + "\n".join(rows).replace("\t", ";").replace(".", ",")),
+    header = "# Width: 300 µm\n# Height: 8 µm\n# Value units: um\n"
+    rows = ["\t".join(repr(float(height)) for height in row) for row in z]
+    for placeholder in ("nan", "Bad", "***", ""):
+        text = header + "\n".join(rows).replace("nan", placeholder) + "\n"
+        assert_scan_equal(read_text(tmp_path, text), (1e-6, 2e-6), z * 1e-6)
+    assert_scan_equal(
+        read_text(tmp_path, header + "\n".join(rows).replace("\t", ";").replace(".", ",")),
         (1e-6, 2e-6),
         z * 1e-6,
     )
@@ -127,17 +132,21 @@ HEADS = {
 }
 
 
-@pytest.mark.parametrize("head, steps, unit", HEADS.values(), ids=HEADS)
-def test_exact_heads_of_other_programs(tmp_path, head, steps, unit):
-    is_scan(read(tmp_path, head + ROWS), steps, Z * unit)
+@pytest.mark.parametrize("header, steps, unit", HEADS.values(), ids=HEADS)
+def test_exact_headers_of_other_programs(tmp_path, header, steps, unit):
+    """The header of each program gives the steps and the unit of the heights."""
+    assert_scan_equal(read_text(tmp_path, header + ROWS), steps, Z * unit)
 
 
 @pytest.mark.skipif(
     "PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
     reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography",
 )
-def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, use_interpreter):
-    """Its own reader of texts, but for a decimal comma, words of a table and Nova's scale, which it does not know."""
+def test_exact_headers_agree_with_surface_topography(tmp_path, use_interpreter):
+    """The scans agree with those of SurfaceTopography within 1e-12.
+
+    Headers with features that it does not support are left out.
+    """
     use_interpreter(os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
     for name in (
         "spip",
@@ -147,7 +156,7 @@ def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, use_int
         "pixel size",
         "sizes of SurfaceTopography",
     ):
-        ours = read(tmp_path, HEADS[name][0] + ROWS)
+        ours = read_text(tmp_path, HEADS[name][0] + ROWS)
         theirs = instruments.read_instrument(fetch(tmp_path / "scan.txt"), None)
         assert ours.z == pytest.approx(theirs.z, rel=1e-12), name
         assert ours.x == pytest.approx(theirs.x, rel=1e-12) and ours.y == pytest.approx(
@@ -155,20 +164,26 @@ def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, use_int
         ), name
 
 
-def test_exact_a_line_scan_is_one_height_a_line_or_one_row(tmp_path):
-    one = "# Value units: nm\n1\n2\n5\n3\n"
-    row = "# Width: 4.0 um\n# Value units: nm\n1 2 5 3\n"
-    for text in (f"# Width: 4.0 um\n{one}", f"Spacing X: 1,0 µm\n{one}", row):
-        found = read(tmp_path, text)
+def test_exact_line_scan_in_column_or_row(tmp_path):
+    """A line scan with one height per line, or with a single row, gives a trace."""
+    heights_per_line = "# Value units: nm\n1\n2\n5\n3\n"
+    single_row = "# Width: 4.0 um\n# Value units: nm\n1 2 5 3\n"
+    for text in (
+        f"# Width: 4.0 um\n{heights_per_line}",
+        f"Spacing X: 1,0 µm\n{heights_per_line}",
+        single_row,
+    ):
+        found = read_text(tmp_path, text)
         assert isinstance(found, Profile) and found.x == pytest.approx(np.arange(4) * 1e-6)
         assert found.z == pytest.approx(np.array([1, 2, 5, 3]) * 1e-9)
 
 
-def test_exact_gwyddion_points_under_their_units(tmp_path):
+def test_exact_gwyddion_points_with_units(tmp_path):
+    """A list of points of Gwyddion below a header with units gives a scan."""
     rows = "".join(
         f"{0.5 * (i + 0.5)}\t{0.25 * (j + 0.5)}\t{Z[j, i]}\n" for j in range(3) for i in range(4)
     )
-    found = read(
+    found = read_text(
         tmp_path,
         f"# Channel: Height\n# Lateral units: µm\n# Value units: nm\n{rows}",
         name="scan.xyz",
@@ -179,11 +194,14 @@ def test_exact_gwyddion_points_under_their_units(tmp_path):
     assert found.y == pytest.approx((np.arange(3) + 0.5) * 0.25e-6)
 
 
-def test_exact_points_under_names_and_units_with_a_decimal_comma(tmp_path):
+def test_exact_points_with_decimal_comma(tmp_path):
+    """Points with decimal commas below a line of names and a line of units give a scan."""
     rows = "".join(
         f"{0.5 * i}\t{0.25 * j}\t{Z[j, i]}\n".replace(".", ",") for j in range(3) for i in range(4)
     )
-    is_scan(read(tmp_path, f"X\tY\tZ\nµm\tµm\tnm\n{rows}"), (0.5e-6, 0.25e-6), Z * 1e-9)
+    assert_scan_equal(
+        read_text(tmp_path, f"X\tY\tZ\nµm\tµm\tnm\n{rows}"), (0.5e-6, 0.25e-6), Z * 1e-9
+    )
 
 
 X = np.array([0.0, 0.5, 1.0, 1.5, 3.0])
@@ -214,60 +232,68 @@ TRACES = {
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 @pytest.mark.parametrize("text, units", TRACES.values(), ids=TRACES)
-def test_exact_traces_with_units_wherever_they_stand(tmp_path, text, units, encoding):
-    found = read(tmp_path, text, units, encoding=encoding)
+def test_exact_traces_with_units_in_any_place(tmp_path, text, units, encoding):
+    """A trace has the same numbers wherever the header gives its units, in UTF-8 and UTF-16."""
+    found = read_text(tmp_path, text, units, encoding=encoding)
     assert isinstance(found, Profile) and found.x == pytest.approx(X * 1e-3, rel=1e-15)
     assert found.z == pytest.approx(H * 1e-6, rel=1e-15)
 
 
-def test_exact_hfm_with_a_column_of_valid_points(tmp_path):
+def test_exact_hfm_file_with_column_of_validity(tmp_path):
+    """In an HFM file the points that are marked as invalid have missing heights."""
     rows = "".join(f"{a};{b};{int(b != 0.75)}\n" for a, b in zip(X, H))
-    found = read(tmp_path, f"X;Y;valid\n[mm];[mm];[1/0]\n{rows}", name="a.hfm")
+    found = read_text(tmp_path, f"X;Y;valid\n[mm];[mm];[1/0]\n{rows}", name="a.hfm")
     assert found.z == pytest.approx(np.where(H == 0.75, np.nan, H) * 1e-3, nan_ok=True)
 
 
-def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path):
-    found = read(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
+def test_exact_given_units_override_header_with_note(tmp_path):
+    """Units that are given override those of the header, and a note states each difference."""
+    found = read_text(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
     assert found.x == pytest.approx(X * 1e-3) and found.z == pytest.approx(H * 1e-6)
     path = tmp_path / "scan.txt"
     assert found.notes == (
         f"{path}:1: the header gives x in um, but mm is used, as given by --units",
     )
-    scan = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um"))
-    is_scan(scan, (1e-3, 1e-3), Z * 1e-6)
+    scan = read_text(
+        tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um")
+    )
+    assert_scan_equal(scan, (1e-3, 1e-3), Z * 1e-6)
     assert scan.notes == (
         f"{path}: the header gives places along x in um, but mm is used, as given by --units",
         f"{path}: the header gives places along y in um, but mm is used, as given by --units",
         f"{path}: the header gives the heights in V, but um is used, as given by --units",
     )
-    named = read(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
-    assert named.notes == (
+    unknown_columns = read_text(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
+    assert unknown_columns.notes == (
         f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",
     )
 
 
-def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
-    """As text and as .npy, missing heights too; a size in the head gives way with a note, columns have no pixel."""
+def test_exact_matrix_with_given_pixel_size(tmp_path):
+    """A matrix without a header is read with a given pixel size, as text and as .npy.
+
+    A size in the header is ignored with a note.
+    """
     z = np.where(np.arange(Z.size).reshape(Z.shape) == 5, np.nan, Z)
-    rows = "\n".join(" ".join(repr(float(one)) for one in row) for row in z) + "\n"
-    is_scan(read(tmp_path, rows, ("0.8 um", "nm")), (0.8e-6, 0.8e-6), z * 1e-9)
+    rows = "\n".join(" ".join(repr(float(height)) for height in row) for row in z) + "\n"
+    assert_scan_equal(read_text(tmp_path, rows, ("0.8 um", "nm")), (0.8e-6, 0.8e-6), z * 1e-9)
     np.save(tmp_path / "scan.npy", z)
     found = read_surface(tmp_path / "scan.npy", ("0.8 um", "nm"))
-    is_scan(found, (0.8e-6, 0.8e-6), z * 1e-9)
-    sized = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
-    is_scan(sized, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert len(sized.notes) == 2
-    assert "the pixel size that you gave, 0.8 um, is used" in sized.notes[0]
-    for text, units, said in (
+    assert_scan_equal(found, (0.8e-6, 0.8e-6), z * 1e-9)
+    scan_with_size = read_text(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
+    assert_scan_equal(scan_with_size, (0.8e-6, 0.8e-6), z * 1e-9)
+    assert len(scan_with_size.notes) == 2
+    assert "the pixel size that you gave, 0.8 um, is used" in scan_with_size.notes[0]
+    for text, units, message in (
         (PAIRS, ("0.8 um", "nm"), "is a pixel size, which is needed only for a matrix"),
         (rows, ("-1 um", "nm"), "unknown unit '-1 um'"),
         (rows, ("0.8 um", "2 nm"), "unknown"),
     ):
-        with pytest.raises(PatchfemError, match=said):
-            read(tmp_path, text, units)
+        with pytest.raises(PatchfemError, match=message):
+            read_text(tmp_path, text, units)
 
 
-CURES = {  # what is refused, what is said, the same text after the remedy, the units given
+CURES = {  # refused text, message, text after the remedy, and given units
     "a bare matrix": (
         ROWS,
         "the width of the scan is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 "
@@ -393,33 +419,40 @@ CURES = {  # what is refused, what is said, the same text after the remedy, the 
 }
 
 
-@pytest.mark.parametrize("bad, said, good, units", CURES.values(), ids=CURES)
-def test_refuses_with_a_remedy_that_works(tmp_path, bad, said, good, units):
+@pytest.mark.parametrize("faulty, message, corrected, units", CURES.values(), ids=CURES)
+def test_refuses_faulty_text_with_valid_remedy(tmp_path, faulty, message, corrected, units):
+    """A faulty text is refused with a remedy, and is read after the remedy is applied."""
     with pytest.raises(PatchfemError) as caught:
-        read(tmp_path, bad)
-    assert said in str(caught.value) and str(tmp_path / "scan.txt") in str(caught.value)
-    found = read(tmp_path, good, units)
+        read_text(tmp_path, faulty)
+    assert message in str(caught.value) and str(tmp_path / "scan.txt") in str(caught.value)
+    found = read_text(tmp_path, corrected, units)
     assert np.isfinite(found.z).sum() >= 3
 
 
-def test_exact_a_spike_as_tall_as_the_scan_is_long_is_told_and_kept(tmp_path):
+def test_exact_spike_higher_than_scan_length_gives_note(tmp_path):
+    """A single spike that is higher than the scan is long is kept with a note.
+
+    If all heights are too large, the unit is questioned and the scan is refused.
+    """
     z = np.random.default_rng(1).normal(size=(20, 30)) * 1e-7
     z[7, 9] = 4e-5
-    rows = "\n".join(" ".join(repr(float(one)) for one in row) for row in z)
-    found = read(tmp_path, f"# Width: 30 um\n# Height: 20 um\n# Value units: m\n{rows}")
+    rows = "\n".join(" ".join(repr(float(height)) for height in row) for row in z)
+    found = read_text(tmp_path, f"# Width: 30 um\n# Height: 20 um\n# Value units: m\n{rows}")
     assert found.z == pytest.approx(z, rel=1e-14)
     assert len(found.notes) == 1
     assert "nm without the 6 highest and the 6 lowest of 600; write " in found.notes[0]
-    with pytest.raises(PatchfemError, match="is the unit of z right"):  # not one of them but all
-        read(
+    # here all heights are too large, not a single one
+    with pytest.raises(PatchfemError, match="is the unit of z right"):
+        read_text(
             tmp_path,
             "# Width: 30 um\n# Height: 20 um\n# Value units: m\n"
-            + "\n".join(" ".join(repr(float(one) * 1e3) for one in row) for row in z),
+            + "\n".join(" ".join(repr(float(height) * 1e3) for height in row) for row in z),
         )
 
 
-def test_always_heights_below_an_atom_are_told(tmp_path):
-    found = read(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
+def test_always_heights_below_atom_give_note(tmp_path):
+    """Heights smaller than an atom are read with a note that questions their unit."""
+    found = read_text(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
     assert found.notes[0].endswith("atom; is the unit of the heights right?")
     (tmp_path / "logo.x3p").write_bytes(write.x3p_of(write.scan() * 1e-7))
     assert (
@@ -427,5 +460,5 @@ def test_always_heights_below_an_atom_are_told(tmp_path):
         .notes[0]
         .endswith("atom; is the unit of the heights right?")
     )
-    assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
-    assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()
+    assert read_text(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
+    assert read_text(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()

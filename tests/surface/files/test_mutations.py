@@ -1,4 +1,4 @@
-"""Damaged files of every format: read or refused by name, whatever was cut, put in, turned over or doubled."""
+"""Randomly damaged files of all formats are read, or refused with a message that names the file."""
 
 import gzip
 import random
@@ -32,7 +32,7 @@ LINES = "".join(f"{x:.2f},{y:.2f},{float(z)!r}\n" for x, y, z in POINTS)
 
 ROWS = "".join(f"{k}.5,0.{k * 37 % 500:03d}\n" for k in range(40))
 
-# name of the file, what is damaged, how the file is made of it
+# file name, content that is damaged, and function that makes the file of it
 SEEDS = {
     "text": ("a.csv", f"# tip 2 um\nx [um],z [um]\n{ROWS}".encode(), bytes),
     "decimal comma": ("a.csv", f"x_um;z_um\n{ROWS}".replace(",", ";").replace(".", ",").encode(), bytes),
@@ -78,8 +78,8 @@ WORDS = (
 )
 
 
-def mutated(seed: bytes, rng: random.Random) -> bytes:
-    """One to four damages: bytes turned over, cut out, doubled, put in, or the end cut off."""
+def mutate(seed: bytes, rng: random.Random) -> bytes:
+    """Return a copy with one to four damages: bytes changed, deleted, doubled or inserted, or the end cut off."""
     data = bytearray(seed)
     for _ in range(rng.randint(1, 4)):
         at = rng.randrange(len(data) + 1)
@@ -100,44 +100,46 @@ def mutated(seed: bytes, rng: random.Random) -> bytes:
     return bytes(data)
 
 
-def outcome(path: Path) -> str:
-    """ "read", "refused" or "missing"; what was read must be a surface."""
+def read_outcome(path: Path) -> str:
+    """Return "read", "refused" or "missing", and check that what was read is a surface."""
     start = process_time()
     try:
         with warnings.catch_warnings(action="error"):
             found = read_surface(path, ("um", "um") if path.suffix in (".npy", ".mat") else None)
     except PatchfemError as error:
         assert str(path) in str(error) and len(str(error)) < 500 + len(str(path))
-        said = "missing" if isinstance(error, Missing) else "refused"
+        result = "missing" if isinstance(error, Missing) else "refused"
     else:
         heights = found.z[np.isfinite(found.z)]
         assert heights.size >= 2 and not np.isinf(found.z).any() and np.abs(heights).max() <= 10.0
         axes = (found.x, found.y) if isinstance(found, Areal) else (found.x,)
         assert all(np.isfinite(axis).all() and (np.diff(axis) > 0).all() for axis in axes)
         assert found.z.shape == tuple(axis.size for axis in reversed(axes))
-        said = "read"
+        result = "read"
     assert process_time() - start < 10.0
-    return said
+    return result
 
 
-def campaign(name: str, count: int, use_interpreter) -> Counter:
-    # A file that has no known format any more starts no process.
+def count_outcomes(name: str, count: int, use_interpreter) -> Counter:
+    # a damaged file of unknown format must not start the other interpreter
+    """Return the numbers of outcomes of randomly damaged copies of one file."""
     use_interpreter("/none")
-    file, seed, make = SEEDS[name]
+    file, seed, make_file = SEEDS[name]
     rng = random.Random(f"surfaces {name}")
-    told = Counter()
+    outcomes = Counter()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / file
-        path.write_bytes(make(seed))
-        assert outcome(path) == "read"
+        path.write_bytes(make_file(seed))
+        assert read_outcome(path) == "read"
         for _ in range(count):
-            path.write_bytes(make(mutated(seed, rng)))
-            told[outcome(path)] += 1
-    return told
+            path.write_bytes(make_file(mutate(seed, rng)))
+            outcomes[read_outcome(path)] += 1
+    return outcomes
 
 
 @pytest.mark.parametrize("count", [40, pytest.param(1000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", SEEDS)
-def test_always_damaged_files_are_read_or_refused_by_name(name, count, use_interpreter):
-    outcomes = campaign(name, count, use_interpreter)
+def test_always_damaged_files_are_read_or_refused(name, count, use_interpreter):
+    """Damaged copies of a file are read or refused with the file name, and at least about 5 % are refused."""
+    outcomes = count_outcomes(name, count, use_interpreter)
     assert outcomes.total() == count and outcomes["refused"] > count // 20 - 2

@@ -1,4 +1,4 @@
-"""Reading a two-column trace: every spelling of one file gives the same numbers, every other file a named refusal."""
+"""Text files with two columns: all spellings give the same trace, and all other files are refused with a message."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ from patchfem.surface import read_profile
 from patchfem.surface.files.units import UNITS
 
 
-def read(tmp_path, content, name="before.csv"):
+def read_content(tmp_path, content, name="before.csv"):
+    """Write the content to a file and return the trace that it contains."""
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     return read_profile(path)
 
 
-def test_exact_units_are_those_of_the_package():
+def test_exact_units_of_files_equal_units_of_scenes():
+    """The units of length in files are those of scenes."""
     assert UNITS == UNIT_FACTORS["length"]
 
 
@@ -66,21 +68,28 @@ SPELLINGS = {
 
 
 @pytest.mark.parametrize("content", SPELLINGS.values(), ids=SPELLINGS)
-def test_exact_every_spelling_is_the_same_trace(tmp_path, content):
-    profile = read(tmp_path, content)
+def test_exact_all_spellings_give_same_trace(tmp_path, content):
+    """All spellings of a text (separators, encodings, headers, decimal signs) give the same trace to the last bit."""
+    profile = read_content(tmp_path, content)
     assert np.array_equal(profile.x, X * UM) and np.array_equal(profile.z, Z * UM)
     assert not profile.missing.any() and profile.notes == ()
     assert not profile.x.flags.writeable and not profile.z.flags.writeable
 
 
-def test_exact_missing_heights_keep_their_place(tmp_path):
-    profile = read(tmp_path, "x [um],z [um]\n0,1\n1,\n2,NaN\n3,***\n4, nan \n5,2\n6,*****\n7,1\n")
+def test_exact_missing_heights_keep_their_positions(tmp_path):
+    """Missing heights remain in the trace as missing samples."""
+    profile = read_content(
+        tmp_path, "x [um],z [um]\n0,1\n1,\n2,NaN\n3,***\n4, nan \n5,2\n6,*****\n7,1\n"
+    )
     assert profile.missing.tolist() == [False, True, True, True, True, False, True, False]
     assert np.array_equal(profile.z[[0, 5, 7]], np.array([1.0, 2.0, 1.0]) * UM)
 
 
-def test_exact_samples_at_one_place_become_their_mean(tmp_path):
-    profile = read(tmp_path, "# a step\nx [um],z [um]\n0,1\n1,1\n1,2\n1,nan\n4,3\n4,nan\n9,3\n")
+def test_exact_samples_with_equal_x_are_averaged(tmp_path):
+    """Samples with equal x are replaced by their mean, with a note."""
+    profile = read_content(
+        tmp_path, "# a step\nx [um],z [um]\n0,1\n1,1\n1,2\n1,nan\n4,3\n4,nan\n9,3\n"
+    )
     assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
         np.array([1, 1.5, 3, 3]) * UM
     )
@@ -92,10 +101,11 @@ def test_exact_samples_at_one_place_become_their_mean(tmp_path):
 
 
 @pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
-def test_exact_rounded_x_is_evened(tmp_path, step):
+def test_exact_rounded_x_becomes_evenly_spaced(tmp_path, step):
+    """Values of x that the file rounds become evenly spaced, with a note; exact values give no note."""
     x = np.arange(2000) * step
     z = np.random.default_rng(0).normal(size=2000)
-    profile = read(
+    profile = read_content(
         tmp_path, "x [um],z [um]\n" + "".join(f"{a:.1f},{b:.5f}\n" for a, b in zip(x, z))
     )
     assert profile.x.size == 2000
@@ -131,10 +141,11 @@ SPELLED_UNITS = {
 
 
 @pytest.mark.parametrize("word", SPELLED_UNITS)
-def test_exact_units_as_instruments_spell_them(tmp_path, word):
+def test_exact_unit_spellings_of_instruments(tmp_path, word):
+    """The spellings of units that instruments use give the same heights."""
     heights = np.array([0, 2.54e-6, -2.54e-6])
     content = text([0, 10, 20], heights / SPELLED_UNITS[word], f"x [um],z [{word}]")
-    assert read(tmp_path, content).z == pytest.approx(heights, rel=1e-12)
+    assert read_content(tmp_path, content).z == pytest.approx(heights, rel=1e-12)
 
 
 GIVE = 'or state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
@@ -197,15 +208,17 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("content", REFUSED, ids=lambda content: repr(content[:30]))
-def test_refuses_by_name(tmp_path, content):
+def test_refuses_malformed_text_with_message(tmp_path, content):
+    """A malformed text is refused with a message that states the line, the fault and the remedy."""
     with pytest.raises(PatchfemError) as caught:
-        read(tmp_path, content)
+        read_content(tmp_path, content)
     message = REFUSED[content].replace("{path}", str(tmp_path / "before.csv"))
     assert str(caught.value) == message
 
 
-@pytest.mark.usefixtures("one_mebibyte_of_text")
-def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path):
+@pytest.mark.usefixtures("small_text_limit")
+def test_refuses_missing_damaged_and_large_files(tmp_path):
+    """A missing file, a folder, a damaged .gz and a text that is too large are refused."""
     with pytest.raises(Missing, match="there is no such file"):
         read_profile(tmp_path / "none.csv")
     with pytest.raises(
@@ -215,16 +228,19 @@ def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path):
     with pytest.raises(PatchfemError, match="cannot be read"):
         read_profile("a\0b")
     with pytest.raises(PatchfemError, match=r"damaged .*; pack it again"):
-        read(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
+        read_content(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
     bomb = gzip.compress(b"0" * (1 << 22))
     for content in (bomb, b" " * (1 << 21)):
         with pytest.raises(PatchfemError, match="more than 1 MiB of text; thin out the samples"):
-            read(tmp_path, content)
+            read_content(tmp_path, content)
 
 
-@pytest.mark.usefixtures("one_mebibyte_of_text")
-def test_always_hostile_files_are_refused_in_little_memory(tmp_path):
-    """A gzip file of 32 MiB of blanks and a line of a million columns; unpacked or split they take 30 MB and more."""
+@pytest.mark.usefixtures("small_text_limit")
+def test_always_hostile_files_need_little_memory(tmp_path):
+    """A .gz of 32 MiB of blanks and a line of a million columns are refused with less than 8 MiB of memory.
+
+    Unpacked or split they would take 30 MB and more.
+    """
     columns = b"x [um],z [um]\n0,0\n" + b"," * 10**6 + b"1\n"
     for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
         (tmp_path / "before.csv").write_bytes(content)
@@ -239,8 +255,8 @@ def test_always_hostile_files_are_refused_in_little_memory(tmp_path):
 @pytest.mark.parametrize(
     "count, seconds", [(50_000, 0.5), pytest.param(1_000_000, 1.0, marks=pytest.mark.slow)]
 )
-def test_always_reading_is_quick(tmp_path, count, seconds):
-    """0.4 us a sample on one core, 0.02 s here; a parser twenty times slower fails."""
+def test_always_reading_is_fast(tmp_path, count, seconds):
+    """Reading takes at most 10 us per sample in the quick run; it took 0.4 us on one core."""
     z = np.random.default_rng(1).normal(size=count)
     path = tmp_path / "long.csv"
     rows = "".join(f"{i * 0.0127:.4f},{height:.6f}\n" for i, height in enumerate(z))
@@ -283,7 +299,8 @@ words_of_heads = st.one_of(
 )
 
 
-def attempt(content: bytes) -> None:
+def read_or_refuse(content: bytes) -> None:
+    """Read the content, and check that it gives a valid trace or a refusal with the file name."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.csv"
         path.write_bytes(content)
@@ -294,9 +311,9 @@ def attempt(content: bytes) -> None:
         except PatchfemError as refusal:
             assert str(path) in str(refusal) and len(str(refusal)) < 400 + len(str(path))
         else:
-            there = ~profile.missing
-            assert there.sum() >= 2
-            assert np.isfinite(profile.z[there]).all()
+            present = ~profile.missing
+            assert present.sum() >= 2
+            assert np.isfinite(profile.z[present]).all()
             assert np.isfinite(profile.x).all()
             assert (np.diff(profile.x) > 0).all()
         assert process_time() - start < 2.0
@@ -307,10 +324,14 @@ def attempt(content: bytes) -> None:
                  lines_of_junk.map(lambda rows: ("x [um],z [um]\n" + "\n".join(rows)).encode()),
                  st.lists(words_of_heads, max_size=12).map(lambda rows: "\n".join(rows).encode()),
                  lines_of_junk.map(lambda rows: "\n".join(rows).encode())))  # fmt: skip
-def test_always_junk_is_refused_by_name(content):
-    attempt(content)
+def test_always_random_content_is_refused_or_read(content):
+    """Random bytes, texts and headers are read as a valid trace or refused."""
+    read_or_refuse(content)
 
 
 @given(st.lists(st.tuples(st.floats(), st.floats()), max_size=30), st.sampled_from([*UNITS]))
-def test_always_any_numbers_are_read_or_refused_by_name(rows, unit):
-    attempt((f"x [{unit}] z [{unit}]\n" + "".join(f"{a!r} {b!r}\n" for a, b in rows)).encode())
+def test_always_random_numbers_are_refused_or_read(rows, unit):
+    """Random numbers in any unit are read as a valid trace or refused."""
+    read_or_refuse(
+        (f"x [{unit}] z [{unit}]\n" + "".join(f"{a!r} {b!r}\n" for a, b in rows)).encode()
+    )

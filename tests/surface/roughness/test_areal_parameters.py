@@ -1,4 +1,4 @@
-"""Parameters of scans (ISO 25178-2) and the areal filter: closed forms of ramps, sines and Gaussian surfaces; holes."""
+"""Parameters of scans (ISO 25178-2) and the areal filter, compared with closed forms, also with missing heights."""
 
 import numpy as np
 import pytest
@@ -20,19 +20,24 @@ from patchfem.surface.roughness.rows import AREAL
 UM = 1e-6
 
 
-def scan(z, step=UM, down=UM) -> Areal:
-    return Areal(np.arange(z.shape[1]) * step, np.arange(z.shape[0]) * down, z, "scan")
+def make_scan(z, step=UM, y_step=UM) -> Areal:
+    """Return a scan of heights with given steps."""
+    return Areal(np.arange(z.shape[1]) * step, np.arange(z.shape[0]) * y_step, z, "scan")
 
 
-def plane_wave(m, n, wave, degrees, step=1.0) -> np.ndarray:
+def make_plane_wave(m, n, wave, degrees, step=1.0) -> np.ndarray:
+    """Return the heights (m, n) of a sine wave in a given direction."""
     y, x = np.meshgrid(np.arange(m) * step, np.arange(n) * step, indexing="ij")
     return np.sin(
         2 * np.pi * (x * np.cos(np.radians(degrees)) + y * np.sin(np.radians(degrees))) / wave + 0.3
     )
 
 
-def gaussian(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
-    """Heights whose autocorrelation is exp(-(u/across)^2 - (v/along)^2), u and v turned by an angle; periodic."""
+def gaussian_surface(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
+    """Return periodic Gaussian heights (m, n) of standard deviation 1 with two correlation lengths.
+
+    The autocorrelation is exp(-(u/across)^2 - (v/along)^2), with u and v rotated by an angle.
+    """
     fy, fx = np.meshgrid(np.fft.fftfreq(m), np.fft.fftfreq(n), indexing="ij")
     c = np.cos(np.radians(degrees))
     s = np.sin(np.radians(degrees))
@@ -44,8 +49,8 @@ def gaussian(m, n, across, along, degrees=0.0, seed=0) -> np.ndarray:
     return z / z.std()
 
 
-def test_exact_a_ramp_before_it_is_levelled():
-    """Slopes a and b: gradient sqrt(a^2 + b^2), area sqrt(1 + a^2 + b^2), with and without holes."""
+def test_exact_gradient_and_area_of_ramp():
+    """A ramp of slopes a and b has gradient sqrt(a^2 + b^2) and area ratio sqrt(1 + a^2 + b^2) - 1, also with holes."""
     y, x = np.meshgrid(np.arange(20) * 2.0, np.arange(30) * 3.0, indexing="ij")
     z = 0.4 * x - 0.7 * y
     for holes in (False, True):
@@ -58,45 +63,53 @@ def test_exact_a_ramp_before_it_is_levelled():
         )
 
 
-def test_exact_a_sine_of_whole_periods():
-    """z = A cos(2 pi x / L): two-point slopes A sqrt(2) sin(pi h / L) / h; Sq, Sp, Sv, the Abbott curve of a sine."""
+def test_exact_parameters_of_sine_surface():
+    """Heights, slopes and volumes of the Abbott curve of a sine surface agree with the closed forms.
+
+    The slope of A cos(2 pi x / L) between samples that lie h apart is A sqrt(2) sin(pi h / L) / h.
+    """
     n = 3997
     wave = 399.7
-    high = 3.0
-    z = np.tile(high * np.cos(2 * np.pi * (np.arange(n) + 0.5) / wave), (8, 1))
-    report = make_report(scan(z * UM))
-    assert report["Sq"].value == pytest.approx(high * UM / np.sqrt(2), rel=1e-9)
+    amplitude = 3.0
+    z = np.tile(amplitude * np.cos(2 * np.pi * (np.arange(n) + 0.5) / wave), (8, 1))
+    report = make_report(make_scan(z * UM))
+    assert report["Sq"].value == pytest.approx(amplitude * UM / np.sqrt(2), rel=1e-9)
     assert report["Ssk"].value == pytest.approx(0, abs=1e-9) and report[
         "Sku"
     ].value == pytest.approx(1.5, rel=1e-9)
     surface = Surface(z, (1.0, 1.0))
     rows = {row.name: row.compute(surface) for row in AREAL}
-    slope = high * np.sqrt(2) * 2 * np.sin(np.pi / wave) / 2
+    slope = amplitude * np.sqrt(2) * 2 * np.sin(np.pi / wave) / 2
     assert rows["Sdq"] == pytest.approx(slope * np.sqrt((n - 0.5) / n), rel=3e-4)
-    assert rows["Sp"] == pytest.approx(high, rel=1e-4) and rows["Sv"] == pytest.approx(
-        high, rel=1e-4
+    assert rows["Sp"] == pytest.approx(amplitude, rel=1e-4) and rows["Sv"] == pytest.approx(
+        amplitude, rel=1e-4
     )
-    every = Surface(
-        high * np.sin(2 * np.pi * (np.arange(40_000) + 0.25) / 40_000).reshape(200, 200), (1.0, 1.0)
+    one_period = Surface(
+        amplitude * np.sin(2 * np.pi * (np.arange(40_000) + 0.25) / 40_000).reshape(200, 200),
+        (1.0, 1.0),
     )
-    rows = {row.name: row.compute(every) for row in AREAL if row.name[0] == "V"}
+    rows = {row.name: row.compute(one_period) for row in AREAL if row.name[0] == "V"}
 
-    # share above c = A sin(phi): 1/2 - phi / pi; volumes by integration of A cos over the phase
-    def height(p):
-        return high * np.sin(np.pi * (0.5 - p))
+    # the ratio above c = A sin(phi) is 1/2 - phi/pi; volumes follow by integration of A cos over
+    # the phase
+    def height_at_ratio(p):
+        """Return the height of the Abbott curve at an areal ratio."""
+        return amplitude * np.sin(np.pi * (0.5 - p))
 
-    def material(p):
-        return high / np.pi * np.cos(np.pi * (0.5 - p)) - p * height(p)
+    def material_volume(p):
+        """Return the material volume above an areal ratio."""
+        return amplitude / np.pi * np.cos(np.pi * (0.5 - p)) - p * height_at_ratio(p)
 
-    assert rows["Vmp"] == pytest.approx(material(0.1), rel=1e-3)
-    assert rows["Vmc"] == pytest.approx(material(0.8) - material(0.1), rel=1e-3)
-    # mean height zero: void = material - mean of (z - c)
-    void = {p: material(p) + height(p) for p in (0.1, 0.8)}
+    assert rows["Vmp"] == pytest.approx(material_volume(0.1), rel=1e-3)
+    assert rows["Vmc"] == pytest.approx(material_volume(0.8) - material_volume(0.1), rel=1e-3)
+    # with zero mean height the void volume is the material volume minus the mean of z - c
+    void = {p: material_volume(p) + height_at_ratio(p) for p in (0.1, 0.8)}
     assert rows["Vvv"] == pytest.approx(void[0.8], rel=1e-3)
     assert rows["Vvc"] == pytest.approx(void[0.1] - void[0.8], rel=1e-3)
 
 
-def test_exact_the_autocorrelation_is_the_sum_over_measured_pairs():
+def test_exact_autocorrelation_is_mean_over_measured_pairs():
+    """The autocorrelation of a scan with holes is the mean over all pairs of measured heights."""
     z = np.random.default_rng(3).normal(size=(9, 12))
     z[2, 3] = z[5, 7:9] = np.nan
     found = autocorrelation(z)
@@ -110,9 +123,9 @@ def test_exact_the_autocorrelation_is_the_sum_over_measured_pairs():
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 117.0])
-def test_exact_grooves_have_a_length_but_no_aspect(degrees):
-    """A sine of wavelength L falls to 0.2 at L arccos(0.2) / (2 pi) and stays above along its crests."""
-    surface = Surface(plane_wave(300, 400, 25.0, degrees), (1.0, 1.0))
+def test_exact_grooves_have_length_but_no_aspect_ratio(degrees):
+    """A sine of wavelength L has Sal = L arccos(0.2) / (2 pi), and no Str, because its crests do not decorrelate."""
+    surface = Surface(make_plane_wave(300, 400, 25.0, degrees), (1.0, 1.0))
     assert autocorrelation_length(surface) == pytest.approx(
         25 * np.arccos(0.2) / (2 * np.pi), rel=0.01
     )
@@ -120,10 +133,12 @@ def test_exact_grooves_have_a_length_but_no_aspect(degrees):
 
 
 @pytest.mark.parametrize("degrees", [0.0, 40.0])
-def test_exact_a_gaussian_surface_of_two_lengths(degrees):
-    """Autocorrelation exp(-(u/a)^2 - (v/b)^2): Sal = a sqrt(ln 5), Str = a / b. A scan of
-    100 x 25 lengths tells them to a few percent."""
-    surface = Surface(gaussian(600, 600, 6.0, 18.0, degrees), (1.0, 1.0))
+def test_exact_length_and_aspect_ratio_of_gaussian_surface(degrees):
+    """With autocorrelation exp(-(u/a)^2 - (v/b)^2), Sal = a sqrt(ln 5) within 5 % and Str = a/b within 10 %.
+
+    The scan contains 100 x 33 correlation lengths; holes change Sal by less than 1 %.
+    """
+    surface = Surface(gaussian_surface(600, 600, 6.0, 18.0, degrees), (1.0, 1.0))
     assert autocorrelation_length(surface) == pytest.approx(6 * np.sqrt(np.log(5)), rel=0.05)
     assert aspect_ratio(surface) == pytest.approx(1 / 3, rel=0.1)
     z = surface.z.copy()
@@ -133,54 +148,60 @@ def test_exact_a_gaussian_surface_of_two_lengths(degrees):
     )
 
 
-def test_exact_steps_of_their_own_along_x_and_y():
-    """Every third row of a surface tells the same lengths."""
-    z = gaussian(900, 400, 12.0, 12.0, seed=2)
+def test_exact_unequal_steps_give_same_length():
+    """Every third row of a surface gives the same autocorrelation length within 2 %."""
+    z = gaussian_surface(900, 400, 12.0, 12.0, seed=2)
     thinned, full = (
-        autocorrelation_length(one) for one in (Surface(z[::3], (3.0, 1.0)), Surface(z, (1.0, 1.0)))
+        autocorrelation_length(surface)
+        for surface in (Surface(z[::3], (3.0, 1.0)), Surface(z, (1.0, 1.0)))
     )
     assert thinned == pytest.approx(full, rel=0.02)
 
 
-def test_always_what_has_no_value_says_why():
+def test_always_missing_areal_parameters_have_reason():
+    """Areal parameters without a value or an interval have a reason."""
     rng = np.random.default_rng(0)
-    for z, name, says in (
+    for z, name, reason in (
         (rng.normal(size=(60, 60)), "Sal", "within two steps"),
         (
-            plane_wave(120, 120, 20.0, 0.0),
+            make_plane_wave(120, 120, 20.0, 0.0),
             "Str",
             "stays above 0.2 over 60 um, so Str is below 0.07",
         ),
         (np.zeros((30, 30)), "Sk", "the scan is flat"),
     ):
-        found = make_report(scan(z * UM))[name]
-        assert found.value is None and says in found.reason
+        found = make_report(make_scan(z * UM))[name]
+        assert found.value is None and reason in found.reason
     assert all(
-        one.low is not None or one.reason
-        for one in make_report(scan(rng.normal(size=(60, 60)) * UM)).values
+        parameter.low is not None or parameter.reason
+        for parameter in make_report(make_scan(rng.normal(size=(60, 60)) * UM)).values
     )
 
 
-def test_exact_the_areal_filter_is_that_of_traces_both_ways():
+def test_exact_areal_filter_is_separable():
+    """The areal filter equals the filter of traces along x and then along y."""
     z = np.random.default_rng(4).normal(size=(80, 60))
     rows = np.array([mean_line(row, 12.0) for row in z])
-    both = np.array([mean_line(column, 20.0) for column in rows.T]).T
-    assert mean_surface(z, (20.0, 12.0)) == pytest.approx(both, abs=1e-12)
+    expected = np.array([mean_line(column, 20.0) for column in rows.T]).T
+    assert mean_surface(z, (20.0, 12.0)) == pytest.approx(expected, abs=1e-12)
 
 
-def test_exact_a_wave_through_the_areal_filter():
-    """What is left in the middle, exp(-pi (alpha cutoff / L)^2): half of a wave as long as the cut-off."""
+def test_exact_wave_transmission_of_areal_filter():
+    """The areal filter transmits exp(-pi (alpha cutoff / L)^2) of a wave of length L, half of it at the cut-off."""
     for wave, degrees in ((40.0, 0.0), (40.0, 30.0), (25.0, 90.0)):
-        waves, rough = filter_scan(scan(plane_wave(240, 240, wave, degrees)), 40 * UM)
+        waves, rough = filter_scan(make_scan(make_plane_wave(240, 240, wave, degrees)), 40 * UM)
         assert waves.z.shape == (200, 200) and waves.x[0] == 20 * UM
-        kept = np.exp(-np.pi * (ALPHA * 40 / wave) ** 2)
-        inside = plane_wave(240, 240, wave, degrees)[60:-60, 60:-60]
-        assert waves.z[40:-40, 40:-40] == pytest.approx(kept * inside, abs=1e-9)
-        assert rough.z[40:-40, 40:-40] == pytest.approx((1 - kept) * inside, abs=1e-9)
+        transmission = np.exp(-np.pi * (ALPHA * 40 / wave) ** 2)
+        inside = make_plane_wave(240, 240, wave, degrees)[60:-60, 60:-60]
+        assert waves.z[40:-40, 40:-40] == pytest.approx(transmission * inside, abs=1e-9)
+        assert rough.z[40:-40, 40:-40] == pytest.approx((1 - transmission) * inside, abs=1e-9)
 
 
-def test_exact_holes_leave_the_mean_surface_of_what_is_measured():
-    """By the definition at some points: the weights on measured heights, scaled to a sum of one; holes stay holes."""
+def test_exact_filter_ignores_holes():
+    """At holes the weights of the filter are normalised over the measured heights.
+
+    Holes remain holes.
+    """
     z = np.random.default_rng(6).normal(size=(70, 70))
     z[20:26, 30:50] = np.nan
     found = mean_surface(z, (15.0, 15.0))
@@ -195,26 +216,29 @@ def test_exact_holes_leave_the_mean_surface_of_what_is_measured():
         )
 
 
-def test_exact_filters_of_a_report():
-    """S- and L-filter of a long and a short wave: the middle one is left."""
+def test_exact_filters_of_areal_report():
+    """The S- and L-filters of a report leave only the middle of three waves, within 2 %."""
     z = (
-        plane_wave(400, 400, 200.0, 0)
-        + plane_wave(400, 400, 40.0, 90)
-        + plane_wave(400, 400, 5.0, 45)
+        make_plane_wave(400, 400, 200.0, 0)
+        + make_plane_wave(400, 400, 40.0, 90)
+        + make_plane_wave(400, 400, 5.0, 45)
     )
-    report = make_report(scan(z * UM), 100 * UM, short=12 * UM)
-    kept = np.exp(-np.pi * (ALPHA * 12 / 40) ** 2) * (1 - np.exp(-np.pi * (ALPHA * 100 / 40) ** 2))
-    assert report["Sq"].value == pytest.approx(kept * UM / np.sqrt(2), rel=0.02)
+    report = make_report(make_scan(z * UM), 100 * UM, short=12 * UM)
+    transmission = np.exp(-np.pi * (ALPHA * 12 / 40) ** 2) * (
+        1 - np.exp(-np.pi * (ALPHA * 100 / 40) ** 2)
+    )
+    assert report["Sq"].value == pytest.approx(transmission * UM / np.sqrt(2), rel=0.02)
     assert report.surface.z.shape == (288, 288) and report.sampling.shape == (400, 400)
 
 
 @pytest.mark.parametrize(
-    "cutoff, says",
+    "cutoff, message",
     [
         (3 * UM, "shorter than 4 steps of 1 um"),
         (90 * UM, "the shorter side is 79 um long; half a cut-off of 90 um"),
     ],
 )
-def test_refuses_a_cutoff(cutoff, says):
-    with pytest.raises(PatchfemError, match=says):
-        filter_scan(scan(np.zeros((80, 120))), cutoff)
+def test_refuses_cutoff_of_areal_filter(cutoff, message):
+    """A cut-off that is too short for the step or too long for the scan is refused."""
+    with pytest.raises(PatchfemError, match=message):
+        filter_scan(make_scan(np.zeros((80, 120))), cutoff)

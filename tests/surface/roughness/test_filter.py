@@ -1,4 +1,4 @@
-"""The Gaussian profile filter: transmission of sines, ends, uneven and missing samples, refusals."""
+"""Gaussian profile filter: transmission of sines, ends of the trace, uneven and missing samples, refusals."""
 
 import numpy as np
 import pytest
@@ -14,24 +14,27 @@ UM = 1e-6
 WAVE = 400 * UM
 
 
-def passed(cutoff: float) -> float:
-    """Rq of a sine of amplitude 1 and wavelength WAVE behind the filter of ISO 16610-21."""
+def filtered_rms(cutoff: float) -> float:
+    """Return Rq of a sine of amplitude 1 and wavelength WAVE after the filter of ISO 16610-21."""
     return (1 - 2.0 ** -((cutoff / WAVE) ** 2)) / np.sqrt(2)
 
 
 @pytest.mark.parametrize("cutoff, known", [(80, 0.0193359), (250, 0.1677264), (800, 0.6629126)])
-def test_exact_a_sine_through_the_filter(cutoff, known):
-    """Whole waves away from the ends to 1e-9, the whole trimmed trace of 1000 waves to 1e-5."""
-    assert passed(cutoff * UM) == pytest.approx(known, rel=3e-6)
+def test_exact_filtered_sine_agrees_with_closed_form(cutoff, known):
+    """Rq of a filtered sine agrees with the closed form within 1e-9 away from the ends.
+
+    Over the whole trimmed trace of 1000 waves it agrees within 1e-5.
+    """
+    assert filtered_rms(cutoff * UM) == pytest.approx(known, rel=3e-6)
     trace = sine(np.arange(400_001) * UM, 1e-6, WAVE)
     rough = filter_trace(trace, cutoff * UM)[1].z / 1e-6
-    assert abs(rough[2000 : 2000 + 400 * 900].std() - passed(cutoff * UM)) < 1e-9
-    assert abs(np.sqrt((rough**2).mean()) - passed(cutoff * UM)) < 1e-5
+    assert abs(rough[2000 : 2000 + 400 * 900].std() - filtered_rms(cutoff * UM)) < 1e-9
+    assert abs(np.sqrt((rough**2).mean()) - filtered_rms(cutoff * UM)) < 1e-5
 
 
 @given(st.floats(20.0, 900.0), st.integers(0, 2**32 - 1))
-def test_exact_the_mean_line_is_the_weighted_mean(cutoff, seed):
-    """Every sample by the definition, the weights that lie within the trace scaled to one."""
+def test_exact_mean_line_agrees_with_definition(cutoff, seed):
+    """The mean line is the weighted mean of the definition, with weights normalised within the trace."""
     z = np.random.default_rng(seed).normal(size=500)
     line = mean_line(z, cutoff)
     x = np.arange(500)
@@ -40,7 +43,8 @@ def test_exact_the_mean_line_is_the_weighted_mean(cutoff, seed):
         assert line[k] == pytest.approx(weight @ z / weight.sum(), abs=1e-8)
 
 
-def test_exact_the_tilted_ends_are_weighted_lines():
+def test_exact_tilted_mean_line_is_weighted_fit():
+    """With tilted ends the mean line is a weighted least-squares line at each sample."""
     z = np.random.default_rng(3).normal(size=400)
     x = np.arange(400)
     cutoff = 90.0
@@ -51,14 +55,16 @@ def test_exact_the_tilted_ends_are_weighted_lines():
         assert line[k] == pytest.approx(offset, abs=1e-7)
 
 
-def test_exact_half_a_cutoff_is_trimmed_at_each_end():
+def test_exact_half_cutoff_is_trimmed_at_ends():
+    """Half a cut-off is trimmed at each end of waviness and roughness."""
     trace = sine(np.arange(10_001) * UM, 1e-6, 80 * UM)
     waviness, rough = filter_trace(trace, 800 * UM)
     assert rough.x[0] == pytest.approx(400 * UM) and rough.x[-1] == pytest.approx(9600 * UM)
     assert np.array_equal(waviness.x, rough.x)
 
 
-def test_exact_waviness_and_roughness_add_up_to_the_levelled_trace():
+def test_exact_waviness_plus_roughness_is_levelled_trace():
+    """Waviness plus roughness is the levelled trace."""
     x = np.arange(3000) * UM
     z = np.random.default_rng(0).normal(0, UM, 3000) + 0.01 * x
 
@@ -66,12 +72,14 @@ def test_exact_waviness_and_roughness_add_up_to_the_levelled_trace():
     assert waviness.z + rough.z == pytest.approx(level(Profile(x, z, "t")).z[125:-125], abs=1e-18)
 
 
-def test_exact_an_even_whole_trace_stays_itself():
+def test_exact_evenly_spaced_trace_is_unchanged():
+    """Resampling returns an evenly spaced trace without missing heights itself."""
     trace = sine(np.arange(100) * UM, UM, 30 * UM)
     assert resample_evenly(trace) is trace
 
 
-def test_exact_uneven_and_missing_samples_of_a_straight_flank():
+def test_exact_uneven_trace_is_resampled_with_notes():
+    """A straight flank with uneven and missing samples is resampled exactly, with a note on each."""
     x = np.array([0.0, 1, 2, 4, 5, 7, 8, 9, 10, 12]) * UM
     z = 0.1 * x
     z[4] = np.nan
@@ -88,7 +96,7 @@ def test_exact_uneven_and_missing_samples_of_a_straight_flank():
 
 
 @pytest.mark.parametrize(
-    "cutoff, says",
+    "cutoff, message",
     [
         (
             3 * UM,
@@ -103,6 +111,7 @@ def test_exact_uneven_and_missing_samples_of_a_straight_flank():
         (np.nan, "a cut-off of"),
     ],
 )
-def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
-    with pytest.raises(PatchfemError, match=says.replace("(", r"\(")):
+def test_refuses_cutoff_that_does_not_fit_trace(cutoff, message):
+    """A cut-off that is too short for the step, too long for the trace, or nan is refused."""
+    with pytest.raises(PatchfemError, match=message.replace("(", r"\(")):
         filter_trace(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)

@@ -1,4 +1,4 @@
-"""Forms of traces and scans: polynomials, circles and cylinders of known truth are taken off, and their radius told."""
+"""Removal of form from traces and scans: polynomials, circles and cylinders of known size, and their radius."""
 
 import re
 
@@ -13,61 +13,73 @@ from patchfem.surface.roughness.form import subtract_form
 UM, MM = 1e-6, 1e-3
 
 
-def trace(z, step=UM) -> Profile:
+def make_trace(z, step=UM) -> Profile:
+    """Return a trace of heights with a given step."""
     return Profile(np.arange(z.size) * step, z, "trace")
 
 
-def circle(x, radius, at, lift) -> np.ndarray:
-    return lift + np.sqrt(radius**2 - (x - at) ** 2)
+def circle_heights(x, radius, centre, offset) -> np.ndarray:
+    """Return the heights of a circle."""
+    return offset + np.sqrt(radius**2 - (x - centre) ** 2)
 
 
 @pytest.mark.parametrize("form", [2, 3, 7])
-def test_exact_a_polynomial_is_taken_off_and_nothing_else(form):
+def test_exact_polynomial_form_is_removed(form):
+    """A polynomial form is removed exactly, and the remaining heights agree with a dense least-squares fit."""
     rng = np.random.default_rng(form)
     x = np.linspace(-1, 1, 500)
-    bent = np.polynomial.polynomial.polyval(x, rng.normal(size=form + 1)) * 1e-5
+    polynomial = np.polynomial.polynomial.polyval(x, rng.normal(size=form + 1)) * 1e-5
     z = rng.normal(size=500) * UM
     z[40:60] = np.nan
-    alone, name = subtract_form(trace(z), form)
-    again = subtract_form(trace(z + bent), form)[0]
-    assert name == f"polynomial of degree {form}" and np.nanmax(np.abs(again.z - alone.z)) < 1e-17
-    there = ~np.isnan(z)
-    dense = np.polynomial.legendre.legvander(x[there], form)
-    assert alone.z[there] == pytest.approx(
-        z[there] - dense @ np.linalg.lstsq(dense, z[there])[0], abs=1e-18
+    expected, name = subtract_form(make_trace(z), form)
+    flattened = subtract_form(make_trace(z + polynomial), form)[0]
+    assert (
+        name == f"polynomial of degree {form}"
+        and np.nanmax(np.abs(flattened.z - expected.z)) < 1e-17
+    )
+    present = ~np.isnan(z)
+    dense = np.polynomial.legendre.legvander(x[present], form)
+    assert expected.z[present] == pytest.approx(
+        z[present] - dense @ np.linalg.lstsq(dense, z[present])[0], abs=1e-18
     )
 
 
 @pytest.mark.parametrize("degree", [1, 2, 4])
-def test_exact_the_polynomial_of_a_scan_of_a_dense_least_squares_solve(degree):
+def test_exact_scan_polynomial_agrees_with_least_squares(degree):
+    """The polynomial that is removed from a scan with holes agrees with a dense least-squares fit."""
     rng = np.random.default_rng(degree)
     z = np.where(rng.random((40, 55)) < 0.3, np.nan, rng.normal(size=(40, 55)))
     scan = Areal(np.arange(55) * 2.0, np.arange(40) * 3.0, z, "scan")
     rows, columns = np.nonzero(~np.isnan(z))
-    base = np.column_stack(
+    basis = np.column_stack(
         [
             (columns / 55) ** i * (rows / 40) ** j
             for i in range(degree + 1)
             for j in range(degree + 1 - i)
         ]
     )
-    rest = z[rows, columns] - base @ np.linalg.lstsq(base, z[rows, columns])[0]
-    assert level(scan, degree).z[rows, columns] == pytest.approx(rest, abs=1e-10)
+    residual = z[rows, columns] - basis @ np.linalg.lstsq(basis, z[rows, columns])[0]
+    assert level(scan, degree).z[rows, columns] == pytest.approx(residual, abs=1e-10)
     assert np.array_equal(np.isnan(level(scan, degree).z), np.isnan(z))
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_exact_a_circle_under_a_trace(sign):
-    """A ball of 5 mm seen over 4 mm, off its middle: 0.1 nm is left, and the radius is told to 1e-6."""
+def test_exact_circle_is_removed_from_trace(sign):
+    """A circle of 5 mm radius over 4 mm is removed within 0.1 nm, and its radius is stated."""
     x = np.arange(4001) * UM
-    flat, name = subtract_form(trace(sign * circle(x, 5 * MM, 1.6 * MM, -4 * MM)), "cylinder")
+    flat, name = subtract_form(
+        make_trace(sign * circle_heights(x, 5 * MM, 1.6 * MM, -4 * MM)), "cylinder"
+    )
     assert np.abs(flat.z).max() < 1e-10
     assert name == f"circle of radius 5 mm (90 % confidence), a {'crest' if sign > 0 else 'trough'}"
 
 
 @pytest.mark.parametrize("degrees, tilt", [(0.0, 0.0), (25.0, 0.01), (140.0, 0.05)])
-def test_exact_a_cylinder_under_a_scan(degrees, tilt):
-    """Radius 8 mm, its axis turned and tilted: heights by the distance of a line, roughness of 0.1 um on top."""
+def test_exact_cylinder_is_removed_from_scan(degrees, tilt):
+    """A tilted cylinder of 8 mm radius under a roughness of 0.1 um is removed within 5 nm.
+
+    Its radius agrees within three times its error, and its axis within 0.1 degrees.
+    """
     rng = np.random.default_rng(1)
     y, x = np.meshgrid(np.arange(150) * 10 * UM, np.arange(200) * 10 * UM, indexing="ij")
     c = np.cos(np.radians(degrees))
@@ -91,10 +103,13 @@ def test_exact_a_cylinder_under_a_scan(degrees, tilt):
 
 
 @pytest.mark.parametrize("count", [15, pytest.param(60, marks=pytest.mark.slow)])
-def test_always_the_error_of_a_radius_holds(count):
-    """90 of 100 made circles hold theirs, less three deviations of the count and 5 of 60 for a jackknife of ten."""
+def test_always_error_of_radius_covers_truth(count):
+    """The error of the radius covers the truth for 90 % of made circles.
+
+    The bound allows three standard deviations of the count and the bias of a jackknife of ten.
+    """
     x = np.arange(1500) * UM
-    held = 0
+    n_covered = 0
     for seed in range(count):
         noise = (
             np.convolve(
@@ -102,31 +117,36 @@ def test_always_the_error_of_a_radius_holds(count):
             )
             * UM
         )
-        name = subtract_form(trace(circle(x, 20 * MM, 0.7 * MM, 0) + noise), "cylinder")[1]
+        name = subtract_form(
+            make_trace(circle_heights(x, 20 * MM, 0.7 * MM, 0) + noise), "cylinder"
+        )[1]
         value, error = re.search(r"radius ([\d.]+) ± ([\d.]+) mm", name).groups()
-        held += abs(float(value) - 20) <= float(error)
-    assert held >= 0.9 * count - 3 * np.sqrt(0.09 * count) - count / 20
+        n_covered += abs(float(value) - 20) <= float(error)
+    assert n_covered >= 0.9 * count - 3 * np.sqrt(0.09 * count) - count / 20
 
 
-def test_exact_a_flat_trace_tells_a_least_radius():
+def test_exact_flat_trace_gives_lower_bound_of_radius():
+    """A flat trace gives a lower bound of the radius."""
     z = np.random.default_rng(0).normal(size=2000) * UM
     assert re.fullmatch(
         r"circle, of a radius above [\d.]+ m+ \(90 % conf.*\)",
-        subtract_form(trace(z), "cylinder")[1],
+        subtract_form(make_trace(z), "cylinder")[1],
     )
 
 
 @pytest.mark.parametrize("text", ["0", "10", "-1", "ball", "2.5", ""])
-def test_refuses_a_form(text):
+def test_refuses_unknown_form(text):
+    """An unknown form or degree is refused."""
     with pytest.raises(PatchfemError, match="use a degree from 1"):
         parse_form(text)
 
 
-def test_refuses_too_few_heights():
+def test_refuses_too_few_heights_for_form():
+    """A trace or scan with too few heights for its form is refused."""
     with pytest.raises(PatchfemError, match="do not determine a polynomial of degree 5"):
-        subtract_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), 5)
+        subtract_form(make_trace(np.where(np.arange(40) < 6, 1.0, np.nan)), 5)
     with pytest.raises(PatchfemError, match="a cylinder needs at least ten"):
-        subtract_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), "cylinder")
+        subtract_form(make_trace(np.where(np.arange(40) < 6, 1.0, np.nan)), "cylinder")
     line = np.full((20, 20), np.nan)
     line[4] = 1.0
     with pytest.raises(PatchfemError, match="do not determine a polynomial of degree 2"):

@@ -1,6 +1,7 @@
-"""Measured traces and scans: the instrument's own printed results, and the numbers of other codes. Needs PATCHFEM_DATA.
+"""Measured traces and scans, compared with printed results of the instrument and with other codes.
 
-The other code takes Rq about the mean of the roughness profile, not about its mean line.
+The tests need PATCHFEM_DATA. One of the codes takes Rq about the mean of the roughness profile, not
+about its mean line.
 """
 
 import json
@@ -23,25 +24,30 @@ TRACES = ("dektak-1.csv", "mitutoyo-2.csv.gz")
 
 
 @pytest.fixture(scope="module")
-def data() -> Path:
+def data_folder() -> Path:
+    """Return the folder of measured data."""
     return Path(os.environ["PATCHFEM_DATA"])
 
 
 @pytest.fixture(scope="module")
-def truth(data) -> dict:
-    return json.loads((data / "truth.json").read_text())
+def reference_values(data_folder) -> dict:
+    """Return the reference values of the measured data."""
+    return json.loads((data_folder / "truth.json").read_text())
 
 
 @pytest.fixture(scope="module")
-def traces(data) -> dict:
-    """Both traces as they are read."""
-    return {name: read_surface(data / name) for name in TRACES}
+def measured_traces(data_folder) -> dict:
+    """Return both measured traces by file name."""
+    return {name: read_surface(data_folder / name) for name in TRACES}
 
 
-def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
-    """Ra, Rq, skewness, Rz(DIN) and deviation to the last printed digit, the step height to one of it."""
-    report = make_report(traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
-    printed = truth["dektak-1.csv"]["instrument_printed_results"]
+def test_exact_report_agrees_with_printed_results(measured_traces, reference_values):
+    """Between the cursors, Ra, Rq, skewness, Rz(DIN) and deviation agree with the print to the last digit.
+
+    The step height agrees within one unit of the last digit.
+    """
+    report = make_report(measured_traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
+    printed = reference_values["dektak-1.csv"]["instrument_printed_results"]
     assert report.sampling.shape == (1697,)
     for name, key, digits in (
         ("Pa", "Ra", 5),
@@ -52,7 +58,7 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
         assert round(report[name].value / UM, digits) == printed[key]
     assert round(report["Psk"].value, 2) == printed["Skew"]
     assert report["ASH"].value / UM == pytest.approx(printed["ASH"], abs=1.5e-5)
-    own = truth["dektak-1.csv"]["own_window_samples_2995_4692"]
+    expected = reference_values["dektak-1.csv"]["own_window_samples_2995_4692"]
     for name, key in (
         ("Pa", "Ra"),
         ("Pq", "Rq"),
@@ -60,18 +66,19 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
         ("MaxDev", "MaxDev"),
         ("ASH", "ASH_last_minus_first"),
     ):
-        assert report[name].value / UM == pytest.approx(own[key], rel=1e-6)
+        assert report[name].value / UM == pytest.approx(expected[key], rel=1e-6)
 
 
 @pytest.mark.parametrize("name", TRACES)
-def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
-    report = make_report(traces[name])
-    known = truth[name]
+def test_exact_primary_profile_agrees_with_three_codes(measured_traces, reference_values, name):
+    """Parameters of the primary profile agree with three other codes within 1e-6."""
+    report = make_report(measured_traces[name])
+    expected = reference_values[name]
     assert report.treatment.cutoff is None and report.surface.roughness is None
     for key, unit in (("Pa", UM), ("Pq", UM), ("Pt", UM), ("Psk", 1), ("Pku", 1)):
-        assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
-    assert report["Pdq"].value == pytest.approx(known["Pdq_2pt"], rel=1e-6)
-    assert not any(one.name.startswith("R") for one in report.values)
+        assert report[key].value == pytest.approx(expected[key] * unit, rel=1e-6)
+    assert report["Pdq"].value == pytest.approx(expected["Pdq_2pt"], rel=1e-6)
+    assert not any(parameter.name.startswith("R") for parameter in report.values)
 
 
 @pytest.mark.parametrize(
@@ -84,40 +91,45 @@ def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
         ("mitutoyo-2.csv.gz", 800),
     ],
 )
-def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff):
-    known = truth[name][f"own_gauss_lc{cutoff}"]
-    report = make_report(traces[name], cutoff * UM)
+def test_exact_roughness_profile_agrees_with_other_code(
+    measured_traces, reference_values, name, cutoff
+):
+    """Parameters of the roughness profile agree with another code within 0.1 %, and Rq within 0.5 %."""
+    expected = reference_values[name][f"own_gauss_lc{cutoff}"]
+    report = make_report(measured_traces[name], cutoff * UM)
     heights = Heights(report.surface.roughness.z, report.sampling.step, cutoff * UM)
-    trimmed = report.surface.roughness.x[0] - traces[name].x[0]
-    assert len(heights.sections) == known["sections"]
-    assert trimmed == pytest.approx(known["trimmed_each_end_um"] * UM, rel=1e-6)
-    assert report["Ra"].value == pytest.approx(known["Ra"] * UM, rel=1e-3)
-    assert heights.z.std() == pytest.approx(known["Rq"] * UM, rel=1e-4)
-    assert report["Rq"].value == pytest.approx(known["Rq"] * UM, rel=5e-3)
-    assert report["Rz"].value == pytest.approx(known["Rz_mean_of_sections"] * UM, rel=1e-4)
+    trimmed = report.surface.roughness.x[0] - measured_traces[name].x[0]
+    assert len(heights.sections) == expected["sections"]
+    assert trimmed == pytest.approx(expected["trimmed_each_end_um"] * UM, rel=1e-6)
+    assert report["Ra"].value == pytest.approx(expected["Ra"] * UM, rel=1e-3)
+    assert heights.z.std() == pytest.approx(expected["Rq"] * UM, rel=1e-4)
+    assert report["Rq"].value == pytest.approx(expected["Rq"] * UM, rel=5e-3)
+    assert report["Rz"].value == pytest.approx(expected["Rz_mean_of_sections"] * UM, rel=1e-4)
 
 
 @pytest.mark.parametrize("name", TRACES)
-def test_exact_the_core_of_another_code(traces, truth, name):
-    """To 5 %: the other code reads a curve of classes."""
-    found = make_report(traces[name])
-    known = truth[name]["surfalize"]
+def test_exact_core_agrees_with_other_code(measured_traces, reference_values, name):
+    """The core parameters agree within 5 % with another code, which evaluates a histogram."""
+    found = make_report(measured_traces[name])
+    expected = reference_values[name]["surfalize"]
     for key in ("k", "pk", "vk"):
-        assert found["P" + key].value == pytest.approx(known["R" + key] * UM, rel=0.05)
+        assert found["P" + key].value == pytest.approx(expected["R" + key] * UM, rel=0.05)
 
 
 @pytest.mark.parametrize("name", ["nanovea-test1.txt.gz", "nanovea-test2.txt.gz"])
-def test_exact_areal_parameters_of_three_codes(data, truth, name):
-    report = make_report(read_surface(data / name, ("mm", "um")))
-    known = truth[name]
+def test_exact_areal_parameters_agree_with_three_codes(data_folder, reference_values, name):
+    """Areal parameters agree with three other codes within 1e-6, and have no intervals on plateaus with pits."""
+    report = make_report(read_surface(data_folder / name, ("mm", "um")))
+    expected = reference_values[name]
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
-        assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
-        # plateaus with pits
+        assert report[key].value == pytest.approx(expected[key] * unit, rel=1e-6)
+        # the surface has plateaus with pits
         assert report[key].low is None and "heights are not Gaussian" in report[key].reason
 
 
-def test_exact_a_digitised_uneven_trace(data):
-    trace = read_surface(data / "xy-1.txt", ("um", "um"))
+def test_exact_uneven_digitised_trace(data_folder):
+    """Pq of an uneven digitised trace agrees within 1 % with a dense interpolation, and a note states the resampling."""
+    trace = read_surface(data_folder / "xy-1.txt", ("um", "um"))
     report = make_report(trace)
     assert "the trace is resampled at every" in report.notes[0]
     dense = np.linspace(trace.x[0], trace.x[-1], 100_001)
@@ -126,8 +138,9 @@ def test_exact_a_digitised_uneven_trace(data):
     assert report["Pq"].value == pytest.approx(np.sqrt((flat**2).mean()), rel=0.01)
 
 
-def test_exact_the_core_of_the_report_is_that_of_the_roughness(traces):
-    trace = traces["mitutoyo-2.csv.gz"]
+def test_exact_report_core_is_that_of_roughness_profile(measured_traces):
+    """The core parameters of a report are those of its roughness profile."""
+    trace = measured_traces["mitutoyo-2.csv.gz"]
     report = make_report(trace, 800 * UM)
     roughness = filter_trace(trace, 800 * UM)[1]
     assert report.heights.core == pytest.approx(fit_core(Heights(roughness.z, 1.0)))

@@ -1,4 +1,4 @@
-"""Peaks of a surface from the mean squares of its traces, as a scene, and as the table that `profile` prints."""
+"""Peaks of a surface from mean squares of its traces, in a scene, and in the table that `profile` prints."""
 
 import re
 import tomllib
@@ -31,116 +31,130 @@ PATCH = (
 RMS = 'rms_height = "0.5 um"\nrms_slope = 0.05\nrms_curvature = "0.02 1/um"\n'
 
 
-def trace_of(z, step) -> Profile:
+def make_trace(z, step) -> Profile:
+    """Return a trace of heights with a given step."""
     return Profile(np.arange(z.size) * step, z, "made")
 
 
-def gaussian(n: int, step: float, waves: tuple, seed: int = 0) -> np.ndarray:
-    """Heights (n, n) of a periodic Gaussian surface alike in all directions, of waves between two lengths [m] with a
-    spectral density that falls as k^-3."""
+def gaussian_surface(n: int, step: float, waves: tuple, seed: int = 0) -> np.ndarray:
+    """Return heights (n, n) of a periodic isotropic Gaussian surface of waves between two lengths [m].
+
+    Its spectral density is proportional to k^-3.
+    """
     k = np.hypot(*np.meshgrid(*2 * [2 * np.pi * np.fft.fftfreq(n, step)]))
     inside = (k >= 2 * np.pi / waves[1]) & (k <= 2 * np.pi / waves[0])
-    size = np.where(inside, np.maximum(k, 1.0) ** -1.5, 0.0)
+    amplitude = np.where(inside, np.maximum(k, 1.0) ** -1.5, 0.0)
     noise = np.random.default_rng(seed).normal(size=(n, n))
-    return np.fft.ifft2(size * np.fft.fft2(noise)).real
+    return np.fft.ifft2(amplitude * np.fft.fft2(noise)).real
 
 
-def summits(alpha: float) -> tuple:
-    """(density, mean curvature, variance over m_0) of summits of m_0 = alpha, m_2 = m_4 = 1 by quadrature of the
-    Gaussian law of curvatures: t = -(z_xx + z_yy) of variance 8/3, the half difference and the twist of variance
-    1/3 each, so that the product of both curvatures is t^2/4 - r^2."""
+def summit_statistics(alpha: float) -> tuple:
+    """Return density, mean curvature, and variance over m_0 of summits for m_0 = alpha and m_2 = m_4 = 1.
 
-    def weight(t):
+    They follow by quadrature of the Gaussian law of curvatures. Here t = -(z_xx + z_yy) has the
+    variance 8/3, half the difference and the twist have 1/3 each, and the product of both
+    curvatures is t^2/4 - r^2.
+    """
+
+    def summit_weight(t):
+        """Return the weight of the curvature sum t."""
         return (t**2 / 4 - 2 / 3 * (1 - np.exp(-3 * t**2 / 8))) * np.exp(-3 * t**2 / 16)
 
-    whole, first, second = (
-        quad(lambda t, n=n: t**n * weight(t), 0, 40, epsabs=0, epsrel=1e-12)[0] for n in range(3)
+    integral, first_moment, second_moment = (
+        quad(lambda t, n=n: t**n * summit_weight(t), 0, 40, epsabs=0, epsrel=1e-12)[0]
+        for n in range(3)
     )
-    mean = first / whole
-    square = second / whole
-    # given t a height is Gaussian, of mean 3 t/4 and variance alpha - 3/2
+    mean = first_moment / integral
+    square = second_moment / integral
+    # for given t a height is Gaussian with mean 3 t/4 and variance alpha - 3/2
     return (
-        whole / np.sqrt(2 * np.pi * 8 / 3) / (2 * np.pi),
+        integral / np.sqrt(2 * np.pi * 8 / 3) / (2 * np.pi),
         mean / 2,
         1 - 1.5 / alpha + 9 / 16 * (square - mean**2) / alpha,
     )
 
 
 @pytest.mark.parametrize("alpha", [1.6, 4.0, 50.0])
-def test_exact_peaks_by_quadrature_of_the_law_of_curvatures(alpha):
-    one, (density, curvature, variance) = (
+def test_exact_peaks_agree_with_quadrature(alpha):
+    """Density and radius of peaks agree within 1e-10 with a quadrature of the law of curvatures."""
+    peaks_found, (density, curvature, variance) = (
         gaussian_peaks(Moments(np.sqrt(alpha), 1.0, 1.0)),
-        summits(alpha),
+        summit_statistics(alpha),
     )
-    assert one.density == pytest.approx(density, rel=1e-10)
-    assert 1 / one.radius == pytest.approx(curvature, rel=1e-10)
-    # of the four digits of the source
-    assert one.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)
+    assert peaks_found.density == pytest.approx(density, rel=1e-10)
+    assert 1 / peaks_found.radius == pytest.approx(curvature, rel=1e-10)
+    # the coefficients of the source have four digits
+    assert peaks_found.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)
 
 
-def test_exact_units_scale():
-    """Heights in other units, lengths along in others: radius, density and deviation follow."""
-    one = gaussian_peaks(Moments(2.0, 0.3, 0.2))
-    other = gaussian_peaks(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
-    assert other == pytest.approx(
-        (one.radius * 49 / 3, one.density / 49, one.deviation * 3), rel=1e-12
+def test_exact_peaks_scale_with_units():
+    """Radius, density and deviation of peaks scale with the units of heights and lengths."""
+    reference = gaussian_peaks(Moments(2.0, 0.3, 0.2))
+    scaled = gaussian_peaks(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
+    assert scaled == pytest.approx(
+        (reference.radius * 49 / 3, reference.density / 49, reference.deviation * 3), rel=1e-12
     )
 
 
-def test_exact_moments_of_known_sines():
-    """Whole waves of two lengths: mean squares in closed form, a difference sees a wave k as sin(k h/2)/(k h/2)."""
+def test_exact_moments_of_two_sines():
+    """Moments of a sum of two sines agree within 0.2 % with closed forms.
+
+    A difference over h reduces a wave k by sin(k h/2)/(k h/2).
+    """
     n = 4096
     step = 0.5e-6
     x = step * np.arange(n + 1)
     waves = [(64, 0.3e-6, 0.4), (410, 0.05e-6, 1.1)]
     z = sum(a * np.cos(2 * np.pi * k * x / (n * step) + p) for k, a, p in waves)
-    for every in (1, 2):
-        found = rms_moments(level(trace_of(z, step)), every)
-        h = every * step
+    for stride in (1, 2):
+        found = rms_moments(level(make_trace(z, step)), stride)
+        h = stride * step
         k = np.array([2 * np.pi * k / (n * step) for k, _, _ in waves])
         a = np.array([a for _, a, _ in waves])
         for order, value in enumerate(found):
-            # both ends of the trace count, and levelling takes a share of the longest wave
+            # both ends of the trace count, and levelling removes a part of the longest wave
             assert value == pytest.approx(
                 np.sqrt(np.sum((a * (2 * np.sin(k * h / 2) / h) ** order) ** 2) / 2), rel=2e-3
             )
 
 
-def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said():
-    """Five grains of eight samples are left out, a sixth lower one is taken for the surface and makes its curvature."""
+def test_exact_dust_in_moments_is_reported():
+    """Five grains of dust are removed; a lower one remains, and the notes state the moments without it."""
     step = 0.5e-6
     z = gaussian_filter1d(np.random.default_rng(7).standard_normal(12001), 16)
     z *= 0.4e-6 / z.std()
     grains = np.zeros(z.size)
     for k in range(6):
         grains[1500 * (k + 1) : 1500 * (k + 1) + 8] = 6e-6 if k else 2.6e-6
-    clean = trace_moments(trace_of(z, step))
-    dusty = trace_moments(trace_of(z + grains, step))
+    clean = trace_moments(make_trace(z, step))
+    dusty = trace_moments(make_trace(z + grains, step))
     assert clean.dust == () and "are left out" in dusty.dust[0]
-    said = re.search(
+    match = re.search(
         r"make up ([\d.]+) % .* rms_slope is (\S+) and rms_curvature (\S+) 1/m", dusty.dust[-1]
     )
-    assert dusty.fine.curvature > 5 * clean.fine.curvature and float(said[1]) > 90
-    assert float(said[2]) == pytest.approx(clean.fine.slope, rel=0.02)
-    assert float(said[3]) == pytest.approx(clean.fine.curvature, rel=0.05)
+    assert dusty.fine.curvature > 5 * clean.fine.curvature and float(match[1]) > 90
+    assert float(match[2]) == pytest.approx(clean.fine.slope, rel=0.02)
+    assert float(match[3]) == pytest.approx(clean.fine.curvature, rel=0.05)
 
 
-def test_refuses_what_no_surface_has():
+def test_refuses_moments_of_no_gaussian_surface():
+    """Traces of a single wave, of alternating heights, without roughness or with few samples are refused."""
     x = np.arange(256) * 1e-6
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
-        # one wave: alpha = 1
-        gaussian_peaks(trace_moments(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)).fine)
+        # a single wave has alpha = 1
+        gaussian_peaks(trace_moments(make_trace(np.sin(2 * np.pi * x / 2e-5), 1e-6)).fine)
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
-        # each is off its neighbours
-        gaussian_peaks(trace_moments(trace_of(1e-6 * (np.arange(64) % 2), 1e-6)).fine)
+        # every height differs from its neighbours
+        gaussian_peaks(trace_moments(make_trace(1e-6 * (np.arange(64) % 2), 1e-6)).fine)
     with pytest.raises(PatchfemError, match="is flat"):
-        trace_moments(trace_of(0.1 * x, 1e-6))
+        trace_moments(make_trace(0.1 * x, 1e-6))
     with pytest.raises(PatchfemError, match="at least 16"):
-        rms_moments(trace_of(np.sin(x[:20] * 1e6), 1e-6), 2)
+        rms_moments(make_trace(np.sin(x[:20] * 1e6), 1e-6), 2)
 
 
-def written(folder, seed=1) -> str:
-    z = 1e-7 * (one := gaussian(256, 1e-6, (8e-6, 1e-4), seed)[0]) / one.std()
+def write_trace(folder, seed=1) -> str:
+    """Write a Gaussian trace and return its file name."""
+    z = 1e-7 * (row := gaussian_surface(256, 1e-6, (8e-6, 1e-4), seed)[0]) / row.std()
     (folder / f"trace{seed}.csv").write_text(
         "x [um],z [um]\n"
         + "".join(f"{k},{height * 1e6!r}\n" for k, height in enumerate(z.tolist()))
@@ -148,11 +162,11 @@ def written(folder, seed=1) -> str:
     return str(folder / f"trace{seed}.csv")
 
 
-def test_exact_the_three_ways_to_tell_peaks_are_one(tmp_path, monkeypatch):
-    """A file, its root mean squares as `profile` prints them, and the peaks of these: one patch."""
+def test_exact_three_ways_to_define_peaks_agree(tmp_path, monkeypatch):
+    """A trace file, its rms values as printed by `profile`, and its peaks give the same contact stiffness."""
     monkeypatch.chdir(tmp_path)
-    one = cli("profile", written(tmp_path))
-    block = one.out[one.out.index("[contact.asperities]") :].split("  At a pressure")[0]
+    answer = cli("profile", write_trace(tmp_path))
+    block = answer.out[answer.out.index("[contact.asperities]") :].split("  At a pressure")[0]
     found = tomllib.loads("\n".join(line.strip() for line in block.splitlines()))["contact"][
         "asperities"
     ]
@@ -171,24 +185,27 @@ def test_exact_the_three_ways_to_tell_peaks_are_one(tmp_path, monkeypatch):
     ]
     (tmp_path / "scene.toml").write_text(ways[0])
     runs = [pf.run("scene.toml"), *(pf.run(text) for text in ways[1:])]
-    stiff = [run.measures["normal_stiffness"].value for run in runs]
-    assert stiff[1] == pytest.approx(stiff[0], rel=1e-4) and stiff[2] == pytest.approx(
-        stiff[1], rel=1e-12
-    )
-    said = [" ".join(note for note in run.extra["notes"] if "Persson" in note) for run in runs]
-    assert "every second sample" in said[0]
-    assert "every second" not in said[1]
-    assert said[1]
-    assert not said[2]
+    stiffnesses = [run.measures["normal_stiffness"].value for run in runs]
+    assert stiffnesses[1] == pytest.approx(stiffnesses[0], rel=1e-4) and stiffnesses[
+        2
+    ] == pytest.approx(stiffnesses[1], rel=1e-12)
+    notes = [" ".join(note for note in run.extra["notes"] if "Persson" in note) for run in runs]
+    assert "every second sample" in notes[0]
+    assert "every second" not in notes[1]
+    assert notes[1]
+    assert not notes[2]
     assert any("Persson" in text for text in pf.plan(pasted).verdict)
     runs[0].save(tmp_path / "out/first")
     (tmp_path / "again.toml").write_text((tmp_path / "out/first/scene.resolved.toml").read_text())
-    again = pf.run(tmp_path / "again.toml")
-    assert again.measures["normal_stiffness"].value == pytest.approx(stiff[0], rel=1e-12)
+    second_run = pf.run(tmp_path / "again.toml")
+    assert second_run.measures["normal_stiffness"].value == pytest.approx(stiffnesses[0], rel=1e-12)
 
 
-def test_exact_the_other_theory_is_the_exponential_law():
-    """The law that the note names has the stiffness that the note tells, in the middle of its range."""
+def test_exact_note_gives_stiffness_of_persson_theory():
+    """The note names an exponential law whose stiffness lies in the range of the note.
+
+    This range is that of Persson's theory.
+    """
     note = next(text for text in pf.plan(PATCH + RMS).verdict if "Persson" in text)
     decay = note.split('decay_length = "')[1].split('"')[0]
     soft, stiff = (
@@ -196,17 +213,17 @@ def test_exact_the_other_theory_is_the_exponential_law():
     )
     pressure = 26 * 4.4482216152605 / 12.7e-3**2
     assert (soft, stiff) == pytest.approx(persson_stiffness(pressure, 0.5e-6), rel=5e-3)
-    other = PATCH.replace("hertz", "exponential") + f'decay_length = "{decay}"\n'
-    made, bare = (
+    exponential_scene = PATCH.replace("hertz", "exponential") + f'decay_length = "{decay}"\n'
+    with_asperities, without_asperities = (
         pf.run(text).measures["normal_stiffness"].value
-        for text in (other, PATCH.partition("[contact.asp")[0])
+        for text in (exponential_scene, PATCH.partition("[contact.asp")[0])
     )
     area = 12.7e-3**2
-    assert soft < 1 / (1 / made - 1 / bare) / area < stiff
+    assert soft < 1 / (1 / with_asperities - 1 / without_asperities) / area < stiff
 
 
 @pytest.mark.parametrize(
-    "keys, said",
+    "keys, message",
     [
         ("", "you can give `from`, or rms_height, rms_slope and rms_curvature"),
         ('radius = "1 um"\n', "contact.asperities.density: missing"),
@@ -217,14 +234,16 @@ def test_exact_the_other_theory_is_the_exponential_law():
         ('from = "nowhere.csv"\n', "there is no file"),
     ],
 )
-def test_refuses_peaks_that_are_not_whole(keys, said, tmp_path):
+def test_refuses_incomplete_peak_definition(keys, message, tmp_path):
+    """An incomplete, contradictory or invalid definition of peaks is refused with its key."""
     (tmp_path / "scene.toml").write_text(PATCH + keys)
-    with pytest.raises(PatchfemError) as wrong:
+    with pytest.raises(PatchfemError) as caught:
         pf.plan(tmp_path / "scene.toml")
-    assert said in str(wrong.value) and "asperities" in str(wrong.value)
+    assert message in str(caught.value) and "asperities" in str(caught.value)
 
 
-def test_a_short_trace_has_peaks_though_half_of_it_tells_none(tmp_path):
+def test_exact_short_trace_has_peaks(tmp_path):
+    """A short trace has peaks although every second of its samples gives none, as the verdict states."""
     x = np.arange(24)
     z = 2 * np.sin(0.5 * x) + 0.3 * np.random.default_rng(3).normal(size=24)
     (tmp_path / "short.csv").write_text(
@@ -237,25 +256,28 @@ def test_a_short_trace_has_peaks_though_half_of_it_tells_none(tmp_path):
     )
 
 
-def test_profile_tells_two_faces_together(tmp_path):
-    files = [written(tmp_path, seed) for seed in (1, 2)]
-    told = pf.profile(*files)["profiles"]
-    both = cli("profile", *files).out.partition("two faces")[2]
-    height = np.hypot(*(one["asperities"]["rms_height"] for one in told))
-    assert f'rms_height = "{height * 1e6:.5g} um"' in both
+def test_exact_profile_combines_two_faces(tmp_path):
+    """The command `profile` prints the rms height of two faces together, the root of the sum of squares."""
+    files = [write_trace(tmp_path, seed) for seed in (1, 2)]
+    profiles = pf.profile(*files)["profiles"]
+    combined = cli("profile", *files).out.partition("two faces")[2]
+    height = np.hypot(*(profile_data["asperities"]["rms_height"] for profile_data in profiles))
+    assert f'rms_height = "{height * 1e6:.5g} um"' in combined
 
 
 CUT = 0.4e-3
 
 
-def passed(wave) -> float:
-    """Share of a wave [m] that the Gaussian filter of ISO 16610-21 leaves in the waviness: half of the cut-off's."""
+def waviness_fraction(wave) -> float:
+    """Return the fraction of a wave [m] that the filter of ISO 16610-21 leaves in the waviness, half at the cut-off."""
     return 0.5 ** (CUT / wave) ** 2
 
 
-def split(folder, waves) -> tuple:
-    """Places [m] of nodes, the gap there [m] and the skin of a patch that takes one trace of cosines [(amplitude,
-    wavelength) in m] for its profile and for its asperities, split at CUT; and the folder's scene."""
+def split_trace(folder, waves) -> tuple:
+    """Return nodes [m], gap [m], skin and scene of a patch that uses one trace for its profile and its asperities.
+
+    The trace is a sum of cosines [(amplitude, wavelength) in m], split at CUT.
+    """
     x = np.linspace(-6.35e-3, 6.35e-3, 25401)
     z = sum(a * np.cos(2 * np.pi * x / wave + k) for k, (a, wave) in enumerate(waves))
     (folder / "trace.csv").write_text(
@@ -265,13 +287,13 @@ def split(folder, waves) -> tuple:
         PATCH.replace('element_size = "1 mm"\n', 'element_size = "25.4 um"\n')
         + 'from = "trace.csv"\ncutoff = "0.4 mm"\n[contact.profile]\nfile = "trace.csv"\n'
     )
-    found = build(loads(text, folder / "scene.toml")).patch
+    patch = build(loads(text, folder / "scene.toml")).patch
     nodes = np.linspace(-6.35e-3, 6.35e-3, 501)
-    return nodes, found.gap.evaluate(nodes).heights, found.interface.skin, text
+    return nodes, patch.gap.evaluate(nodes).heights, patch.interface.skin, text
 
 
-def test_exact_one_cutoff_splits_a_trace_between_the_gap_and_its_asperities(tmp_path):
-    """Each wave of a known spectrum counts once: the gap has what the filter passes, the peaks what it stops."""
+def test_exact_cutoff_splits_trace_between_gap_and_asperities(tmp_path):
+    """Each wave of a trace counts once: the gap has the waviness, and the asperities have the roughness."""
     waves = [
         (1e-6, 2.54e-3),
         (0.3e-6, 0.508e-3),
@@ -279,79 +301,97 @@ def test_exact_one_cutoff_splits_a_trace_between_the_gap_and_its_asperities(tmp_
         (0.1e-6, 63.5e-6),
         (2e-8, 25.4e-6),
     ]
-    x, gap, skin, _ = split(tmp_path, waves)
-    inner = np.abs(x) < 4e-3  # the mean line bends near the ends
+    x, gap, skin, _ = split_trace(tmp_path, waves)
+    is_inner = np.abs(x) < 4e-3  # near the ends the mean line deviates
     columns = [part(2 * np.pi * x / wave) for _, wave in waves[:4] for part in (np.cos, np.sin)]
     fit = np.linalg.lstsq(
-        np.stack([*columns, np.ones(x.size), x], 1)[inner], gap[inner], rcond=None
+        np.stack([*columns, np.ones(x.size), x], 1)[is_inner], gap[is_inner], rcond=None
     )[0]
-    for (size, wave), found in zip(waves, np.hypot(fit[0:8:2], fit[1:8:2])):
-        seen = np.sinc(25.4e-6 / wave)  # by the mean over a node's own length
-        assert found == pytest.approx(size * passed(wave) * seen, abs=3e-4 * size), wave
-    left = [(size * (1 - passed(wave)), 2 * np.pi / wave) for size, wave in waves]
+    for (amplitude, wave), fitted in zip(waves, np.hypot(fit[0:8:2], fit[1:8:2])):
+        averaging = np.sinc(
+            25.4e-6 / wave
+        )  # reduction by the mean over the tributary length of a node
+        assert fitted == pytest.approx(
+            amplitude * waviness_fraction(wave) * averaging, abs=3e-4 * amplitude
+        ), wave
+    roughness_waves = [
+        (amplitude * (1 - waviness_fraction(wave)), 2 * np.pi / wave) for amplitude, wave in waves
+    ]
     for name, order in (("height", 0), ("slope", 1), ("curvature", 2)):
-        truth = np.sqrt(sum((a * k**order) ** 2 / 2 for a, k in left))
+        truth = np.sqrt(sum((a * k**order) ** 2 / 2 for a, k in roughness_waves))
         assert getattr(skin, f"rms_{name}") == pytest.approx(truth, rel=5e-3), name
-    whole = trace_moments(
+    moments_of_all = trace_moments(
         Profile(
             np.arange(25401) * 0.5e-6,
             sum(a * np.cos(2 * np.pi * np.arange(25401) * 0.5e-6 / wave) for a, wave in waves),
             "whole",
         )
     ).fine
-    assert whole.height > 4 * skin.rms_height  # what counted twice
+    # without the cut-off the long waves would count twice
+    assert moments_of_all.height > 4 * skin.rms_height
 
 
-def test_profile_prints_the_peaks_below_its_cutoff_and_they_paste_to_the_same_patch(
-    tmp_path, monkeypatch
-):
+def test_exact_printed_peaks_give_same_patch(tmp_path, monkeypatch):
+    """The command `profile` prints the peaks below its cut-off, which in a scene give the same asperities.
+
+    Without the cut-off the verdict warns that long waves count twice.
+    """
     monkeypatch.chdir(tmp_path)
     rng = np.random.default_rng(11)
     waves = [(2e-8 * n**-0.8, 12.7e-3 / n) for n in (5, *rng.integers(10, 900, 60).tolist())]
-    *_, skin, text = split(tmp_path, waves)
-    said = cli("profile", "trace.csv", "--cutoff", "0.4 mm")
-    told = pf.profile("trace.csv", cutoff="0.4 mm")["profiles"][0]
-    assert told["asperities"]["rms_height"] == pytest.approx(
-        told["measures"]["Rq"]["value"], rel=1e-9
+    *_, skin, text = split_trace(tmp_path, waves)
+    answer = cli("profile", "trace.csv", "--cutoff", "0.4 mm")
+    profile_data = pf.profile("trace.csv", cutoff="0.4 mm")["profiles"][0]
+    assert profile_data["asperities"]["rms_height"] == pytest.approx(
+        profile_data["measures"]["Rq"]["value"], rel=1e-9
     )
-    assert told["asperities"]["cutoff"] == 0.4e-3
-    assert "only waves below the cut-off of 400 um" in said.out
-    assert told["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
-    bare = cli("profile", "trace.csv").out
-    assert "cutoff =" not in bare and "otherwise the long waves count twice" in bare
-    block = said.out[said.out.index("[contact.asperities]") :].split("  At a pressure")[0]
+    assert profile_data["asperities"]["cutoff"] == 0.4e-3
+    assert "only waves below the cut-off of 400 um" in answer.out
+    assert profile_data["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
+    without_cutoff = cli("profile", "trace.csv").out
+    assert (
+        "cutoff =" not in without_cutoff
+        and "otherwise the long waves count twice" in without_cutoff
+    )
+    block = answer.out[answer.out.index("[contact.asperities]") :].split("  At a pressure")[0]
     pasted = text.replace(
         'from = "trace.csv"\ncutoff = "0.4 mm"\n',
         "".join(f"{line.strip()}\n" for line in block.splitlines()[2:]),
     )
-    again = build(loads(pasted, tmp_path / "scene.toml")).patch.interface.skin
+    pasted_skin = build(loads(pasted, tmp_path / "scene.toml")).patch.interface.skin
     for name in ("radius", "density", "height_deviation"):
-        assert getattr(again, name) == pytest.approx(getattr(skin, name), rel=1e-4), name
-    lacking = pf.plan(loads(pasted.replace('cutoff = "400 um"\n', ""), tmp_path / "scene.toml"))
-    assert any("waves longer than 127 um" in one for one in lacking.verdict)
+        assert getattr(pasted_skin, name) == pytest.approx(getattr(skin, name), rel=1e-4), name
+    verdict_without_cutoff = pf.plan(
+        loads(pasted.replace('cutoff = "400 um"\n', ""), tmp_path / "scene.toml")
+    )
+    assert any(
+        "waves longer than 127 um" in sentence for sentence in verdict_without_cutoff.verdict
+    )
     assert not any(
-        "longer than" in one for one in pf.plan(loads(pasted, tmp_path / "scene.toml")).verdict
+        "longer than" in sentence
+        for sentence in pf.plan(loads(pasted, tmp_path / "scene.toml")).verdict
     )
 
 
-def test_heights_that_are_not_gaussian_are_told():
-    """None of 40 Gaussian traces is doubted; tops cut off and single peaks are, each with its sign."""
+def test_always_non_gaussian_heights_are_reported():
+    """None of 40 Gaussian traces is reported as not Gaussian; truncated tops and single peaks are, with their effect."""
     step = 1e-6
     for seed in range(40):
-        row = gaussian(256, step, (8e-6, 6e-5), seed)[seed]
-        assert trace_moments(trace_of(row, step)).not_gaussian == "", seed
-    rows = gaussian(512, step, (8e-6, 6e-5), 3)[::128].ravel() * 1e-7
+        row = gaussian_surface(256, step, (8e-6, 6e-5), seed)[seed]
+        assert trace_moments(make_trace(row, step)).not_gaussian == "", seed
+    rows = gaussian_surface(512, step, (8e-6, 6e-5), 3)[::128].ravel() * 1e-7
     rows /= rows.std() / 1e-7
-    for z, word in ((np.minimum(rows, 0.3e-7), "stiffer"), (np.maximum(rows, -0.3e-7), "softer")):
-        doubt = trace_moments(trace_of(z, step)).not_gaussian
-        assert word in doubt and "(0 and 3)" in doubt
+    for z, effect in ((np.minimum(rows, 0.3e-7), "stiffer"), (np.maximum(rows, -0.3e-7), "softer")):
+        doubt = trace_moments(make_trace(z, step)).not_gaussian
+        assert effect in doubt and "(0 and 3)" in doubt
 
 
 @pytest.mark.parametrize(
-    "cutoff, said", [("13 mm", "no wave would remain"), ("1 um", "must be at least")]
+    "cutoff, message", [("13 mm", "no wave would remain"), ("1 um", "must be at least")]
 )
-def test_refuses_a_cutoff_that_does_not_split(tmp_path, cutoff, said):
-    *_, text = split(tmp_path, [(1e-6, 1e-3), (1e-7, 1e-4), (1e-8, 2e-5)])
-    with pytest.raises(PatchfemError, match=said) as wrong:
+def test_refuses_cutoff_without_waves_below(tmp_path, cutoff, message):
+    """A cut-off that leaves no wave for the asperities or is too short is refused."""
+    *_, text = split_trace(tmp_path, [(1e-6, 1e-3), (1e-7, 1e-4), (1e-8, 2e-5)])
+    with pytest.raises(PatchfemError, match=message) as caught:
         pf.run(loads(text.replace("0.4 mm", cutoff), tmp_path / "scene.toml"))
-    assert "contact.asperities.cutoff" in str(wrong.value)
+    assert "contact.asperities.cutoff" in str(caught.value)

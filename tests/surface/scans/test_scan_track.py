@@ -1,4 +1,4 @@
-"""The wear track of two areal scans: direction, mean section, length and volume of tracks that were made."""
+"""Wear track of two areal scans: direction, mean section, length and volume of made tracks."""
 
 import numpy as np
 import pytest
@@ -12,25 +12,27 @@ CELL, COUNT = 1e-6, 260
 SIDE, WIDTH, DEPTH, RIDGE = CELL * (COUNT - 1), 60e-6, 0.5e-6, 20e-6  # RIDGE: base of the ridges
 
 
-def made(angle: float, length: float, ridges=(0.0, 0.0), middle=(5e-6, -8e-6)) -> tuple:
-    """Depths (m, n) [m] of a parabolic track with round ends, length [m] between their middles, 0 for an endless one,
-    and triangular ridges [m] beside it; and where its middle lies across it."""
+def make_track_depth(angle: float, length: float, ridges=(0.0, 0.0), centre=(5e-6, -8e-6)) -> tuple:
+    """Return the depths (m, n) [m] of a parabolic track with ridges [m], and the position of its centre across it.
+
+    The length [m] is that between the centres of the round ends; 0 stands for an endless track.
+    """
     axis = CELL * np.arange(COUNT) - SIDE / 2
-    x, y = np.meshgrid(axis - middle[0], axis - middle[1])
-    beside = np.array([-np.sin(angle), np.cos(angle)])
-    beside *= np.sign(beside[np.argmax(abs(beside))])
-    across = x * beside[0] + y * beside[1]
+    x, y = np.meshgrid(axis - centre[0], axis - centre[1])
+    normal = np.array([-np.sin(angle), np.cos(angle)])
+    normal *= np.sign(normal[np.argmax(abs(normal))])
+    across = x * normal[0] + y * normal[1]
     along = x * np.cos(angle) + y * np.sin(angle)
-    out = np.maximum(abs(along) - length / 2, 0.0) if length else 0 * along
-    depth = DEPTH * np.clip(1 - (np.hypot(across, out) / (WIDTH / 2)) ** 2, 0.0, None)
+    beyond_ends = np.maximum(abs(along) - length / 2, 0.0) if length else 0 * along
+    depth = DEPTH * np.clip(1 - (np.hypot(across, beyond_ends) / (WIDTH / 2)) ** 2, 0.0, None)
     for height, side in zip(ridges, (-1, 1)):
-        off = abs(across - side * (WIDTH + RIDGE) / 2)
-        depth -= (out == 0) * height * np.clip(1 - off / (RIDGE / 2), 0.0, None)
-    return depth, float(beside @ middle)
+        distance = abs(across - side * (WIDTH + RIDGE) / 2)
+        depth -= (beyond_ends == 0) * height * np.clip(1 - distance / (RIDGE / 2), 0.0, None)
+    return depth, float(normal @ centre)
 
 
-def tracked(depth):
-    """The track in a map of depths with a noise of 2 nm."""
+def measure_track(depth):
+    """Return the track in a map of depths with a noise of 2 nm."""
     axis = CELL * np.arange(COUNT)
     noise = 2e-9
     depth = depth + noise * np.random.default_rng(0).normal(size=depth.shape)
@@ -46,15 +48,16 @@ def tracked(depth):
         (-0.7, 120e-6, (0.0, 0.0)),
     ],
 )
-def test_exact_a_track_has_its_direction_section_and_volume(angle, length, ridges):
-    depth, middle = made(angle, length, ridges)
-    found = tracked(depth)
+def test_exact_track_direction_section_and_volume(angle, length, ridges):
+    """Direction, section and volume of a track agree within 1.5 to 2 %, and at most two intervals miss the truth."""
+    depth, centre = make_track_depth(angle, length, ridges)
+    found = measure_track(depth)
     area = 2 / 3 * DEPTH * WIDTH
-    left, right = (one * RIDGE / 2 for one in ridges)
+    left, right = (value * RIDGE / 2 for value in ridges)
     truth = {
         "direction": angle,
-        "from": middle - WIDTH / 2,
-        "to": middle + WIDTH / 2,
+        "from": centre - WIDTH / 2,
+        "to": centre + WIDTH / 2,
         "width": WIDTH,
         "depth_mean": 2 / 3 * DEPTH,
         "depth_floor": DEPTH,
@@ -65,8 +68,10 @@ def test_exact_a_track_has_its_direction_section_and_volume(angle, length, ridge
         "pile_up_right": right,
         "pile_up": left + right,
     }
-    held = [found.values[name].low <= one <= found.values[name].high for name, one in truth.items()]
-    assert not found.why and sum(held) >= len(held) - 2, dict(zip(truth, held))
+    covers = [
+        found.values[name].low <= value <= found.values[name].high for name, value in truth.items()
+    ]
+    assert not found.why and sum(covers) >= len(covers) - 2, dict(zip(truth, covers))
     for name in ("width", "depth_mean", "depth_floor", "step", "area_gross", "area_net"):
         assert found.values[name].value == pytest.approx(truth[name], rel=0.015), name
     for name in ("pile_up_left", "pile_up_right"):
@@ -74,7 +79,7 @@ def test_exact_a_track_has_its_direction_section_and_volume(angle, length, ridge
             truth[name], abs=0.15 * max(left, right) + 1e-15
         ), name
     volume = found.values["volume"]
-    if length:  # with the round ends, half a paraboloid each
+    if length:  # the round ends are half a paraboloid each
         assert volume.value == pytest.approx(
             area * length + np.pi * DEPTH * (WIDTH / 2) ** 2 / 2, rel=0.02
         )
@@ -82,18 +87,20 @@ def test_exact_a_track_has_its_direction_section_and_volume(angle, length, ridge
         assert volume.value is None and "leaves the region" in volume.reason
 
 
-def test_always_a_track_that_widens_scatters_along():
-    depth, _ = made(0.0, 0.0)
+def test_always_widening_track_has_scatter_of_width():
+    """A track that widens along its length has the mean width within 2 % and the scatter of its width within 10 %."""
+    depth, _ = make_track_depth(0.0, 0.0)
     across = CELL * np.arange(COUNT)[:, None] - SIDE / 2 + 8e-6
     half = WIDTH / 2 * np.linspace(0.7, 1.3, COUNT)
-    found = tracked(DEPTH * np.clip(1 - (across / half) ** 2, 0.0, None))
+    found = measure_track(DEPTH * np.clip(1 - (across / half) ** 2, 0.0, None))
     assert found.values["width"].value == pytest.approx(WIDTH, rel=0.02)
     assert found.scatter["width"] == pytest.approx(0.6 * WIDTH / np.sqrt(12), rel=0.1)
-    assert tracked(depth).scatter["width"] < 0.02 * WIDTH
+    assert measure_track(depth).scatter["width"] < 0.02 * WIDTH
 
 
 @pytest.mark.parametrize("kind", ["pit", "strips", "border"])
-def test_always_what_is_no_track_says_why(kind):
+def test_always_missing_track_has_reason(kind):
+    """A pit, parallel strips and wear at the border are not a track, and the reason is stated."""
     axis = CELL * np.arange(COUNT) - SIDE / 2
     x, y = np.meshgrid(axis, axis)
     depth = {
@@ -101,23 +108,24 @@ def test_always_what_is_no_track_says_why(kind):
         "strips": DEPTH * np.clip(np.sin(2 * np.pi * y / 65e-6), 0.0, None),
         "border": DEPTH * np.clip((y + 20e-6) / SIDE, 0.0, None),
     }[kind]
-    found = tracked(depth)
+    found = measure_track(depth)
     assert found.why and all(
-        one.value is None and one.reason == found.why for one in found.values.values()
+        value.value is None and value.reason == found.why for value in found.values.values()
     )
 
 
 @pytest.mark.slow
-def test_always_two_scans_tell_their_track():
-    depth, _ = made(0.35, 0.0, middle=(0.0, 0.0))
+def test_always_comparison_of_scans_reports_track():
+    """The comparison of two scans reports the track with its width within 2 % and its direction."""
+    depth, _ = make_track_depth(0.35, 0.0, centre=(0.0, 0.0))
     random = np.random.default_rng(3)
     axis = CELL * np.arange(COUNT)
-    from test_scans import waves
+    from test_scans import surface_heights
 
     x, y = np.meshgrid(axis, axis)
     before, after = (
         Areal(axis, axis, z + 2e-9 * random.normal(size=z.shape), "a scan")
-        for z in (waves(x, y), waves(x, y) - depth + 1e-3 * x)
+        for z in (surface_heights(x, y), surface_heights(x, y) - depth + 1e-3 * x)
     )
     found = change.compare_scans(before, after)
     assert found.track.values["width"].value == pytest.approx(WIDTH, rel=0.02)
