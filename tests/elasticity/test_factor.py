@@ -1,4 +1,4 @@
-"""Factors of a stiffness against the dense inverse, and the properties of the dissection of a mesh."""
+"""Sparse factors of a stiffness compared with the dense inverse, and properties of the nested dissection of a mesh."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from patchfem.elasticity.dissect import MAX_LEAF_NODES, dissect_nodes
 from patchfem.mesh import graded_grid
 
 
-def scattered(count, seed):
-    """Points on the unit square and the edges of their Delaunay triangles."""
-    points = np.random.default_rng(seed).random((count, 2))
+def random_triangulation(n_points, seed):
+    """Return random points on the unit square and the edges of their Delaunay triangles."""
+    points = np.random.default_rng(seed).random((n_points, 2))
     cells = Delaunay(points).simplices
     return points, np.unique(
         np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])), axis=0
@@ -29,19 +29,21 @@ def scattered(count, seed):
 
 
 @pytest.mark.parametrize("size, split", [(5e-4, 0.0), (1e-4, 0.5)])
-def test_exact_solutions_and_compliance_are_those_of_the_dense_inverse(size, split):
+def test_exact_factor_solutions_equal_dense_inverse(size, split):
+    """Compliance and solutions of the factored mesh equal those of the dense inverse, and the load is unchanged."""
     mesh = of_grid(graded_grid(2e-3, 1e-3, size, COATING), split, seed=4)
     piece = Substructure(mesh, COATED)
     full = np.linalg.inv(free_stiffness(piece).toarray())
     k = 2 * mesh.interface.size
     assert np.abs(piece.factor.compliance() - full[-k:, -k:]).max() <= 1e-10 * np.abs(full).max()
     load = np.random.default_rng(1).normal(size=(full.shape[0], 3))
-    kept = load.copy()
+    original = load.copy()
     assert np.abs(piece.factor.solve(load) - full @ load).max() <= 1e-10 * np.abs(full @ load).max()
-    assert np.array_equal(load, kept)
+    assert np.array_equal(load, original)
 
 
-def test_refuses_a_singular_stiffness():
+def test_refuses_singular_stiffness():
+    """A singular stiffness is refused."""
     matrix = csc_matrix(
         np.diag([2.0, 1, 1, 1, 1, 1])
         - np.diag([1.0, 0, 0, 0, 0], 1)
@@ -52,51 +54,53 @@ def test_refuses_a_singular_stiffness():
         fronts.factorise(matrix, np.array([0, 2, 3])).compliance()
 
 
-@given(count=st.integers(4, 900), seed=st.integers(0, 99))
-def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves(count, seed):
-    points, pairs = scattered(count, seed)
+@given(n_points=st.integers(4, 900), seed=st.integers(0, 99))
+def test_always_dissection_separates_mesh_into_halves(n_points, seed):
+    """The dissection is a permutation whose last separator is small and leaves parts of at most half of the nodes."""
+    points, pairs = random_triangulation(n_points, seed)
     order, firsts = dissect_nodes(points, pairs)
-    assert np.array_equal(np.sort(order), np.arange(count))
-    assert firsts[0] == 0 and firsts[-1] == count and np.all(np.diff(firsts) > 0)
-    if count <= MAX_LEAF_NODES:
+    assert np.array_equal(np.sort(order), np.arange(n_points))
+    assert firsts[0] == 0 and firsts[-1] == n_points and np.all(np.diff(firsts) > 0)
+    if n_points <= MAX_LEAF_NODES:
         return
-    cut = order[firsts[-2] :]
-    left = ~np.isin(pairs, cut).any(axis=1)
-    graph = coo_matrix((np.ones(left.sum()), pairs[left].T), shape=(count, count))
+    separator = order[firsts[-2] :]
+    is_kept = ~np.isin(pairs, separator).any(axis=1)
+    graph = coo_matrix((np.ones(is_kept.sum()), pairs[is_kept].T), shape=(n_points, n_points))
     label = connected_components(graph, False)[1]
-    # the last cut parts the halves
-    assert np.bincount(np.delete(label, cut)).max() <= count / 2 + 1
-    assert cut.size <= 3 * np.sqrt(count)
+    # the last separator divides the mesh into halves
+    assert np.bincount(np.delete(label, separator)).max() <= n_points / 2 + 1
+    assert separator.size <= 3 * np.sqrt(n_points)
 
 
-def grounded(pairs, count: int, ground: float):
-    """Stiffness (3 count, 3 count) of springs along random rows between pairs (e, 2) of nodes, each held besides."""
+def random_stiffness(pairs, n_nodes: int, ground_stiffness: float):
+    """Return the stiffness (3 n, 3 n) of random springs between pairs of nodes, with grounded nodes."""
     rows = np.random.default_rng(2).normal(size=(len(pairs), 6))
     columns = (3 * pairs[:, :, None] + np.arange(3)).reshape(-1, 6)
     stretch = coo_matrix(
         (rows.ravel(), (np.repeat(np.arange(len(pairs)), 6), columns.ravel())),
-        (len(pairs), 3 * count),
+        (len(pairs), 3 * n_nodes),
     ).tocsr()
-    return stretch.T @ stretch + ground * eye_array(3 * count)
+    return stretch.T @ stretch + ground_stiffness * eye_array(3 * n_nodes)
 
 
-@pytest.mark.parametrize("count", [1, 20, 700])
-def test_exact_factor_of_a_matrix_of_which_only_the_entries_are_known(count):
-    """Whatever the order of its unknowns, in parts without a path between them."""
-    pairs = scattered(count, 3)[1] if count > 3 else np.zeros((0, 2), int)
-    one = grounded(pairs, count, 0.1)
-    whole = block_diag([one, one, 5.0]).tocsr()
-    order = np.random.default_rng(4).permutation(whole.shape[0])
-    whole = whole[order][:, order]
-    load = np.random.default_rng(1).normal(size=(whole.shape[0], 3))
-    found = fronts.SparseFactor(whole)
+@pytest.mark.parametrize("n_nodes", [1, 20, 700])
+def test_exact_sparse_factor_of_permuted_matrix(n_nodes):
+    """The factor of a randomly permuted matrix of unconnected blocks solves its equations."""
+    pairs = random_triangulation(n_nodes, 3)[1] if n_nodes > 3 else np.zeros((0, 2), int)
+    block = random_stiffness(pairs, n_nodes, 0.1)
+    matrix = block_diag([block, block, 5.0]).tocsr()
+    order = np.random.default_rng(4).permutation(matrix.shape[0])
+    matrix = matrix[order][:, order]
+    load = np.random.default_rng(1).normal(size=(matrix.shape[0], 3))
+    factor = fronts.SparseFactor(matrix)
     for given_load in (load, load[:, 0]):
-        np.testing.assert_allclose(whole @ found.solve(given_load), given_load, atol=1e-11)
-    assert found.fronts.n_entries < whole.shape[0] ** 2 / (6 if count > 500 else 1)
+        np.testing.assert_allclose(matrix @ factor.solve(given_load), given_load, atol=1e-11)
+    assert factor.fronts.n_entries < matrix.shape[0] ** 2 / (6 if n_nodes > 500 else 1)
 
 
-def test_refuses_a_motion_without_strain_and_one_that_gives_energy_back_by_their_names():
-    pairs = scattered(300, 5)[1]
+def test_refuses_zero_energy_motion_and_negative_energy():
+    """A motion of zero energy and one of negative energy are refused with different exceptions."""
+    pairs = random_triangulation(300, 5)[1]
     laplacian = np.zeros((300, 300))
     for i, j in pairs:
         laplacian[[i, j], [i, j]] += 1.0

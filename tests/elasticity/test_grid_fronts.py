@@ -1,4 +1,4 @@
-"""What a grid will cost: the sizes of its fronts are those of the factors, and more cells never cost less."""
+"""Predicted cost of a grid: the predicted sizes are those of the factors, and more elements never cost less."""
 
 import numpy as np
 import pytest
@@ -11,28 +11,30 @@ from patchfem.elasticity.grid_fronts import predict_work
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("nx, ny", [(2, 2), (5, 3), (16, 70), (41, 20), (90, 33)])
-def test_exact_predicted_work_is_that_of_the_factors(nx, ny, mirrored):
+def test_exact_predicted_work_equals_factor_sizes(nx, ny, mirrored):
+    """The predicted number of fronts and entries agrees with the computed factors."""
     piece = make_piece(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1, COATED)
-    found = condense(piece.stencil, mirrored)
-    stacks = found.inner_factor.stacks
+    condensed = condense(piece.stencil, mirrored)
+    stacks = condensed.inner_factor.stacks
     work = predict_work(nx, ny, mirrored)
-    # some own nothing
+    # some fronts own no unknowns
     assert work.fronts >= sum(len(stack.own) for stack in stacks)
     assert work.shapes >= len(stacks)
-    kept = sum(factor.lower_factor.shape[0] ** 2 for factor in found.kept_factors)
-    whole = sum(stack.own_factor.size + stack.ring_factor.size for stack in stacks)
+    kept_entries = sum(factor.lower_factor.shape[0] ** 2 for factor in condensed.kept_factors)
+    stack_entries = sum(stack.own_factor.size + stack.ring_factor.size for stack in stacks)
     assert (
-        whole + kept <= work.factor_entries <= whole + 4 * kept
-    )  # half of a middle column is held
+        stack_entries + kept_entries <= work.factor_entries <= stack_entries + 4 * kept_entries
+    )  # half of a middle column is stored
     assert predict_bytes(nx, ny, mirrored) >= 8 * work.factor_entries
 
 
-def test_always_more_nodes_cost_more():
-    for predicted in (predict_seconds, predict_bytes):
+def test_always_predicted_cost_increases_with_nodes():
+    """The predicted time and memory increase with the number of nodes and decrease with symmetry."""
+    for predict in (predict_seconds, predict_bytes):
         for mirrored in (False, True):
-            steps = [
-                predicted(nx, ny, mirrored)
+            costs = [
+                predict(nx, ny, mirrored)
                 for nx, ny in ((10, 10), (30, 20), (60, 60), (61, 90), (200, 120))
             ]
-            assert np.all(np.diff(steps) > 0)
-        assert predicted(101, 80, True) < predicted(101, 80, False)
+            assert np.all(np.diff(costs) > 0)
+        assert predict(101, 80, True) < predict(101, 80, False)

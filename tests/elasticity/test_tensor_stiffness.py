@@ -1,4 +1,4 @@
-"""Stiffness of tensor grids and of other meshes against `skfem.models.elasticity`, which the package does not use."""
+"""Stiffness of tensor grids and other meshes compared with `skfem.models.elasticity`, which the package does not use."""
 
 from __future__ import annotations
 
@@ -21,15 +21,16 @@ from patchfem.elasticity.elasticity import grid_cells
 from patchfem.elasticity.tensor_stiffness import apply_stencil
 from patchfem.mesh import graded_grid
 
-LINES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
+SPACINGS = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
 
 
 def grid_nodes(x, depth):
+    """Return the nodes (nx, ny, 2) of a tensor grid."""
     return np.stack(np.meshgrid(x, depth, indexing="ij"), axis=-1)
 
 
-def linear(shape, element, points, cells, coated, layers, degree=2):
-    """Stiffness of all nodes by scikit-fem's linear elasticity, unknowns (along x, inward) node by node."""
+def assemble_with_skfem(shape, element, points, cells, coated, layers, degree=2):
+    """Return the stiffness of all nodes by scikit-fem's linear elasticity, unknowns (along x, inward) node by node."""
     basis = Basis(shape(points.T.copy(), cells.T.copy()), ElementVector(element()), intorder=degree)
     pairs = np.array([lame(*layers.substrate, layers.plane), lame(*layers.coating, layers.plane)])
     lam, mu = (
@@ -39,52 +40,61 @@ def linear(shape, element, points, cells, coated, layers, degree=2):
     return linear_elasticity(lam, mu).assemble(basis)[order][:, order]
 
 
-def assemble_nodes(nodes, coating_rows, layers):
-    """A Piece of quadrilaterals whose nodes (nx, ny, 2) stand anywhere, assembled by scikit-fem."""
+def assemble_quad_piece(nodes, coating_rows, layers):
+    """Return a piece of quadrilaterals with arbitrary nodes (nx, ny, 2), assembled by scikit-fem."""
     columns, rows = nodes.shape[:2]
-    cells, coat = grid_cells(columns, rows, coating_rows)
+    cells, is_coating = grid_cells(columns, rows, coating_rows)
     flat = nodes.reshape(-1, 2)
     free = (2 * np.flatnonzero(np.arange(len(flat)) % rows < rows - 1)[:, None] + [0, 1]).ravel()
-    matrix = linear(MeshQuad, ElementQuad1, flat, cells, coat, layers)[free][:, free]
+    matrix = assemble_with_skfem(MeshQuad, ElementQuad1, flat, cells, is_coating, layers)[free][
+        :, free
+    ]
     return Piece(
         nodes[:, 0, 0].copy(),
         nodes[columns // 2, :, 1].copy(),
         flat,
         cells,
-        coat,
+        is_coating,
         layers,
         computed={"stencil": make_stencil(matrix, columns)},
     )
 
 
 @given(
-    across=LINES, down=LINES, coating=st.integers(0, 9), plane=st.sampled_from(["strain", "stress"])
+    column_widths=SPACINGS,
+    row_heights=SPACINGS,
+    coating=st.integers(0, 9),
+    plane=st.sampled_from(["strain", "stress"]),
 )
-def test_exact_a_tensor_grid_has_the_stiffness_of_scikit_fem_s_own_form(
-    across, down, coating, plane
-):
-    x, depth = (np.append(0, np.cumsum(part)) * 1e-4 for part in (across, down))
+def test_exact_grid_stiffness_equals_scikit_fem(column_widths, row_heights, coating, plane):
+    """The stiffness of a tensor grid equals that of scikit-fem's linear elasticity to round-off."""
+    x, depth = (
+        np.append(0, np.cumsum(spacings)) * 1e-4 for spacings in (column_widths, row_heights)
+    )
     layers = Layers(CARBIDE, TITANIUM, plane)
-    coating = min(coating, len(down))
-    mine = make_piece(x, depth, coating, layers)
-    theirs = assemble_nodes(grid_nodes(x, depth), coating, layers)
-    scale = np.abs(theirs.stencil).max()
-    # scikit-fem takes a cell's length from its map, which knows the coordinates to round-off only
-    lost = max(np.ptp(points) / np.diff(points).min() for points in (x, depth))
-    assert np.abs(mine.stencil - theirs.stencil).max() <= 2e-15 * lost * scale
-    assert np.array_equal(mine.cells, theirs.cells) and np.array_equal(
-        mine.is_coating, theirs.is_coating
+    coating = min(coating, len(row_heights))
+    computed = make_piece(x, depth, coating, layers)
+    expected = assemble_quad_piece(grid_nodes(x, depth), coating, layers)
+    scale = np.abs(expected.stencil).max()
+    # scikit-fem computes element lengths from its mapping, with the round-off of the coordinates
+    aspect = max(np.ptp(points) / np.diff(points).min() for points in (x, depth))
+    assert np.abs(computed.stencil - expected.stencil).max() <= 2e-15 * aspect * scale
+    assert np.array_equal(computed.cells, expected.cells) and np.array_equal(
+        computed.is_coating, expected.is_coating
     )
     u = np.random.default_rng(0).normal(size=(x.size, depth.size - 1, 2, 2))
-    wanted = free_stiffness(mine) @ u.reshape(-1, 2)
-    assert np.abs(apply_stencil(mine.stencil, u).reshape(-1, 2) - wanted).max() <= 1e-13 * scale
+    product = free_stiffness(computed) @ u.reshape(-1, 2)
+    assert (
+        np.abs(apply_stencil(computed.stencil, u).reshape(-1, 2) - product).max() <= 1e-13 * scale
+    )
     assert np.array_equal(
-        make_matrix(make_stencil(free_stiffness(mine), x.size)).toarray(),
-        free_stiffness(mine).toarray(),
+        make_matrix(make_stencil(free_stiffness(computed), x.size)).toarray(),
+        free_stiffness(computed).toarray(),
     )
 
 
-def test_exact_only_the_first_run_on_a_machine_imports_scikit_fem(tmp_path):
+def test_exact_scikit_fem_is_imported_only_without_cache(tmp_path):
+    """Only the first run on a machine imports scikit-fem; later runs read the cached element matrices."""
     code = (
         "import sys; from patchfem.elasticity.tensor_stiffness import tensor_stencil as f; "
         "print(f([0, 0.1, 0.3], [0, 0.2, 0.7], [1, 2], [3, 5]).tolist(), 'skfem' in sys.modules)"
@@ -104,19 +114,22 @@ def test_exact_only_the_first_run_on_a_machine_imports_scikit_fem(tmp_path):
 
 
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
-def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(split):
+def test_exact_mesh_stiffness_equals_scikit_fem(split):
+    """The stiffness of a mesh of triangles and quads equals that of scikit-fem's linear elasticity to round-off."""
     mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
     piece = Substructure(mesh, COATED)
     first = len(mesh.triangles)
-    whole = 0
+    expected = 0
     for shape, element, cells, coated, degree in (
         (MeshTri, ElementTriP1, mesh.triangles, mesh.is_coating[:first], 1),
         (MeshQuad, ElementQuad1, mesh.quads, mesh.is_coating[first:], 2),
     ):
         if len(cells):
-            whole = whole + linear(shape, element, mesh.points, cells, coated, COATED, degree)
+            expected = expected + assemble_with_skfem(
+                shape, element, mesh.points, cells, coated, COATED, degree
+            )
     free = (2 * piece.order[:, None] + [0, 1]).ravel()
     assert (
-        np.abs((whole[free][:, free] - free_stiffness(piece)).toarray()).max()
-        <= 1e-14 * np.abs(whole.data).max()
+        np.abs((expected[free][:, free] - free_stiffness(piece)).toarray()).max()
+        <= 1e-14 * np.abs(expected.data).max()
     )

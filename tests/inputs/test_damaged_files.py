@@ -1,4 +1,4 @@
-"""Damaged files are refused by a sentence; a mistake in a reader is not reported as a damaged file."""
+"""Damaged files are refused with a message; a fault in a reader is not reported as a damaged file."""
 
 import io
 import random
@@ -9,9 +9,9 @@ import pyuff
 from lab_files import SI, loop, record, written
 from scipy import sparse
 from scipy.io import mmwrite, savemat
-from test_matlab import written as write_version_5
-from test_matlab73 import RUN, by_scipy
-from test_matlab73 import written as write_version_73
+from test_matlab import matlab5_bytes as write_version_5
+from test_matlab73 import RUN, matlab5_struct_bytes
+from test_matlab73 import matlab73_bytes as write_version_73
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import matlab5, matlab73, matrices, nastran, read_datasets, read_variables
@@ -21,18 +21,20 @@ MATRIX_73 = b"MATLAB 7.3 MAT-file" + bytes(500)
 
 
 def read_stiffness(path):
+    """Read the stiffness matrix of a file."""
     return matrices.read_matrix(path, "stiffness")
 
 
-def saved(write, **keys) -> bytes:
+def bytes_of(write, **options) -> bytes:
     """Return what a function writes into a binary file."""
     file = io.BytesIO()
-    write(file, **keys)
+    write(file, **options)
     return file.getvalue()
 
 
-def market(matrix, **keys) -> bytes:
-    return saved(lambda file: mmwrite(file, matrix, **keys))
+def matrix_market(matrix, **options) -> bytes:
+    """Return a matrix as the content of a Matrix Market file."""
+    return bytes_of(lambda file: mmwrite(file, matrix, **options))
 
 
 OUTPUT4 = f"""\
@@ -49,19 +51,19 @@ DMIG    K       {0:8d}{6:8d}{2:8d}{0:8d}
 DMIG    K       {7:8d}{1:8d}{"":8s}{7:8d}{1:8d}     4.0
 """
 FILES = {
-    "coordinates.mtx": (read_stiffness, market(sparse.coo_array(K))),
-    "full.mtx": (read_stiffness, market(K)),
+    "coordinates.mtx": (read_stiffness, matrix_market(sparse.coo_array(K))),
+    "full.mtx": (read_stiffness, matrix_market(K)),
     "rows.mtx": (read_stiffness, b"1 1 4.0\n1 2 -1.5\n2 2 3e-3\n"),
-    "plain.npz": (read_stiffness, saved(np.savez, K=K)),
-    "packed.npz": (read_stiffness, saved(np.savez_compressed, K=K)),
+    "plain.npz": (read_stiffness, bytes_of(np.savez, K=K)),
+    "packed.npz": (read_stiffness, bytes_of(np.savez_compressed, K=K)),
     "text.op4": (read_stiffness, OUTPUT4.encode()),
     "cards.pch": (read_stiffness, DMIG.encode()),
-    "v5.mat": (read_stiffness, saved(savemat, mdict={"K": sparse.csc_array(K)})),
+    "v5.mat": (read_stiffness, bytes_of(savemat, mdict={"K": sparse.csc_array(K)})),
 }
 
 
-def damaged(data: bytes, rng: random.Random) -> bytes:
-    """Cut a file off, or flip one to three of its bits."""
+def damage(data: bytes, rng: random.Random) -> bytes:
+    """Truncate a file, or flip one to three of its bits."""
     if rng.random() < 0.3:
         return data[: rng.randrange(len(data))]
     changed = bytearray(data)
@@ -72,7 +74,8 @@ def damaged(data: bytes, rng: random.Random) -> bytes:
 
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.filterwarnings("ignore")
-def test_always_a_damaged_matrix_is_read_or_refused_by_name(tmp_path, name):
+def test_always_damaged_matrix_file_is_read_or_refused(tmp_path, name):
+    """A damaged matrix file is read or refused with its name."""
     read, content = FILES[name]
     rng = random.Random(3)
     path = tmp_path / name
@@ -80,7 +83,7 @@ def test_always_a_damaged_matrix_is_read_or_refused_by_name(tmp_path, name):
     assert read(path).values.shape[0] > 0
     n_refused = 0
     for _ in range(80):
-        path.write_bytes(damaged(content, rng))
+        path.write_bytes(damage(content, rng))
         try:
             read(path)
         except PatchfemError as error:
@@ -93,26 +96,26 @@ SMALL = ("full", "scattered", "cells", "letters", "scalar")
 VARIABLES = {  # a MATLAB file, and the first byte that may be damaged
     "packed": (write_version_5(True, SMALL), 128),
     "unpacked": (write_version_5(False, SMALL), 128),
-    "structures": (by_scipy({"run": RUN}, False), 128),
+    "structures": (matlab5_struct_bytes({"run": RUN}, False), 128),
     "version 7.3": (write_version_73({"run": RUN, "g": 9.81}), 520),
 }
 COUNTS = [word.to_bytes(4, "little") for word in (0xFFFFFFFF, 0x80000000, 0x7FFFFFFF, 1, 14)]
 
 
 @pytest.mark.parametrize("name", VARIABLES)
-def test_always_damaged_variables_are_read_or_refused_by_name(name):
-    """One to three bytes, or counts of four bytes, become others; some of these files make SciPy's reader crash."""
+def test_always_damaged_matlab_file_is_read_or_refused(name):
+    """A MATLAB file with changed bytes or counts is read or refused with its name; some of them make SciPy crash."""
     content, first = VARIABLES[name]
     rng = random.Random(5)
     n_refused = 0
     for _ in range(150):
         changed = bytearray(content)
         for _ in range(rng.randint(1, 3)):
-            place = rng.randrange(first, len(content) - 4)
+            offset = rng.randrange(first, len(content) - 4)
             if rng.random() < 0.5:
-                changed[place] = rng.randrange(256)
+                changed[offset] = rng.randrange(256)
             else:
-                changed[place & ~3 : (place & ~3) + 4] = rng.choice(COUNTS)
+                changed[offset & ~3 : (offset & ~3) + 4] = rng.choice(COUNTS)
         try:
             for variable in read_variables("a.mat", bytes(changed)).values():
                 values = variable.values()
@@ -126,8 +129,11 @@ def test_always_damaged_variables_are_read_or_refused_by_name(name):
 @pytest.mark.parametrize("layout", ["coordinates", "full"])
 @pytest.mark.parametrize("number", ["1E-", "1x", "1E-\0\0", "1 2", ""])
 @pytest.mark.parametrize("end", ["", "\n"])
-def test_refuses_a_damaged_number_of_a_matrix_market_file(tmp_path, layout, number, end):
-    """SciPy 1.17 reads most of these files, and two of them end its process."""
+def test_refuses_invalid_number_in_matrix_market_file(tmp_path, layout, number, end):
+    """A Matrix Market file with an invalid number is refused.
+
+    SciPy 1.17 reads most of these files, and two of them terminate its process.
+    """
     path = tmp_path / "a.mtx"
     banner = f"%%MatrixMarket matrix {'coordinate' if layout == 'coordinates' else 'array'} real general\n"
     rows = "2 2 2\n1 1 4\n2 2 " if layout == "coordinates" else "2 2\n4\n0\n0\n"
@@ -141,39 +147,49 @@ def test_refuses_a_damaged_number_of_a_matrix_market_file(tmp_path, layout, numb
     [(K, "symmetric"), (K, "general"), (K.astype(complex), "hermitian"), (K * (1 + 0j), "general")],
 )
 @pytest.mark.parametrize("is_sparse", [False, True])
-def test_exact_each_symmetry_and_field_of_matrix_market(tmp_path, matrix, symmetry, is_sparse):
+def test_exact_matrix_market_symmetries_and_fields(tmp_path, matrix, symmetry, is_sparse):
+    """Every symmetry and field of a Matrix Market file gives the same matrix."""
     path = tmp_path / "a.mtx"
-    path.write_bytes(market(sparse.coo_array(matrix) if is_sparse else matrix, symmetry=symmetry))
+    path.write_bytes(
+        matrix_market(sparse.coo_array(matrix) if is_sparse else matrix, symmetry=symmetry)
+    )
     assert np.array_equal(read_stiffness(path).values.toarray(), K)
 
 
 @pytest.mark.parametrize("is_sparse", [False, True])
-def test_refuses_a_skew_symmetric_and_a_complex_matrix(tmp_path, is_sparse):
+def test_refuses_skew_symmetric_and_complex_matrix(tmp_path, is_sparse):
+    """A skew-symmetric and a complex stiffness are refused."""
     path = tmp_path / "a.mtx"
     make = sparse.coo_array if is_sparse else np.asarray
-    path.write_bytes(market(make(np.array([[0.0, 1.0], [-1.0, 0.0]])), symmetry="skew-symmetric"))
+    path.write_bytes(
+        matrix_market(make(np.array([[0.0, 1.0], [-1.0, 0.0]])), symmetry="skew-symmetric")
+    )
     with pytest.raises(PatchfemError, match="the stiffness is not symmetric; gyroscopic"):
         read_stiffness(path)
-    path.write_bytes(market(make(K * (1 + 1j)), symmetry="symmetric"))
+    path.write_bytes(matrix_market(make(K * (1 + 1j)), symmetry="symmetric"))
     with pytest.raises(PatchfemError, match="the stiffness is complex"):
         read_stiffness(path)
 
 
-def test_refuses_an_array_of_one_dimension(tmp_path):
+def test_refuses_one_dimensional_array(tmp_path):
+    """A one-dimensional array is refused as a matrix."""
     np.savez(tmp_path / "a.npz", K=np.ones(4))
     with pytest.raises(PatchfemError, match=r"must be square, not of shape \(4,\)"):
         read_stiffness(tmp_path / "a.npz")
 
 
 def read_matlab_5(path):
-    return read_variables(path, saved(savemat, mdict={"K": K}))
+    """Read the variables of a MATLAB file of version 5."""
+    return read_variables(path, bytes_of(savemat, mdict={"K": K}))
 
 
 def read_matlab_73(path):
+    """Read the variables of a MATLAB file of version 7.3."""
     return read_variables(path, MATRIX_73)
 
 
 def read_universal(path):
+    """Write and read a universal file with one record."""
     time, slide, _ = loop(20, 1)
     return read_datasets(written(path.with_suffix(".uff"), [SI, record(time, slide, 8)]))
 
@@ -189,17 +205,20 @@ READERS = {
 }
 
 
-@pytest.mark.parametrize("mistake", [AttributeError, NameError])
+@pytest.mark.parametrize("error_type", [AttributeError, NameError])
 @pytest.mark.parametrize("name", READERS)
-def test_a_mistake_in_a_reader_is_not_a_damaged_file(tmp_path, monkeypatch, name, mistake):
-    read, owner, function = READERS[name]
+def test_always_reader_fault_is_not_reported_as_damaged_file(
+    tmp_path, monkeypatch, name, error_type
+):
+    """An exception from a fault in a reader is raised and not reported as a damaged file."""
+    read, module, function = READERS[name]
     path = tmp_path / name
     if name in FILES:
         path.write_bytes(FILES[name][1])
 
-    def fail(*arguments, **keys):
-        raise mistake("a mistake in the program")
+    def fail(*arguments, **options):
+        raise error_type("a mistake in the program")
 
-    monkeypatch.setattr(owner, function, fail)
-    with pytest.raises(mistake, match="a mistake in the program"):
+    monkeypatch.setattr(module, function, fail)
+    with pytest.raises(error_type, match="a mistake in the program"):
         read(path)

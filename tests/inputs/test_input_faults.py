@@ -1,4 +1,4 @@
-"""Claims about input files that planted faults showed to be unchecked."""
+"""Properties of input files for which mutation tests found no check."""
 
 import pytest
 
@@ -7,16 +7,18 @@ from patchfem.inputs import matrices, parse_requests, read_records, read_slide
 from patchfem.inputs.records import MAX_BYTES
 
 
-def test_exact_path_of_a_file_in_metres_with_its_lateral_column(tmp_path):
+def test_exact_path_file_with_lateral_column_in_metres(tmp_path):
+    """A path file with a lateral column is converted to seconds and metres."""
     path = tmp_path / "path.csv"
     path.write_text("lateral [um],time [ms],displacement [mm]\n0,0,0\n4,500,0.25\n-2,1500,-0.5\n")
-    time, along, across = read_slide(path)
+    time, longitudinal, lateral = read_slide(path)
     assert time == pytest.approx([0, 0.5, 1.5], rel=1e-15)
-    assert along == pytest.approx([0, 2.5e-4, -5e-4], rel=1e-15)
-    assert across == pytest.approx([0, 4e-6, -2e-6], rel=1e-15)
+    assert longitudinal == pytest.approx([0, 2.5e-4, -5e-4], rel=1e-15)
+    assert lateral == pytest.approx([0, 4e-6, -2e-6], rel=1e-15)
 
 
-def test_refuses_a_matlab_file_that_is_too_large_before_it_is_read(tmp_path):
+def test_refuses_oversized_matlab_file_before_reading(tmp_path):
+    """A MATLAB file above the size limit is refused before it is read."""
     path = tmp_path / "large.mat"
     with path.open("wb") as file:
         file.truncate(MAX_BYTES + 1)
@@ -24,12 +26,15 @@ def test_refuses_a_matlab_file_that_is_too_large_before_it_is_read(tmp_path):
         read_records(path, parse_requests(["force=F [N]"]))
 
 
-def test_exact_rows_of_numbers_without_mass_at_the_end_fit_a_larger_stiffness(tmp_path):
-    """Lines of row, column and number do not state the size of the matrix, so the mass is extended by zeros."""
+def test_exact_mass_is_padded_to_size_of_stiffness(tmp_path):
+    """A mass of lines of row, column and number is padded with zeros to the size of the stiffness.
+
+    Such lines do not state the size of the matrix.
+    """
     stiffness = tmp_path / "k.mtx"
     mass = tmp_path / "m.mtx"
     stiffness.write_text("1 1 4.0\n1 2 -1.0\n2 2 3.0\n")
     mass.write_text("1 1 2.5\n")
     pair = (matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass"))
-    found = [one.values.toarray().tolist() for one in matrices.align_rows(*pair)]
-    assert found == [[[4.0, -1.0], [-1.0, 3.0]], [[2.5, 0.0], [0.0, 0.0]]]
+    matrix_lists = [matrix.values.toarray().tolist() for matrix in matrices.align_rows(*pair)]
+    assert matrix_lists == [[[4.0, -1.0], [-1.0, 3.0]], [[2.5, 0.0], [0.0, 0.0]]]

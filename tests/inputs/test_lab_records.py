@@ -1,4 +1,4 @@
-"""Records of instruments in SI: every format against the numbers that were written, every mistake named."""
+"""Records of instruments in SI units: every format gives the written numbers, and every fault has a message."""
 
 import numpy as np
 import pytest
@@ -13,54 +13,60 @@ from patchfem.inputs.units import find_unit_factor
 TIME, SLIDE, FORCE = loop(20, 1)
 
 
-def test_exact_a_universal_file_keeps_every_bit(tmp_path):
-    found = read_records(
+def test_exact_universal_file_round_trip(tmp_path):
+    """Time, displacement and force of a universal file are read back bit for bit."""
+    records = read_records(
         written(tmp_path / "a.uff", [SI, record(TIME, SLIDE, 8), record(TIME, FORCE, 13)]), []
     )
-    assert list(found.values) == ["time", "displacement", "force"] and not found.notes
-    for name, truth in (("time", TIME), ("displacement", SLIDE), ("force", FORCE)):
-        assert found.values[name].tobytes() == truth.tobytes()
+    assert list(records.values) == ["time", "displacement", "force"] and not records.notes
+    for name, expected in (("time", TIME), ("displacement", SLIDE), ("force", FORCE)):
+        assert records.values[name].tobytes() == expected.tobytes()
 
 
 @pytest.mark.parametrize("binary, spacing, digits", [(0, 0, 6), (0, 1, 6), (1, 1, 6)])
-def test_exact_other_layouts_hold_what_their_text_holds(tmp_path, binary, spacing, digits):
-    sets = [
-        record(TIME, one, kind, binary=binary, abscissa_spacing=spacing)
-        for one, kind in ((SLIDE, 8), (FORCE, 13))
+def test_exact_universal_file_layouts(tmp_path, binary, spacing, digits):
+    """Text and binary layouts of a universal file give the values to the digits that they contain."""
+    datasets = [
+        record(TIME, values, quantity_type, binary=binary, abscissa_spacing=spacing)
+        for values, quantity_type in ((SLIDE, 8), (FORCE, 13))
     ]
-    found = read_records(written(tmp_path / "a.unv", [SI, *sets]), [])
-    assert found.values["force"] == pytest.approx(FORCE, rel=1e-11)
-    assert found.values["time"] == pytest.approx(TIME, rel=10 ** (1 - digits))
+    records = read_records(written(tmp_path / "a.unv", [SI, *datasets]), [])
+    assert records.values["force"] == pytest.approx(FORCE, rel=1e-11)
+    assert records.values["time"] == pytest.approx(TIME, rel=10 ** (1 - digits))
 
 
-def test_exact_units_of_dataset_164_and_of_labels(tmp_path):
-    """In inches and lbf: 1/0.0254 inch is a metre; a label of the channel goes before the dataset."""
-    sets = [
+def test_exact_units_of_dataset_164_and_channel_labels(tmp_path):
+    """Units of dataset 164 (inch, lbf) are converted; the unit of a channel label takes precedence."""
+    datasets = [
         INCH,
         record(TIME, SLIDE / 0.0254, 8),
         record(TIME, FORCE / 4.4482216152605, 13),
         record(TIME, SLIDE, 12, ordinate_axis_units_lab="g"),
         record(TIME, SLIDE, 11, ordinate_axis_units_lab="?"),
     ]
-    found = read_records(written(tmp_path / "a.uff", sets), [])
-    assert found.values["displacement"] == pytest.approx(SLIDE, rel=1e-14)
-    assert found.values["force"] == pytest.approx(FORCE, rel=1e-14)
-    assert np.array_equal(found.values["acceleration"], SLIDE * 9.80665)
-    assert found.values["velocity"] == pytest.approx(SLIDE * 0.0254, rel=1e-14)
-    assert len(found.notes) == 1
-    assert "'?' is not known; the unit of dataset 164 is used" in found.notes[0]
-    bare = read_records(written(tmp_path / "b.uff", [record(TIME, FORCE, 13)]), [])
-    assert np.array_equal(bare.values["force"], FORCE) and "read as SI" in bare.notes[0]
+    records = read_records(written(tmp_path / "a.uff", datasets), [])
+    assert records.values["displacement"] == pytest.approx(SLIDE, rel=1e-14)
+    assert records.values["force"] == pytest.approx(FORCE, rel=1e-14)
+    assert np.array_equal(records.values["acceleration"], SLIDE * 9.80665)
+    assert records.values["velocity"] == pytest.approx(SLIDE * 0.0254, rel=1e-14)
+    assert len(records.notes) == 1
+    assert "'?' is not known; the unit of dataset 164 is used" in records.notes[0]
+    without_units = read_records(written(tmp_path / "b.uff", [record(TIME, FORCE, 13)]), [])
+    assert (
+        np.array_equal(without_units.values["force"], FORCE)
+        and "read as SI" in without_units.notes[0]
+    )
 
 
-def test_exact_channels_by_name_place_and_number(tmp_path):
-    sets = [
+def test_exact_channels_by_label_node_and_number(tmp_path):
+    """A channel can be chosen by its label, its node and direction, or its number."""
+    datasets = [
         SI,
         record(TIME, SLIDE, 8, id1="upper", rsp_node=12),
         record(TIME, 2 * SLIDE, 8, id1="lower", rsp_dir=-1),
         record(TIME, FORCE, 0, id1="bridge"),
     ]
-    path = written(tmp_path / "a.uff", sets)
+    path = written(tmp_path / "a.uff", datasets)
     with pytest.raises(
         PatchfemError, match=r"2 channels contain displacement; choose .* 1 'upper' at 12:\+x"
     ):
@@ -70,44 +76,45 @@ def test_exact_channels_by_name_place_and_number(tmp_path):
             read_records(path, parse_requests([f"displacement={source}"])).values["displacement"],
             SLIDE,
         )
-    turned = read_records(path, parse_requests(["displacement=lower,force=bridge [lbf]"]))
-    assert np.array_equal(turned.values["displacement"], -2 * SLIDE)
-    assert "points along -x" in turned.notes[0]
-    assert np.array_equal(turned.values["force"], FORCE * 4.4482216152605)
+    reversed_records = read_records(path, parse_requests(["displacement=lower,force=bridge [lbf]"]))
+    assert np.array_equal(reversed_records.values["displacement"], -2 * SLIDE)
+    assert "points along -x" in reversed_records.notes[0]
+    assert np.array_equal(reversed_records.values["force"], FORCE * 4.4482216152605)
     with pytest.raises(
         PatchfemError, match=r"'bridge' has no unit; write --map \"force=CHANNEL \[N\]\""
     ):
         read_records(path, parse_requests(["force=bridge"]))
 
 
-def test_exact_matlab_columns_by_an_explicit_map(tmp_path):
+def test_exact_matlab_columns_with_explicit_map(tmp_path):
+    """Columns of MATLAB variables are assigned to quantities by an explicit map."""
     savemat(
         tmp_path / "a.mat",
         {"t": 1e3 * TIME, "data": np.stack([SLIDE, FORCE], axis=1), "note": "text"},
     )
-    found = read_records(
+    records = read_records(
         tmp_path / "a.mat",
         parse_requests(["time=t [ms]", "displacement=data(:,1) [m]", "force=data(:,2) [N]"]),
     )
-    assert np.array_equal(found.values["force"], FORCE) and np.array_equal(
-        found.values["displacement"], SLIDE
+    assert np.array_equal(records.values["force"], FORCE) and np.array_equal(
+        records.values["displacement"], SLIDE
     )
-    assert np.array_equal(found.values["time"], 1e3 * TIME * 1e-3)
+    assert np.array_equal(records.values["time"], 1e3 * TIME * 1e-3)
 
 
-def test_exact_tables_of_instruments(tmp_path):
-    """Semicolons, quotes, names with blanks, units in brackets or round ones, a column of remarks."""
+def test_exact_instrument_tables_are_read(tmp_path):
+    """Tables with semicolons, quotes, names with blanks, units in brackets and a column of remarks are read."""
     path = tmp_path / "a.csv"
     rows = [
         f"{t!r};{d * 1e3!r};{f!r};ok"
         for t, d, f in zip(TIME.tolist(), SLIDE.tolist(), FORCE.tolist())
     ]
     path.write_text('"Time (s)";"LVDT 1 [mm]";"Force [N]";remark\n' + "\n".join(rows) + "\n")
-    found = read_records(path, parse_requests(["displacement=LVDT 1", "force=Force"]))
-    assert np.array_equal(found.values["time"], TIME) and np.array_equal(
-        found.values["force"], FORCE
+    records = read_records(path, parse_requests(["displacement=LVDT 1", "force=Force"]))
+    assert np.array_equal(records.values["time"], TIME) and np.array_equal(
+        records.values["force"], FORCE
     )
-    assert found.values["displacement"] == pytest.approx(SLIDE, rel=1e-15)
+    assert records.values["displacement"] == pytest.approx(SLIDE, rel=1e-15)
     assert list(read_records(path, []).values) == ["time", "force"]
 
 
@@ -123,12 +130,13 @@ def test_exact_tables_of_instruments(tmp_path):
         ("in/sec2", 0.0254),
     ],
 )
-def test_exact_spellings_of_units(unit, factor):
+def test_exact_unit_spellings_are_recognised(unit, factor):
+    """The usual spellings of a unit of acceleration give its factor."""
     assert find_unit_factor("acceleration", unit) == factor
 
 
 @pytest.mark.parametrize(
-    "words, says",
+    "requests, message",
     [
         (["force"], "NAME=CHANNEL"),
         (["mass=a"], "one of time, displacement"),
@@ -138,42 +146,48 @@ def test_exact_spellings_of_units(unit, factor):
         (["force=3"], "no channel '3'"),
     ],
 )
-def test_refuses_maps_by_name(tmp_path, words, says):
+def test_refuses_invalid_channel_map(tmp_path, requests, message):
+    """An invalid channel map is refused with the request concerned."""
     path = written(tmp_path / "a.uff", [SI, record(TIME, FORCE, 13)])
-    answer = cli(
+    result = cli(
         "import",
         path,
         "-o",
         tmp_path / "o.csv",
-        *(word for one in words for word in ("--map", one)),
+        *(word for request in requests for word in ("--map", request)),
     )
-    assert answer.code == 2 and says in answer.err and not (tmp_path / "o.csv").exists()
+    assert result.code == 2 and message in result.err and not (tmp_path / "o.csv").exists()
 
 
-def spoilt(values, at=3, to=np.nan):
-    out = np.array(values)
-    out[at] = to
-    return out
+def replace_value(values, index=3, value=np.nan):
+    """Return a copy of the values with one value replaced."""
+    changed = np.array(values)
+    changed[index] = value
+    return changed
 
 
 @pytest.mark.parametrize(
-    "sets, says",
+    "datasets, message",
     [
         ([SI], "no record over time"),
-        ([record(spoilt(TIME, to=0.0), FORCE, 13)], "of sample 4 is not later than"),
+        ([record(replace_value(TIME, value=0.0), FORCE, 13)], "of sample 4 is not later than"),
         ([record(TIME, FORCE, 13), record(TIME + 1, SLIDE, 8)], "is sampled at other times than"),
         ([record(TIME, FORCE + 1j, 13)], "complex"),
         ([record(TIME, FORCE, 0)], "no channel label names a quantity"),
         ([SI | {"length": 0.0}, record(TIME, FORCE, 13)], "must be > 0"),
     ],
 )
-def test_refuses_universal_files_by_name(tmp_path, sets, says):
-    answer = cli("import", written(tmp_path / "a.uff", sets), "-o", tmp_path / "o.csv")
-    assert answer.code == 2 and says in answer.err and str(tmp_path / "a.uff") in answer.err
+def test_refuses_invalid_universal_record(tmp_path, datasets, message):
+    """A universal file with invalid records is refused with its name and the reason."""
+    result = cli("import", written(tmp_path / "a.uff", datasets), "-o", tmp_path / "o.csv")
+    assert result.code == 2 and message in result.err and str(tmp_path / "a.uff") in result.err
 
 
-def test_refuses_values_that_are_not_finite(tmp_path):
-    """pyuff writes them as 0, so the bytes of one value are replaced."""
+def test_refuses_non_finite_value(tmp_path):
+    """A value that is not finite is refused with its sample.
+
+    pyuff writes NaN as 0, so the bytes of one value are replaced.
+    """
     path = written(tmp_path / "a.uff", [record(TIME, SLIDE, 13)])
     path.write_bytes(path.read_bytes().replace(SLIDE[3].tobytes(), np.array(np.nan).tobytes()))
     with pytest.raises(PatchfemError, match=r"a\.uff: force of sample 4 is nan"):
@@ -181,7 +195,7 @@ def test_refuses_values_that_are_not_finite(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text, says",
+    "text, message",
     [
         ("1,2\n3,4\n5,6\n", ":1: a header like"),
         ("time [s],force [N]\n0,1\n1\n", ":3: 1 cells, but 2 column names"),
@@ -195,19 +209,21 @@ def test_refuses_values_that_are_not_finite(tmp_path):
         ("time [s],A\n0,1\n1,2\n", "no channel label names"),
     ],
 )
-def test_refuses_tables_by_line(tmp_path, text, says):
+def test_refuses_invalid_table_with_line_number(tmp_path, text, message):
+    """An invalid table is refused with the line of the fault."""
     (tmp_path / "a.csv").write_text(text)
-    answer = cli("import", tmp_path / "a.csv", "-o", tmp_path / "o.csv")
-    assert answer.code == 2 and says in answer.err and str(tmp_path / "a.csv") in answer.err, (
-        answer.err
+    result = cli("import", tmp_path / "a.csv", "-o", tmp_path / "o.csv")
+    assert result.code == 2 and message in result.err and str(tmp_path / "a.csv") in result.err, (
+        result.err
     )
 
 
-def test_refuses_other_files_and_spoilt_ones(tmp_path):
+def test_refuses_unsupported_missing_and_damaged_files(tmp_path):
+    """Unsupported, missing and damaged files are refused with the exit code of their fault."""
     savemat(tmp_path / "a.mat", {"t": TIME, "s": {"x": 1.0}, "wide": np.ones((3, 3))})
     (tmp_path / "b.uff").write_bytes(b"    -1\n    58\nnothing\n    -1\n")
     (tmp_path / "c.tdms").write_bytes(b"")
-    for words, code, says in (
+    for words, code, message in (
         (["a.mat"], 2, "assign the variables of the file"),
         (["a.mat", "--map", "force=F [N]"], 2, "no variable 'F'"),
         (["a.mat", "--map", "force=t"], 2, "has no units"),
@@ -220,14 +236,14 @@ def test_refuses_other_files_and_spoilt_ones(tmp_path):
         (["d.mat"], 4, "no such"),
         (["d.csv"], 4, "no such"),
     ):
-        answer = cli("import", tmp_path / words[0], *words[1:], "-o", tmp_path / "o.csv")
-        assert answer.code == code and says in answer.err and "internal fault" not in answer.err, (
-            answer.err
-        )
+        result = cli("import", tmp_path / words[0], *words[1:], "-o", tmp_path / "o.csv")
+        assert (
+            result.code == code and message in result.err and "internal fault" not in result.err
+        ), result.err
 
 
-def test_exact_what_is_imported_is_a_drive_and_a_loop(tmp_path):
-    """An accelerometer in g that starts at 2 s drives a rig; --zero lets a slide start at 0, 0."""
+def test_exact_imported_files_are_valid_drive_and_loop(tmp_path):
+    """An imported acceleration is a valid drive, and with `--zero` an imported loop starts at 0."""
     path = written(
         tmp_path / "a.uff",
         [
@@ -242,8 +258,8 @@ def test_exact_what_is_imported_is_a_drive_and_a_loop(tmp_path):
     assert np.array_equal(value, np.cos(300 * TIME) * 9.80665) and np.array_equal(
         time, TIME + 2 - 2
     )
-    words = ("--map", "displacement=2,force=3", "--zero")
-    assert cli("import", path, "-o", tmp_path / "loop.csv", *words).code == 0
-    found = read_loop(tmp_path / "loop.csv")
-    assert found.time[0] == 0 and np.array_equal(found.reading, FORCE)
-    assert np.array_equal(found.displacement, (SLIDE + 1e-6) - (SLIDE + 1e-6)[0])
+    options = ("--map", "displacement=2,force=3", "--zero")
+    assert cli("import", path, "-o", tmp_path / "loop.csv", *options).code == 0
+    records = read_loop(tmp_path / "loop.csv")
+    assert records.time[0] == 0 and np.array_equal(records.reading, FORCE)
+    assert np.array_equal(records.displacement, (SLIDE + 1e-6) - (SLIDE + 1e-6)[0])

@@ -1,5 +1,4 @@
-"""Sparse matrices from files of finite-element programs: each format gives the matrix that was written, each bad file
-its sentence."""
+"""Sparse matrices from files of finite-element programs: each format is read exactly, and invalid files are refused."""
 
 import struct
 
@@ -13,80 +12,82 @@ from patchfem.inputs import matrices
 
 K = np.array([[4.0, -1.5, 0, 0], [-1.5, 3.0, -2.0, 0], [0, -2.0, 6.5, -1e-3], [0, 0, -1e-3, 1.25]])
 M = np.diag([1.0, 2.0, 3.0, 4.0])
-PLACES = [(7, 1), (7, 6), (12, 1), (900, 0)]  # of the rows, in the order in which they are sorted
+ROW_NODES = [(7, 1), (7, 6), (12, 1), (900, 0)]  # node and direction of each row, in sorted order
 
 
-def output4_text(name: str, matrix, sparse_rows: bool, big: bool) -> str:
-    """An OUTPUT4 file in text, its columns from the first to the last number or by strings of rows."""
+def output4_text(name: str, matrix, sparse_rows: bool, is_big: bool) -> str:
+    """Return an OUTPUT4 file in text, with columns from the first to the last number or by strings of rows."""
     n = len(matrix)
-    out = []
-    out.append(f"{n:8d}{-n if big else n:8d}{6:8d}{2:8d}{name:8s}1P,3E23.16")
+    lines = []
+    lines.append(f"{n:8d}{-n if is_big else n:8d}{6:8d}{2:8d}{name:8s}1P,3E23.16")
 
-    def numbers(values):
+    def numbers(column_values):
         return [
-            "".join(f"{value:23.16E}" for value in values[k : k + 3])
-            for k in range(0, len(values), 3)
+            "".join(f"{value:23.16E}" for value in column_values[k : k + 3])
+            for k in range(0, len(column_values), 3)
         ]
 
     for j, column in enumerate(matrix.T, 1):
-        there = np.flatnonzero(column)
+        rows = np.flatnonzero(column)
         if not sparse_rows:
-            out += [
-                f"{j:8d}{there[0] + 1:8d}{there[-1] - there[0] + 1:8d}",
-                *numbers(column[there[0] : there[-1] + 1]),
+            lines += [
+                f"{j:8d}{rows[0] + 1:8d}{rows[-1] - rows[0] + 1:8d}",
+                *numbers(column[rows[0] : rows[-1] + 1]),
             ]
             continue
-        out.append(f"{j:8d}{0:8d}{4 * there.size:8d}")
-        for i in there:
-            out += [
-                f"{3:8d}{i + 1:8d}" if big else f"{i + 1 + 3 * 65536:8d}",
+        lines.append(f"{j:8d}{0:8d}{4 * rows.size:8d}")
+        for i in rows:
+            lines += [
+                f"{3:8d}{i + 1:8d}" if is_big else f"{i + 1 + 3 * 65536:8d}",
                 *numbers(column[[i]]),
             ]
-    return "\n".join([*out, f"{n + 1:8d}{1:8d}{1:8d}", " 1.0000000000000000E+00", ""])
+    return "\n".join([*lines, f"{n + 1:8d}{1:8d}{1:8d}", " 1.0000000000000000E+00", ""])
 
 
 def output4_binary(
-    name: str, matrix, order: str, sparse_rows: bool, big: bool, wide: int = 4
+    name: str, matrix, order: str, sparse_rows: bool, is_big: bool, word_bytes: int = 4
 ) -> bytes:
-    """The same in records of Fortran, with words of 4 or 8 bytes."""
+    """Return an OUTPUT4 file in Fortran records with words of 4 or 8 bytes."""
     n = len(matrix)
-    whole = "i" if wide == 4 else "q"
-    out = []
+    int_format = "i" if word_bytes == 4 else "q"
+    records = []
 
     def record(*ints, data=b""):
-        body = struct.pack(f"{order}{len(ints)}{whole}", *ints) + data
-        out.append(struct.pack(order + "i", len(body)) + body + struct.pack(order + "i", len(body)))
+        body = struct.pack(f"{order}{len(ints)}{int_format}", *ints) + data
+        records.append(
+            struct.pack(order + "i", len(body)) + body + struct.pack(order + "i", len(body))
+        )
 
-    words = 8 // wide
-    record(n, -n if big else n, 6, 2, data=name.ljust(2 * wide).encode())
+    words = 8 // word_bytes
+    record(n, -n if is_big else n, 6, 2, data=name.ljust(2 * word_bytes).encode())
     for j, column in enumerate(matrix.T, 1):
-        there = np.flatnonzero(column)
+        rows = np.flatnonzero(column)
         if not sparse_rows:
-            values = column[there[0] : there[-1] + 1]
-            record(j, there[0] + 1, words * values.size, data=values.astype(order + "f8").tobytes())
+            values = column[rows[0] : rows[-1] + 1]
+            record(j, rows[0] + 1, words * values.size, data=values.astype(order + "f8").tobytes())
             continue
         parts = b"".join(
             struct.pack(
-                f"{order}{2 if big else 1}{whole}",
-                *((words + 1, i + 1) if big else ((words + 1) * 65536 + i + 1,)),
+                f"{order}{2 if is_big else 1}{int_format}",
+                *((words + 1, i + 1) if is_big else ((words + 1) * 65536 + i + 1,)),
             )
             + struct.pack(order + "d", column[i])
-            for i in there
+            for i in rows
         )
-        record(j, 0, len(parts) // wide, data=parts)
+        record(j, 0, len(parts) // word_bytes, data=parts)
     record(n + 1, 1, words, data=struct.pack(order + "d", 1.0))
-    return b"".join(out)
+    return b"".join(records)
 
 
-def punched(name: str, matrix, wide: bool) -> str:
-    """DMIG cards of the lower triangle, in wide or narrow fields, with numbers as Nastran shortens them."""
-    out = [f"DMIG    {name:8s}{0:8d}{6:8d}{2:8d}{0:8d}"]
-    for j, (node, axis) in enumerate(PLACES):
+def dmig_cards(name: str, matrix, is_wide: bool) -> str:
+    """Return DMIG cards of the lower triangle in wide or narrow fields, with numbers shortened as by Nastran."""
+    lines = [f"DMIG    {name:8s}{0:8d}{6:8d}{2:8d}{0:8d}"]
+    for j, (node, axis) in enumerate(ROW_NODES):
         rows = [i for i in range(j, len(matrix)) if matrix[i, j]]
-        if wide:
-            out.append(f"DMIG*   {name:16s}{node:16d}{axis:16d}")
-            out += [
-                f"*       {PLACES[i][0]:16d}{PLACES[i][1]:16d}{matrix[i, j]:16.9E}".replace(
+        if is_wide:
+            lines.append(f"DMIG*   {name:16s}{node:16d}{axis:16d}")
+            lines += [
+                f"*       {ROW_NODES[i][0]:16d}{ROW_NODES[i][1]:16d}{matrix[i, j]:16.9E}".replace(
                     "E", "D"
                 )
                 for i in rows
@@ -94,68 +95,77 @@ def punched(name: str, matrix, wide: bool) -> str:
             continue
         for i in rows:
             short = f"{matrix[i, j]:.2E}".replace("E-0", "-").replace("E+00", "")
-            out.append(
-                f"DMIG    {name:8s}{node:8d}{axis:8d}{'':8s}{PLACES[i][0]:8d}{PLACES[i][1]:8d}{short:>8s}"
+            lines.append(
+                f"DMIG    {name:8s}{node:8d}{axis:8d}{'':8s}{ROW_NODES[i][0]:8d}{ROW_NODES[i][1]:8d}{short:>8s}"
             )
-    return "$ punched\n" + "\n".join(out) + "\nENDDATA\n"
+    return "$ punched\n" + "\n".join(lines) + "\nENDDATA\n"
 
 
-def lower(matrix, named: bool) -> str:
-    """Lines of Abaqus: one triangle by rows, or both by nodes and directions."""
-    out = ["** matrix"]
+def abaqus_lines(matrix, has_nodes: bool) -> str:
+    """Return Abaqus lines of the lower triangle by rows, or of both triangles by node and direction."""
+    lines = ["** matrix"]
     for i, j in zip(*np.nonzero(matrix)):
-        if named:
-            out.append(
-                f"{PLACES[i][0]},{PLACES[i][1]}, {PLACES[j][0]},{PLACES[j][1]}, {matrix[i, j]:.17e}"
+        if has_nodes:
+            lines.append(
+                f"{ROW_NODES[i][0]},{ROW_NODES[i][1]}, {ROW_NODES[j][0]},{ROW_NODES[j][1]}, {matrix[i, j]:.17e}"
             )
         elif i >= j:
-            out.append(f"{i + 1} {j + 1} {matrix[i, j]:.17e}")
-    return "\n".join(out)
+            lines.append(f"{i + 1} {j + 1} {matrix[i, j]:.17e}")
+    return "\n".join(lines)
 
 
-def written(path, kind: str):
-    """A file or two of K and M in one of the formats: (path of K, path of M)."""
-    both = path / f"both{kind}"
-    if kind == ".mtx":
-        mmwrite(path / "k.mtx", sparse.coo_array(K), symmetry="symmetric")
-        mmwrite(path / "m.mtx", M)
-        return path / "k.mtx", path / "m.mtx"
-    if kind == ".mat":
-        savemat(both, {"K": sparse.csc_array(K), "M": M, "note": "beam"})
-    elif kind == ".npz":
-        np.savez(both, K=K, M=M, T=np.ones(4))
-    return both, both
+def write_pair(folder, suffix: str):
+    """Write K and M in one of the formats and return the two paths."""
+    path_of_both = folder / f"both{suffix}"
+    if suffix == ".mtx":
+        mmwrite(folder / "k.mtx", sparse.coo_array(K), symmetry="symmetric")
+        mmwrite(folder / "m.mtx", M)
+        return folder / "k.mtx", folder / "m.mtx"
+    if suffix == ".mat":
+        savemat(path_of_both, {"K": sparse.csc_array(K), "M": M, "note": "beam"})
+    elif suffix == ".npz":
+        np.savez(path_of_both, K=K, M=M, T=np.ones(4))
+    return path_of_both, path_of_both
 
 
-@pytest.mark.parametrize("kind", [".mtx", ".mat", ".npz"])
-def test_exact_matrices_of_plain_files(tmp_path, kind):
-    stiffness, mass = written(tmp_path, kind)
-    found = matrices.align_rows(
+@pytest.mark.parametrize("suffix", [".mtx", ".mat", ".npz"])
+def test_exact_matrices_of_common_formats(tmp_path, suffix):
+    """Stiffness and mass of Matrix Market, MATLAB and NumPy files are read exactly."""
+    stiffness, mass = write_pair(tmp_path, suffix)
+    read_matrices = matrices.align_rows(
         matrices.read_matrix(stiffness, "stiffness"), matrices.read_matrix(mass, "mass")
     )
-    assert [np.array_equal(one.values.toarray(), true) for one, true in zip(found, (K, M))] == [
+    assert [
+        np.array_equal(matrix.values.toarray(), expected)
+        for matrix, expected in zip(read_matrices, (K, M))
+    ] == [
         True,
         True,
     ]
 
 
-def test_exact_matrix_of_save_npz(tmp_path):
+def test_exact_matrix_of_scipy_sparse_file(tmp_path):
+    """A matrix saved by SciPy's `save_npz` is read exactly."""
     sparse.save_npz(tmp_path / "k.npz", sparse.csr_array(K))
     assert np.array_equal(matrices.read_matrix(tmp_path / "k.npz", "damping").values.toarray(), K)
 
 
-@pytest.mark.parametrize("sparse_rows, big", [(False, False), (True, False), (True, True)])
-def test_exact_output4(tmp_path, sparse_rows, big):
-    texts = [output4_text(name, one, sparse_rows, big) for name, one in (("KAAX", K), ("MAAX", M))]
+@pytest.mark.parametrize("sparse_rows, is_big", [(False, False), (True, False), (True, True)])
+def test_exact_output4_matrices(tmp_path, sparse_rows, is_big):
+    """OUTPUT4 files in text and binary, of either byte order and word size, are read exactly."""
+    texts = [
+        output4_text(name, matrix, sparse_rows, is_big)
+        for name, matrix in (("KAAX", K), ("MAAX", M))
+    ]
     (tmp_path / "text.op4").write_text("".join(texts))
     files = [tmp_path / "text.op4"]
     for order in "<>":
-        for wide in (4, 8):
-            files.append(tmp_path / f"{'big' if order == '>' else 'little'}{wide}.op4")
+        for word_bytes in (4, 8):
+            files.append(tmp_path / f"{'big' if order == '>' else 'little'}{word_bytes}.op4")
             files[-1].write_bytes(
                 b"".join(
-                    output4_binary(name, one, order, sparse_rows, big, wide)
-                    for name, one in (("KAAX", K), ("MAAX", M))
+                    output4_binary(name, matrix, order, sparse_rows, is_big, word_bytes)
+                    for name, matrix in (("KAAX", K), ("MAAX", M))
                 )
             )
     for file in files:
@@ -163,73 +173,86 @@ def test_exact_output4(tmp_path, sparse_rows, big):
         assert np.array_equal(matrices.read_matrix(file, "mass").values.toarray(), M), file
 
 
-@pytest.mark.parametrize("wide", [True, False])
-def test_exact_punched_cards_with_their_places(tmp_path, wide):
-    (tmp_path / "a.pch").write_text(punched("KAAX", K, wide) + punched("MAAX", M, wide))
+@pytest.mark.parametrize("is_wide", [True, False])
+def test_exact_dmig_cards_with_nodes(tmp_path, is_wide):
+    """DMIG cards are read exactly, with the node and direction of each row."""
+    (tmp_path / "a.pch").write_text(dmig_cards("KAAX", K, is_wide) + dmig_cards("MAAX", M, is_wide))
     stiffness, mass = matrices.align_rows(
         *(matrices.read_matrix(tmp_path / "a.pch", name) for name in ("stiffness", "mass"))
     )
-    assert stiffness.places.tolist() == [list(place) for place in PLACES]
+    assert stiffness.places.tolist() == [list(place) for place in ROW_NODES]
     assert np.array_equal(stiffness.values.toarray(), K) and np.array_equal(
         mass.values.toarray(), M
     )
 
 
-def test_exact_lines_of_abaqus(tmp_path):
-    (tmp_path / "rows.mtx").write_text(lower(K, False))
-    (tmp_path / "nodes.mtx").write_text(lower(K, True))
+def test_exact_abaqus_matrix_lines(tmp_path):
+    """Abaqus matrix lines by row number and by node are read exactly."""
+    (tmp_path / "rows.mtx").write_text(abaqus_lines(K, False))
+    (tmp_path / "nodes.mtx").write_text(abaqus_lines(K, True))
     by_rows, by_nodes = (
         matrices.read_matrix(tmp_path / f"{name}.mtx", "stiffness") for name in ("rows", "nodes")
     )
     assert np.array_equal(by_rows.values.toarray(), K) and by_rows.places is None
     assert np.array_equal(by_nodes.values.toarray(), K) and by_nodes.places.tolist() == [
-        list(p) for p in PLACES
+        list(p) for p in ROW_NODES
     ]
 
 
-def slender(seed: int, n: int = 60):
-    """Stiffness (n, n) of a clamped beam of rigid links and hinges, in a random unit for each coordinate, and its shape
-    (n,) of lowest stiffness."""
+def slender_beam(seed: int, n: int = 60):
+    """Return the stiffness (n, n) of a clamped beam of rigid links and its shape (n,) of lowest stiffness.
+
+    Each coordinate has a random unit.
+    """
     D = np.eye(n) - 2 * np.eye(n, k=-1) + np.eye(n, k=-2)
     unit = np.random.default_rng(seed).uniform(1, 2, n)
-    stiff = D.T @ D * np.outer(unit, unit) * 1e7
-    return sparse.csr_array(stiff), np.linalg.eigh(stiff)[1][:, 0]
+    stiffness = D.T @ D * np.outer(unit, unit) * 1e7
+    return sparse.csr_array(stiffness), np.linalg.eigh(stiffness)[1][:, 0]
 
 
 @pytest.mark.parametrize(
-    "told, rounded",
+    "expected, round_values",
     [
         ("10 digits", lambda values: [float(f"{one:.9e}") for one in values]),
         ("4 digits", lambda values: [float(f"{one:.3e}") for one in values]),
         ("single precision", lambda values: values.astype(np.float32).astype(float)),
     ],
 )
-def test_exact_what_digits_that_a_file_lacks_leave_uncertain(told, rounded):
-    """Of 200 rounded matrices the stiffness of a shape scatters by what is told; K rounds alike above and below the
-    diagonal."""
-    shares = []
+def test_exact_rounding_uncertainty_of_stiffness(expected, round_values):
+    """The estimated uncertainty of a rounded stiffness agrees with the scatter over 200 rounded matrices.
+
+    The rounding is recognised as a number of digits or as single precision.
+    """
+    ratios = []
     for seed in range(200):
-        whole, shape = slender(seed)
-        assert matrices.estimate_rounding(whole) is None
-        short = whole.copy()
-        short.data = np.array(rounded(whole.data))
-        words, off = matrices.estimate_rounding(short)
-        assert words == told
-        shares.append(
-            shape @ (short - whole) @ shape / matrices.compute_form_deviation(short, off, shape)
+        full, shape = slender_beam(seed)
+        assert matrices.estimate_rounding(full) is None
+        rounded_matrix = full.copy()
+        rounded_matrix.data = np.array(round_values(full.data))
+        digits, rounding = matrices.estimate_rounding(rounded_matrix)
+        assert digits == expected
+        ratios.append(
+            shape
+            @ (rounded_matrix - full)
+            @ shape
+            / matrices.compute_form_deviation(rounded_matrix, rounding, shape)
         )
-    assert 0.85 < np.sqrt(np.mean(np.square(shares))) < 1.15
+    assert 0.85 < np.sqrt(np.mean(np.square(ratios))) < 1.15
 
 
-def test_exact_few_or_whole_numbers_show_no_rounding():
+def test_exact_unrounded_matrices_show_no_rounding():
+    """A matrix of few or of full-precision numbers shows no rounding."""
     assert matrices.estimate_rounding(sparse.csr_array(K)) is None
-    assert matrices.estimate_rounding(sparse.csr_array(slender(1)[0] / 3)) is None
+    assert matrices.estimate_rounding(sparse.csr_array(slender_beam(1)[0] / 3)) is None
 
 
-def test_exact_rows_of_places_that_files_order_in_their_own_way():
-    one = matrices.Matrix(sparse.csr_array(np.diag([1.0, 2.0])), np.array([[5, 1], [2, 3]]))
-    other = matrices.Matrix(sparse.csr_array(np.diag([7.0])), np.array([[3, 1]]))
-    first, second = matrices.align_rows(one, other)
+def test_exact_rows_are_aligned_by_node():
+    """Matrices whose files order the nodes differently are aligned by node and direction."""
+    first_matrix = matrices.Matrix(
+        sparse.csr_array(np.diag([1.0, 2.0])), np.array([[5, 1], [2, 3]])
+    )
+    second_matrix = matrices.Matrix(sparse.csr_array(np.diag([7.0])), np.array([[3, 1]]))
+    first, second = matrices.align_rows(first_matrix, second_matrix)
     assert first.places.tolist() == [[2, 3], [3, 1], [5, 1]]
     assert first.values.diagonal().tolist() == [2, 0, 1] and second.values.diagonal().tolist() == [
         0,
@@ -238,17 +261,17 @@ def test_exact_rows_of_places_that_files_order_in_their_own_way():
     ]
 
 
-HEAD = "%%MatrixMarket matrix coordinate real "
-BAD = {
+BANNER = "%%MatrixMarket matrix coordinate real "
+INVALID_FILES = {
     "a.mtx": ("hello\n", "cannot be read"),
     "b.mtx": ("1 2\n3 4\n", "is not a matrix: write a Matrix Market"),
-    "c.mtx": (HEAD + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
-    "d.mtx": (HEAD + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
+    "c.mtx": (BANNER + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
+    "d.mtx": (BANNER + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
     "e.mtx": (
-        HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n",
+        BANNER + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n",
         "not symmetric: entries differ from the transpose by 0.5",
     ),
-    "f.mtx": (HEAD + "general\n1 1 1\n1 1 nan\n", "not finite"),
+    "f.mtx": (BANNER + "general\n1 1 1\n1 1 nan\n", "not finite"),
     "g.mtx": (
         "%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n",
         "a Matrix Market pattern without",
@@ -262,7 +285,7 @@ BAD = {
     "a.pch": ("$ nothing\n", "contains no DMIG card"),
     "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
     "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "the matrix is complex"),
-    "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
+    "d.pch": (dmig_cards("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
     "a.op4": ("nothing\n", "not a readable OUTPUT4 file"),
     "b.op4": ("", "contains no matrix"),
     "c.op4": (
@@ -277,44 +300,46 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("name", BAD)
-def test_refuses_each_bad_file_with_its_sentence(tmp_path, name):
-    content, says = BAD[name]
+@pytest.mark.parametrize("name", INVALID_FILES)
+def test_refuses_invalid_matrix_file(tmp_path, name):
+    """Each invalid matrix file is refused with its name and the reason."""
+    content, message = INVALID_FILES[name]
     (tmp_path / name).write_text(content)
     with pytest.raises(PatchfemError) as caught:
         matrices.read_matrix(tmp_path / name, "stiffness")
-    assert says in str(caught.value) and name in str(caught.value), str(caught.value)
+    assert message in str(caught.value) and name in str(caught.value), str(caught.value)
 
 
-def test_always_refuses_damaged_binary_matrices_by_a_sentence(tmp_path):
-    """Every cut of a file, and every byte of its first records changed, is refused or read, never a traceback."""
-    whole = output4_binary("KAAX", K, "<", True, False)
+def test_always_damaged_output4_file_is_read_or_refused(tmp_path):
+    """A truncated or changed binary OUTPUT4 file is read or refused with its name."""
+    full = output4_binary("KAAX", K, "<", True, False)
     path = tmp_path / "k.op4"
-    for change in [whole[:cut] for cut in range(0, len(whole), 7)] + [
-        whole[:k] + bytes([whole[k] ^ 0x5A]) + whole[k + 1 :] for k in range(120)
+    for damaged in [full[:cut] for cut in range(0, len(full), 7)] + [
+        full[:k] + bytes([full[k] ^ 0x5A]) + full[k + 1 :] for k in range(120)
     ]:
-        path.write_bytes(change)
+        path.write_bytes(damaged)
         try:
             matrices.read_matrix(path, "stiffness")
         except PatchfemError as error:
             assert "k.op4" in str(error)
 
 
-def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
+def test_refuses_unknown_names_and_unequal_sizes(tmp_path):
+    """Arrays without a known name, matrices of different sizes and mixed row names are refused."""
     np.savez(tmp_path / "a.npz", A=K, B=M)
     with pytest.raises(
         PatchfemError, match=r"contains no stiffness under a known name .* its arrays: A, B"
     ):
         matrices.read_matrix(tmp_path / "a.npz", "stiffness")
     np.savez(tmp_path / "k.npz", K=K)
-    for wanted in ("mass", "damping"):
+    for kind in ("mass", "damping"):
         with pytest.raises(
-            PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {wanted}"
+            PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {kind}"
         ):
-            matrices.read_matrix(tmp_path / "k.npz", wanted)
-    one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
+            matrices.read_matrix(tmp_path / "k.npz", kind)
+    large, small = (matrices.Matrix(sparse.csr_array(matrix)) for matrix in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):
-        matrices.align_rows(one, small)
-    named = matrices.Matrix(sparse.csr_array(K), np.array(PLACES))
+        matrices.align_rows(large, small)
+    with_nodes = matrices.Matrix(sparse.csr_array(K), np.array(ROW_NODES))
     with pytest.raises(PatchfemError, match="name nodes and directions and others do not"):
-        matrices.align_rows(one, named)
+        matrices.align_rows(large, with_nodes)

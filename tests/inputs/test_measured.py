@@ -1,4 +1,4 @@
-"""Tables of measurements: Table 1 as typed, units, and every faulty table refused at its line."""
+"""Tables of measurements: Table 1 of the report, units, and messages about faulty tables."""
 
 from math import pi
 from pathlib import Path
@@ -14,33 +14,37 @@ OMEGA = 2 * pi * 143
 HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
 
 
-def test_table_1_as_typed():
+def test_table_1_is_read_completely():
+    """The rows, flags and units of Table 1 are read completely."""
     rows = read_table(TABLE_1)
     assert len(rows) == 28
     assert sum(r.acceleration is not None for r in rows) == 27
     assert sum(r.displacement is not None for r in rows) == 8
-    bare = [r for r in rows if r.acceleration is None]
-    assert [(r.frequency, r.input, r.displacement, r.flag) for r in bare] == [
+    without_acceleration = [r for r in rows if r.acceleration is None]
+    assert [(r.frequency, r.input, r.displacement, r.flag) for r in without_acceleration] == [
         (143.0, 8 * G_N, None, "U")
     ]
     assert sum("R" in r.flag for r in rows) == 9 and sum("U" in r.flag for r in rows) == 3
-    assert all((r.displacement is None) == ("*" in r.flag or r in bare) for r in rows)
-    mine = next(r for r in rows if r.frequency == 143 and r.input == 5 * G_N and "R" not in r.flag)
-    assert mine.acceleration == pytest.approx(6 * G_N, rel=1e-15)
-    assert mine.displacement == pytest.approx(0.23 * 25.4e-6, rel=1e-15)
+    assert all(
+        (r.displacement is None) == ("*" in r.flag or r in without_acceleration) for r in rows
+    )
+    row = next(r for r in rows if r.frequency == 143 and r.input == 5 * G_N and "R" not in r.flag)
+    assert row.acceleration == pytest.approx(6 * G_N, rel=1e-15)
+    assert row.displacement == pytest.approx(0.23 * 25.4e-6, rel=1e-15)
 
 
-def test_table_1_interface_force_at_the_onset():
-    """A rigid block of mass M at 143 Hz and 4 g needs the interface force a_abs - x omega_n^2 = 4.8 g times M."""
-    mine = next(
+def test_table_1_interface_force_at_onset():
+    """The interface force of a rigid block at 143 Hz and 4 g, a - x omega_n^2, is 4.83 g times its mass."""
+    row = next(
         r
         for r in read_table(TABLE_1)
         if r.frequency == 143 and r.input == 4 * G_N and "R" not in r.flag
     )
-    assert (mine.acceleration - mine.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
+    assert (row.acceleration - row.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
 
 
-def test_exact_units_of_a_table(tmp_path):
+def test_exact_table_units_are_converted(tmp_path):
+    """Units of a table of measurements are converted to SI, and missing cells are None."""
     path = tmp_path / "t.csv"
     path.write_text(
         "\ufeffinput [m/s^2], displacement [um],frequency [kHz],flag\n2,3,0.1,UR\n\n4,,0.2,\n",
@@ -58,7 +62,7 @@ def test_exact_units_of_a_table(tmp_path):
     assert set("UR") < set(FLAG_MEANINGS)
 
 
-@pytest.mark.parametrize("text, wanted", [
+@pytest.mark.parametrize("text, message", [
     ("", ":1: {like}, not ''"),
     ("frequency,input [g]\n", ":1: {like}, not 'frequency,input [g]' (frequency without a unit)"),
     ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of g, m/s^2"),
@@ -79,16 +83,18 @@ def test_exact_units_of_a_table(tmp_path):
     ("frequency [Hz],input [g],flags\n143,5,U\n", ":1: column 'flags' is unknown; possible columns "
                                                "are flag and frequency"),
 ])  # fmt: skip
-def test_refuses_a_faulty_table(tmp_path, text, wanted):
+def test_refuses_faulty_measurement_table(tmp_path, text, message):
+    """A faulty table of measurements is refused with the line of the fault."""
     path = tmp_path / "t.csv"
     path.write_text(text, "utf-8")
     with pytest.raises(PatchfemError) as caught:
         read_table(path)
-    wanted = wanted.replace("{like}", "a header like `frequency [Hz],input [g],flag` is needed")
-    assert str(caught.value).startswith(f"{path}{wanted}")
+    message = message.replace("{like}", "a header like `frequency [Hz],input [g],flag` is needed")
+    assert str(caught.value).startswith(f"{path}{message}")
 
 
-def test_refuses_a_file_that_cannot_be_read(tmp_path):
+def test_refuses_unreadable_measurement_table(tmp_path):
+    """A table that is missing, a folder or not text is refused."""
     (tmp_path / "t.csv").write_bytes(b"frequency [Hz],input [g]\n\xff")
     for path in (tmp_path / "t.csv", tmp_path):
         with pytest.raises(PatchfemError, match="cannot be read"):
@@ -97,27 +103,28 @@ def test_refuses_a_file_that_cannot_be_read(tmp_path):
         read_table(tmp_path / "none.csv")
 
 
-def test_exact_cells_may_stand_in_quotes(tmp_path):
+def test_exact_quoted_cells_are_read(tmp_path):
+    """Cells in quotation marks are read."""
     (tmp_path / "t.csv").write_text(HEAD + '"143",5,"6.0",,"UR"\n')
     (row,) = read_table(tmp_path / "t.csv")
     assert (row.frequency, row.acceleration, row.flag) == (143.0, 6.0 * G_N, "UR")
 
 
 @pytest.mark.parametrize(
-    "head",
+    "header",
     [
         "time [s],displacement [m]",
         "Time [ms],velocity [m/s]",
         "time [s],relative_displacement [m],friction_force [N]",
     ],
 )
-def test_refuses_a_record_with_the_way_to_fit_it(tmp_path, head):
-    """A ring-down is fitted by way of its frequency and damping."""
+def test_refuses_time_record_with_advice(tmp_path, header):
+    """A record over time is refused with the command that fits its frequency and damping."""
     path = tmp_path / "ring.csv"
-    path.write_text(head + "\n" + ("1,2,3"[: 2 * head.count(",") + 1] + "\n") * 3)
+    path.write_text(header + "\n" + ("1,2,3"[: 2 * header.count(",") + 1] + "\n") * 3)
     (tmp_path / "ring.mat").write_bytes(b"MATLAB 5.0\xff")
-    for one in (path, tmp_path / "ring.mat"):
+    for file in (path, tmp_path / "ring.mat"):
         with pytest.raises(
-            PatchfemError, match=rf"records over time.*`patchfem import {one} --decay"
+            PatchfemError, match=rf"records over time.*`patchfem import {file} --decay"
         ):
-            read_table(one)
+            read_table(file)

@@ -1,4 +1,4 @@
-"""Signals of measurements: a universal file gives back what was written into it."""
+"""Signals of measurements: a universal file is read back as it was written."""
 
 import numpy as np
 import pytest
@@ -8,11 +8,12 @@ from lab_files import INCH, record, written
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_signal
 
-W = 2 * np.pi * 143
+OMEGA = 2 * np.pi * 143
 
 
-def test_exact_a_universal_file_is_read_back(tmp_path):
-    t = np.arange(200) / 1e4
+def test_exact_signal_of_universal_file_round_trip(tmp_path):
+    """The acceleration of a universal file is read back, and a missing quantity is refused."""
+    times = np.arange(200) / 1e4
     path = tmp_path / "shake.uff"
     pyuff.UFF(str(path)).write_sets(
         pyuff.prepare_58(
@@ -23,8 +24,8 @@ def test_exact_a_universal_file_is_read_back(tmp_path):
             ref_node=1,
             ref_dir=1,
             ordinate_spec_data_type=12,
-            data=np.sin(W * t),
-            x=t,
+            data=np.sin(OMEGA * times),
+            x=times,
             abscissa_spacing=1,
             abscissa_inc=1e-4,
             num_pts=200,
@@ -48,17 +49,24 @@ def test_exact_a_universal_file_is_read_back(tmp_path):
         "overwrite",
     )
     time, value = read_signal(path, "acceleration")
-    assert time == pytest.approx(t, abs=1e-9)
-    assert value == pytest.approx(np.sin(W * t), abs=1e-6)
+    assert time == pytest.approx(times, abs=1e-9)
+    assert value == pytest.approx(np.sin(OMEGA * times), abs=1e-6)
     with pytest.raises(PatchfemError, match="force is needed; 0 of the 1"):
         read_signal(path, "force")
 
 
-def test_exact_a_recorded_drive_is_in_the_unit_of_its_label_or_of_the_file(tmp_path):
-    """Written in g by its label, and in inch/s^2 by dataset 164, whose factor is 1/0.0254."""
-    t = np.arange(200) / 1e4
-    a = np.sin(W * t)
-    label = written(tmp_path / "a.uff", [record(t, a / 9.80665, 12, ordinate_axis_units_lab="g")])
-    inches = written(tmp_path / "b.uff", [INCH, record(t, a / 0.0254, 12), record(t, a, 8)])
-    for path in (label, inches):
-        assert read_signal(path, "acceleration")[1] == pytest.approx(a, rel=1e-14, abs=1e-15)
+def test_exact_signal_units_of_label_and_dataset_164(tmp_path):
+    """A signal in g by its label, or in inch/s^2 by dataset 164, is converted to m/s^2."""
+    times = np.arange(200) / 1e4
+    acceleration = np.sin(OMEGA * times)
+    in_g = written(
+        tmp_path / "a.uff", [record(times, acceleration / 9.80665, 12, ordinate_axis_units_lab="g")]
+    )
+    in_inches = written(
+        tmp_path / "b.uff",
+        [INCH, record(times, acceleration / 0.0254, 12), record(times, acceleration, 8)],
+    )
+    for path in (in_g, in_inches):
+        assert read_signal(path, "acceleration")[1] == pytest.approx(
+            acceleration, rel=1e-14, abs=1e-15
+        )
