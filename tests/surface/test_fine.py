@@ -104,7 +104,7 @@ def test_exact_a_wave_is_resolved_if_its_contact_spans_an_element(share):
     """Truth: Westergaard's contact of one sine. Waves longer than it have no height and touch everywhere."""
     amplitude = 1e-6
     wavelength = 2 * LENGTH / 40
-    spectrum = wave_spectrum(cosines([40], [amplitude]))
+    spectrum = wave_spectrum(make_cosines([40], [amplitude]))
     closing = closed_forms.westergaard_full_pressure(wavelength, amplitude, 1.0)
     width = 2 * float(
         closed_forms.westergaard_half_width(share * closing, wavelength, amplitude, 1.0)
@@ -117,7 +117,7 @@ def test_exact_a_wave_is_resolved_if_its_contact_spans_an_element(share):
 
 
 def test_exact_under_full_contact_two_elements_resolve_a_wave_and_no_load_resolves_none():
-    spectrum = wave_spectrum(cosines([2, 40, 300], [1e-6, 1e-6, 1e-6]))
+    spectrum = wave_spectrum(make_cosines([2, 40, 300], [1e-6, 1e-6, 1e-6]))
     assert spectrum.shortest_resolved_wave(LENGTH / 300.01, 1.0) == pytest.approx(LENGTH / 150)
     assert spectrum.shortest_resolved_wave(LENGTH / 299.99, 1.0) == pytest.approx(2 * LENGTH / 299)
     rough = Profile(X, np.random.default_rng(1).normal(size=X.size), "rough")
