@@ -37,10 +37,10 @@ LIMIT, LENGTH = (
 def example_folder(tmp_path_factory):
     """Return a copy of the package with all examples, where the commands of the page have run, except for two engines."""
     folder = tmp_path_factory.mktemp("adding")
-    adding.copied(folder, PAGE)
+    adding.copy_package(folder, PAGE)
     (folder / "waved.toml").write_text(WAVED, "utf-8")
-    lines = [line for line in adding.commands(PAGE) if not any(word in line for word in LATER)]
-    adding.run(
+    lines = [line for line in adding.find_commands(PAGE) if not any(word in line for word in LATER)]
+    adding.run_commands(
         folder,
         [*lines, "plan rig.toml --set drive.waveform=hold", "run waved.toml -o waved --no-page"],
     )
@@ -79,9 +79,9 @@ def test_exact_law_of_page_agrees_with_closed_form(example_folder):
 @pytest.mark.slow
 def test_always_law_of_page_agrees_in_three_engines(example_folder):
     """Event engine, march and harmonic balance give the same loop of the added law within their error estimates."""
-    adding.run(
+    adding.run_commands(
         example_folder,
-        [line for line in adding.commands(PAGE) if any(word in line for word in LATER)],
+        [line for line in adding.find_commands(PAGE) if any(word in line for word in LATER)],
     )
     smooth = read_measures(example_folder / "smooth")
     for engine in ("march", "harmonic"):
@@ -113,10 +113,10 @@ def test_refuses_shape_table_without_piece_key(tmp_path):
     """A scene with an added shape whose table lacks the key `on` is refused with the line of the table."""
     on = '    on: key(Piece, "the piece that carries the shape") = "upper"\n'
     assert on in PAGE
-    adding.copied(tmp_path, PAGE.replace(on, ""))
+    adding.copy_package(tmp_path, PAGE.replace(on, ""))
     (tmp_path / "waved.toml").write_text(WAVED, "utf-8")
     with pytest.raises(AssertionError, match=r"waved.toml:7: contact.ripple: .* has no key `on`"):
-        adding.run(tmp_path, ["check waved.toml"])
+        adding.run_commands(tmp_path, ["check waved.toml"])
 
 
 def test_always_added_drive_gives_waveform_and_sweep(example_folder):

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import MODULES, cli, loaded
+from command_line import MODULES, modules_after, run_cli
 from scene_texts import BENCH, COULOMB, LINEAR, POINT, SHORT, SMALL_PATCH, STRUCTURE
 
 import patchfem as pf
@@ -65,7 +65,7 @@ def results() -> dict:
 
 def test_exact_import_loads_no_large_package():
     """`import patchfem` loads neither NumPy, SciPy, xarray, pydantic nor Matplotlib."""
-    modules = loaded(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
+    modules = modules_after(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
     assert not {"numpy", "pydantic", "scipy", "xarray", "matplotlib"} & modules
     assert {name for name in modules if name.startswith("patchfem")} == {
         "patchfem",
@@ -91,7 +91,7 @@ def test_exact_public_names_exist():
 def test_exact_results_equal_command_line(name, results, tmp_path):
     """Measures, outcome, warnings and histories of `pf.run` equal those of the command line."""
     (tmp_path / "a.toml").write_text(KINDS[name], "utf-8")
-    answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out", "-q", "--json")
+    answer = run_cli("run", tmp_path / "a.toml", "-o", tmp_path / "out", "-q", "--json")
     printed = json.loads(answer.out)
     result = results[name]
     assert printed["measures"] == {key: measure_object(one) for key, one in result.measures.items()}
@@ -105,7 +105,7 @@ def test_exact_results_equal_command_line(name, results, tmp_path):
 def test_exact_save_writes_command_line_folder(results, tmp_path):
     """`Result.save` writes the files and the summary of the command line, and refuses a folder with foreign files."""
     (tmp_path / "a.toml").write_text(BENCH, "utf-8")
-    cli("run", tmp_path / "a.toml", "-o", tmp_path / "there", "-q")
+    run_cli("run", tmp_path / "a.toml", "-o", tmp_path / "there", "-q")
     assert results["bench"].save(tmp_path / "here") == tmp_path / "here"
     names = {
         place: sorted(path.name for path in (tmp_path / place).iterdir())
@@ -433,7 +433,7 @@ def test_exact_levels_plot_draws_on_given_axes():
 def test_exact_plots_do_not_import_pyplot():
     """A plot of a loop does not import matplotlib.pyplot, which may open a window."""
     code = f"import patchfem as pf; pf.run({BENCH!r}).plot.loop()\n{MODULES}"
-    assert "matplotlib.pyplot" not in loaded(code)
+    assert "matplotlib.pyplot" not in modules_after(code)
 
 
 def test_exact_progress_goes_to_stderr_or_callback(capfd, monkeypatch):

@@ -15,7 +15,7 @@ from zipfile import ZipFile
 
 import numba
 import pytest
-from limits import limited
+from limits import limit_file_size
 from scene_texts import PLASTIC, POINT, TRIANGLE
 from test_inner import CALLS, KERNELS
 
@@ -536,7 +536,7 @@ def test_always_unwritable_cache_does_not_stop_run(code_folder, obstacle):
     if obstacle == "a file in the way":
         code_folder.write_text("mine")
     found = make_dispatcher(code_folder)
-    with limited(0 if obstacle == "no room" else 1 << 30):
+    with limit_file_size(0 if obstacle == "no room" else 1 << 30):
         assert count_cache_misses(found) == (1, 0)
     assert not [path for path in code_folder.rglob("*") if path.is_file()]
     if obstacle == "no room":
@@ -548,7 +548,7 @@ def test_always_unwritable_cache_does_not_stop_run(code_folder, obstacle):
 def test_always_generated_module_needs_no_file(code_folder):
     """A generated kernel module works from memory on a full disk, and a damaged file of it is written again."""
     text = "WIDE = 3\nfrom . import jit as part\n\n\ndef wide(x):\n    return WIDE * x\n"
-    with limited(0):
+    with limit_file_size(0):
         found = compiled.write_kernel_module("compiled.without_file", text)
         assert found.WIDE == 3 and found.load_module().wide(2) == 6
         assert found.load_module().part.__name__ == "patchfem.compiled.jit"
@@ -568,7 +568,7 @@ def test_always_generated_module_needs_no_file(code_folder):
 def test_exact_message_on_full_cache():
     """The message on compilation says that code is compiled at every command if the cache has no room, else once."""
     messages = []
-    with limited(1000):
+    with limit_file_size(1000):
         compiled._report_once.__wrapped__(messages.append)
     compiled._report_once.__wrapped__(messages.append)
     if compiled.IS_JIT_DISABLED:

@@ -5,7 +5,7 @@ import builtins
 import re
 from pathlib import Path
 
-from import_graph import sources, syntax_nodes
+from import_graph import read_sources, syntax_nodes
 
 ROOT = Path(__file__).parents[1]
 PARAMETER = re.compile(r"\s*\w[\w, ]* : (?P<type>.+)")
@@ -74,7 +74,7 @@ def find_unknown(modules: dict) -> list:
 
 def parse_modules() -> dict:
     """Return the nodes of each module of the package by its dotted name."""
-    return {name: syntax_nodes(text) for name, text in sources(ROOT).items()}
+    return {name: syntax_nodes(text) for name, text in read_sources(ROOT).items()}
 
 
 def test_always_docstrings_name_classes_that_exist():

@@ -15,11 +15,11 @@ from command_line import (
     FROM_PYTHON,
     FROM_SHELL,
     MODULES,
-    absent,
-    cli,
+    assert_not_loaded,
     has_code_of,
-    loaded,
-    loaded_again,
+    modules_after,
+    modules_after_cached,
+    run_cli,
 )
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
 
@@ -104,7 +104,7 @@ FOLDERS = {  # kind of scene -> text, folders that `patchfem run` loads for the 
 def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
     """`patchfem run` in a new process loads the physics folders listed for its kind of scene and no others."""
     text, folders = FOLDERS[kind]
-    modules = loaded(FROM_SHELL, "run", write_scene(text), "-o", tmp_path / "out", "-q")
+    modules = modules_after(FROM_SHELL, "run", write_scene(text), "-o", tmp_path / "out", "-q")
     assert {name for name in PHYSICS if has_code_of(modules, name)} == set(folders.split())
 
 
@@ -159,7 +159,7 @@ def modules_of_run(text: str) -> set:
     with TemporaryDirectory() as folder:
         path = Path(folder, "scene.toml")
         path.write_text(text, "utf-8")
-        return loaded(FROM_PYTHON, path)
+        return modules_after(FROM_PYTHON, path)
 
 
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
@@ -228,8 +228,8 @@ def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""
     text, words, modules, packages = COMMANDS[name]
     places = {"SCENE": write_scene(text), "OUT": tmp_path / "out"}
-    found = loaded_again(FROM_SHELL, *(places.get(word, word) for word in words))
-    absent(found, *modules.split())
+    found = modules_after_cached(FROM_SHELL, *(places.get(word, word) for word in words))
+    assert_not_loaded(found, *modules.split())
     roots = {one.partition(".")[0] for one in found} | found
     assert not roots & set(packages.split())
     assert not list(tmp_path.glob("out/fields*")) or "patch" in name or words[1] == str(RIG)
@@ -240,10 +240,10 @@ def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
 def test_exact_sweep_loads_only_its_engine(write_scene, law):
     """A sweep of rigs does not load the smooth engine, and writes its Dataset without Dask."""
     code = f"import sys, patchfem\npatchfem.sweep(sys.argv[1], {{'friction.static': [0.1, 0.2]}})\n{MODULES}"
-    modules = loaded_again(
+    modules = modules_after_cached(
         code, write_scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20"))
     )
-    absent(modules, "dynamics.smooth")
+    assert_not_loaded(modules, "dynamics.smooth")
     assert "xarray" in modules and "dask.array" not in modules
 
 
@@ -268,8 +268,10 @@ def test_exact_short_history_needs_no_compiler(write_scene, tmp_path, monkeypatc
         "PATCHFEM_CACHE", raising=False
     )  # this variable has priority over XDG_CACHE_HOME
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    modules = loaded(FROM_PYTHON, write_scene(text))
-    absent(modules, "compiled.jit", "compiled.cache_files", "dynamics.events.march_kernels")
+    modules = modules_after(FROM_PYTHON, write_scene(text))
+    assert_not_loaded(
+        modules, "compiled.jit", "compiled.cache_files", "dynamics.events.march_kernels"
+    )
     assert "llvmlite" not in modules
     assert not [*tmp_path.rglob("*.code"), *tmp_path.rglob("*.nbi")]
     assert text != RINGING or pf.run(text).measures["ring_frequency"].value
@@ -312,15 +314,15 @@ def test_exact_versions_of_installed_packages():
         "from importlib.metadata import entry_points as e; from importlib.metadata import version; "
         "found = version('numpy') if e(group='console_scripts') else ''",
     ):
-        assert loaded(f"import json, patchfem.__main__; {use}; print(json.dumps([found]))") == {
-            version("numpy")
-        }
+        assert modules_after(
+            f"import json, patchfem.__main__; {use}; print(json.dumps([found]))"
+        ) == {version("numpy")}
 
 
 def test_always_shell_completion_is_written_to_given_file(tmp_path, monkeypatch):
     """`--install-completion` writes the completion script to the file given by -o."""
     monkeypatch.setenv("HOME", str(tmp_path))
-    done = cli("--install-completion", "--shell", "bash", "-o", tmp_path / "patchfem.bash")
+    done = run_cli("--install-completion", "--shell", "bash", "-o", tmp_path / "patchfem.bash")
     assert done.code == 0, done.err
     assert "patchfem" in (tmp_path / "patchfem.bash").read_text() and "patchfem" in done.out
 

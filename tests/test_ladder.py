@@ -14,7 +14,14 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from import_graph import FUNCTIONS, import_cycles, import_graph, imports, sources, syntax_nodes
+from import_graph import (
+    FUNCTIONS,
+    import_cycles,
+    import_graph,
+    list_imports,
+    read_sources,
+    syntax_nodes,
+)
 
 from patchfem.exceptions import PatchfemError
 from patchfem.scene import Material, Tables
@@ -169,7 +176,7 @@ def check_effects(tree: dict) -> list:
 def find_faults(tree: dict) -> list:
     """Return all breaches of the layering in {dotted name: source}, as sentences."""
     parsed = {name: syntax_nodes(text) for name, text in tree.items()}
-    found = {name: imports(name, text, tree) for name, text in tree.items()}
+    found = {name: list_imports(name, text, tree) for name, text in tree.items()}
     order = reading_order(tree)
     rungs = {name: number for number, name in order} | {
         "": len(order) + 1,
@@ -209,15 +216,15 @@ SMALL = {  # a small package without a fault, into which each test inserts one
 
 def test_exact_package_obeys_reading_order():
     """The package has no fault, and the folders of the physics stand in the documented order."""
-    tree = sources(HERE)
+    tree = read_sources(HERE)
     assert find_faults(tree) == []
     assert [name for _, name in reading_order(tree) if name in PHYSICS] == PHYSICS
 
 
 def test_exact_checker_finds_modules_and_imports():
     """The checker finds more than 100 modules and 500 imports of the package, imports in strings included."""
-    tree = sources(HERE)
-    found = [one for name, text in tree.items() for one in imports(name, text, tree)]
+    tree = read_sources(HERE)
+    found = [one for name, text in tree.items() for one in list_imports(name, text, tree)]
     assert len(tree) > 100
     assert len(reading_order(tree)) > 10
     assert sum(one.is_own for one in found) > 500
@@ -312,7 +319,7 @@ def test_always_scene_tables_have_effects():
 
 
 if __name__ == "__main__":
-    found = find_faults(sources(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
+    found = find_faults(read_sources(Path(sys.argv[1]) if len(sys.argv) > 1 else HERE))
     print(*found, f"{len(found)} faults", sep="\n")
 
 

@@ -5,9 +5,9 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
-from import_graph import sources
+from import_graph import read_sources
 
-SOURCES = sources(Path(__file__).parents[1])
+SOURCES = read_sources(Path(__file__).parents[1])
 FOLDERS = sorted({name.partition(".")[0] for name in SOURCES if "." in name})
 
 

@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 
 import pytest
-from command_line import cli
-from study_module import study
+from command_line import run_cli
+from study_module import load_study
 
 import patchfem as pf
 from patchfem.core import G_N
@@ -54,8 +54,8 @@ def test_exact_version_agrees_in_all_documents(tmp_path):
     released = re.search(r"^date-released: (\S+)$", citation, re.M).group(1)
     assert re.search(r"^version: (\S+)$", citation, re.M).group(1) == pf.__version__
     assert re.search(r"^## (.+?):", changes, re.M).group(1) == f"{pf.__version__} ({released})"
-    assert cli("--version").out.strip() == pf.__version__
-    assert re.search(rf"patchfem +{re.escape(pf.__version__)}\n", cli("doctor").out)
+    assert run_cli("--version").out.strip() == pf.__version__
+    assert re.search(rf"patchfem +{re.escape(pf.__version__)}\n", run_cli("doctor").out)
     pf.run(pf.new("bench")).save(tmp_path)
     assert json.loads((tmp_path / "summary.json").read_text())["patchfem"] == pf.__version__
     assert f"patchfem {pf.__version__}" in (tmp_path / "report.html").read_text()
@@ -223,7 +223,7 @@ def test_exact_readme_comparison_is_reproduced():
     So are the rms deviations from the measured rows.
     """
     bullet = comparison_paragraph()
-    unfitted = study("table_1/unfitted.py")
+    unfitted = load_study("table_1/unfitted.py")
     amplitude = "relative_displacement_amplitude"
     peak = "absolute_acceleration_peak"
 
@@ -249,7 +249,7 @@ def test_exact_readme_comparison_is_reproduced():
     assert f"{computed[143, 4][0]:.3f} mil at 143 Hz (measured: 0.08 mil)" in bullet
     assert f"{computed[135, 4][0]:.3f} mil at 135 Hz (measured: 0.25 mil)" in bullet
     assert f"At 6 g it is {compute(143, 6)[0]:.0f} mil instead of 0.33 mil" in bullet
-    scores = study("table_1/second_path.py").as_it_stands()["held_out"]
+    scores = load_study("table_1/second_path.py").as_it_stands()["held_out"]
     rms = re.search(r"deviate by (\d+) % \(rms\) and the accelerations by (\d+) %", bullet)
     assert 100 * scores["displacement"] == pytest.approx(float(rms[1]), abs=1)
     assert 100 * scores["acceleration"] == pytest.approx(float(rms[2]), abs=1)
@@ -335,7 +335,7 @@ def run_recipe(tmp_path, monkeypatch):
     def run_commands(question: str) -> str:
         """Run the commands of a recipe and return the output of the last."""
         for words in commands[question].split("&&"):
-            answer = cli(*shlex.split(words)[1:])
+            answer = run_cli(*shlex.split(words)[1:])
             assert answer.code == 0, answer.err
         return answer.out
 

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 import surfaces
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COATED, COULOMB, DRIVE, KEYS, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
@@ -29,7 +29,7 @@ def load(text: str, keys: dict, folder) -> None:
 
 def run_failing_command(words: tuple, folder) -> None:
     """Run a command that fails with exit code 2, and raise its message."""
-    answer = cli(*words)
+    answer = run_cli(*words)
     assert answer.code == 2
     raise pf.PatchfemError(answer.err)
 
@@ -143,7 +143,7 @@ def test_always_all_removed_features_are_tested():
 def test_refuses_sdf_file_without_extra(tmp_path):
     """An SDF file is refused with the name of the extra to install."""
     path = tmp_path / "scan.sdf"
-    path.write_bytes(surfaces.sdf_binary(surfaces.scan()))
+    path.write_bytes(surfaces.make_binary_sdf(surfaces.draw_scan()))
     with pytest.raises(
         pf.Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"
     ):

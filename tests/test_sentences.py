@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 LIST = HERE / "sentences.toml"
 sys.path[:0] = [str(HERE / "support")] if __name__ == "__main__" else []
 
-from command_line import cli  # noqa: E402
+from command_line import run_cli  # noqa: E402
 from scene_texts import BENCH, COULOMB, POINT, RIG, SHORT, SMALL_PATCH  # noqa: E402
 
 import patchfem as pf  # noqa: E402
@@ -84,12 +84,12 @@ def collect_sentences(folder: Path) -> dict:
     out["refusal"] = {}
     out["warning"] = {}
     for name, words in SCREENS.items():
-        answer = cli(*words, "-o", folder / name, "--no-page")
+        answer = run_cli(*words, "-o", folder / name, "--no-page")
         out["answer"][name] = (
             answer.out.partition("\n\n")[0] if words[0] == "sweep" else first_lines(answer.out)
         )
     for name, words in REFUSALS.items():
-        out["refusal"][name] = cli(*words).err
+        out["refusal"][name] = run_cli(*words).err
     for name, (text, sets) in WARNINGS.items():
         result = pf.run(text, **sets)
         out["warning"][name] = "\n".join(

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from command_line import cli
-from scene_texts import shaken
+from command_line import run_cli
+from scene_texts import make_shaken_block
 
 import patchfem as pf
 
@@ -17,8 +17,8 @@ BLOCK = {
     },
     "drive": {"kind": "base", "frequency": 100.0, "acceleration": "9 g", "cycles": 50},
 }
-TEXT = 'title = "a block"\n' + shaken('law = "coulomb"', "9 g", 50)
-PLASTIC_BLOCK = shaken('law = "elastic-plastic"\nbond_length = "1 um"', "9 g", 50)
+TEXT = 'title = "a block"\n' + make_shaken_block('law = "coulomb"', "9 g", 50)
+PLASTIC_BLOCK = make_shaken_block('law = "elastic-plastic"\nbond_length = "1 um"', "9 g", 50)
 PIECES = """[contact]
 length = "10 mm"
 width = "10 mm"
@@ -141,7 +141,7 @@ def test_exact_report_shows_several_results(results_folder, tmp_path):
 )
 def test_exact_export_equals_command_line(results_folder, tmp_path, folder, name, given, words):
     """`pf.export` writes the same bytes as the command line, or raises its error message."""
-    answer = cli("export", results_folder / folder, "-o", tmp_path / f"shell_{name}", *words)
+    answer = run_cli("export", results_folder / folder, "-o", tmp_path / f"shell_{name}", *words)
     if answer.code:
         with pytest.raises(pf.PatchfemError) as error:
             pf.export(results_folder / folder, tmp_path / name, **given)
@@ -256,7 +256,7 @@ def test_refuses_folder_with_foreign_files(tmp_path, monkeypatch, scene, words):
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "notes.txt").write_text("mine", "utf-8")
     (tmp_path / "scene.toml").write_text(scene, "utf-8")
-    answer = cli(words[0], "scene.toml", *words[1:], "-o", "other")
+    answer = run_cli(words[0], "scene.toml", *words[1:], "-o", "other")
     assert answer.code == 2
     assert "notes.txt" in answer.err
     assert (tmp_path / "other" / "notes.txt").is_file()
@@ -317,7 +317,7 @@ def test_exact_import_equals_command_line(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text("time [ms],force [lbf]\n0,1\n1,2\n2,-1\n", "utf-8")
     found = pf.import_(path, tmp_path / "python.csv", zero=True)
-    cli("import", path, "-o", tmp_path / "shell.csv", "--zero")
+    run_cli("import", path, "-o", tmp_path / "shell.csv", "--zero")
     assert (tmp_path / "python.csv").read_bytes() == (
         tmp_path / "shell.csv"
     ).read_bytes() and found["rows"] == 3

@@ -46,7 +46,7 @@ GROUPS = {
     "Readings beside": "measured",
     "Many runs": "sweep",
 }
-TABLES = {header.strip("[]"): model for header, model in keys_page.tables()}
+TABLES = {header.strip("[]"): model for header, model in keys_page.iterate_tables()}
 FENCE = "```"
 KINDS = {"patch": "pressure", "bench": "loop", "rig": "history", "linear": "history"}
 WITHOUT = 6  # rows of a table of changes
@@ -72,7 +72,7 @@ def write(folder: Path) -> None:
         (folder / "effects" / name).write_text(text, "utf-8")
     pages = {
         "glossary": glossary(),
-        "messages": limits_page.messages(),
+        "messages": limits_page.format_messages(),
         "commands": commands(),
         "python": python(),
         "code": code(),
@@ -112,7 +112,7 @@ def effects_index() -> str:
         of = [name for name in SHOWN_EFFECTS if re.split(r"[.=]", name)[0] == table]
         parts += [
             f"## {title}",
-            keys_page.grid(
+            keys_page.format_table(
                 ("effect", "what it does"),
                 [(f"[`{name}`]({slug(name)}.md)", about(name)) for name in of],
             ),
@@ -256,7 +256,7 @@ def changes(name: str, result, folder: Path) -> str:
         if plain is not None
         else ("measure", "value")
     )
-    return keys_page.grid(heads, rows[:WITHOUT]) if rows else ""
+    return keys_page.format_table(heads, rows[:WITHOUT]) if rows else ""
 
 
 def differs(one, other) -> bool:
@@ -281,13 +281,13 @@ def key_rows(name: str) -> list:
     used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
     named = [key, *" ".join(used).split()] if value else list(attributes_by_key(model))
     rows = [
-        keys_page._row(model, one, table)
+        keys_page._format_row(model, one, table)
         for one in named
         if one in attributes_by_key(model)
         and not keys_page._is_table(model, attributes_by_key(model)[one])
     ]
     head = ("key", "kind", "default", "required", "meaning")
-    return [keys_page.grid(head, rows)] if rows else ["This effect has no keys."]
+    return [keys_page.format_table(head, rows)] if rows else ["This effect has no keys."]
 
 
 def limits(name: str) -> list:
@@ -295,9 +295,9 @@ def limits(name: str) -> list:
     value = effect_table(name)[2]
     said = {}
     if value in LAWS:
-        law = tried.laws()[value]
+        law = tried.list_laws()[value]
         for one in (*tried.RIGS, *tried.MORE, *tried.BENCHES):
-            for sentence in tried.refused(law, one):
+            for sentence in tried.find_refusal(law, one):
                 said.setdefault(sentence, []).append(one.words)
     elif name != "sweep":
         for other in SHOWN_EFFECTS:
@@ -307,7 +307,7 @@ def limits(name: str) -> list:
     more = "[Limits](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the models neglect."
     return [
         *(
-            [keys_page.grid(("cannot be combined with", "message"), rows)]
+            [keys_page.format_table(("cannot be combined with", "message"), rows)]
             if rows
             else ["This effect can be combined with every other effect that the scene can have."]
         ),

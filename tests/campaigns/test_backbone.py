@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import IWAN, JOINT_SHAKEN, shaken
+from scene_texts import IWAN, JOINT_SHAKEN, make_shaken_block
 from scipy.integrate import solve_ivp
 
 import patchfem as pf
@@ -15,7 +15,7 @@ OMEGA = 200 * np.pi
 
 
 def model(law: str, **sets):
-    return pf.build(shaken(law), **sets)
+    return pf.build(make_shaken_block(law), **sets)
 
 
 def segalman(u):
@@ -97,7 +97,7 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
 
 def test_exact_a_cubic_spring_has_duffings_backbone():
     """omega^2 = omega_0^2 + 3 k3 A^2/(4 m) to the first order of k3 A^2/k, and the damping of the structure alone."""
-    scene = shaken(PLASTIC)
+    scene = make_shaken_block(PLASTIC)
     scene = scene[scene.index("[structure]") :] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
     a = np.array([1e-5, 1e-4])
     found = compute_backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
@@ -110,9 +110,9 @@ def test_exact_a_cubic_spring_has_duffings_backbone():
 
 def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
     """Where the balance falls through 0 is the limit cycle that does not last."""
-    one = pf.build(shaken(PLASTIC), **{"structure.mode.axial.damping": -0.01})
+    one = pf.build(make_shaken_block(PLASTIC), **{"structure.mode.axial.damping": -0.01})
     found = compute_backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
-    free = shaken(PLASTIC).replace(
+    free = make_shaken_block(PLASTIC).replace(
         'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
         'kind = "free"\ndisplacement = "1 mm"',
     )
@@ -122,7 +122,7 @@ def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
 
 def test_two_modes_are_chosen_by_name_and_matched_by_shape():
     """The held mode with most of the axial coordinate is the axial one, whatever its place among the frequencies."""
-    scene = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace(
+    scene = make_shaken_block('law = "elastic-plastic"\nbond_length = "1 um"').replace(
         "[drive]",
         """[[structure.mode]]
 name = "yaw"
@@ -161,16 +161,16 @@ def test_refuses_what_has_no_backbone():
     "scene, said",
     [
         (
-            shaken(PLASTIC).replace("100 N", "0 N")
+            make_shaken_block(PLASTIC).replace("100 N", "0 N")
             + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n',
             r"leave out \[friction\] and the normal load",
         ),
         (
-            shaken(PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"),
+            make_shaken_block(PLASTIC).replace("slide = 1.0", "slide = 1.0\noutput = 0.0"),
             "does not move the point of the output",
         ),
         (
-            shaken('law = "coulomb"').replace(
+            make_shaken_block('law = "coulomb"').replace(
                 'frequency = "100 Hz"\ndamping', 'frequency = "0 Hz"\ndamping'
             ),
             "no natural frequency",
@@ -185,8 +185,8 @@ def test_refuses_a_mode_without_an_answer(scene, said):
 @pytest.mark.parametrize(
     "scene",
     [
-        shaken(PLASTIC)[shaken(PLASTIC).index("[structure]") :],
-        shaken('law = "coulomb"').replace("100 N", "0 N"),
+        make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :],
+        make_shaken_block('law = "coulomb"').replace("100 N", "0 N"),
     ],
 )
 def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
@@ -212,7 +212,7 @@ stiffness = "100 kN/m"
 [[structure.damper]]
 between = [1, 0]
 coefficient = "40 N s/m"
-""" + shaken(PLASTIC)[shaken(PLASTIC).index("[drive]") :]
+""" + make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[drive]") :]
     one = compute_backbone(pf.build(scene), "2", [1e-4]).curves
     k = np.array([[3e5, -1e5], [-1e5, 1e5]])
     m = np.diag([0.5, 0.3])
@@ -238,7 +238,9 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
 
 
 def test_amplitudes_stay_within_the_stop():
-    stopped = pf.build(shaken(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
+    stopped = pf.build(
+        make_shaken_block(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass')
+    )
     found = compute_backbone(stopped, methods=("decay", "quasi-static"))
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
@@ -264,7 +266,7 @@ bond_length = "10 um"
 static = 0.3
 load = "100 N"
 """
-    rig = shaken(PLASTIC)
+    rig = make_shaken_block(PLASTIC)
     a = np.array([2e-6, 9e-6, 12e-6, 30e-6])
     found = compute_backbone(
         pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]), "", a, ("balance",)
@@ -277,7 +279,7 @@ load = "100 N"
     assert "did not converge at these amplitudes; the curve" in found.notes[0]
 
 
-FOLDED = shaken('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace(
+FOLDED = make_shaken_block('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace(
     'load = "100 N"', 'load = "12.011 N"'
 )
 FOLDED = (
@@ -320,7 +322,7 @@ def test_beyond_a_fold_the_curve_goes_on():
     assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
 
 
-TWO = shaken(PLASTIC.replace("1 mm", "1 um")).replace(
+TWO = make_shaken_block(PLASTIC.replace("1 mm", "1 um")).replace(
     "[drive]",
     """[[structure.mode]]
 name = "second"
@@ -352,7 +354,11 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     """A contact that holds on a spring is no end: where nothing slips the decay is that of the held modes, zeta
     omega/omega_held of one mode. Of 13 points there were 7, of two modes 3."""
     a = np.geomspace(1e-7, 2e-3, 13)
-    text = TWO.replace("1 um", "0.1 mm") if two else shaken(PLASTIC.replace("1 mm", "10 um"))
+    text = (
+        TWO.replace("1 um", "0.1 mm")
+        if two
+        else make_shaken_block(PLASTIC.replace("1 mm", "10 um"))
+    )
     found = compute_backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
     assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
@@ -380,7 +386,7 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     assert (one.damping_error < (1e-4 if two else 0.2) * one.damping)[still].all()
 
 
-NEAR = shaken(PLASTIC.replace("1 mm", "0.1 mm")).replace(
+NEAR = make_shaken_block(PLASTIC.replace("1 mm", "0.1 mm")).replace(
     "[drive]",
     """[[structure.mode]]
 name = "yaw"
@@ -427,7 +433,7 @@ radius = "20 m"
 [friction]
 law = "coulomb"
 static = 0.3
-""" + shaken("")[shaken("").index("[structure]") :]
+""" + make_shaken_block("")[make_shaken_block("").index("[structure]") :]
 
 
 def test_always_the_mesh_is_in_the_bars_of_micro_slip():
@@ -509,7 +515,7 @@ def test_the_stuck_frequency_follows_from_the_stiffness_of_a_run():
 def test_amplitudes_unless_given_end_where_the_mode_is_nearly_free(slide):
     """A contact that slides by a hundredth of the output: the default ended at 7 m, not 0.7 mm, where `travel` did not
     stop it."""
-    one = pf.build(shaken(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
+    one = pf.build(make_shaken_block(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
     found = compute_backbone(one, "", None, ("quasi-static",))
     deflected = 30 * slide / (0.5 * OMEGA**2)  # by the largest friction
     top = max(deflected, 1.5e-3 / slide)
@@ -540,7 +546,7 @@ def test_bonds_without_a_closed_loop_name_the_method_that_works():
 def test_a_static_curve_ends_where_its_force_falls():
     """An interlock gives way at a quarter of its wave: 20 um of 80."""
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
-    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]") :].replace(
+    scene = make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :].replace(
         "[[structure.mode]]", bonded, 1
     )
     found = compute_backbone(
@@ -552,10 +558,10 @@ def test_a_static_curve_ends_where_its_force_falls():
 
 
 def test_python_gives_a_dataset():
-    found = pf.backbone(shaken(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
+    found = pf.backbone(make_shaken_block(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
     assert found["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
     assert found["quasi_static_frequency"].attrs["units"] == "Hz" and found.attrs["mode"] == "axial"
     with pytest.raises(pf.PatchfemError, match="one of balance"):
-        pf.backbone(shaken(IWAN), method="static")
+        pf.backbone(make_shaken_block(IWAN), method="static")
     with pytest.raises(pf.PatchfemError, match="above 0"):
-        pf.backbone(shaken(IWAN), amplitudes=[0.0])
+        pf.backbone(make_shaken_block(IWAN), amplitudes=[0.0])

@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH, PIECE
 
 import patchfem as pf
@@ -96,7 +96,7 @@ def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, ow
 def test_exact_the_table_has_every_value_its_error_and_its_distance_to_the_best(tmp_path):
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
-    said = cli("cost", scene, "--over", "element_size", "-o", tmp_path / "out", "--json", "-q")
+    said = run_cli("cost", scene, "--over", "element_size", "-o", tmp_path / "out", "--json", "-q")
     assert said.code == 0, said.err
     answer = json.loads(said.out)["element_size"]
     *even, chosen = answer["runs"]
@@ -204,7 +204,7 @@ def test_exact_a_bench_with_few_steps_meets_tight_tolerances_with_the_steps_that
     text += "[accuracy]\nsteps_per_cycle = 100\n" if "[accuracy]" not in text else ""
     scene = tmp_path / "bench.toml"
     scene.write_text(text, "utf-8")
-    said = cli("cost", scene, "-o", tmp_path / "out", "-q")
+    said = run_cli("cost", scene, "-o", tmp_path / "out", "-q")
     assert said.code == 0, said.err
     head, *rows = said.out.splitlines()
     assert head.split() == ["tolerance", "CPU", "s", "error", "worst", "measure"]
@@ -230,7 +230,7 @@ def test_exact_a_bench_with_few_steps_meets_tight_tolerances_with_the_steps_that
 def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
-    answer = cli("cost", scene, *words)
+    answer = run_cli("cost", scene, *words)
     assert answer.code == 2 and said in answer.err
 
 

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from command_line import cli
-from page_data import unheard
+from command_line import run_cli
+from page_data import find_accessibility_errors
 from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
@@ -424,7 +424,7 @@ def asked(tmp_path):
 def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, asked):
     """The path file of the scene is the measured loop, so a run of the fitted scene gives the fitted rows."""
     free = "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
-    answer = cli(*asked, "--free", free, "--hold", "cycle=2", "--json")
+    answer = run_cli(*asked, "--free", free, "--hold", "cycle=2", "--json")
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
     assert found == json.loads((tmp_path / "out/fit.json").read_text())
@@ -433,7 +433,10 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
     assert found["held"]["rows"] == 24 and found["unit"] == "N"
     page = (tmp_path / "out/report.html").read_text("utf-8")
     value, _, (low, high) = format_fitted(one)
-    assert unheard(page) == [] and f"<b>friction.static = {value} ({low} to {high});" in page
+    assert (
+        find_accessibility_errors(page) == []
+        and f"<b>friction.static = {value} ({low} to {high});" in page
+    )
     scene = load(tmp_path / "out/scene.fitted.toml")
     assert scene.friction.static == one["value"] and scene.slide.file == "../loop.csv"
     ran = bench.run(build(scene), None, 400)
@@ -453,7 +456,9 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
 
     monkeypatch.setattr(least_squares, "MAX_EVALUATIONS", 1)
     assert (
-        cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um").code
+        run_cli(
+            *asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
+        ).code
         == 3
     )
     assert json.loads((tmp_path / "out/fit.json").read_text())["outcome"] == "not_converged"
@@ -473,7 +478,7 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
     ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
 ])  # fmt: skip
 def test_refuses_a_bad_range(asked, free, says, tmp_path):
-    answer = cli(*asked, "--free", free)
+    answer = run_cli(*asked, "--free", free)
     assert answer.code == 2 and says in answer.err and not (tmp_path / "out").exists()
 
 
@@ -496,7 +501,9 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
 ])  # fmt: skip
 def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
     (tmp_path / "loop.csv").write_text(text)
-    answer = cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um")
+    answer = run_cli(
+        *asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
+    )
     assert answer.code == 2 and "loop.csv" in answer.err and says in answer.err, answer.err
 
 
@@ -519,9 +526,9 @@ def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
         header="time [s],displacement [m],force [N]",
     )
     told = [
-        cli("check", scene),
-        cli("run", scene, "-o", tmp_path / "out"),
-        cli(
+        run_cli("check", scene),
+        run_cli("run", scene, "-o", tmp_path / "out"),
+        run_cli(
             "fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit"
         ),
     ]
@@ -537,13 +544,13 @@ def test_refuses_other_requests(asked, tmp_path):
         (["--hold", "cycle"], 2, "column=value,value"),
         (["--hold", "cycle=1,2"], 2, "only 0 rows are"),
     ):
-        answer = cli(*asked, *free, *words)
+        answer = run_cli(*asked, *free, *words)
         assert answer.code == code and says in answer.err, answer.err
-    assert cli(*asked[:3], tmp_path / "none.csv", *free).code == 4
+    assert run_cli(*asked[:3], tmp_path / "none.csv", *free).code == 4
     (tmp_path / "scene.toml").write_text(
         POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8"
     )
-    assert "friction.static: must be >= 0" in cli(*asked, *free).err
+    assert "friction.static: must be >= 0" in run_cli(*asked, *free).err
     with pytest.raises(SceneError, match="but this is a patch scene"):
         text = (
             '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '

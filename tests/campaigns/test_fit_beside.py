@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from test_fit import LAWS, LOAD, POINT, SINE, dahl, free_of, play, rows, scene_of, table
 
 from patchfem.campaigns import LoopOptions, fit_loop
@@ -73,7 +73,7 @@ def test_always_the_verb_writes_its_offsets(tmp_path):
     time, slide = rows(40, 4)
     loop = table(tmp_path / "loop.csv", time[47:], slide[47:], dahl(slide, *TRUTH)[47:] - 3.0)
     (tmp_path / "scene.toml").write_text(POINT + LAWS["bonds"] + SINE, "utf-8")
-    done = cli(
+    done = run_cli(
         "fit",
         tmp_path / "scene.toml",
         "--to",

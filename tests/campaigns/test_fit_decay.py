@@ -3,9 +3,9 @@
 import decay_fits
 import numpy as np
 import pytest
-from command_line import cli
-from page_data import unheard
-from scene_texts import DRIVE, KILOGRAM, POINT, friction_of, shaken
+from command_line import run_cli
+from page_data import find_accessibility_errors
+from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table, make_shaken_block
 
 import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
@@ -14,7 +14,7 @@ from patchfem.core import PatchfemError
 
 IWAN = (
     POINT
-    + friction_of("iwan").replace("1e7 N/m", "1e6 N/m").replace("chi = -0.5", "chi = -0.35")
+    + make_friction_table("iwan").replace("1e7 N/m", "1e6 N/m").replace("chi = -0.5", "chi = -0.35")
     + KILOGRAM
     + DRIVE
 )
@@ -57,7 +57,9 @@ def test_exact_the_parameters_of_a_computed_decay_are_recovered(tmp_path):
     np.testing.assert_allclose(rows[:, 5:], measured[:, [1, 3]], rtol=1e-5)
 
 
-FLUID = shaken('law = "tanh"\nreference_speed = "0.3 m/s"').replace("static = 0.3", "static = 0.6")
+FLUID = make_shaken_block('law = "tanh"\nreference_speed = "0.3 m/s"').replace(
+    "static = 0.3", "static = 0.6"
+)
 
 
 def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
@@ -88,13 +90,17 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     (tmp_path / "rig.toml").write_text(START)
     written(tmp_path / "decay.csv", IWAN)
     ask = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
-    assert "--hold" in cli(*ask, "--hold", "frequency=1 Hz").err
-    answer = cli(*ask, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")
+    assert "--hold" in run_cli(*ask, "--hold", "frequency=1 Hz").err
+    answer = run_cli(*ask, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")
     assert answer.code == 0
     assert "3 amplitudes of decay.csv by balance" in answer.out
     assert "friction.chi" in answer.out
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert unheard(page) == [] and page.count("<svg") == 1 and "rms of the residual" in page
+    assert (
+        find_accessibility_errors(page) == []
+        and page.count("<svg") == 1
+        and "rms of the residual" in page
+    )
     both = tmp_path / "backbone.csv"
     both.write_text("method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="several methods"):

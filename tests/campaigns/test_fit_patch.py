@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from command_line import cli
-from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
+from command_line import run_cli
+from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, make_friction_table
 
 import patchfem as pf
 from patchfem.campaigns import fit_patch
@@ -20,7 +20,7 @@ CROWN = (
     + 'load = "26 lbf"\nelement_size = "0.2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n[contact.crown]\n'
     'radius = "10 m"\n'
 )
-JOINT = CROWN + "[contact.shear]\n" + friction_of("coulomb")
+JOINT = CROWN + "[contact.shear]\n" + make_friction_table("coulomb")
 RIG = JOINT + KILOGRAM + DRIVE
 WINKLER = (
     PIECE
@@ -34,7 +34,7 @@ law = "linear"
 normal_stiffness = "1e12 Pa/m"
 tangential_ratio = 0.8
 """
-    + friction_of("coulomb")
+    + make_friction_table("coulomb")
     + SLIDE
 )
 
@@ -130,7 +130,7 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
     """The differences that are printed are those of the table of loops."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bench.toml").write_text(JOINT + SLIDE)
-    answer = cli(
+    answer = run_cli(
         "fit", "bench.toml", "--from-patch", "--amplitudes", "10 nm..200 nm:9", "-o", "out"
     )
     assert answer.code == 0, answer.err
@@ -152,13 +152,13 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
     )
     assert fitted == pytest.approx(patch, rel=1e-6)
     # its own folder is replaced
-    assert cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0
+    assert run_cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0
 
 
 @pytest.mark.parametrize(
     "text, said, mended",
     [
-        (POINT + friction_of("iwan") + SLIDE, "[contact]", JOINT + SLIDE),
+        (POINT + make_friction_table("iwan") + SLIDE, "[contact]", JOINT + SLIDE),
         (CROWN, "[friction]", JOINT + SLIDE),
         (
             JOINT.replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"') + SLIDE,

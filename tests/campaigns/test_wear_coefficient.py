@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COATED, COULOMB, POINT
 
 import patchfem as pf
@@ -32,7 +32,7 @@ def test_exact_the_coefficient_comes_back_from_its_own_depth(scene, tmp_path, na
     value = {"worn_depth_mean": found["worn_volume"].value / length**2}.get(name) or found[
         name
     ].value
-    answer = cli(
+    answer = run_cli(
         "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
     )
     assert answer.code == 0, answer.err
@@ -55,7 +55,7 @@ def test_exact_an_interval_of_the_depth_becomes_one_of_the_coefficient(scene, tm
             }
         )
     )
-    answer = cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
+    answer = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
     one = json.loads(answer.out)["values"]["wear.coefficient"]
     assert one["low"] / one["value"] == pytest.approx(0.75, rel=2e-3)
     assert one["high"] / one["value"] == pytest.approx(1.5, rel=2e-3)
@@ -63,7 +63,7 @@ def test_exact_an_interval_of_the_depth_becomes_one_of_the_coefficient(scene, tm
 
 def test_refuses_what_cannot_be_fitted(scene, tmp_path):
     def said(*words):
-        answer = cli("fit", scene, *words)
+        answer = run_cli("fit", scene, *words)
         assert answer.code == 2
         assert "Traceback" not in answer.err
         assert not (tmp_path / "out").exists()

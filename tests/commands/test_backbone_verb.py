@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from scene_texts import IWAN, shaken
+from scene_texts import IWAN, make_shaken_block
 
 from patchfem import formatting
 from patchfem.__main__ import main
@@ -28,7 +28,7 @@ COLUMNS = [
 @pytest.fixture
 def scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "joint.toml").write_text(shaken(IWAN), "utf-8")
+    (tmp_path / "joint.toml").write_text(make_shaken_block(IWAN), "utf-8")
     return tmp_path
 
 
@@ -83,7 +83,11 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
 
 
 def test_the_screen_answers_in_sentences_and_names_what_is_not_known(scene, capsys):
-    rigid = shaken(IWAN).replace('"iwan"', '"coulomb"').replace("chi = -0.5\nbeta = 0.5\n", "")
+    rigid = (
+        make_shaken_block(IWAN)
+        .replace('"iwan"', '"coulomb"')
+        .replace("chi = -0.5\nbeta = 0.5\n", "")
+    )
     (scene / "joint.toml").write_text(rigid.replace('stiffness = "20 kN/m"\n', ""), "utf-8")
     assert run("backbone", "joint.toml", "--amplitudes", "2 mm,5 mm", "--no-page", "-q") == 0
     shown = capsys.readouterr().out

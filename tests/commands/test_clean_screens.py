@@ -6,7 +6,7 @@ from html import unescape
 from pathlib import Path
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
 
@@ -42,7 +42,7 @@ def texts_of(page: str) -> str:
 
 def ran(path: Path, out: Path, *words) -> list:
     """Warnings of a run, on the screen and on its page alike; nothing ugly stands on either."""
-    answer = cli(*words, path, "-o", out)
+    answer = run_cli(*words, path, "-o", out)
     assert answer.code == 0, answer.err
     page = (out / "report.html").read_text("utf-8")
     for text in (answer.out, answer.err, texts_of(page)):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
 
@@ -133,7 +133,7 @@ def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
 
 
 def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
-    answer = cli("compare", runs / "half", runs / "worn", "--json", "-o", tmp_path / "out")
+    answer = run_cli("compare", runs / "half", runs / "worn", "--json", "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
     assert (
@@ -171,7 +171,7 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
     for line in STORY[1].splitlines():
         words = shlex.split(line)
         sets = more if "wear.cycles" in line else more[:4]
-        answer = cli(*words[1:], *(sets if words[1] == "run" else ()), "-q")
+        answer = run_cli(*words[1:], *(sets if words[1] == "run" else ()), "-q")
         assert words[0] == "patchfem" and answer.code == 0, answer.err
     told = " ".join(STORY[2].replace("> ", "").split())
     head = answer.out.splitlines()[0]
@@ -197,7 +197,7 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
 def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
     (runs / "empty").mkdir(exist_ok=True)
     (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
-    answer = cli("compare", *(runs / name for name in names), "-o", tmp_path / "out")
+    answer = run_cli("compare", *(runs / name for name in names), "-o", tmp_path / "out")
     assert answer.code == (4 if "nowhere" in names else 2)
     assert told in answer.err
     assert "Traceback" not in answer.err
@@ -211,12 +211,12 @@ def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
         ("--keep-spikes",),
         ("--units", "um,um"),
     ):
-        answer = cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
+        answer = run_cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
         assert answer.code == 2
         assert f"{words[0]} can only be used for measured surfaces" in answer.err
         assert "leave it out" in answer.err
     (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
-    answer = cli(
+    answer = run_cli(
         "compare", runs / "file.csv", runs / "worn", "--direction", "x", "-o", tmp_path / "out"
     )
     assert answer.code == 2 and "file.csv: a file, while" in answer.err
@@ -224,7 +224,7 @@ def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
     for name in ("summary.json", "scene.resolved.toml", "result.nc"):
         (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
     (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
-    answer = cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
+    answer = run_cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
     assert answer.code == 2
     assert "bad/result.nc: cannot be read" in answer.err
     assert "Traceback" not in answer.err
@@ -244,7 +244,7 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
         f"a.csv,{tmp_path / 'a.csv'},",
     ]
     (tmp_path / "pairs.csv").write_text("\n".join(rows) + "\n")
-    answer = cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out", "--json")
+    answer = run_cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out", "--json")
     found = json.loads(answer.out)
     assert answer.code == 3 and [one["outcome"] for one in found] == ["done"] * 2 + [
         "failed"

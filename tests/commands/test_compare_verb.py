@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ALWAYS, FROM_SHELL, cli, loaded
-from pairs import UM, pair
+from command_line import ALWAYS, FROM_SHELL, modules_after, run_cli
+from pairs import UM, make_worn_pair
 from synthetic import report_area
 
 import patchfem as pf
@@ -50,7 +50,7 @@ def written(path: Path, trace: Profile) -> Path:
 @pytest.fixture(scope="module")
 def files(tmp_path_factory) -> tuple:
     """Before, after with half of it worn, and the pair."""
-    p = pair(30077, share=0.5)
+    p = make_worn_pair(30077, worn_fraction=0.5)
     place = tmp_path_factory.mktemp("traces")
     return written(place / "before.csv", p.before), written(place / "after.csv", p.after), p
 
@@ -59,7 +59,7 @@ def files(tmp_path_factory) -> tuple:
 def compared(files, tmp_path_factory) -> tuple:
     """(Answer, folder) of the comparison of both along y."""
     out = tmp_path_factory.mktemp("compared") / "out"
-    return cli("compare", *files[:2], "--direction", "y", "-o", out), out
+    return run_cli("compare", *files[:2], "--direction", "y", "-o", out), out
 
 
 def test_exact_the_answer_in_one_command(files, compared):
@@ -85,15 +85,15 @@ def test_exact_the_answer_in_one_command(files, compared):
 
 
 def test_exact_json_says_why_there_is_no_depth(files, tmp_path):
-    other = written(tmp_path / "elsewhere.csv", pair(50001, share=0.3).after)
-    found = json.loads(cli("compare", files[0], other, "--json").out)
+    other = written(tmp_path / "elsewhere.csv", make_worn_pair(50001, worn_fraction=0.3).after)
+    found = json.loads(run_cli("compare", files[0], other, "--json").out)
     for name in NAMES[:4]:
         assert found[name]["value"] is None and "no common part" in found[name]["reason"]
     assert found["amplitude_ratio"]["value"] > 0
 
 
 def test_exact_identical_traces_show_no_change(files):
-    found = json.loads(cli("compare", files[0], files[0], "--json").out)
+    found = json.loads(run_cli("compare", files[0], files[0], "--json").out)
     assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] is None
     assert found["hidden_wear"]["high"] is None and found["hidden_wear"]["value"] < 1e-9
     assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
@@ -103,7 +103,7 @@ def test_exact_identical_traces_show_no_change(files):
 def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     (tmp_path / "patch.toml").write_text(SCENE.replace("before.csv", str(files[0])))
     out = tmp_path / "out"
-    answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", out)
+    answer = run_cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", out)
     assert answer.code == 0, answer.err
     found = json.loads((out / "compare.json").read_text())["pressed"]
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness"):
@@ -119,7 +119,7 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
     profile = f"contact.profile.file={out / 'surface_after.csv'}"
-    alone = cli(
+    alone = run_cli(
         "run", tmp_path / "patch.toml", "--set", profile, "--json", "-o", tmp_path / "alone"
     )
     assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(
@@ -129,9 +129,11 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
 
 @pytest.mark.slow
 def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
-    p = pair(30078, share=0.0)
+    p = make_worn_pair(30078, worn_fraction=0.0)
     across = written(tmp_path / "by.csv", p.before), written(tmp_path / "ay.csv", p.after)
-    found = json.loads(cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out)
+    found = json.loads(
+        run_cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out
+    )
     assert found["verdict"] == "worn, waves reduced along x, no change shown along y"
     assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {
         "before",
@@ -151,7 +153,7 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
             for i, a in enumerate(x)
         )
     )
-    found = json.loads(cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
+    found = json.loads(run_cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
     assert found["verdict"] == "no change shown"
     assert "agree up to a plane" in found["worn_depth_max"]["reason"]
 
@@ -172,7 +174,7 @@ def test_refuses_from_python_what_the_command_refuses(files, count, direction, s
 
 
 def test_exact_neither_meshes_nor_compiled_code_are_imported(files, tmp_path):
-    modules = loaded(FROM_SHELL, "compare", *files[:2], "-o", tmp_path / "out")
+    modules = modules_after(FROM_SHELL, "compare", *files[:2], "-o", tmp_path / "out")
     assert not modules & {*ALWAYS, "skfem"}
 
 
@@ -184,7 +186,7 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
         (tmp_path / "data" / name).parent.mkdir(exist_ok=True)
         (tmp_path / "data" / name).write_text(rows)
     files = [tmp_path / "data" / name for name in ("before.csv", "after.csv")]
-    answer = cli(verb, *files, "-o", tmp_path / "data")
+    answer = run_cli(verb, *files, "-o", tmp_path / "data")
     assert answer.code == 2 and "not patchfem results" in answer.err
     assert all(path.read_text() == rows for path in files)
     assert len(list((tmp_path / "data").iterdir())) == 2
@@ -192,9 +194,9 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
 
 def test_exact_a_told_shift_is_a_length(files):
     shift = files[2].shift
-    answer = cli("compare", *files[:2], "--shift", f"{shift / UM:.1f} um", "--json")
+    answer = run_cli("compare", *files[:2], "--shift", f"{shift / UM:.1f} um", "--json")
     found = json.loads(answer.out)
     assert found["reference"] == "place"
     assert found["shift"]["value"] == pytest.approx(shift, abs=0.02 * UM)
-    answer = cli("compare", *files[:2], "--shift", f"{shift / UM + 300:.1f} um")
+    answer = run_cli("compare", *files[:2], "--shift", f"{shift / UM + 300:.1f} um")
     assert "not available; at the given shift of" in answer.out

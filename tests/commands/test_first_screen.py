@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH, JOINT_SHAKEN, POINT
 
 import patchfem as pf
@@ -49,7 +49,7 @@ def run(tmp_path, kind, *words, **keys):
         for key, value in keys.items()
         for word in ("--set", f"{key.replace('__', '.')}={value}")
     ]
-    return cli("run", path, "-o", tmp_path / "out", "--no-page", *sets, *words)
+    return run_cli("run", path, "-o", tmp_path / "out", "--no-page", *sets, *words)
 
 
 def in_si(text: str) -> float:
@@ -144,8 +144,8 @@ def test_exact_progress_as_lines(capsys):
 
 
 def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
-    screen = cli().out
-    assert screen == cli("--help").out and max(map(len, screen.splitlines())) <= 80
+    screen = run_cli().out
+    assert screen == run_cli("--help").out and max(map(len, screen.splitlines())) <= 80
     assert [line for line in screen.splitlines() if line in VERB_GROUPS] == [
         "Start",
         "Study",
@@ -167,8 +167,8 @@ def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
 def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(read_template("rig"), "utf-8")
-    short = cli("plan", path).out
-    long = cli("plan", path, "-v").out
+    short = run_cli("plan", path).out
+    long = run_cli("plan", path, "-v").out
     assert "\nabsent" not in short
     assert long.startswith(short)
     assert "\nabsent" in f"\n{long[len(short) :]}"
@@ -320,7 +320,7 @@ def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
     """A tilted joint bears on a hundredth of its length, and slips in a part of that."""
     scene = tmp_path / "joint.toml"
     scene.write_text(JOINT_SHAKEN + '[contact.tilt]\nangle = "10 mrad"\n', "utf-8")
-    answer = cli(
+    answer = run_cli(
         "run", scene, "-o", tmp_path / "out", "--no-page", "--set", "accuracy.tolerance=1e-2"
     )
     lines = answer.out.splitlines()
@@ -402,7 +402,7 @@ def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(read_template("rig"), "utf-8")
     said = [
-        cli("check", path, "--set", f"structure.mode.axial.damping={value}")
+        run_cli("check", path, "--set", f"structure.mode.axial.damping={value}")
         for value in ("0.49", "0.5", "1")
     ]
     assert [one.code for one in said] == [0, 0, 0] and said[0].err == ""

@@ -6,9 +6,9 @@ import tomllib
 import numpy as np
 import pytest
 import pyuff
-from command_line import cli
-from lab_files import SI, record, written
-from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven, free
+from command_line import run_cli
+from lab_files import SI, make_record, write_universal
+from lab_modes import OMEGA, RESIDUE, TIME, ZETA, driven_response, free_decay
 
 from patchfem import build
 from patchfem.core import PatchfemError
@@ -24,23 +24,25 @@ SHAKEN = AROUND + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = 
 @pytest.fixture(scope="module")
 def shaken(tmp_path_factory):
     """A force in N and the acceleration beside it in g."""
-    force, response = driven("acceleration")
-    return written(
+    force, response = driven_response("acceleration")
+    return write_universal(
         tmp_path_factory.mktemp("lab") / "shaker.uff",
         [
             SI,
-            record(TIME, force, 13, id1="cell"),
-            record(TIME, response / 9.80665, 12, id1="tip", ordinate_axis_units_lab="g"),
+            make_record(TIME, force, 13, id1="cell"),
+            make_record(TIME, response / 9.80665, 12, id1="tip", ordinate_axis_units_lab="g"),
         ],
     )
 
 
 def test_always_a_note_shows_what_a_file_wrote_as_text(tmp_path):
     """A unit with a NUL byte once came to the screen as it stood, as would any sign that moves the cursor."""
-    tip = record(TIME, driven("acceleration")[1], 12, id1="tip", ordinate_axis_units_lab="NO")
-    path = written(tmp_path / "lab.uff", [SI, tip])
+    tip = make_record(
+        TIME, driven_response("acceleration")[1], 12, id1="tip", ordinate_axis_units_lab="NO"
+    )
+    path = write_universal(tmp_path / "lab.uff", [SI, tip])
     path.write_bytes(path.read_bytes().replace(b"NO ", b"N\x1b "))
-    answer = cli("import", path, "-o", tmp_path / "out.csv")
+    answer = run_cli("import", path, "-o", tmp_path / "out.csv")
     assert answer.code == 0
     assert "its unit 'N?' is not known" in answer.err
     assert "\x1b" not in answer.err
@@ -64,7 +66,7 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
         source, np.transpose([*table.values()]), delimiter=",", header=",".join(table), comments=""
     )
     asked = [word for name in table for word in ("--map", f"{name.split()[0]}={name.split()[0]}")]
-    plain = cli("import", source, "-o", out, *asked)
+    plain = run_cli("import", source, "-o", out, *asked)
     assert plain.code == 0
     assert "time starts at 2 s, displacement starts at 3.89" in plain.err
     assert "--zero" in plain.err
@@ -72,7 +74,7 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
         PatchfemError, match=r"table\.csv:2: time starts at 2: .*patchfem import --zero"
     ):
         read_slide(out)
-    answer = cli("import", source, "-o", out, "--zero", *asked)
+    answer = run_cli("import", source, "-o", out, "--zero", *asked)
     assert answer.code == 0 and answer.err == ""
     assert read_slide(out) == (
         pytest.approx(time, abs=1e-12),
@@ -84,7 +86,7 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
 
 
 def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
-    answer = cli("import", shaken, "-o", tmp_path / "modes.toml", "--json")
+    answer = run_cli("import", shaken, "-o", tmp_path / "modes.toml", "--json")
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
     assert [one["frequency"] for one in found["modes"]] == pytest.approx(HERTZ, rel=1e-8)
@@ -100,7 +102,7 @@ def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
 
 
 def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):
-    answer = cli(
+    answer = run_cli(
         "import",
         shaken,
         "-o",
@@ -117,7 +119,7 @@ def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):
 
 def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
     """Its modes carry the window's damping, which the record does not."""
-    answer = cli("import", shaken, "-o", tmp_path / "response.uff", "--segment", "1 s")
+    answer = run_cli("import", shaken, "-o", tmp_path / "response.uff", "--segment", "1 s")
     assert answer.code == 0 and "window hann" in answer.out, answer.err
     kinds = [
         one["func_type"]
@@ -128,16 +130,16 @@ def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
     shapes = universal.read_universal(tmp_path / "response.uff")
     at = np.argmin(np.abs(shapes.frequency - HERTZ[1]))
     assert shapes.frequency[at] == pytest.approx(HERTZ[1], rel=1e-3)
-    answer = cli("import", tmp_path / "response.uff", "-o", tmp_path / "modes.toml")
+    answer = run_cli("import", tmp_path / "response.uff", "-o", tmp_path / "modes.toml")
     assert answer.code == 0 and "260" in answer.out, answer.err
     build(FORCED + (tmp_path / "modes.toml").read_text())
 
 
 def test_exact_a_free_decay_of_a_table(tmp_path):
-    time, place = free()
+    time, place = free_decay()
     rows = [f"{t!r},{1e3 * p!r}" for t, p in zip(time.tolist(), place.tolist())]
     (tmp_path / "ring.csv").write_text("Time [s],LVDT [mm]\n" + "\n".join(rows) + "\n")
-    answer = cli(
+    answer = run_cli(
         "import",
         tmp_path / "ring.csv",
         "--map",
@@ -179,11 +181,13 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
         }
         for k in range(2)
     ]
-    path = written(tmp_path / "shapes.uff", [SI, *sets])
-    answer = cli("import", path, "-o", tmp_path / "modes.toml")
+    path = write_universal(tmp_path / "shapes.uff", [SI, *sets])
+    answer = run_cli("import", path, "-o", tmp_path / "modes.toml")
     assert answer.code == 2
     assert "give the node and direction that slide, such as --map slide=11:+x" in answer.err
-    answer = cli("import", path, "-o", tmp_path / "modes.toml", "--map", "slide=12:+x,output=11:+x")
+    answer = run_cli(
+        "import", path, "-o", tmp_path / "modes.toml", "--map", "slide=12:+x,output=11:+x"
+    )
     assert answer.code == 0, answer.err
     modes = build(SHAKEN + (tmp_path / "modes.toml").read_text()).rig.modes
     assert modes.mass == pytest.approx(3, rel=1e-5)  # dataset 55 holds six digits
@@ -208,7 +212,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
 )
 def test_refuses_by_name(shaken, tmp_path, monkeypatch, words, says):
     monkeypatch.chdir(tmp_path)
-    answer = cli("import", shaken, *words)
+    answer = run_cli("import", shaken, *words)
     assert answer.code == 2 and says in answer.err and "internal fault" not in answer.err, (
         answer.err
     )

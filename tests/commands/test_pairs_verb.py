@@ -6,8 +6,8 @@ import re
 
 import numpy as np
 import pytest
-from command_line import cli
-from pairs import UM, track
+from command_line import run_cli
+from pairs import UM, make_track_pair
 from scipy.stats import t
 
 import patchfem as pf
@@ -22,7 +22,7 @@ def table(tmp_path_factory):
     """A table of three pairs with a track, the last of which has no file after."""
     place = tmp_path_factory.mktemp("pairs")
     for k in range(2):
-        made = track("band", 7100 + k, COUNT)
+        made = make_track_pair("band", 7100 + k, COUNT)
         for name, one in (("before", made.before), ("after", made.after)):
             (place / f"{name}{k}.csv").write_text(
                 "x [um],z [um]\n"
@@ -39,7 +39,7 @@ def table(tmp_path_factory):
 @pytest.fixture(scope="module")
 def answered(table, tmp_path_factory):
     out = tmp_path_factory.mktemp("answered") / "out"
-    return cli("compare", "--pairs", table, "-o", out, "--json"), out
+    return run_cli("compare", "--pairs", table, "-o", out, "--json"), out
 
 
 def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
@@ -128,7 +128,7 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
 def test_refuses_a_table_that_is_none(tmp_path, text, says):
     path = tmp_path / "pairs.csv"
     path.write_text(text)
-    answer = cli("compare", "--pairs", path, "-o", tmp_path / "out")
+    answer = run_cli("compare", "--pairs", path, "-o", tmp_path / "out")
     assert answer.code == 2 and f"{path}{says}" in answer.err and not (tmp_path / "out").exists()
     with pytest.raises(pf.PatchfemError):
         read_pairs(path)
@@ -136,7 +136,7 @@ def test_refuses_a_table_that_is_none(tmp_path, text, says):
 
 def test_refuses_a_table_of_which_no_pair_can_be_compared(tmp_path):
     (tmp_path / "pairs.csv").write_text("before,after\na.csv,b.csv\n")
-    answer = cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")
+    answer = run_cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")
     assert answer.code == 2 and (tmp_path / "out" / "pairs.csv").is_file()
     with pytest.raises(pf.PatchfemError, match="not both"):
         pf.compare("a.csv", "b.csv", pairs=tmp_path / "pairs.csv")

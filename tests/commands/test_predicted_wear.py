@@ -7,7 +7,7 @@ import numpy as np
 import predicted_pairs
 import pytest
 import xarray
-from command_line import cli
+from command_line import run_cli
 from scene_texts import SMALL_PATCH
 
 import patchfem as pf
@@ -78,7 +78,7 @@ def test_always_the_interval_of_the_coefficient_contains_the_truth(made, tmp_pat
         x, z = np.loadtxt(folder / name, delimiter=",", skiprows=1, unpack=True) * 1e-6
         files.append(write_trace(tmp_path / name, x, z[::-1]))
     centre = x[0] + x[-1] - pair.centre
-    answer = cli(
+    answer = run_cli(
         "compare", *files, "--predicted", folder / "wear", "--piece", pair.piece, "-o", out
     )
     assert answer.code == 0, answer.err

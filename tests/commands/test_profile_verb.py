@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ALWAYS, FROM_SHELL, cli, loaded
+from command_line import ALWAYS, FROM_SHELL, modules_after, run_cli
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
@@ -42,7 +42,7 @@ def scan(tmp_path) -> Path:
 
 
 def test_exact_the_table(trace):
-    answer = cli("profile", trace, "--cutoff", "0.25 mm")
+    answer = run_cli("profile", trace, "--cutoff", "0.25 mm")
     assert answer.code == 0 and answer.err == ""
     lines = answer.out.splitlines()
     assert lines[0] == (
@@ -80,14 +80,14 @@ def test_exact_the_table(trace):
 
 
 def test_exact_definitions_where_asked(trace):
-    plain = cli("profile", trace).out
-    long = cli("profile", trace, "-v").out
+    plain = run_cli("profile", trace).out
+    long = run_cli("profile", trace, "-v").out
     assert "mean of the absolute heights" not in plain and "mean of the absolute heights" in long
     assert "no cut-off, so no roughness profile" in plain and "  Ra " not in plain
 
 
 def test_exact_json_in_si(trace, scan):
-    answer = json.loads(cli("profile", trace, scan, "--json").out)
+    answer = json.loads(run_cli("profile", trace, scan, "--json").out)
     first, second = answer["profiles"]
     assert first["file"] == str(trace) and first["kind"] == "profile" and second["kind"] == "areal"
     assert first["measures"]["Pq"]["value"] == pytest.approx(5 * UM / np.sqrt(2), rel=0.01)
@@ -102,16 +102,16 @@ def test_exact_json_in_si(trace, scan):
         1e-9 * np.sqrt((rest**2).mean()), rel=1e-9
     )
     assert second["shape"] == [12, 16]
-    window = json.loads(cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)["profiles"][
-        0
-    ]
+    window = json.loads(run_cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)[
+        "profiles"
+    ][0]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
     assert {"RzDin", "MaxDev", "ASH"} <= set(window["measures"])
 
 
 def test_exact_the_page_and_its_numbers(trace, tmp_path):
     out = tmp_path / "out"
-    answer = cli("profile", trace, "--cutoff", "0.25 mm", "-o", out)
+    answer = run_cli("profile", trace, "--cutoff", "0.25 mm", "-o", out)
     assert answer.out.splitlines()[-1] == f"results: {out}"
     page = (out / "report.html").read_text()
     data = json.loads((out / "profile.json").read_text())
@@ -131,7 +131,7 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
         names[-1].write_text(
             "x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z))
         )
-    assert cli("profile", *names, scan, "-o", out).code == 0
+    assert run_cli("profile", *names, scan, "-o", out).code == 0
     data = json.loads((out / "profile.json").read_text())
     rows = (out / "profile.csv").read_text().splitlines()
     assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [
@@ -154,20 +154,20 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
     ):
         again = make_report(read_surface(out / "surfaces" / name))[parameter].value
         assert again == pytest.approx(data["profiles"][k]["measures"][parameter]["value"], rel=1e-7)
-    assert "counts twice" in cli("profile", names[0], names[0]).out
+    assert "counts twice" in run_cli("profile", names[0], names[0]).out
 
 
 def test_refuses_a_text_without_units(tmp_path):
     path = tmp_path / "bare.csv"
     path.write_text("".join(f"{k},{k % 7}\n" for k in range(50)))
-    answer = cli("profile", path)
+    answer = run_cli("profile", path)
     assert answer.code == 2 and "units are never guessed" in answer.err
-    assert cli("profile", path, "--units", "um,nm").code == 0
+    assert run_cli("profile", path, "--units", "um,nm").code == 0
 
 
 @pytest.mark.slow
 def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
-    modules = loaded(FROM_SHELL, "profile", trace, "--cutoff", "0.25 mm")
+    modules = modules_after(FROM_SHELL, "profile", trace, "--cutoff", "0.25 mm")
     assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
 
 
@@ -177,7 +177,7 @@ def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
 def test_exact_the_dektak_file_as_it_is():
     """The file as the instrument exports it: the results that it printed between its cursors, by --window."""
     path = Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv"
-    answer = json.loads(cli("profile", path, "--window", "468 um,733 um", "--json").out)[
+    answer = json.loads(run_cli("profile", path, "--window", "468 um,733 um", "--json").out)[
         "profiles"
     ][0]
     assert answer["step"] == pytest.approx(0.15625e-6, rel=1e-12)
@@ -202,9 +202,9 @@ def test_exact_the_dektak_file_as_it_is():
 def test_exact_areal_files_as_they_are(name, units):
     folder = Path(os.environ["PATCHFEM_DATA"])
     known = json.loads((folder / "truth.json").read_text())[name]
-    found = json.loads(cli("profile", folder / name, "--units", units, "--json").out)["profiles"][
-        0
-    ]["measures"]
+    found = json.loads(run_cli("profile", folder / name, "--units", units, "--json").out)[
+        "profiles"
+    ][0]["measures"]
     for key, unit in (("Sa", UM), ("Sq", UM), ("Sz", UM), ("Ssk", 1), ("Sku", 1)):
         assert found[key]["value"] == pytest.approx(known[key] * unit, rel=1e-6)
 
@@ -216,7 +216,7 @@ def test_exact_the_flatness_of_the_brake_reuss_beam():
     folder = Path(os.environ["PATCHFEM_DATA"])
     known = json.loads((folder / "truth.json").read_text())["brb_surface_data.mat"]
     answer = json.loads(
-        cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out
+        run_cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out
     )["profiles"][0]
     assert answer["measures"]["Sz"]["value"] == pytest.approx(
         known["flatness_PV_um"] * UM, rel=1e-6
@@ -266,7 +266,7 @@ def split_scene(tmp_path, monkeypatch) -> Path:
 def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
     """Truth: 0.45 times the rms height beyond the Gaussian filter; the pressure that closes a sine of this slope."""
     words = ("profile", "waves.csv", "--split", split_scene, "--cutoff", "250 um", "--json")
-    split = json.loads(cli(*words).out)["split"]
+    split = json.loads(run_cli(*words).out)["split"]
     waves = np.array([LONG, SHORT])
     heights = np.array([HIGH, LOW]) * (1 - 2 ** -((250e-6 / waves) ** 2))
     assert split["cutoff"] == pytest.approx(250e-6)
@@ -280,7 +280,7 @@ def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
 
 
 def test_the_split_scene_keeps_the_rest_of_the_text_and_runs(split_scene):
-    answer = cli("profile", "waves.csv", "--split", "scene.toml", "-o", "split.toml")
+    answer = run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "split.toml")
     assert answer.code == 0 and answer.err == ""
     assert "split the trace: waves longer than " in answer.out
     text = Path("split.toml").read_text("utf-8")
@@ -292,10 +292,12 @@ def test_the_split_scene_keeps_the_rest_of_the_text_and_runs(split_scene):
     contact = pf.load("split.toml").contact
     assert SHORT < contact.asperities.cutoff < LONG
     assert contact.asperities.tangential_ratio == 1.0 and contact.profile.heights == "surface"
-    assert cli("run", "split.toml", "--no-page").code == 0
+    assert run_cli("run", "split.toml", "--no-page").code == 0
     # the name of the trace is relative to the new scene
     Path("other").mkdir()
-    assert cli("profile", "waves.csv", "--split", "scene.toml", "-o", "other/split.toml").code == 0
+    assert (
+        run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "other/split.toml").code == 0
+    )
     assert pf.load("other/split.toml").contact.profile.file == "../waves.csv"
 
 
@@ -313,7 +315,7 @@ def test_refuses_a_split_that_cannot_be(split_scene):
         (("scene.toml", "--set", "contact.load=1 N"), "--set"),
         (("scene.toml", "--cutoff", "50 mm"), "reduce contact.element_size"),
     ):
-        answer = cli("profile", "waves.csv", "--split", *words)
+        answer = run_cli("profile", "waves.csv", "--split", *words)
         assert answer.code == 2 and said in answer.err, words
     assert Path("scene.toml").read_text("utf-8") == SPLIT_SCENE
 
@@ -324,7 +326,7 @@ def test_run_refuses_or_warns_of_such_a_trace_with_both_tables(split_scene):
     tables = ["    [contact.profile]", "    [contact.asperities]", '    law = "exponential"']
     for size, code in (("635 um", 2), ("40 um", 3)):
         split_scene.write_text(static.replace("63.5 um", size), "utf-8")
-        answer = cli("run", "scene.toml", "--no-page")
+        answer = run_cli("run", "scene.toml", "--no-page")
         lines = answer.err.splitlines()
         assert answer.code == code and set(tables) <= set(lines), size
         assert sum("split the trace: waves longer than" in line for line in lines) == 1

@@ -1,8 +1,8 @@
 """Command lines that are refused: the exit code, one line for each mistake, and no file in the folder is changed."""
 
 import pytest
-from command_line import cli
-from scene_texts import COULOMB, IWAN, POINT, SHORT, shaken
+from command_line import run_cli
+from scene_texts import COULOMB, IWAN, POINT, SHORT, make_shaken_block
 
 from patchfem.scene import read_template
 
@@ -15,7 +15,7 @@ FILES = {
     "point.toml": POINT
     + COULOMB
     + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n',
-    "joint.toml": shaken(IWAN),
+    "joint.toml": make_shaken_block(IWAN),
     "shipped.toml": read_template("rig"),
     "cases.csv": "normal.load [N],friction.static\n10,0.3\n",
     "pairs.csv": "before,after\na.csv,b.csv\n",
@@ -177,7 +177,7 @@ def test_refuses_a_command_line(tmp_path, monkeypatch, words, says, code):
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         (tmp_path / name).write_text(text, "utf-8")
-    answer = cli(*words)
+    answer = run_cli(*words)
     lines = answer.err.splitlines()
     assert (answer.code, answer.out, len(lines)) == (code, "", len(says)), answer
     assert all(part in answer.err for part in says) and "internal fault" not in answer.err

@@ -4,8 +4,8 @@ import csv
 
 import numpy as np
 import pytest
-from command_line import cli
-from page_data import data_of
+from command_line import run_cli
+from page_data import read_page_data
 from scene_texts import COULOMB, POINT, SHORT
 
 LOADS = ("10 N", "26 lbf")
@@ -24,7 +24,7 @@ def swept(tmp_path_factory):
         "drive.acceleration=1 g..5 g:3lin",
     )
     for name, more in (("first", ()), ("second", ("--set", "friction.static=0.1"))):
-        answer = cli("sweep", scene, *over, *more, "-o", base / name, "-q")
+        answer = run_cli("sweep", scene, *over, *more, "-o", base / name, "-q")
         assert answer.code == 0, answer.err
     return base
 
@@ -43,7 +43,7 @@ def amplitudes(data: dict) -> np.ndarray:
 
 
 def test_exact_the_page_of_a_sweep_holds_its_table(swept):
-    data = data_of((swept / "first" / "report.html").read_text())
+    data = read_page_data((swept / "first" / "report.html").read_text())
     table = rows(swept / "first")
     assert [one["name"] for one in data["keys"]] == ["normal.load", "drive.acceleration"] and data[
         "grid"
@@ -61,15 +61,15 @@ def test_exact_the_page_of_a_sweep_holds_its_table(swept):
 
 def test_exact_a_page_made_again_from_the_files_is_the_same(swept):
     page = swept / "first" / "report.html"
-    before = data_of(page.read_text())
-    assert cli("report", swept / "first").out.strip() == str(page)
-    assert data_of(page.read_text()) == before
+    before = read_page_data(page.read_text())
+    assert run_cli("report", swept / "first").out.strip() == str(page)
+    assert read_page_data(page.read_text()) == before
 
 
 def test_exact_sweeps_side_by_side_are_one_table(swept):
     page = swept / "both.html"
-    assert cli("report", swept / "first", swept / "second", "-o", page).code == 0
-    data = data_of(page.read_text())
+    assert run_cli("report", swept / "first", swept / "second", "-o", page).code == 0
+    data = read_page_data(page.read_text())
     table = rows(swept / "first") + rows(swept / "second")
     assert data["keys"][0]["name"] == "sweep"
     assert data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
@@ -82,19 +82,21 @@ def test_exact_sweeps_side_by_side_are_one_table(swept):
 
 
 def test_refuses_what_cannot_stand_side_by_side(swept, tmp_path):
-    assert cli("report").code == 2
+    assert run_cli("report").code == 2
     (tmp_path / "empty").mkdir()
-    answer = cli("report", tmp_path / "empty")
+    answer = run_cli("report", tmp_path / "empty")
     assert answer.code == 2 and "not a results folder: it has no summary.json" in answer.err
     case = next((swept / "first" / "cases").iterdir())
-    answer = cli("report", swept / "first", case)
+    answer = run_cli("report", swept / "first", case)
     assert answer.code == 2 and "first is a sweep" in answer.err
     (swept / "first" / "sweep.nc").rename(swept / "first" / "kept.nc")
-    answer = cli("report", swept / "first")
+    answer = run_cli("report", swept / "first")
     (swept / "first" / "kept.nc").rename(swept / "first" / "sweep.nc")
     assert answer.code == 2 and "it has no sweep.nc" in answer.err
     other = swept / "other"
-    answer = cli("sweep", swept / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q")
+    answer = run_cli(
+        "sweep", swept / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q"
+    )
     assert (answer.code, answer.out, answer.err) == (0, "", ""), "quiet, it says nothing but faults"
-    answer = cli("report", swept / "first", other)
+    answer = run_cli("report", swept / "first", other)
     assert answer.code == 2 and "over different keys" in answer.err

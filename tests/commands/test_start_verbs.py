@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem import load
@@ -25,29 +25,31 @@ register_verbs([])  # all verbs
 
 def test_exact_new_writes_what_it_prints(tmp_path):
     path = tmp_path / "mine.toml"
-    assert cli("new", "joint").out == read_template("joint") == pf.new("joint")
-    answer = cli("new", "joint", "-o", path)
+    assert run_cli("new", "joint").out == read_template("joint") == pf.new("joint")
+    answer = run_cli("new", "joint", "-o", path)
     assert answer.code == 0
     assert path.read_text("utf-8") == read_template("joint")
     assert f"patchfem run {path}" in answer.out
     for kind, verb in NEXT_VERBS.items():
-        assert f"patchfem {verb} " in cli("new", kind, "-o", tmp_path / f"{kind}.toml").out
+        assert f"patchfem {verb} " in run_cli("new", kind, "-o", tmp_path / f"{kind}.toml").out
         assert f"patchfem {verb} FILE" in " ".join(read_template(kind).replace("\n#", " ").split())
     path.write_text("mine", "utf-8")
-    answer = cli("new", "rig", "-o", path)
+    answer = run_cli("new", "rig", "-o", path)
     assert answer.code == 2 and "already exists" in answer.err and path.read_text("utf-8") == "mine"
 
 
 def test_exact_new_names_its_kinds():
-    assert [line.split()[0] for line in cli("new").out.splitlines()] == list(TEMPLATE_DESCRIPTIONS)
+    assert [line.split()[0] for line in run_cli("new").out.splitlines()] == list(
+        TEMPLATE_DESCRIPTIONS
+    )
     said = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(TEMPLATE_DESCRIPTIONS)}\n"
-    assert cli("new", "joitn")[::2] == (2, said)
+    assert run_cli("new", "joitn")[::2] == (2, said)
     with pytest.raises(pf.PatchfemError, match="did you mean 'joint'"):
         pf.new("joitn")
 
 
 def test_exact_the_demo_is_the_rig_of_the_report(tmp_path):
-    answer = cli("demo", "-o", tmp_path / "out", "--no-page")
+    answer = run_cli("demo", "-o", tmp_path / "out", "--no-page")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     amplitude = summary["measures"]["relative_displacement_amplitude"]
     assert answer.code == 0 and amplitude["value"] == pytest.approx(
@@ -62,9 +64,9 @@ def test_exact_the_demo_is_the_rig_of_the_report(tmp_path):
 
 
 def test_exact_the_schema_is_written_as_it_is_printed(tmp_path):
-    assert cli("schema", "-o", tmp_path / "a.json").code == 0
-    assert (tmp_path / "a.json").read_text("utf-8") == cli("schema").out
-    assert json.loads(cli("schema").out)["$defs"]["Contact"]["properties"]["length"][
+    assert run_cli("schema", "-o", tmp_path / "a.json").code == 0
+    assert (tmp_path / "a.json").read_text("utf-8") == run_cli("schema").out
+    assert json.loads(run_cli("schema").out)["$defs"]["Contact"]["properties"]["length"][
         "examples"
     ] == ["12.7 mm"]
 
@@ -77,7 +79,7 @@ def replace_versions(monkeypatch, version_of) -> None:
 def examine_with(monkeypatch, version_of) -> dict:
     """Run the doctor with these versions of packages; return the findings by name."""
     replace_versions(monkeypatch, version_of)
-    return {finding["name"]: finding for finding in json.loads(cli("doctor", "--json").out)}
+    return {finding["name"]: finding for finding in json.loads(run_cli("doctor", "--json").out)}
 
 
 def only(*installed: str):
@@ -114,7 +116,7 @@ def test_always_the_doctor_tells_what_is_missing(monkeypatch, broken_opengl):
     assert found["trame (fields in a browser)"]["cure"] == 'pip install "patchfem[web]"'
     window = found["the window by OpenGL"]
     assert window["found"] == "Failed to load an X11 library" and window["cure"]
-    lines = cli("doctor").out.splitlines()
+    lines = run_cli("doctor").out.splitlines()
     assert len(lines) == len(found)
     assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "the", "trame"]
 
@@ -142,7 +144,7 @@ def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_fi
 
 def test_always_a_fault_of_the_program_says_what_to_send(monkeypatch):
     replace_versions(monkeypatch, lambda name: 1 / 0)
-    answer = cli("doctor")
+    answer = run_cli("doctor")
     assert answer.code == 1
     assert "internal fault in " in answer.err and "): ZeroDivisionError" in answer.err
     assert "what `patchfem doctor` says to the project's issue tracker" in answer.err
@@ -153,18 +155,18 @@ def test_always_the_doctor_says_where_compiled_code_cannot_be_kept(
 ):
     (tmp_path / "file").touch()
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "file" / "below"))
-    found = {finding["name"]: finding for finding in json.loads(cli("doctor", "--json").out)}
+    found = {finding["name"]: finding for finding in json.loads(run_cli("doctor", "--json").out)}
     assert not found["compiled code"]["fine"] and "PATCHFEM_CACHE" in found["compiled code"]["cure"]
 
 
 def test_exact_a_scene_cites_what_its_effects_stand_on(tmp_path):
     keys = lambda text: re.findall(r"^@\w+\{(\w+),", text, re.M)  # noqa: E731
-    assert keys(cli("cite").out) == ["srinivasan1985", "patchfem"]
+    assert keys(run_cli("cite").out) == ["srinivasan1985", "patchfem"]
     path = tmp_path / "a.toml"
     path.write_text(
         read_template("rig").replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"'), "utf-8"
     )
-    assert keys(cli("cite", path).out) == ["srinivasan1985", "patchfem", "oden1983"]
+    assert keys(run_cli("cite", path).out) == ["srinivasan1985", "patchfem", "oden1983"]
     assert {"hueber2005", "archard1953"} <= set(
         keys(bibtex(load(read_template("wear")).effect_names()))
     )

@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COULOMB, PIECE, POINT, STRUCTURE
 
 from patchfem.commands import make_printable
@@ -63,12 +63,12 @@ def test_exact_a_stream_of_few_signs_shows_the_others_by_their_codes(scene, tmp_
 
 
 def test_refuses_the_root_as_a_folder_of_results(scene):
-    answer = cli("run", scene, "-o", "/")
+    answer = run_cli("run", scene, "-o", "/")
     assert answer.code == 2 and answer.err.count("\n") == 1 and "/: the root" in answer.err
 
 
 def test_exact_a_name_is_shown_on_one_line_without_moving_the_cursor(tmp_path):
-    answer = cli("check", str(tmp_path / "a\x1b[31m\nb.toml"))
+    answer = run_cli("check", str(tmp_path / "a\x1b[31m\nb.toml"))
     assert answer.code == 2 and answer.err.count("\n") == 1
     assert "a?[31m?b.toml: cannot be read" in answer.err
     assert make_printable("a\udcffü") == "a?ü"
@@ -79,7 +79,7 @@ def test_exact_results_name_no_folder_of_this_machine(tmp_path):
     rows = "".join(f"{13 * k},{abs(k % 400 - 200) / 400 + 1e-4 * k:.4f}\n" for k in range(1100))
     (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + rows)
     (tmp_path / "a.toml").write_text(PATCH + '[contact.profile]\nfile = "trace.csv"\n')
-    answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
+    answer = run_cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
     out = tmp_path / "out"
     assert answer.code == 0 and "trace.csv: x runs from " in (out / "summary.json").read_text()
     assert {
@@ -93,6 +93,6 @@ def test_exact_results_name_no_folder_of_this_machine(tmp_path):
 def test_exact_a_name_of_any_bytes_is_run_and_shown(tmp_path):
     path = tmp_path / os.fsdecode(b"b\xff\xfe.toml")
     path.write_text(SCENE, encoding="utf-8")
-    assert cli("run", path, "-o", tmp_path / os.fsdecode(b"o\xff"), "-q").code == 0
+    assert run_cli("run", path, "-o", tmp_path / os.fsdecode(b"o\xff"), "-q").code == 0
     page = (tmp_path / os.fsdecode(b"o\xff") / "report.html").read_text("utf-8")
     assert "b??" in page and "ü ± µ" in page

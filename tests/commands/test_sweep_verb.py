@@ -13,9 +13,9 @@ from time import sleep
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
+from command_line import run_cli
 from computed_cases import ComputedCases
-from page_data import data_of
+from page_data import read_page_data
 from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
@@ -54,7 +54,7 @@ def alike(found, measure, part="value") -> None:
 
 def sweep_into(out, scene, *words):
     """Sweep a scene into a folder on the command line."""
-    return cli("sweep", scene, *words, "-o", out)
+    return run_cli("sweep", scene, *words, "-o", out)
 
 
 def names(folder) -> set:
@@ -143,12 +143,12 @@ def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
     path = tmp_path / "rig.toml"
     table = f'[sweep]\n"normal.load" = "{",".join(LOADS)}"\n"drive.acceleration" = "1 g..5 g:2"\n'
     path.write_text(RIG + table, encoding="utf-8")
-    assert cli("check", path).code == 0
+    assert run_cli("check", path).code == 0
     assert sweep_into(tmp_path / "swept", path).code == 3
-    assert cli("check", path).out.endswith("a rig scene without mistakes, 6 cases\n")
-    assert json.loads(cli("check", path, "--json").out)["cases"] == 6
+    assert run_cli("check", path).out.endswith("a rig scene without mistakes, 6 cases\n")
+    assert json.loads(run_cli("check", path, "--json").out)["cases"] == 6
     assert (tmp_path / "swept" / "sweep.csv").read_bytes() == (swept[0] / "sweep.csv").read_bytes()
-    told = cli("run", path, "-o", tmp_path / "one")
+    told = run_cli("run", path, "-o", tmp_path / "one")
     assert told.code == 2 and "use `patchfem sweep`" in told.err
 
 
@@ -264,15 +264,15 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
     with monkeypatch.context() as another:
         another.setattr(os, "getpid", lambda: 1)
         first = Folder(tmp_path / "a", ()).__enter__()
-    answer = cli(*words)
+    answer = run_cli(*words)
     assert answer.code == 4
     assert "another sweep (process 1)" in answer.err
     assert "remove the file a/.writer" in answer.err
     first.__exit__(None, None, None)
-    assert cli(*words).code == 0
+    assert run_cli(*words).code == 0
     # beyond the largest number of a process: it died
     (tmp_path / "a" / ".writer").write_text("4194305")
-    assert cli(*words).code == 0
+    assert run_cli(*words).code == 0
 
 
 def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
@@ -428,13 +428,13 @@ def test_exact_the_printed_command_of_drawn_cases_draws_them_again(tmp_path, mon
         )
 
     command = printed(first)
-    assert command[:2] == ["patchfem", "sweep"] and cli(*command[1:], "-o", again).code == 0
+    assert command[:2] == ["patchfem", "sweep"] and run_cli(*command[1:], "-o", again).code == 0
     assert read_table(first)["command"] == shlex.join(command)  # what `patchfem report` prints
     assert (
         sweep_into(listed, scene, "--set", "normal.load=90 N", "--cases", first / "sweep.csv").code
         == 0
     )
-    assert cli(*printed(listed)[1:], "-o", tmp_path / "third").code == 0
+    assert run_cli(*printed(listed)[1:], "-o", tmp_path / "third").code == 0
     for other in (again, listed, tmp_path / "third"):
         assert (other / "sweep.csv").read_bytes() == (first / "sweep.csv").read_bytes()
 
@@ -468,7 +468,7 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
     )
     assert answer == said.out.splitlines()[0]
     page = (tmp_path / "a/report.html").read_text("utf-8")
-    assert data_of(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
+    assert read_page_data(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
     again = sweep_into(tmp_path / "a", scene, *drawn, "--of", "pressure_peak", "--resume")
     assert json.loads(data.read_text("utf-8"))["answer"].endswith(
         "(no case has a value of pressure peak, so this answer describes other measures)."
@@ -489,11 +489,11 @@ def test_refuses_a_sweep_of_which_no_case_could_be_run(scene, tmp_path):
 
 
 def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):
-    told = json.loads(cli("plan", scene, *OVER, "--json").out)
-    one = json.loads(cli("plan", scene, "--json").out)
+    told = json.loads(run_cli("plan", scene, *OVER, "--json").out)
+    one = json.loads(run_cli("plan", scene, "--json").out)
     assert told["cases"] == 6 and told["values"] == {"normal.load": 3, "drive.acceleration": 2}
     half, more = (
-        json.loads(cli("plan", scene, "--over", f"friction.static=0.1..0.6:{n}", "--json").out)
+        json.loads(run_cli("plan", scene, "--over", f"friction.static=0.1..0.6:{n}", "--json").out)
         for n in (1000, 2000)
     )
     assert more["seconds"] - half["seconds"] == pytest.approx(
@@ -504,24 +504,26 @@ def test_exact_the_plan_of_a_sweep_counts_its_cases(scene):
         one["engine"],
         one["effects"],
     )
-    assert "6 cases of 3 normal.load, 2 drive.acceleration" in cli("plan", scene, *OVER).out
+    assert "6 cases of 3 normal.load, 2 drive.acceleration" in run_cli("plan", scene, *OVER).out
 
 
 def test_exact_the_plan_of_a_sweep_names_the_case_whose_values_it_prints(scene):
     """Groups of the first case once stood there as if they were those of the scene."""
     swept = "--over", "friction.static=0.41,0.1"
-    told = json.loads(cli("plan", scene, *swept, "--json").out)
+    told = json.loads(run_cli("plan", scene, *swept, "--json").out)
     assert told["case"] == {"friction.static": "0.41"}
     assert (
         told["groups"]
-        == json.loads(cli("plan", scene, "--set", "friction.static=0.41", "--json").out)["groups"]
+        == json.loads(run_cli("plan", scene, "--set", "friction.static=0.41", "--json").out)[
+            "groups"
+        ]
     )
-    assert cli("plan", scene, *swept).out.startswith(
+    assert run_cli("plan", scene, *swept).out.startswith(
         "case     friction.static 0.41 (the first case); "
     )
     own = scene.with_name("own.toml")
     own.write_text(RIG + '\n[sweep]\n"friction.static" = [0.1, 0.2]\n', "utf-8")
-    chosen = cli("plan", own, "--set", "friction.static=0.3")  # a single case that is chosen
+    chosen = run_cli("plan", own, "--set", "friction.static=0.3")  # a single case that is chosen
     assert chosen.code == 0 and "sweep " not in chosen.out and "kind     rig" in chosen.out
 
 

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import cli
-from import_graph import sources, syntax_nodes
+from command_line import run_cli
+from import_graph import read_sources, syntax_nodes
 from scene_texts import BENCH, COATED
 
 from patchfem.__main__ import VERBS
@@ -56,8 +56,8 @@ def planted(tmp_path, monkeypatch):
     Path("loop.csv").write_text(LOOP)
     Path("trace.csv").write_text(TRACE)
     assert (
-        cli("run", "bench.toml", "-o", "out", "-q").code
-        == cli("run", "patch.toml", "-o", "pressed", "-q").code
+        run_cli("run", "bench.toml", "-o", "out", "-q").code
+        == run_cli("run", "patch.toml", "-o", "pressed", "-q").code
         == 0
     )
     for name in NAMES:
@@ -76,7 +76,7 @@ def ran(folder: Path) -> list:
 )
 def test_always_no_verb_runs_what_lies_in_the_working_folder(planted, every):
     for name in VERBS if every else ("sweep",):
-        answer = cli(name, *WORDS.get(name, ()))
+        answer = run_cli(name, *WORDS.get(name, ()))
         assert answer.code in (0, 2, 3), (name, answer)
         assert not ran(planted), name
     assert (planted / "swept" / "sweep.csv").is_file() and (planted / "seen.png").is_file() is every
@@ -85,7 +85,7 @@ def test_always_no_verb_runs_what_lies_in_the_working_folder(planted, every):
 @pytest.mark.slow
 def test_always_a_cluster_runs_nothing_of_the_working_folder(planted):
     pytest.importorskip("distributed")
-    answer = cli(*SWEPT, "swept", "--executor", "dask", "-j", "1")
+    answer = run_cli(*SWEPT, "swept", "--executor", "dask", "-j", "1")
     assert answer.code == 0, answer.err
     assert not ran(planted)
 
@@ -106,7 +106,7 @@ def test_exact_the_planted_modules_run_where_python_looks_for_them(planted):
 def test_always_every_interpreter_that_is_started_leaves_out_the_working_folder():
     """Lists of words that begin with the interpreter name -P next."""
     seen = 0
-    for name, text in sources(Path(__file__).parents[2]).items():
+    for name, text in read_sources(Path(__file__).parents[2]).items():
         for node in syntax_nodes(text) if "sys.executable" in text else ():
             words = [ast.unparse(one) for one in node.elts] if isinstance(node, ast.List) else []
             if words[:1] in (["sys.executable"], ["PYTHON"]):

@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pieces import TITANIUM, bare, pair_of, refined_middle
+from pieces import TITANIUM, make_bare_layers, make_compliance, make_refined_grid
 
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
@@ -24,8 +24,8 @@ def crown_radius(plane):
 @cache
 def press_crown(per_half_width, plane="strain"):
     """Return the grid and the contact state of the crowned pair."""
-    grid = refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, 12.7e-3, 6e-3)
-    pair = pair_of(grid, bare(TITANIUM, plane), width=1.0)
+    grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, 12.7e-3, 6e-3)
+    pair = make_compliance(grid, make_bare_layers(TITANIUM, plane), width=1.0)
     return grid, press(pair, crown(grid.x, crown_radius(plane)), LOAD)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pieces import LOAD, coated_pair, rough
+from pieces import LOAD, draw_gap, make_coated_pair
 
 from patchfem.compiled import load
 from patchfem.contact import N_BUILT, ContactSets, name_set, press
@@ -20,7 +20,7 @@ PRESS = load("contact.press_kernels")
 @cache
 def make_crowned_sets(cells: int = 40, radius: float = 50.0) -> tuple:
     """Return the contact sets and the state of a crowned pair under the load of the rig."""
-    pieces = coated_pair(cells)
+    pieces = make_coated_pair(cells)
     x = pieces.interface.x
     state = press(pieces, x**2 / (2 * radius), LOAD, 0.1 * LOAD * x[-1])
     force = state.sigma_n * pieces.interface.weight
@@ -96,9 +96,9 @@ def test_exact_tableau_stays_accurate_after_many_pivots():
 def test_always_set_search_solves_rough_surfaces(seed):
     """The set search gives the forces of a unilateral solve on random rough surfaces within 1e-11."""
     rng = np.random.default_rng(seed)
-    pieces = coated_pair(40)
+    pieces = make_coated_pair(40)
     x = pieces.interface.x
-    gap = rough(rng, x, 2e-7)
+    gap = draw_gap(rng, x, 2e-7)
     state = press(pieces, gap, LOAD, 0.0)
     force = state.sigma_n * pieces.interface.weight
     sets = ContactSets(pieces.normal, x, gap + state.rotation * x - state.approach, force > 0)

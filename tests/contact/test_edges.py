@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pieces import TITANIUM, bare, refined_middle
+from pieces import TITANIUM, make_bare_layers, make_refined_grid
 
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact import edges, press
@@ -49,12 +49,12 @@ def test_exact_wedge_on_springs_edge_and_stiffness(load):
 @pytest.fixture(scope="module")
 def hertz_block():
     """Compliance of both pieces of the Hertz pair, with elements of a/10 at the contact."""
-    return compute_block(refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / 10, WIDTH, 6e-3, 1.06))
+    return compute_block(make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / 10, WIDTH, 6e-3, 1.06))
 
 
 def compute_block(grid) -> tuple:
     """Return the compliance of two titanium pieces on a grid and the height [m] of its first row."""
-    nn, tt, _ = interface_compliance(make_piece(grid.x, grid.depth, 0, bare(TITANIUM)))
+    nn, tt, _ = interface_compliance(make_piece(grid.x, grid.depth, 0, make_bare_layers(TITANIUM)))
     interface = Interface(grid.x, frozen_array(grid.tributary_lengths() * WIDTH), WIDTH)
     return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(
         grid.depth[1]
@@ -96,7 +96,7 @@ def test_always_hertz_edges_are_accurate_on_graded_mesh(hertz_block):
 
     With the last element alone the edge was off by up to an eighth of the longer element.
     """
-    uniform = refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / 10, WIDTH, 6e-3, 1.06)
+    uniform = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / 10, WIDTH, 6e-3, 1.06)
     inside = np.abs(uniform.x) < 0.9 * HALF_WIDTH - 1e-9
     x = np.sort(
         np.concatenate([uniform.x, uniform.x[inside] + HALF_WIDTH / 20, [-0.85 * HALF_WIDTH]])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
-from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, pair_of
-from study_module import study
+from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, make_compliance
+from study_module import load_study
 
 from patchfem.closed_forms import contact as exact
 from patchfem.contact import press
@@ -18,7 +18,7 @@ from patchfem.contact.unilateral import solve_forces
 from patchfem.mesh import TensorGrid
 from patchfem.mesh.tensor import graded_rows
 
-halfspace = study("common/halfspace.py")
+halfspace = load_study("common/halfspace.py")
 press_periodic, residuals, wave_numbers = (
     halfspace.press_periodic,
     halfspace.residuals,
@@ -134,7 +134,7 @@ def test_exact_coated_elements_agree_with_half_plane_transform(
     grid = make_crown_grid(
         16 * spacing * np.ceil(1.5 * substrate_half_width / spacing / 16), spacing, 1.1
     )
-    state = press(pair_of(grid, COATED, 1.0), crown(grid.x, radius), load)
+    state = press(make_compliance(grid, COATED, 1.0), crown(grid.x, radius), load)
     half_width = np.abs(x[reference.pressure > 0]).max()
     reference_pressure = np.interp(grid.x, x, reference.pressure)
     inside = np.abs(grid.x) < 0.9 * half_width

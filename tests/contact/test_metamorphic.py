@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import (
     LENGTH,
-    coated_pair,
-    rough,
+    draw_gap,
+    make_coated_pair,
 )
 
 from patchfem.contact import press, press_to_approach
@@ -21,11 +21,13 @@ N_ELEMENTS = 60
 def random_gap(seed, height):
     """Return a gap of white noise, waves or steps on the interface."""
     rng = np.random.default_rng(seed)
-    x = coated_pair(N_ELEMENTS).interface.x
+    x = make_coated_pair(N_ELEMENTS).interface.x
     kind = rng.integers(3)
     if kind == 0:
         return 10.0**height * rng.normal(size=x.size)
-    return rough(rng, x, 10.0**height) if kind == 1 else 10.0**height * rng.integers(0, 3, x.size)
+    return (
+        draw_gap(rng, x, 10.0**height) if kind == 1 else 10.0**height * rng.integers(0, 3, x.size)
+    )
 
 
 def nodal_forces(pair, state):
@@ -47,7 +49,7 @@ def test_exact_moment_rotation_and_approach_control_agree(seed, height, power, l
     The tolerance includes the rounding of the rotation and approach, which matters where the gap is
     large compared with the approach.
     """
-    pair = coated_pair(N_ELEMENTS)
+    pair = make_coated_pair(N_ELEMENTS)
     gap = random_gap(seed, height)
     load = 10.0**power
     x = pair.interface.x

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
+from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 from scipy.integrate import quad
 from scipy.stats import norm
-from skins import longer, solve, strips_of, tangent
+from skins import layer_stiffness, make_strips, press_layer, stretch_law
 
 from patchfem.contact import (
     ExponentialAsperities,
@@ -40,16 +40,16 @@ each_layer = pytest.mark.parametrize("layer", LAYERS.values(), ids=LAYERS.keys()
 
 def pair_arrays(n_elements=100):
     """Return the normal compliance, the nodes and the nodal areas of the coated pair."""
-    pair = coated_pair(n_elements)
+    pair = make_coated_pair(n_elements)
     return pair.normal, pair.interface.x, pair.interface.weight
 
 
 def test_exact_reference_pressure_shifts_approach_only():
     """The reference pressure of an exponential layer shifts the approach by u0 log(ratio) and keeps the forces."""
     compliance, x, weight = pair_arrays()
-    gap = rough(np.random.default_rng(1), x, 1e-6)
+    gap = draw_gap(np.random.default_rng(1), x, 1e-6)
     mean_reference, high_reference = (
-        solve(ExponentialAsperities(1e-7, p), compliance, x, weight, gap, LOAD)
+        press_layer(ExponentialAsperities(1e-7, p), compliance, x, weight, gap, LOAD)
         for p in (None, 1e3 * MEAN_PRESSURE)
     )
     assert np.abs(mean_reference.force - high_reference.force).max() <= 1e-11 * LOAD
@@ -62,21 +62,21 @@ def test_exact_reference_pressure_shifts_approach_only():
 GAPS = {
     "flat": lambda x: 0 * x,
     "tilt": lambda x: 1e-4 * x,
-    "rough": lambda x: rough(np.random.default_rng(5), x, 3e-7),
+    "rough": lambda x: draw_gap(np.random.default_rng(5), x, 3e-7),
 }
 
 
 @pytest.mark.parametrize("offset", [None, 2e-3])
 def test_order_one_stiff_linear_layer_converges_to_bare_contact(offset):
     """The pressure with a linear layer converges to that of bare contact with the inverse of the layer stiffness."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     compliance, x, weight = pair_arrays()
     gap = GAPS["tilt"](x)
     moment = None if offset is None else offset * LOAD
     bare = press(pair, gap, LOAD, moment)
     errors = [
         np.abs(
-            solve(LinearAsperities(k), compliance, x, weight, gap, LOAD, moment).pressure
+            press_layer(LinearAsperities(k), compliance, x, weight, gap, LOAD, moment).pressure
             - bare.sigma_n
         ).max()
         / MEAN_PRESSURE
@@ -92,9 +92,11 @@ def test_order_one_thin_layers_converge_to_bare_contact(layer):
     """The pressure with a thin layer converges to that of bare contact with the thickness, up to a logarithm."""
     compliance, x, weight = pair_arrays()
     gap = GAPS["tilt"](x)
-    bare = press(coated_pair(100), gap, LOAD).sigma_n
+    bare = press(make_coated_pair(100), gap, LOAD).sigma_n
     errors = [
-        np.abs(solve(longer(layer, t), compliance, x, weight, gap, LOAD).pressure - bare).max()
+        np.abs(
+            press_layer(stretch_law(layer, t), compliance, x, weight, gap, LOAD).pressure - bare
+        ).max()
         / bare.max()
         for t in (1e-3, 1e-4, 1e-5, 1e-6)
     ]
@@ -106,12 +108,12 @@ def test_order_one_thin_layers_converge_to_bare_contact(layer):
 def test_exact_layer_controls_give_same_forces(layer, offset):
     """Prescribing the rotation and the approach that moment control returned gives the same forces."""
     compliance, x, weight = pair_arrays()
-    gap = 2e-5 * x + rough(np.random.default_rng(3), x, 1e-7)
-    free = solve(layer, compliance, x, weight, gap, LOAD, LOAD * offset)
-    prescribed_rotation = solve(
+    gap = 2e-5 * x + draw_gap(np.random.default_rng(3), x, 1e-7)
+    free = press_layer(layer, compliance, x, weight, gap, LOAD, LOAD * offset)
+    prescribed_rotation = press_layer(
         layer, compliance, x, weight, gap + free.theta * x, LOAD, rotation=free.theta
     )
-    prescribed_approach = solve(
+    prescribed_approach = press_layer(
         layer, compliance, x, weight, gap + free.theta * x, approach=free.delta, rotation=free.theta
     )
     for other in (prescribed_rotation, prescribed_approach):
@@ -124,9 +126,9 @@ def test_exact_layer_forces_minimise_energy():
     """The gradient of the complementary energy vanishes in every direction that keeps load and moment."""
     compliance, x, weight = pair_arrays()
     rng = np.random.default_rng(4)
-    gap = rough(rng, x, 1e-7)
+    gap = draw_gap(rng, x, 1e-7)
     for layer in (ExponentialAsperities(1e-7, 1e6), HERTZ_LAYER):
-        state = solve(layer, compliance, x, weight, gap, LOAD, 1e-3 * LOAD)
+        state = press_layer(layer, compliance, x, weight, gap, LOAD, 1e-3 * LOAD)
         slope = compliance @ state.force + gap - layer.separation(state.pressure)
         rigid_motions = np.stack([np.ones(x.size), x / LENGTH], axis=1)
         residual = slope - rigid_motions @ np.linalg.lstsq(rigid_motions, slope, rcond=None)[0]
@@ -189,16 +191,18 @@ def test_exact_separation_inverts_pressure(layer):
 def test_exact_doubled_problem_doubles_pressure(layer):
     """Doubling the gap, the layer thickness and the load doubles forces and approach."""
     compliance, x, weight = pair_arrays()
-    gap = 3e-5 * x + rough(np.random.default_rng(2), x, 1e-7)
+    gap = 3e-5 * x + draw_gap(np.random.default_rng(2), x, 1e-7)
     scaled_layers = {
         "linear": lambda: layer,
         "exponential": lambda: ExponentialAsperities(1e-6, 2e6),
-        "hertz": lambda: replace(longer(layer, 2.0), density=2 * longer(layer, 2.0).density),
+        "hertz": lambda: replace(
+            stretch_law(layer, 2.0), density=2 * stretch_law(layer, 2.0).density
+        ),
     }
     scaled_layer = next(scaled_layers[name]() for name, law in LAYERS.items() if law is layer)
     for moment in (None, 1e-3 * LOAD):
-        state = solve(layer, compliance, x, weight, gap, LOAD, moment)
-        scaled_state = solve(
+        state = press_layer(layer, compliance, x, weight, gap, LOAD, moment)
+        scaled_state = press_layer(
             scaled_layer,
             compliance,
             x,
@@ -217,15 +221,15 @@ def test_exact_tangential_stiffness_of_layer_and_bodies():
     Rigid bodies leave the sum of k A of the layer; a stiff layer leaves the stiffness of the
     bodies.
     """
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     compliance, _, weight = pair_arrays()
     k = np.full(weight.size, 1e13)
-    assert tangent(0 * compliance, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
+    assert layer_stiffness(0 * compliance, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
     all_nodes = np.ones(weight.size, bool)
-    assert tangent(compliance, weight, 1e9 * k) == pytest.approx(
+    assert layer_stiffness(compliance, weight, 1e9 * k) == pytest.approx(
         tangential_stiffness(compliance, all_nodes), rel=1e-5
     )
-    stiffness = tangent(pair.tangential, weight, 0.8 * k)
+    stiffness = layer_stiffness(pair.tangential, weight, 0.8 * k)
     expected = np.linalg.solve(
         pair.tangential + np.diag(1 / (0.8e13 * weight)), np.ones(weight.size)
     ).sum()
@@ -233,13 +237,13 @@ def test_exact_tangential_stiffness_of_layer_and_bodies():
     assert stiffness < min(0.8e13 * AREA, tangential_stiffness(pair.tangential, all_nodes))
     partial_stiffness = np.where(np.arange(weight.size) < 40, k, 0.0)
     contact_block = np.ix_(partial_stiffness > 0, partial_stiffness > 0)
-    assert tangent(compliance, weight, partial_stiffness) == pytest.approx(
+    assert layer_stiffness(compliance, weight, partial_stiffness) == pytest.approx(
         np.linalg.solve(
             compliance[contact_block] + np.diag(1 / (1e13 * weight[:40])), np.ones(40)
         ).sum(),
         rel=1e-11,
     )
-    assert tangent(compliance, weight, 0 * k) == 0.0
+    assert layer_stiffness(compliance, weight, 0 * k) == 0.0
 
 
 # ------------------------------------------------------------------------------------------------------- never failing
@@ -250,11 +254,11 @@ def test_exact_holder_spring_equals_applied_moment(layer, spring):
     compliance, x, weight = pair_arrays(60)
     gap = 1e-4 * x
     moment = 2e-3 * LOAD
-    with_spring = solve(
+    with_spring = press_layer(
         layer, compliance, x, weight, gap, LOAD, moment, rotation=1e-4, spring=spring
     )
     rotation = with_spring.theta - 1e-4
-    free = solve(layer, compliance, x, weight, gap, LOAD, moment + spring * rotation)
+    free = press_layer(layer, compliance, x, weight, gap, LOAD, moment + spring * rotation)
     assert abs(rotation) > 1e-9 and free.theta == pytest.approx(rotation, rel=1e-7)
     assert np.abs(with_spring.force - free.force).max() <= 1e-9 * LOAD
     assert with_spring.moment == pytest.approx(
@@ -313,7 +317,7 @@ def test_always_layer_solve_converges(
     gap = 10**angle * x + (
         10**log_roughness * rng.normal(size=x.size)
         if is_noise
-        else rough(rng, x, 10**log_roughness)
+        else draw_gap(rng, x, 10**log_roughness)
     )
     layer = {
         "linear": LinearAsperities(10**log_stiffness),
@@ -328,7 +332,7 @@ def test_always_layer_solve_converges(
         x,
         weight,
         gap,
-        solve(layer, compliance, x, weight, gap, load, moment),
+        press_layer(layer, compliance, x, weight, gap, load, moment),
         load,
         moment,
     )
@@ -345,7 +349,7 @@ def test_always_prescribed_approach_converges(depth, sign, seed, law):
     compliance, x, weight = pair_arrays(40)
     gap = 1e-6 * np.random.default_rng(seed).normal(size=x.size)
     layer = {**LAYERS, "exponential": ExponentialAsperities(1e-8, 1e6)}[law]
-    state = solve(layer, compliance, x, weight, gap, approach=gap.min() + sign * 10**depth)
+    state = press_layer(layer, compliance, x, weight, gap, approach=gap.min() + sign * 10**depth)
     assert (
         state.force.min() >= 0 and max(state.residuals.values(), default=0.0) <= STRIP_RESIDUAL_TOL
     )
@@ -363,7 +367,7 @@ def test_exact_approach_near_pressure_floor():
         np.log(1e6) + 300
     )  # the separation at which the pressure is exp(MIN_LOG_PRESSURE)
     for factor in (1 - 1e-3, 1 - 1e-9, 1.0, 1 + 1e-9, 1 + 1e-3, 1 + 1e-2):
-        state = solve(
+        state = press_layer(
             layer, compliance, x, weight, gap, approach=gap.min() - factor * limit_separation
         )
         assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
@@ -378,7 +382,7 @@ def test_exact_dual_descent_gives_newton_forces(monkeypatch):
     newton = asperity_layer._solve_newton
     for layer in (ExponentialAsperities(1e-8, MEAN_PRESSURE), replace(HERTZ_LAYER, deviation=1e-8)):
         for moment in (None, 2e-3 * LOAD):
-            with_newton = solve(layer, compliance, x, weight, gap, LOAD, moment)
+            with_newton = press_layer(layer, compliance, x, weight, gap, LOAD, moment)
             with (
                 monkeypatch.context() as patch
             ):  # Newton steps are left only for the patch under a prescribed approach
@@ -387,7 +391,7 @@ def test_exact_dual_descent_gives_newton_forces(monkeypatch):
                     "_solve_newton",
                     lambda *a: None if a[0].contact.target.size else newton(*a),
                 )
-                without_newton = solve(layer, compliance, x, weight, gap, LOAD, moment)
+                without_newton = press_layer(layer, compliance, x, weight, gap, LOAD, moment)
             assert without_newton.iterations > with_newton.iterations
             assert np.abs(without_newton.force - with_newton.force).max() <= 1e-9 * LOAD
 
@@ -400,16 +404,16 @@ def test_refuses_unsolvable_layer_controls():
     c, x, weight = pair_arrays(40)
     for control in ({}, {"load": 1.0, "approach": 1e-6}, {"approach": 1e-6, "moment": 0.0}):
         with pytest.raises(PatchfemError, match="give a load"):
-            solve(HERTZ_LAYER, c, x, weight, 0 * x, **control)
+            press_layer(HERTZ_LAYER, c, x, weight, 0 * x, **control)
     for load in (-1.0, np.nan, np.inf):
         with pytest.raises(PatchfemError, match=r"contact\.load"):
-            solve(HERTZ_LAYER, c, x, weight, 0 * x, load)
+            press_layer(HERTZ_LAYER, c, x, weight, 0 * x, load)
     with pytest.raises(PatchfemError, match="tips over"):
-        solve(HERTZ_LAYER, c, x, weight, 0 * x, LOAD, 0.5 * LENGTH * LOAD)
+        press_layer(HERTZ_LAYER, c, x, weight, 0 * x, LOAD, 0.5 * LENGTH * LOAD)
     with pytest.raises(PatchfemError, match="no first touch"):
-        solve(ExponentialAsperities(1e-6), c, x, weight, 0 * x, approach=1e-6)
+        press_layer(ExponentialAsperities(1e-6), c, x, weight, 0 * x, approach=1e-6)
     with pytest.raises(PatchfemError, match="rough layer is too large to compute"):
-        solve(ExponentialAsperities(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
+        press_layer(ExponentialAsperities(1e-9, 1e6), 0 * c, x, weight, 0 * x, approach=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -425,18 +429,18 @@ def test_refuses_unconverged_layer_solve(monkeypatch, limit, value, message):
     c, x, weight = pair_arrays(40)
     monkeypatch.setattr(f"patchfem.contact.{limit}", value)
     with pytest.raises(NotConverged, match=message):
-        solve(HERTZ_LAYER, c, x, weight, 1e-4 * x, LOAD)
+        press_layer(HERTZ_LAYER, c, x, weight, 1e-4 * x, LOAD)
 
 
 def test_always_residual_check_detects_wrong_force():
     """The independent residual check detects a wrong force that still balances the load."""
     compliance, x, weight = pair_arrays(40)
     for layer in (LAYERS["exponential"], HERTZ_LAYER):
-        state = solve(layer, compliance, x, weight, 1e-5 * x, LOAD)
+        state = press_layer(layer, compliance, x, weight, 1e-5 * x, LOAD)
         wrong = state.force.copy()
         wrong[3], wrong[4] = wrong[3] * 1.001, wrong[4] - 0.001 * wrong[3]
         residuals = compute_strip_residuals(
-            strips_of(compliance, x, weight, np.zeros(1), layer),
+            make_strips(compliance, x, weight, np.zeros(1), layer),
             1e-5 * x[None],
             wrong[None],
             HolderPosition(state.delta),

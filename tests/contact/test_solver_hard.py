@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
+from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
 
 from patchfem.contact import (
     RESIDUAL_TOL,
@@ -108,7 +108,7 @@ def test_exact_solution_equals_enumeration_of_contact_sets(n_nodes, seed, contro
 @pytest.mark.parametrize("node", [1, 37, 50, 88])
 def test_exact_single_contact_node_carries_load(node):
     """A single node in contact carries the load, although its rotation is not unique."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     x = pair.interface.x
     c = pair.normal
     gap = 1e-2 * np.abs(x - x[node])
@@ -134,7 +134,7 @@ def test_exact_single_contact_node_carries_load(node):
 @pytest.mark.parametrize("moment", [None, 0.0])
 def test_exact_vanishing_load_scales_linearly(fraction, moment):
     """A tiny load on flat pieces scales linearly, and on a crown only the crest touches."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     full_state, small_state = (
         press(pair, np.zeros(101), f * LOAD, moment) for f in (1.0, fraction)
     )
@@ -151,37 +151,37 @@ def test_exact_vanishing_load_scales_linearly(fraction, moment):
 def test_refuses_load_too_small_to_represent(load):
     """A load so small that the pressures underflow is refused."""
     with pytest.raises(PatchfemError, match=r"contact\.load: .* too small .* give 0"):
-        press(coated_pair(100), np.zeros(101), load)
+        press(make_coated_pair(100), np.zeros(101), load)
 
 
 @pytest.mark.parametrize("load", [1e201, 1.7e308, np.inf, np.nan, -1.0])
 def test_refuses_invalid_load(load):
     """A negative, infinite, undefined or excessive load is refused."""
     with pytest.raises(PatchfemError, match=r"contact\.load: "):
-        press(coated_pair(100), np.zeros(101), load)
+        press(make_coated_pair(100), np.zeros(101), load)
 
 
 def test_refuses_approach_too_small_to_represent():
     """An approach so small that the pressures underflow is refused."""
     with pytest.raises(PatchfemError, match=r"contact\.approach: .* too small"):
-        press_to_approach(coated_pair(100), np.zeros(101), 1e-300)
+        press_to_approach(make_coated_pair(100), np.zeros(101), 1e-300)
 
 
 @pytest.mark.parametrize("moment", [None, LOAD * 1e-5])
 def test_refuses_indefinite_compliance(moment):
     """A compliance that is not positive definite is refused, without advice on load or holder."""
-    c = -coated_pair(100).normal
+    c = -make_coated_pair(100).normal
     with pytest.raises(
         NotConverged, match=r"not positive definite.*contact\.element_size"
     ) as caught:
-        press(make_pair(coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
+        press(make_pair(make_coated_pair(100).interface.x, c), np.zeros(101), LOAD, moment)
     # a different load would not help
     assert "raise the load" not in str(caught.value) and "holder" not in str(caught.value)
 
 
 def test_refuses_undetermined_rotation_with_advice():
     """The message about an undetermined free rotation advises to set or raise the rotational stiffness of the holder."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
 
     def message(**control):
         problem = patch_problem(pair.interface.x, np.zeros(101), LOAD, **control)
@@ -195,10 +195,10 @@ def test_refuses_undetermined_rotation_with_advice():
 @pytest.mark.parametrize("control", ["load", "line", "spring"])
 def test_exact_huge_spikes_equal_removed_nodes(control):
     """Nodes with a gap of a metre carry nothing, and the solution is that without these nodes."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     x = pair.interface.x
     rng = np.random.default_rng(4)
-    gap = rough(rng, x, 3e-7)
+    gap = draw_gap(rng, x, 3e-7)
     spikes = np.zeros(101, bool)
     spikes[rng.choice(np.arange(1, 100), 30, replace=False)] = True
     moment, spring = {
@@ -224,7 +224,7 @@ def test_exact_huge_spikes_equal_removed_nodes(control):
 @pytest.mark.parametrize("moment", [None, LOAD * 2e-3])
 def test_exact_large_gap_offset_adds_to_approach(offset, moment):
     """A gap offset of a kilometre changes only the approach, up to the rounding of the gap."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     distant_gap = offset + crown(pair.interface.x, 1.0)
     near_gap = distant_gap - offset  # exact subtraction, as both numbers are within a factor of two
     distant_state = press(pair, distant_gap, LOAD, moment)
@@ -249,7 +249,7 @@ def test_exact_large_gap_offset_adds_to_approach(offset, moment):
 @pytest.mark.parametrize("side", [1, -1])
 def test_exact_load_line_near_tipping_limit(fraction, side):
     """A load line just inside the end of the piece gives balanced, non-negative forces."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     x = pair.interface.x
     load_line = side * fraction * LENGTH
     for gap in (np.zeros(101), crown(x, 1.0), 1e-6 * np.random.default_rng(1).normal(size=101)):
@@ -274,7 +274,7 @@ def test_exact_load_line_near_tipping_limit(fraction, side):
 def test_refuses_load_line_beyond_end(fraction):
     """A load line at or beyond the end of the piece is refused, because the piece tips over."""
     with pytest.raises(PatchfemError, match=r"contact\.load_line: .* tips over"):
-        press(coated_pair(100), np.zeros(101), LOAD, LOAD * fraction * LENGTH)
+        press(make_coated_pair(100), np.zeros(101), LOAD, LOAD * fraction * LENGTH)
 
 
 @pytest.mark.parametrize(
@@ -284,12 +284,12 @@ def test_refuses_load_line_beyond_end(fraction):
 def test_refuses_invalid_moment_or_spring(change):
     """An undefined moment and a negative or undefined spring stiffness are refused."""
     with pytest.raises(PatchfemError, match=r"contact\.load_line"):
-        press(coated_pair(100), np.zeros(101), LOAD, **change)
+        press(make_coated_pair(100), np.zeros(101), LOAD, **change)
 
 
 def test_exact_spring_supports_load_line_beyond_end():
     """With a holder spring the last node carries the load, and the spring takes the remaining moment."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     x = pair.interface.x
     state = press(pair, 1e-2 * (x[-1] - x), LOAD, LOAD * LENGTH, spring=1e4)
     assert nodal_forces(pair, state)[-1] == pytest.approx(LOAD, rel=1e-13)
@@ -302,7 +302,7 @@ def test_exact_spring_supports_load_line_beyond_end():
 @pytest.mark.parametrize("moment", [None, 0.0])
 def test_exact_plateau_forces_follow_compliance(moment):
     """The forces of 21 nodes of equal height are those of their compliance block alone."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     gap = np.full(101, 1e-3)
     plateau = slice(40, 61)
     gap[plateau] = 0.0
@@ -353,12 +353,12 @@ def test_exact_primal_method_solves_cycling_strips():
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_primal_method_with_two_rotations(seed):
     """The primal method solves strips that rotate about two axes, and agrees with the combined solver."""
-    pair = coated_pair(40)
+    pair = make_coated_pair(40)
     n_strips = 3
     x = np.tile(pair.interface.x, n_strips)
     y = np.repeat([-3e-3, 0.0, 3e-3], pair.interface.x.size)
     rng = np.random.default_rng(seed)
-    gap = np.concatenate([rough(rng, pair.interface.x, 1e-7) for _ in range(n_strips)])
+    gap = np.concatenate([draw_gap(rng, pair.interface.x, 1e-7) for _ in range(n_strips)])
     motions = np.stack([np.ones(x.size), x, y], axis=1)
     problem = ContactProblem(gap, motions, np.array([LOAD, 0.0, 0.0]), springs=np.zeros(3))
     solution, _ = solve_primal(
@@ -387,8 +387,8 @@ CONTROLS = {
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
 def test_exact_primal_method_agrees_under_every_control(control):
     """The primal method and the default method have the same solution under every control."""
-    pair = coated_pair(100)
-    gap = rough(np.random.default_rng(3), pair.interface.x, 1e-6)
+    pair = make_coated_pair(100)
+    gap = draw_gap(np.random.default_rng(3), pair.interface.x, 1e-6)
     problem = patch_problem(
         pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control
     )
@@ -401,7 +401,7 @@ def test_exact_primal_method_agrees_under_every_control(control):
 
 def test_refuses_solution_with_large_residual(monkeypatch):
     """A solution whose forces or motion are wrong by 1e-9 is refused."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     solution = solve(
         StripCompliance(pair.normal), patch_problem(pair.interface.x, np.zeros(101), LOAD)
     )
@@ -435,7 +435,7 @@ def test_exact_projected_forces_satisfy_optimality(seed, size):
 @cache
 def _fine_pair() -> Compliance:
     """Return the coated pair with 400 elements."""
-    return coated_pair(400)
+    return make_coated_pair(400)
 
 
 def random_operator(rng, size):
@@ -465,7 +465,7 @@ def random_gap(rng, x):
     m = x.size
     return (
         lambda: scale * rng.normal(size=m),
-        lambda: rough(rng, x, scale),
+        lambda: draw_gap(rng, x, scale),
         lambda: scale * rng.normal(size=m) * (rng.random(m) < 0.1),
         lambda: scale * np.cumsum(rng.random(m) < 0.1) * rng.choice([-1, 1]),
         lambda: sum(10.0 ** rng.uniform(-12, -2) * rng.normal(size=m) for _ in range(3)),

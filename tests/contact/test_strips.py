@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
-from skins import press_strips, solve, tangent
+from pieces import LENGTH, LOAD, WIDTH, draw_gap, make_coated_pair
+from skins import layer_stiffness, press_layer, press_strips
 
 from patchfem.closed_forms.contact import (
     wedge_on_asperities,
@@ -51,7 +51,7 @@ each_control = pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROL
 
 def pair_strips(n_strips, n_elements=60):
     """Return (normal, x, weight, offsets) of strips of the coated pair."""
-    pair = coated_pair(n_elements)
+    pair = make_coated_pair(n_elements)
     c, _, weight = split_into_strips(pair, n_strips)
     return c, pair.interface.x, weight, strip_offsets(WIDTH, n_strips)
 
@@ -70,7 +70,7 @@ def add_linear_layer(layer, c, weight):
 
 def solve_undivided(layer, n_elements, gap, moment=None, spring=0.0, load=LOAD):
     """Return (nodal forces, delta, theta) of the undivided patch."""
-    pair = coated_pair(n_elements)
+    pair = make_coated_pair(n_elements)
     x = pair.interface.x
     weight = pair.interface.weight
     if layer is None or isinstance(layer, LinearAsperities):
@@ -79,13 +79,13 @@ def solve_undivided(layer, n_elements, gap, moment=None, spring=0.0, load=LOAD):
         )
         state = press(pair, gap, load, moment, spring=spring)
         return state.sigma_n * weight, state.approach, state.rotation
-    state = solve(layer, pair.normal, x, weight, gap, load, moment)
+    state = press_layer(layer, pair.normal, x, weight, gap, load, moment)
     return state.force, state.delta, state.theta
 
 
 def random_gaps(rng, x, n_strips, amplitude):
     """Return one smooth random gap per strip (count, m) [m]."""
-    return np.array([rough(rng, x, amplitude) for _ in range(n_strips)])
+    return np.array([draw_gap(rng, x, amplitude) for _ in range(n_strips)])
 
 
 # ------------------------------------------------------------------------------------------------- against one patch
@@ -169,7 +169,7 @@ def test_exact_strips_equal_block_diagonal_problem(layer, has_diagonals):
         positions = np.tile(x, y.size)
         gaps = (gap + roll * y[:, None]).ravel()
         if not is_linear:
-            dense = solve(
+            dense = press_layer(
                 layer,
                 np.kron(np.eye(y.size), c) + np.diag(diagonals.ravel()),
                 positions,
@@ -453,7 +453,7 @@ def test_order_two_stiffness_equals_load_difference(layer):
 
 def test_exact_strip_stiffnesses_equal_undivided_patch():
     """Normal and tangential stiffness of strips without roll equal those of the undivided patch."""
-    pair = coated_pair(60)
+    pair = make_coated_pair(60)
     c, tangential, weight = split_into_strips(pair, 8)
     y = strip_offsets(WIDTH, 8)
     gap = 1e-4 * pair.interface.x
@@ -467,7 +467,9 @@ def test_exact_strip_stiffnesses_equal_undivided_patch():
     )
     layer = LAYERS["hertz"]
     rough_state = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD, asperities=layer)
-    expected = tangent(pair.tangential, pair.interface.weight, 0.8 * rough_state.stiffness[0])
+    expected = layer_stiffness(
+        pair.tangential, pair.interface.weight, 0.8 * rough_state.stiffness[0]
+    )
     assert strips_stiffness(tangential, weight, rough_state, 0.8) == pytest.approx(
         expected, rel=1e-12
     )

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pieces import COATED, COATING, LENGTH, LOAD, TILTS, WIDTH, coated_pair, pair_of, rough
+from pieces import (
+    COATED,
+    COATING,
+    LENGTH,
+    LOAD,
+    TILTS,
+    WIDTH,
+    draw_gap,
+    make_coated_pair,
+    make_compliance,
+)
 
 from patchfem.contact import press, press_to_approach
 from patchfem.contact.gaps import crown, tilt
@@ -16,7 +26,7 @@ from patchfem.mesh import graded_grid
 @pytest.mark.parametrize("offset", [0.0, 1e-3, 3e-3])
 def test_always_load_line_on_right_opens_left_side(offset):
     """A load line right of the centre gives a negative rotation, which opens the left side."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     state = press(pair, np.zeros(101), LOAD, LOAD * offset)
     assert np.sign(np.round(state.rotation, 16)) == -np.sign(offset)
     fixed = press(pair, tilt(pair.interface.x, 1e-5), LOAD)
@@ -26,12 +36,12 @@ def test_always_load_line_on_right_opens_left_side(offset):
 def random_cases(n_cases):
     """Yield pairs with smooth, noisy and spiked gaps of 1 nm to 100 um, loads and load lines."""
     rng = np.random.default_rng(2026)
-    pair = pair_of(graded_grid(LENGTH, 6.35e-3, LENGTH / 40, COATING), COATED)
+    pair = make_compliance(graded_grid(LENGTH, 6.35e-3, LENGTH / 40, COATING), COATED)
     x = pair.interface.x
     for k in range(n_cases):
         amplitude = 10 ** rng.uniform(-9, -4)
         gap = (
-            rough(rng, x, amplitude),
+            draw_gap(rng, x, amplitude),
             amplitude * rng.normal(size=x.size),
             amplitude * rng.standard_cauchy(x.size),
         )[k % 3]
@@ -55,7 +65,7 @@ def test_always_initial_active_set_does_not_affect_forces():
 @pytest.mark.parametrize("moment", [None, 0.0])
 def test_exact_zero_load_gives_touching_pieces_without_force(moment):
     """Under zero load the pieces touch without force, and the approach is the smallest gap."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     gap = crown(pair.interface.x, 1.0) + 3e-6
     state = press(pair, gap, 0.0, moment)
     assert state.outcome is Outcome.NO_CONTACT
@@ -66,7 +76,7 @@ def test_exact_zero_load_gives_touching_pieces_without_force(moment):
 
 def test_exact_approach_is_relative_to_gap_offset():
     """Shifting gap and approach by the same negative offset leaves load and pressure unchanged."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     gap = crown(pair.interface.x, 1.0)
     above = press_to_approach(pair, gap, 2e-6)
     below = press_to_approach(pair, gap - 8e-6, 2e-6 - 8e-6)
@@ -87,7 +97,7 @@ TWO_BODY_RESULTS = {
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_coated_pair_agrees_with_uncondensed_bodies(angle):
     """Contact fraction, stiffness, peak pressure and approach agree with a solution of both bodies without condensation."""
-    pair = coated_pair(200)
+    pair = make_coated_pair(200)
     x = pair.interface.x
     weight = pair.interface.weight
     state = press(pair, tilt(x, angle), LOAD)

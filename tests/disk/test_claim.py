@@ -8,8 +8,8 @@ import threading
 from pathlib import Path
 
 import pytest
-from command_line import cli
-from limits import limited
+from command_line import run_cli
+from limits import limit_file_size
 from scene_texts import BENCH
 
 from patchfem.core import Missing
@@ -97,7 +97,7 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
     lock = tmp_path / ".out.writer"
     first = process(HOLD, lock)
     assert first.stdout.readline() == "taken\n"
-    answer = cli(*words)
+    answer = run_cli(*words)
     assert answer.code == 4
     assert f"another run (process {first.pid}) is writing to this" in answer.err
     assert names(tmp_path) == {"scene.toml", ".out.writer"}
@@ -105,7 +105,7 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
     while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
         pass
     assert not is_running(first.pid)  # nobody has waited for it, but it works no more
-    assert cli(*words).code == 0 and names(tmp_path) == {"scene.toml", "out"}
+    assert run_cli(*words).code == 0 and names(tmp_path) == {"scene.toml", "out"}
     first.communicate()
 
 
@@ -164,7 +164,7 @@ def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
 
 def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path):
     """Part of a name once stayed behind, which no process could own or remove."""
-    with limited(5):
+    with limit_file_size(5):
         with pytest.raises(Missing, match=r"out: cannot be written.* \((No space left|File too)"):
             FolderLock(tmp_path / "lock", "out", "run").acquire()
         with pytest.raises(Missing, match="out: cannot be written"):

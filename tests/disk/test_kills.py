@@ -8,7 +8,7 @@ import sys
 import time
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH
 
 from patchfem.export.netcdf import h5netcdf
@@ -90,7 +90,7 @@ def test_always_runs_killed_at_random_times_leave_whole_results(tmp_path):
     out = tmp_path / "out"
     chance = random.Random(17)
     scene.write_text(BENCH, "utf-8")
-    assert cli("run", scene, "-o", out).code == 0
+    assert run_cli("run", scene, "-o", out).code == 0
     words = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", out]
     begin = time.perf_counter()
     assert subprocess.run(words, check=True).returncode == 0
@@ -110,7 +110,7 @@ def test_always_runs_killed_at_random_times_leave_whole_results(tmp_path):
         }
         whole(out)
     assert killed > 20
-    assert cli("run", scene, "-q", "-o", out).code == 0
+    assert run_cli("run", scene, "-q", "-o", out).code == 0
     assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
     whole(out)
 

@@ -12,8 +12,8 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from command_line import cli
-from limits import limited
+from command_line import run_cli
+from limits import limit_file_size
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
@@ -34,7 +34,7 @@ def results(tmp_path_factory):
     """(scene, results folder) of pressed pieces."""
     place = tmp_path_factory.mktemp("results")
     (place / "scene.toml").write_text(COATED, "utf-8")
-    assert cli("run", place / "scene.toml", "-o", place / "out", "--no-page").code == 0
+    assert run_cli("run", place / "scene.toml", "-o", place / "out", "--no-page").code == 0
     return place / "scene.toml", place / "out"
 
 
@@ -47,8 +47,8 @@ def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_
     scene.write_text(COATED, "utf-8")
     out.mkdir()
     (out / "summary.json").write_text("older")
-    with limited(size):
-        answer = cli("run", scene, "-o", out)
+    with limit_file_size(size):
+        answer = run_cli("run", scene, "-o", out)
     assert (
         answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err
     ), answer.err
@@ -102,8 +102,10 @@ def test_always_every_file_is_the_older_one_where_there_is_no_room(
     monkeypatch.chdir(tmp_path)
     name = words[-1]
     Path(name).write_text("older")
-    with limited(2048):
-        answer = cli(*({"SCENE": results[0], "OUT": results[1]}.get(word, word) for word in words))
+    with limit_file_size(2048):
+        answer = run_cli(
+            *({"SCENE": results[0], "OUT": results[1]}.get(word, word) for word in words)
+        )
     assert (
         answer.code == 4
         and "not enough space" in answer.err
@@ -122,7 +124,7 @@ def test_always_every_file_is_the_older_one_where_there_is_no_room(
 )
 def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
     for device, code in ("/dev/full", 4), ("/dev/null", 0):
-        answer = cli("schema", "-o", device)
+        answer = run_cli("schema", "-o", device)
         assert answer.code == code and stat.S_ISCHR(os.stat(device).st_mode)
         assert not code or "/dev/full: not enough space (No space left on device)" in answer.err
 
@@ -131,7 +133,7 @@ def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
 def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, size):
     data = np.arange(10_000.0)
     with (
-        limited(size),
+        limit_file_size(size),
         pytest.raises(OSError) as caught,
         open_lossy(tmp_path / "a.h5") as kept,
         h5py.File(kept, "w") as file,
@@ -179,7 +181,7 @@ def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_
 def test_refuses_before_it_writes_what_has_no_room(tmp_path):
     space = find_free_space(tmp_path / "not" / "yet" / "a")
     assert space.size > 0 and ("free" in space.limit or "limit" in space.limit)
-    with limited(100):
+    with limit_file_size(100):
         limit = "is the limit on the size of a file (ulimit -f)"
         assert find_free_space(tmp_path / "a") == (100, limit, True)
         with (
@@ -207,12 +209,12 @@ def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(BENCH, "utf-8")
     words = ("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "out", "-q")
-    with limited(8192):  # a summary has room, the table with the page has not
-        answer = cli(*words)
+    with limit_file_size(8192):  # a summary has room, the table with the page has not
+        answer = run_cli(*words)
     assert answer.code == 4 and "not enough space" in answer.err and "out/" in answer.err
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2
     assert not [one for one in (tmp_path / "out").rglob("*") if one.name.startswith(".")]
-    assert cli(*words, "--resume").code == 0
+    assert run_cli(*words, "--resume").code == 0
 
 
 class InterruptedStream(io.StringIO):
@@ -226,7 +228,7 @@ class InterruptedStream(io.StringIO):
 def test_exact_an_interrupt_after_a_file_is_in_place_names_the_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("a.json").write_text("older")
-    answer = cli("schema", "-o", "a.json", stdout=InterruptedStream())
+    answer = run_cli("schema", "-o", "a.json", stdout=InterruptedStream())
     assert answer.code == 130 and answer.err == "interrupted; already complete: a.json\n"
     assert Path("a.json").read_text() != "older"
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
@@ -240,7 +242,7 @@ def test_exact_an_interrupt_before_a_file_is_replaced_says_that(tmp_path, monkey
         raise KeyboardInterrupt
 
     monkeypatch.setattr(os, "replace", interrupt)
-    answer = cli("schema", "-o", "a.json")
+    answer = run_cli("schema", "-o", "a.json")
     assert answer.code == 130 and answer.err == "interrupted; no file was replaced\n"
     assert Path("a.json").read_text() == "older"
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
@@ -248,7 +250,7 @@ def test_exact_an_interrupt_before_a_file_is_replaced_says_that(tmp_path, monkey
 
 def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):
     with (
-        limited(1000),
+        limit_file_size(1000),
         pytest.raises(
             Missing, match=r"a\.json: not enough space.*: 2 kB needed, 1 kB is the limit"
         ),
@@ -278,14 +280,14 @@ def test_exact_a_full_table_of_files_is_told_as_that(tmp_path, monkeypatch):
 def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "FILE").write_text("")
-    answer = cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
+    answer = run_cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
     assert answer.code == 4
     assert f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
 
 
 def test_always_a_name_that_is_too_long_wants_a_shorter_one(tmp_path):
     (tmp_path / "bench.toml").write_text(BENCH)
-    answer = cli("run", tmp_path / "bench.toml", "-o", tmp_path / ("a" * 250))
+    answer = run_cli("run", tmp_path / "bench.toml", "-o", tmp_path / ("a" * 250))
     assert answer.code == 4 and answer.err.rstrip().endswith("use a shorter name")
 
 
@@ -294,6 +296,6 @@ def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
-    answer = cli("run", tmp_path / "bench.toml")
+    answer = run_cli("run", tmp_path / "bench.toml")
     assert answer.code == 4
     assert "the working folder no longer exists; change to an existing one" in answer.err

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
@@ -16,7 +16,7 @@ from patchfem.dynamics.harmonic.laws import Jenkins
 
 def make_modes(omega, zeta, slide, output) -> ModalBasis:
     """Return a modal basis with modal mass 0.5."""
-    return basis_of(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
+    return make_modal_basis(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
 
 
 def modal_accelerations(modes: ModalBasis, y, force: float):

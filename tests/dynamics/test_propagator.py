@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 
 from patchfem.core import G_N, SineDrive
@@ -30,7 +30,7 @@ DRIVES = {
 
 def make_basis(omega, zeta, slide=(1.0,), base=(1.0,), mass=2.0, damping=None):
     """Return a modal basis with modal mass 2 by default."""
-    return basis_of(omega, zeta, slide, base, mass=mass, damping=damping)
+    return make_modal_basis(omega, zeta, slide, base, mass=mass, damping=damping)
 
 
 def coupled_basis():

@@ -10,8 +10,8 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
-from limits import limited
+from command_line import run_cli
+from limits import limit_file_size
 from march_paths import share_one_loop
 from scene_texts import (
     BENCH,
@@ -103,7 +103,7 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS[kind], "utf-8")
     command = ("run", scene, "--no-page", "-o")
-    assert cli(*command, tmp_path / "whole").code == 0
+    assert run_cli(*command, tmp_path / "whole").code == 0
     n_saves = len(save_counter.saved)
     assert n_saves >= 15 and sorted(path.name for path in tmp_path.iterdir()) == [
         "scene.toml",
@@ -114,14 +114,14 @@ def test_exact_resumed_run_equals_uninterrupted_run(tmp_path, save_counter, kind
     for stop in (1, n_saves // 3, 1, n_saves // 4):  # counted from the previous interruption
         save_counter.saved.clear()
         save_counter.stop = stop
-        answer = cli(*command, out, *["--resume"] * partial.is_dir())
+        answer = run_cli(*command, out, *["--resume"] * partial.is_dir())
         assert answer.code == 130 and "out.partial, add --resume to the command" in answer.err, (
             answer.err
         )
         assert partial.is_dir() and all(is_state(path.name) for path in partial.iterdir())
     save_counter.saved.clear()
     save_counter.stop = 0
-    assert cli(*command, out, "--resume").code == 0 and 0 < len(save_counter.saved) < n_saves
+    assert run_cli(*command, out, "--resume").code == 0 and 0 < len(save_counter.saved) < n_saves
     assert_same_results(out, tmp_path / "whole")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml", "whole"]
     assert not any(is_state(path.name) for path in out.iterdir())
@@ -133,44 +133,44 @@ def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS["one slide"], "utf-8")
     command = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
-    answer = cli(*command)
+    answer = run_cli(*command)
     assert (
         answer.code == 2
         and "out: this folder contains no interrupted run; run without --resume" in answer.err
     )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
     save_counter.stop = 5
-    assert cli(*command[:-1]).code == 130
+    assert run_cli(*command[:-1]).code == 130
     save_counter.stop = 0
     state = tmp_path / "out.partial" / "march_1.npz"
     for change in ("friction.static=0.31", "drive.cycles=20", "accuracy.steps_per_cycle=80"):
-        answer = cli(*command, "--set", change)
+        answer = run_cli(*command, "--set", change)
         assert answer.code == 2 and "belongs to another scene or to another version" in answer.err
     data = state.read_bytes()
     for damaged in (data[:-100], b"", b"PK nothing", data[:2000]):
         state.write_bytes(damaged)
-        answer = cli(*command)
+        answer = run_cli(*command)
         assert (
             answer.code == 2 and "cannot be read" in answer.err and "without --resume" in answer.err
         )
     state.write_bytes(data)
-    assert cli(*command).code == 0
-    answer = cli(*command)  # the message must not refer to out.partial, which no longer exists
+    assert run_cli(*command).code == 0
+    answer = run_cli(*command)  # the message must not refer to out.partial, which no longer exists
     assert (
         answer.code == 0
         and "out: this run is already complete" in answer.err
         and ".partial" not in answer.err
     )
-    assert json.loads(cli(*command, "--json").out) == json.loads(
+    assert json.loads(run_cli(*command, "--json").out) == json.loads(
         (tmp_path / "out" / "summary.json").read_text("utf-8")
     )
-    answer = cli(*command, "--set", "friction.static=0.31")
+    answer = run_cli(*command, "--set", "friction.static=0.31")
     assert (
         answer.code == 2
         and "out: this folder contains no interrupted run but a complete run of" in answer.err
     )
     scene.write_text(BENCH, "utf-8")
-    answer = cli(*command)
+    answer = run_cli(*command)
     assert answer.code == 2 and "integrated in time" in answer.err
 
 
@@ -180,8 +180,8 @@ def test_always_run_continues_without_disk_space_for_its_state(tmp_path, save_co
     scene = tmp_path / "scene.toml"
     scene.write_text(RIGS["one slide"], "utf-8")
     save_counter.stop = 5
-    with limited(5000):
-        answer = cli("run", scene, "--no-page", "-o", tmp_path / "out")
+    with limit_file_size(5000):
+        answer = run_cli("run", scene, "--no-page", "-o", tmp_path / "out")
     # the results do not fit; the missing state alone does not end the run
     assert answer.code == 4 and "result.nc: not enough space" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
@@ -223,6 +223,6 @@ def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
             message.strip().endswith("out.partial, add --resume to the command")
             and len(message.splitlines()) == 1
         )
-    assert cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
+    assert run_cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
     assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "out"}
     assert os.path.getsize(out / "result.nc") > 10_000

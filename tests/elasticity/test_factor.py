@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from any_mesh_cases import of_grid
+from any_mesh_cases import mesh_of_grid
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import COATED, COATING
@@ -31,7 +31,7 @@ def random_triangulation(n_points, seed):
 @pytest.mark.parametrize("size, split", [(5e-4, 0.0), (1e-4, 0.5)])
 def test_exact_factor_solutions_equal_dense_inverse(size, split):
     """Compliance and solutions of the factored mesh equal those of the dense inverse, and the load is unchanged."""
-    mesh = of_grid(graded_grid(2e-3, 1e-3, size, COATING), split, seed=4)
+    mesh = mesh_of_grid(graded_grid(2e-3, 1e-3, size, COATING), split, seed=4)
     piece = Substructure(mesh, COATED)
     full = np.linalg.inv(free_stiffness(piece).toarray())
     k = 2 * mesh.interface.size

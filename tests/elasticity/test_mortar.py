@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from any_mesh_cases import of_grid
+from any_mesh_cases import mesh_of_grid
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import HEIGHT, LENGTH, TITANIUM, bare, refined_middle
+from pieces import HEIGHT, LENGTH, TITANIUM, make_bare_layers, make_refined_grid
 
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
@@ -70,7 +70,7 @@ def block_compliance(x, height, young, poisson=TITANIUM[1], plane="strain", grow
     """Return (nn, tt, nt) of a block of uniform material on these columns, with rows that grow downwards."""
     depth = np.concatenate([[0.0], np.cumsum(graded_rows(np.diff(x).min(), height, growth))])
     return elasticity.interface_compliance(
-        elasticity.make_piece(x, depth, 0, bare((young, poisson), plane))
+        elasticity.make_piece(x, depth, 0, make_bare_layers((young, poisson), plane))
     )
 
 
@@ -90,7 +90,7 @@ def distorted_mesh(sizes, seed):
     """Return a mesh of a block in which half of the quads are split and the inner nodes are moved at random."""
     x = make_nodes(sizes)
     depth = np.linspace(0, HEIGHT, 7)
-    piece = of_grid(TensorGrid(x, depth, 0), 0.5)
+    piece = mesh_of_grid(TensorGrid(x, depth, 0), 0.5)
     points = piece.points.copy()
     inner = (points > [x[0], 0]).all(axis=1) & (points < [x[-1], HEIGHT]).all(axis=1)
     shifts = np.random.default_rng(seed).uniform(-0.2, 0.2, (inner.sum(), 2))
@@ -103,7 +103,7 @@ def distorted_pair(poisson=0.0, stiff=100.0):
     rng = np.random.default_rng(4)
     pair = [
         substructure.Substructure(
-            distorted_mesh(rng.uniform(0.5, 1.0, count), count), bare((young, poisson))
+            distorted_mesh(rng.uniform(0.5, 1.0, count), count), make_bare_layers((young, poisson))
         )
         for count, young in ((12, YOUNG), (9, stiff * YOUNG))
     ]
@@ -234,9 +234,9 @@ def test_exact_matching_nodes_add_compliances():
 
 @cache
 def _compute_hertz_block(per_half_width):
-    grid = refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, LENGTH, 6e-3, 1.1)
+    grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, LENGTH, 6e-3, 1.1)
     return grid.x, elasticity.interface_compliance(
-        elasticity.make_piece(grid.x, grid.depth, 0, bare(TITANIUM))
+        elasticity.make_piece(grid.x, grid.depth, 0, make_bare_layers(TITANIUM))
     )
 
 
@@ -302,7 +302,7 @@ def test_exact_unsuitable_side_ripples_and_is_rejected(fine, stiff, low, high):
 def test_exact_grid_follows_coarser_side(stiff):
     """Where the coarser side changes along the interface, the chosen grid follows the coarser side."""
     coarse, fine = (
-        refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / count, LENGTH, 6e-3, 1.1).x
+        make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / count, LENGTH, 6e-3, 1.1).x
         for count in (16, 40)
     )
     x_low = np.concatenate([fine[fine < 0], coarse[coarse >= 0]])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from limits import limited
+from limits import limit_file_size
 
 from patchfem.elasticity import Layers, cache
 from patchfem.mesh import PieceMesh
@@ -119,7 +119,7 @@ def test_exact_unwritable_cache_folder_is_ignored(tmp_path, monkeypatch):
 def test_always_full_or_shared_cache_folder_is_ignored(cache_folder):
     """A folder without free space or writable by other users is not used."""
     key = cache.grid_key(X, DEPTH, 1, LAYERS)
-    with limited(500):
+    with limit_file_size(500):
         cache.store_arrays(key, ARRAYS)
     # a truncated file would never be replaced
     assert cache.load_arrays(key, SHAPES) is None and list(cache_folder.iterdir()) == []

@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from any_mesh_cases import cloud, of_grid
+from any_mesh_cases import mesh_of_grid, triangulate_graded_rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
+from pieces import CARBIDE, COATED, COATING, TITANIUM, make_bare_layers, make_refined_grid
 
 from patchfem.elasticity import (
     Cells,
@@ -53,10 +53,10 @@ def grid_piece(grid, layers=COATED):
 @cache
 def all_cells():
     """Return the cells of a tensor grid, of mixed quads and triangles, and of triangles alone, all coated."""
-    triangles = cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+    triangles = triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
     return (
         get_cells(grid_piece(SMALL)),
-        mesh_cells(of_grid(SMALL, 0.5, seed=2)),
+        mesh_cells(mesh_of_grid(SMALL, 0.5, seed=2)),
         mesh_cells(triangles),
     )
 
@@ -109,7 +109,7 @@ def test_exact_single_row_coating_is_recovered_along_row():
 @settings(settings.get_profile("costly"))
 def test_exact_quadratic_displacement_has_exact_error_estimate(seed, plane):
     """For a quadratic displacement the recovered stress is exact, and the error estimate equals the exact error."""
-    layers = bare(TITANIUM, plane)
+    layers = make_bare_layers(TITANIUM, plane)
     piece = grid_piece(SMALL, layers)
     a, b = np.random.default_rng(seed).normal(size=(2, 3))
     cells = get_cells(piece)
@@ -185,7 +185,7 @@ def test_exact_strain_energy_equals_work_and_errors_add_up(split):
         piece = grid_piece(SMALL)
         face = np.arange(SMALL.x.size) * SMALL.depth.size
     else:
-        mesh = of_grid(SMALL, split, seed=2)
+        mesh = mesh_of_grid(SMALL, split, seed=2)
         piece = substructure.Substructure(mesh, COATED)
         face = mesh.interface
     u = elasticity.compute_displacement(piece, *force)
@@ -224,7 +224,7 @@ def solve_hertz_block(per_half_width, coating=0.0):
 
     A `coating` of the same material marks a line in the block.
     """
-    grid = refined_middle(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, 150e-3, 70e-3, 1.1)
+    grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, 150e-3, 70e-3, 1.1)
     uniform_depth = np.arange(0, 2 * per_half_width + 1) * HALF_WIDTH / per_half_width
     depth = np.concatenate(
         [
@@ -234,7 +234,7 @@ def solve_hertz_block(per_half_width, coating=0.0):
         ]
     )
     rows = round(coating / HALF_WIDTH * per_half_width)
-    piece = grid_piece(TensorGrid(grid.x, depth, rows), bare(TOUGH))
+    piece = grid_piece(TensorGrid(grid.x, depth, rows), make_bare_layers(TOUGH))
     fine_x = np.linspace(-HALF_WIDTH, HALF_WIDTH, 20001)
     p = P0 * np.sqrt(np.maximum(1 - (fine_x / HALF_WIDTH) ** 2, 0)) * (fine_x[1] - fine_x[0])
     element = np.searchsorted(grid.x, fine_x, side="right") - 1
@@ -297,9 +297,9 @@ def test_exact_coating_traction_balances_load_and_moment(mesh_kind, seed, plane)
         x = SMALL.x
     else:
         mesh = (
-            of_grid(SMALL, 0.5, seed=2)
+            mesh_of_grid(SMALL, 0.5, seed=2)
             if mesh_kind == "mixed"
-            else cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+            else triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
         )
         piece = substructure.Substructure(mesh, layers)
         x = mesh.x
@@ -332,13 +332,13 @@ def test_exact_coating_traction_balances_load_and_moment(mesh_kind, seed, plane)
 @settings(settings.get_profile("costly"))
 def test_exact_traction_on_inclined_coating_under_uniform_stress(seed, slope):
     """Under uniform stress the traction on an inclined coating interface equals sigma n at every inner node."""
-    mesh = of_grid(SMALL, 0.5, seed=2)
+    mesh = mesh_of_grid(SMALL, 0.5, seed=2)
     points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
-    cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, bare(TITANIUM))
+    cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, make_bare_layers(TITANIUM))
     strain = np.random.default_rng(seed).normal(size=(2, 2))
     computed = compute_coating_traction(cells, (points @ strain.T)[None])
     (exx, exy), (eyx, eyy) = strain
-    xx, yy, _, xy = hooke((exx, eyy, (exy + eyx) / 2), np.array(0), bare(TITANIUM))
+    xx, yy, _, xy = hooke((exx, eyy, (exy + eyx) / 2), np.array(0), make_bare_layers(TITANIUM))
     normal_vector, tangent = np.array([[-slope, 1.0], [1.0, slope]]) / np.hypot(1, slope)
     traction = -np.array([[xx, xy], [xy, yy]]) @ normal_vector
     scale = np.abs([xx, yy, xy]).max()
@@ -349,7 +349,7 @@ def test_exact_traction_on_inclined_coating_under_uniform_stress(seed, slope):
 
 def test_exact_uncoated_piece_has_no_coating_traction():
     """A piece without coating has no coating traction."""
-    piece = grid_piece(graded_grid(2e-3, 1e-3, 2e-4), bare(TITANIUM))
+    piece = grid_piece(graded_grid(2e-3, 1e-3, 2e-4), make_bare_layers(TITANIUM))
     cells = get_cells(piece)
     assert compute_coating_traction(cells, np.zeros((1, len(cells.points), 2))) is None
 
@@ -362,9 +362,9 @@ def test_exact_error_estimate_agrees_with_refined_energy(split):
     (Galerkin orthogonality).
     """
     mesh = (
-        of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2)
+        mesh_of_grid(graded_grid(2e-3, 1e-3, 1e-4, COATING), split, seed=2)
         if split is not None
-        else cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
+        else triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
     )
     finest = mesh.refine().refine()
     pressure = 1e8 * np.maximum(1 - (finest.x / 0.6e-3) ** 2, 0)

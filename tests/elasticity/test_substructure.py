@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from any_mesh_cases import cloud, of_grid
+from any_mesh_cases import mesh_of_grid, triangulate_graded_rows
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM
@@ -32,7 +32,7 @@ planes = st.sampled_from(["strain", "stress"])
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
 def test_exact_mesh_compliance_equals_dense_inverse(split):
     """The compliance of a mesh is the interface block of the dense inverse, symmetric and positive definite."""
-    mesh = of_grid(graded_grid(4e-3, 2e-3, 2e-4, COATING), split, seed=7)
+    mesh = mesh_of_grid(graded_grid(4e-3, 2e-3, 2e-4, COATING), split, seed=7)
     piece = Substructure(mesh, COATED)
     m = 2 * mesh.interface.size
     expected = np.linalg.inv(free_stiffness(piece).toarray())[-m:, -m:]
@@ -52,7 +52,7 @@ def test_exact_stiff_coating_compliance_within_round_off_bound():
     layers = Layers((TITANIUM[0] * 1e5, CARBIDE[1]), TITANIUM, "strain")
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / 40, 1e-6)
     grid_piece = elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, layers)
-    mesh_piece = Substructure(of_grid(grid, seed=1), layers)
+    mesh_piece = Substructure(mesh_of_grid(grid, seed=1), layers)
     expected = condense(grid_piece)[0]
     computed = condense(mesh_piece)[0]
     assert 1e-12 < mesh_piece.round_off_error <= MAX_REFINEMENT_CHANGE
@@ -66,12 +66,12 @@ def test_always_compliance_is_independent_of_numbering(coating, substrate, plane
     """The compliance is independent of the node numbering and does not decrease with refinement."""
     grid = graded_grid(4e-3, 2e-3, 1e-3, COATING)
     layers = Layers(coating, substrate, plane)
-    base = condense(Substructure(of_grid(grid, split), layers))
+    base = condense(Substructure(mesh_of_grid(grid, split), layers))
     for computed, expected in zip(
-        condense(Substructure(of_grid(grid, split, seed=3), layers)), base
+        condense(Substructure(mesh_of_grid(grid, split, seed=3), layers)), base
     ):
         assert np.abs(computed - expected).max() <= 1e-9 * base[0].max()
-    refined = condense(Substructure(of_grid(grid, split).refine(), layers))
+    refined = condense(Substructure(mesh_of_grid(grid, split).refine(), layers))
     coarse_nodes = [part[::2, ::2] for part in refined]
     added_compliance = np.block(
         [
@@ -87,7 +87,7 @@ def test_always_compliance_is_independent_of_numbering(coating, substrate, plane
 def test_exact_mesh_fields_agree_with_compliance_and_grid(split):
     """Displacements and stresses of a mesh agree with its compliance, balance the load, and equal those of the grid."""
     grid = graded_grid(4e-3, 2e-3, 2e-4, COATING)
-    mesh = of_grid(grid, split, seed=5)
+    mesh = mesh_of_grid(grid, split, seed=5)
     piece = Substructure(mesh, COATED)
     nn, tt, nt = condense(piece)
     shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
@@ -122,7 +122,7 @@ def test_exact_mesh_fields_agree_with_compliance_and_grid(split):
 def harmonic_error(wavelength, n_elements):
     """Return the relative error of the compliance of half a wave on a coated piece of triangles."""
     min_size = wavelength / 2 / n_elements
-    mesh = cloud(
+    mesh = triangulate_graded_rows(
         wavelength / 4,
         2 * wavelength,
         lambda x, y: 0 * x + min(min_size + 0.05 * y, wavelength / 16),
@@ -164,7 +164,7 @@ def test_refuses_slender_piece_with_short_elements():
     height = 20.0
     layers = Layers((young, nu), (young, nu), "stress")
     fine, coarse = (
-        of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3)
+        mesh_of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3)
     )
     with pytest.raises(
         NotConverged, match=r"shortest cell is 1.04 um in a piece of 100 um x 20 m: use longer"

@@ -8,7 +8,7 @@ import sys
 
 import numpy as np
 import pytest
-from any_mesh_cases import of_grid
+from any_mesh_cases import mesh_of_grid
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM
@@ -116,7 +116,7 @@ def test_exact_scikit_fem_is_imported_only_without_cache(tmp_path):
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
 def test_exact_mesh_stiffness_equals_scikit_fem(split):
     """The stiffness of a mesh of triangles and quads equals that of scikit-fem's linear elasticity to round-off."""
-    mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
+    mesh = mesh_of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
     piece = Substructure(mesh, COATED)
     first = len(mesh.triangles)
     expected = 0

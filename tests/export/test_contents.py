@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import xarray as xr
-from limits import limited
+from limits import limit_file_size
 
 from patchfem.core import Missing
 from patchfem.export import netcdf
@@ -27,6 +27,6 @@ def test_exact_large_file_has_same_contents(tmp_path):
     netcdf.write_netcdf(data, tmp_path / "large.nc")
     with xr.open_dataset(tmp_path / "large.nc") as large:
         assert large.identical(data.to_xarray())
-    with limited(5000), pytest.raises(Missing):
+    with limit_file_size(5000), pytest.raises(Missing):
         netcdf.write_netcdf(data, tmp_path / "none.nc")
     assert [path.name for path in tmp_path.iterdir()] == ["large.nc"]

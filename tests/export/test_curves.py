@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
+from command_line import run_cli
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
-from page_data import charts_of
+from page_data import read_charts
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem.core import Outcome
@@ -67,7 +67,7 @@ def run_results(tmp_path_factory):
         if text not in results:
             path = base / f"scene{len(results)}.toml"
             path.write_text(text, "utf-8")
-            answer = cli("run", path, "-o", base / path.stem, "-q")
+            answer = run_cli("run", path, "-o", base / path.stem, "-q")
             assert answer.code == 0, answer.err
             with xr.open_dataset(base / path.stem / "result.nc") as data:
                 results[text] = base / path.stem, data.load()
@@ -153,7 +153,9 @@ def test_exact_folded_curve_peak_agrees_with_backbone(run_results):
     """
     folder, data = run_results(STIFFENED + SWEEP.format(140, 180, 2))
     page = (folder / "report.html").read_text()
-    marks = charts_of(page)["Steady motion at the output", "half the peak-to-peak motion"]["marks"]
+    marks = read_charts(page)["Steady motion at the output", "half the peak-to-peak motion"][
+        "marks"
+    ]
     assert [mark["x"] for mark in marks if mark["name"] == "fold"] == pytest.approx(
         data.curve_fold.values
     )
@@ -197,7 +199,7 @@ def test_exact_page_lists_levels_in_order(run_results):
         (5, 4, "slips"),
         (6, 3, "stuck"),
     ]
-    marks = charts_of(page)["Level by level", "half the peak-to-peak motion"]["marks"]
+    marks = read_charts(page)["Level by level", "half the peak-to-peak motion"]["marks"]
     arrows = [(mark["name"], *mark["x"]) for mark in marks if mark["kind"] == "arrow"]
     assert arrows == [("raised", 5, 6), ("lowered", 6, 5), ("lowered", 5, 4)]
     assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))

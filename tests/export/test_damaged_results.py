@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH, COATED, COULOMB
 
 OTHER = {
@@ -31,10 +31,10 @@ def results_folders(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made")
     (folder / "a.toml").write_text(COATED + COULOMB + SLIDE)
     (folder / "b.toml").write_text(BENCH)
-    assert cli("run", folder / "a.toml", "-o", folder / "a", "-q", "--no-page").code == 0
-    assert cli("run", folder / "b.toml", "-o", folder / "b", "-q", "--no-page").code == 0
+    assert run_cli("run", folder / "a.toml", "-o", folder / "a", "-q", "--no-page").code == 0
+    assert run_cli("run", folder / "b.toml", "-o", folder / "b", "-q", "--no-page").code == 0
     assert (
-        cli(
+        run_cli(
             "sweep",
             folder / "b.toml",
             "--over",
@@ -102,7 +102,7 @@ def find_faulty_answers(parent: Path, folder: Path) -> list:
     for command in commands:
         with warnings.catch_warnings(record=True) as raised:
             warnings.simplefilter("always")
-            answer = cli(*command)
+            answer = run_cli(*command)
         if (
             answer.code not in (0, 2)
             or "Warning" in answer.err
@@ -156,7 +156,7 @@ def test_refuses_summary_with_invalid_value(results_folders, tmp_path, value):
     for name in "a", "b":
         shutil.copytree(results_folders / name, tmp_path / name)
     change_summary(tmp_path / "a", lambda data: data["measures"]["normal_load"].update(value=value))
-    answer = cli("report", tmp_path / "a", tmp_path / "b", "-o", tmp_path / "p.html")
+    answer = run_cli("report", tmp_path / "a", tmp_path / "b", "-o", tmp_path / "p.html")
     assert answer.code == (0 if value in (1e308, None) else 2), answer
     assert (
         answer.code == 0
@@ -188,7 +188,7 @@ def test_refuses_incomplete_sweep_table(results_folders, tmp_path, change):
     """A sweep whose table has missing, repeated or malformed rows is refused."""
     shutil.copytree(results_folders / "s", tmp_path / "s")
     change_table_lines(tmp_path / "s", change)
-    answer = cli("report", tmp_path / "s", "-o", tmp_path / "p.html")
+    answer = run_cli("report", tmp_path / "s", "-o", tmp_path / "p.html")
     assert answer.code == 2 and "the sweep in this folder cannot be read" in answer.err, answer
 
 
@@ -208,6 +208,6 @@ def test_refuses_sweep_with_invalid_attributes(results_folders, tmp_path, name, 
     shutil.copytree(results_folders / "s", tmp_path / "s")
     with h5py.File(tmp_path / "s" / "sweep.nc", "r+") as file:
         file.attrs[name] = value
-    answer = cli("report", tmp_path / "s", "-o", tmp_path / "p.html")
+    answer = run_cli("report", tmp_path / "s", "-o", tmp_path / "p.html")
     assert answer.code == (0 if name == "source" else 2), answer
     assert "Traceback" not in answer.err and "internal" not in answer.err

@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 import pyvista
-from exported import UNITS, at, waves, write_small
+from exported import UNITS, frame_values, make_wave_block, write_small_series
 from scene_texts import COATED
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -31,7 +31,7 @@ import os, sys
 from pathlib import Path
 from patchfem.export.fields import vtkhdf
 sys.path[:0] = {paths!r}
-from exported import write_small, write_waves
+from exported import write_small_series, write_wave_series
 calls, inner, vtkhdf.MIN_FRAMEWISE_BYTES = [0], vtkhdf._rounding_function, 0
 def counted(nearest):
     def one(values):
@@ -178,7 +178,7 @@ def framewise_writing(monkeypatch):
 @pytest.mark.usefixtures("framewise_writing")
 def test_exact_large_series_has_rounded_frames(tmp_path):
     """A series written frame by frame contains every frame, rounded to the stated number of bits."""
-    small = write_small(tmp_path / "out", 5)
+    small = write_small_series(tmp_path / "out", 5)
     for number, grids in enumerate(read_frames_with_vtk(tmp_path / "out" / NAME)):
         for name, block in small.blocks.items():
             for data, written in (
@@ -186,7 +186,7 @@ def test_exact_large_series_has_rounded_frames(tmp_path):
                 (grids[name].cell_data, block.cell_data),
             ):
                 for array, values in written.items():
-                    expected = at(values, number)
+                    expected = frame_values(values, number)
                     if expected.dtype == np.float32:
                         expected = round_to_bits(expected, vtkhdf.BITS.get(array, vtkhdf.MOST_BITS))
                     assert np.array_equal(data[array], expected), array
@@ -202,7 +202,7 @@ def test_exact_large_series_has_rounded_frames(tmp_path):
 
 def test_always_killed_writer_leaves_complete_frames(tmp_path):
     """A killed writer leaves a partial file with all complete frames, and no file of the final name."""
-    run_until_killed("write_small(Path('out'), 6)", 47, tmp_path)
+    run_until_killed("write_small_series(Path('out'), 6)", 47, tmp_path)
     [partial] = (tmp_path / "out").iterdir()
     assert is_partial_name(partial.name)
     assert partial.name.startswith(".fields.")
@@ -218,7 +218,7 @@ def test_always_killed_writer_leaves_complete_frames(tmp_path):
         ]
         # the file ends with the frame before the interrupted one
         assert count == 47 // len(chunked) - 1 > 0
-    whole = write_small(tmp_path / "whole", 6)
+    whole = write_small_series(tmp_path / "whole", 6)
     for number, grids in enumerate(read_frames_with_vtk(partial)):
         expected = round_to_bits(
             whole.blocks["upper"].cell_data["von_mises"][number], vtkhdf.MOST_BITS
@@ -233,8 +233,8 @@ def test_always_exported_series_is_compact(tmp_path):
 
     With a mesh in every frame it took 2.4 times as much.
     """
-    piece = waves(12, 90, 60)
-    line = waves(12, 90, 1)
+    piece = make_wave_block(12, 90, 60)
+    line = make_wave_block(12, 90, 1)
     piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
     line.point_data.update(
         dict.fromkeys(("gap", "normal_stress"), np.zeros((1, len(line.points)), np.float32))

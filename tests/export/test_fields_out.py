@@ -13,8 +13,8 @@ import meshio
 import numpy as np
 import pytest
 import pyvista
-from command_line import cli
-from exported import CROWNED, UNITS, at, write_small
+from command_line import run_cli
+from exported import CROWNED, UNITS, frame_values, write_small_series
 from scene_texts import BENCH
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import vtkDataArray
@@ -54,7 +54,7 @@ def assert_block_equal(grid, block, number: int) -> None:
     ):
         assert set(data.keys()) == expected_arrays.keys()
         for name, values in expected_arrays.items():
-            expected = at(values, number)
+            expected = frame_values(values, number)
             assert data[name].dtype == expected.dtype
             assert np.array_equal(data[name], expected, equal_nan=expected.dtype.kind == "f"), name
 
@@ -82,7 +82,10 @@ def join_blocks(small, number: int) -> tuple:
     cell_data = {"part": np.repeat(np.array([0, 1, 2], np.int8), [7, 7, 3])}
     for name in ("stress", "von_mises", "stress_error", "material"):
         values = np.concatenate(
-            [at(small.blocks[side].cell_data[name], number) for side in ("lower", "upper")]
+            [
+                frame_values(small.blocks[side].cell_data[name], number)
+                for side in ("lower", "upper")
+            ]
         )
         cell_data[name] = np.concatenate(
             [
@@ -95,7 +98,7 @@ def join_blocks(small, number: int) -> tuple:
 
 def test_exact_blocks_have_values_of_pieces(tmp_path):
     """The blocks of a file have the points, displacements, stresses, materials and bond stresses of the pieces."""
-    small = write_small(tmp_path / "out", 4)
+    small = write_small_series(tmp_path / "out", 4)
     assert tuple(small.blocks) == NAMES
     for side, piece in zip(("lower", "upper"), small.pair):
         block = small.blocks[side]
@@ -124,7 +127,7 @@ def test_exact_blocks_have_values_of_pieces(tmp_path):
 
 def test_exact_vtk_reads_three_named_blocks(tmp_path, capfd):
     """VTK reads three named blocks with equal arrays at every time, and prints no error."""
-    small = write_small(tmp_path / "out", 4)
+    small = write_small_series(tmp_path / "out", 4)
     reader = vtkHDFReader()
     reader.SetFileName(str(tmp_path / "out" / NAME))
     reader.UpdateInformation()
@@ -142,7 +145,7 @@ def test_exact_vtk_reads_three_named_blocks(tmp_path, capfd):
 
 def test_exact_file_states_units_and_codes(tmp_path):
     """The file states the unit of every array and the meanings of the codes."""
-    write_small(tmp_path / "out")
+    write_small_series(tmp_path / "out")
     with h5py.File(tmp_path / "out" / NAME) as file:
         for block in NAMES:
             group = file["VTKHDF"][block]
@@ -167,11 +170,11 @@ def test_exact_file_states_units_and_codes(tmp_path):
 @pytest.mark.parametrize("number", [None, 0, 1])
 def test_exact_vtu_agrees_in_vtk_and_meshio(tmp_path, number):
     """A .vtu export has equal points, arrays, units and codes when read by VTK and by meshio."""
-    small = write_small(tmp_path / "out")
+    small = write_small_series(tmp_path / "out")
     arguments = ["export", tmp_path / "out", "-o", tmp_path / "one.vtu"] + (
         [] if number is None else ["--frame", number]
     )
-    assert cli(*arguments).code == 0
+    assert run_cli(*arguments).code == 0
     frame = 2 if number is None else number
     grid = read_grid_with_vtk(tmp_path / "one.vtu")
     mesh = meshio.read(tmp_path / "one.vtu")
@@ -225,9 +228,9 @@ def test_exact_pvd_agrees_in_pyvista(tmp_path):
 
     A shorter series written afterwards leaves no older frames.
     """
-    small = write_small(tmp_path / "out", 12)
+    small = write_small_series(tmp_path / "out", 12)
     pvd_file = tmp_path / "out" / "fields.pvd"
-    assert cli("export", tmp_path / "out", "-o", pvd_file).code == 0
+    assert run_cli("export", tmp_path / "out", "-o", pvd_file).code == 0
     reader = pyvista.PVDReader(str(pvd_file))
     assert reader.time_values == list(small.times)
     for number in range(12):
@@ -245,8 +248,10 @@ def test_exact_pvd_agrees_in_pyvista(tmp_path):
         <= set(FILES)
     )
     (tmp_path / "out" / "fields_frames" / "frame_0007.vtu").write_text("of an earlier version")
-    write_small(tmp_path / "out", 2)  # a shorter series replaces all frames of the longer one
-    assert cli("export", tmp_path / "out", "-o", pvd_file).code == 0
+    write_small_series(
+        tmp_path / "out", 2
+    )  # a shorter series replaces all frames of the longer one
+    assert run_cli("export", tmp_path / "out", "-o", pvd_file).code == 0
     assert sorted(path.name for path in (tmp_path / "out" / "fields_frames").iterdir()) == sorted(
         f"frame_000{number}{end}"
         for number in (0, 1)
@@ -256,15 +261,15 @@ def test_exact_pvd_agrees_in_pyvista(tmp_path):
 
 def test_exact_csv_has_interface_values(tmp_path):
     """A .csv export has the values of the interface to the last bit, with their units."""
-    small = write_small(tmp_path / "out")
-    assert cli("export", tmp_path / "out", "-o", tmp_path / "rows.csv", "--frame", 1).code == 0
+    small = write_small_series(tmp_path / "out")
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "rows.csv", "--frame", 1).code == 0
     with open(tmp_path / "rows.csv", newline="", encoding="utf-8") as file:
         header, *rows = csv.reader(file)
     columns = dict(zip(header, zip(*rows)))
     line = small.blocks["interface"]
     assert np.array_equal(np.array(columns.pop("x [m]"), float), line.points[:, 0])
     for name, values in line.point_data.items():
-        expected = at(values, 1)
+        expected = frame_values(values, 1)
         for k, axis in enumerate(("_x", "_y", "_z") if expected.ndim > 1 else ("",)):
             read = np.array(columns.pop(f"{name}{axis} [{UNITS[name]}]")).astype(expected.dtype)
             assert np.array_equal(read, expected[:, k] if axis else expected)
@@ -273,10 +278,10 @@ def test_exact_csv_has_interface_values(tmp_path):
 
 def test_exact_vtkhdf_export_is_a_copy(tmp_path):
     """A .vtkhdf export is a copy of the fields file; a copy onto itself is refused."""
-    write_small(tmp_path / "out")
-    assert cli("export", tmp_path / "out", "-o", tmp_path / "copy.vtkhdf").code == 0
+    write_small_series(tmp_path / "out")
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "copy.vtkhdf").code == 0
     assert (tmp_path / "copy.vtkhdf").read_bytes() == (tmp_path / "out" / NAME).read_bytes()
-    assert cli("export", tmp_path / "out", "-o", tmp_path / "out" / NAME).code == 2
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "out" / NAME).code == 2
 
 
 @pytest.mark.parametrize(
@@ -296,9 +301,9 @@ def test_exact_vtkhdf_export_is_a_copy(tmp_path):
 )
 def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code, message):
     """An unsupported file type, an invalid frame or a place that is not a folder is refused, and no file is written."""
-    write_small(tmp_path / "out")
+    write_small_series(tmp_path / "out")
     monkeypatch.chdir(tmp_path)
-    answer = cli("export", "out", *arguments)
+    answer = run_cli("export", "out", *arguments)
     assert answer.code == code and message in answer.err and "internal fault" not in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
@@ -314,8 +319,8 @@ def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code
 )
 def test_always_export_creates_missing_folder(tmp_path, name, created):
     """An export creates its missing folders, as for `export tp -o tp_pvd/fields.pvd`."""
-    write_small(tmp_path / "out")
-    answer = cli("export", tmp_path / "out", "-o", tmp_path / "new" / "one" / name)
+    write_small_series(tmp_path / "out")
+    answer = run_cli("export", tmp_path / "out", "-o", tmp_path / "new" / "one" / name)
     assert answer.code == 0, answer.err
     assert {path.name for path in (tmp_path / "new" / "one").iterdir()} == created
 
@@ -329,7 +334,7 @@ def test_refuses_missing_or_damaged_fields(tmp_path):
     (tmp_path / NAME).write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
     with pytest.raises(PatchfemError, match="not a readable HDF5 file"):
         export_fields(tmp_path, tmp_path / "a.vtu")
-    write_small(tmp_path / "out")
+    write_small_series(tmp_path / "out")
     (tmp_path / "a_frames").mkdir()
     (tmp_path / "a_frames" / "mine.txt").write_text("kept")
     with pytest.raises(PatchfemError, match=r"mine\.txt"):
@@ -380,15 +385,15 @@ def test_exact_run_prints_place_of_fields(tmp_path):
     """A run prints the file of its fields and the command that exports them for an older ParaView."""
     (tmp_path / "point.toml").write_text(BENCH, "utf-8")
     (tmp_path / "pair.toml").write_text(CROWNED, "utf-8")
-    assert "fields" not in cli("run", tmp_path / "point.toml", "-o", tmp_path / "point").out
-    answer = cli("run", tmp_path / "pair.toml", "-o", tmp_path / "my pair")
+    assert "fields" not in run_cli("run", tmp_path / "point.toml", "-o", tmp_path / "point").out
+    answer = run_cli("run", tmp_path / "pair.toml", "-o", tmp_path / "my pair")
     last_line = answer.out.splitlines()[-1]
     assert (
         last_line.startswith(f"fields: {tmp_path / 'my pair' / NAME} ")
         and "ParaView 5.13" in last_line
     )
     command = shlex.split(last_line.split("`")[1])
-    assert command[0] == "patchfem" and cli(*command[1:]).code == 0
+    assert command[0] == "patchfem" and run_cli(*command[1:]).code == 0
     assert pyvista.PVDReader(str(tmp_path / "my pair" / "fields.pvd")).read()[0].keys() == list(
         NAMES
     )
@@ -396,7 +401,7 @@ def test_exact_run_prints_place_of_fields(tmp_path):
 
 def test_refuses_fields_of_older_version(tmp_path):
     """A fields file with the single mesh of an older version is refused."""
-    write_small(tmp_path / "out")
+    write_small_series(tmp_path / "out")
     with h5py.File(tmp_path / "out" / NAME, "r+") as file:
         file["VTKHDF"].attrs["Type"] = np.bytes_("UnstructuredGrid")
     with pytest.raises(PatchfemError, match=r"older version of patchfem; run the scene again"):
@@ -406,12 +411,12 @@ def test_refuses_fields_of_older_version(tmp_path):
 def test_refuses_field_export_without_contact(tmp_path):
     """Export and view of fields are refused for a run without [contact]."""
     (tmp_path / "point.toml").write_text(BENCH, "utf-8")
-    assert cli("run", tmp_path / "point.toml", "-o", tmp_path / "out", "-q").code == 0
+    assert run_cli("run", tmp_path / "point.toml", "-o", tmp_path / "out", "-q").code == 0
     for arguments in (
         ("export", tmp_path / "out", "-o", tmp_path / "a.pvd"),
         ("view", tmp_path / "out"),
     ):
-        answer = cli(*arguments)
+        answer = run_cli(*arguments)
         assert answer.code == 4 and "only a run with [contact]" in answer.err
 
 

@@ -8,8 +8,8 @@ import sys
 import matplotlib
 import numpy as np
 import pytest
-from command_line import cli
-from exported import write_small
+from command_line import run_cli
+from exported import write_small_series
 from PIL import Image
 
 from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film_settings
@@ -32,7 +32,7 @@ sys.exit({code})
 def small_folder(tmp_path_factory):
     """Return the folder of a pressed state and, long after it, three frames of random fields."""
     folder = tmp_path_factory.mktemp("film") / "<b>out"
-    write_small(folder, 4, times=[0.0, 7.0, 7.1, 7.2])
+    write_small_series(folder, 4, times=[0.0, 7.0, 7.1, 7.2])
     return folder
 
 
@@ -116,7 +116,7 @@ def test_exact_colour_range_is_constant(small_folder):
 def test_exact_gif_frames_agree_with_pictures(small_folder, drawn_frames, tmp_path):
     """The frames of a .gif agree with the single pictures within the 256 colours of the format."""
     settings, pictures = drawn_frames
-    answer = cli("view", small_folder, "-o", tmp_path / "a.gif")
+    answer = run_cli("view", small_folder, "-o", tmp_path / "a.gif")
     assert answer.code == 0 and "3 frames, 7 s to 7.2 s" in answer.out, answer.err
     with Image.open(tmp_path / "a.gif") as gif:
         assert (gif.n_frames, gif.size, gif.info["loop"]) == (
@@ -160,7 +160,7 @@ def test_exact_ffmpeg_receives_all_frames(small_folder, drawn_frames, tmp_path, 
     """For an .mp4 every frame is passed to ffmpeg unchanged."""
     (tmp_path / "bin").mkdir()
     install_fake_ffmpeg(tmp_path / "bin", monkeypatch, 0)
-    answer = cli("view", small_folder, "-o", tmp_path / "a.mp4")
+    answer = run_cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 0, answer.err
     arguments, data = (tmp_path / "a.mp4").read_bytes().split(b"\n", 1)
     assert f"-s {WIDE}x{HIGH} ".encode() in arguments and WIDE % 2 == HIGH % 2 == 0
@@ -174,7 +174,7 @@ def test_refuses_mp4_that_ffmpeg_cannot_write(small_folder, tmp_path, monkeypatc
     """If ffmpeg fails, its message is printed and no file remains."""
     (tmp_path / "bin").mkdir()
     install_fake_ffmpeg(tmp_path / "bin", monkeypatch, 1)
-    answer = cli("view", small_folder, "-o", tmp_path / "a.mp4")
+    answer = run_cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 4 and "the codec is missing" in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["bin"]
 
@@ -183,7 +183,7 @@ def test_refuses_mp4_without_ffmpeg(small_folder, tmp_path, monkeypatch):
     """Without ffmpeg an .mp4 is refused before a frame is drawn."""
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    answer = cli("view", small_folder, "-o", tmp_path / "a.mp4")
+    answer = run_cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 4 and "pip install imageio-ffmpeg" in answer.err
     assert not list(tmp_path.iterdir())
 
@@ -191,16 +191,16 @@ def test_refuses_mp4_without_ffmpeg(small_folder, tmp_path, monkeypatch):
 def test_refuses_animation_without_motion(small_folder, tmp_path):
     """An animation of a run without fields, of a single frame or with the option --frame is refused."""
     (tmp_path / "lumped").mkdir()
-    answer = cli("view", tmp_path / "lumped", "-o", tmp_path / "a.gif")
+    answer = run_cli("view", tmp_path / "lumped", "-o", tmp_path / "a.gif")
     assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
-    write_small(tmp_path / "still", 1)
-    answer = cli("view", tmp_path / "still", "-o", tmp_path / "a.gif")
+    write_small_series(tmp_path / "still", 1)
+    answer = run_cli("view", tmp_path / "still", "-o", tmp_path / "a.gif")
     assert answer.code == 2 and "no motion to show" in answer.err and "-o FILE.png" in answer.err
-    answer = cli("view", small_folder, "-o", tmp_path / "a.gif", "--frame", "1")
+    answer = run_cli("view", small_folder, "-o", tmp_path / "a.gif", "--frame", "1")
     assert answer.code == 2 and "--frame" in answer.err
     for options in (("--frame", "1"), ("--magnify", "2")):
-        answer = cli("view", small_folder, "-o", tmp_path / "a.html", *options)
+        answer = run_cli("view", small_folder, "-o", tmp_path / "a.html", *options)
         assert answer.code == 2 and "sliders for frame and magnification" in answer.err
-    answer = cli("view", small_folder, "-o", tmp_path / "still" / "fields.vtkhdf" / "a.gif")
+    answer = run_cli("view", small_folder, "-o", tmp_path / "still" / "fields.vtkhdf" / "a.gif")
     assert answer.code == 4 and "cannot be written (Not a directory)" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["lumped", "still"]

@@ -5,7 +5,7 @@ import shutil
 import subprocess
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COULOMB, POINT
 
 CHROMIUM = (
@@ -33,7 +33,7 @@ def test_always_page_is_drawn_without_script_errors(name, tmp_path):
     scene = tmp_path / "bench.toml"
     scene.write_text(BENCH, "utf-8")
     verb, *arguments = PAGES[name]
-    assert cli(verb, scene, *arguments, "-o", tmp_path / "out", "-q").code == 0
+    assert run_cli(verb, scene, *arguments, "-o", tmp_path / "out", "-q").code == 0
     command = [
         CHROMIUM,
         "--headless=new",

@@ -12,9 +12,9 @@ import types
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from command_line import cli
-from exported import write_small
-from paraview_stand_in import Simple, blocks_at, times_and_files
+from command_line import run_cli
+from exported import write_small_series
+from paraview_stand_in import SimpleModule, compute_blocks, read_frames
 
 from patchfem.export.drawing.film import make_film_settings
 from patchfem.export.drawing.panels import upper_piece_slide
@@ -22,9 +22,9 @@ from patchfem.export.fields.blocks import NAMES
 from patchfem.export.fields.series import Series
 
 
-def run_script(path, monkeypatch, *arguments, kind=None) -> Simple:
+def run_script(path, monkeypatch, *arguments, kind=None) -> SimpleModule:
     """Run a script as `pvpython PATH ARGUMENTS`; kind is the class of render windows without a display."""
-    simple = Simple()
+    simple = SimpleModule()
     package = types.ModuleType("paraview")
     package.simple = simple
     for name, module in (("paraview", package), ("paraview.simple", simple)):
@@ -46,7 +46,7 @@ def run_script(path, monkeypatch, *arguments, kind=None) -> Simple:
 def script_file(bench_folder, tmp_path_factory):
     """Return the script of a bench, in a folder whose name contains quotes."""
     folder = tmp_path_factory.mktemp('it\'s a "run"')
-    answer = cli("export", bench_folder, "-o", folder / "the 'last'.py")
+    answer = run_cli("export", bench_folder, "-o", folder / "the 'last'.py")
     assert answer.code == 0, answer.err
     assert "the 'last'.pvd and the 'last'_frames beside it" in answer.out
     return folder / "the 'last'.py"
@@ -60,14 +60,14 @@ def test_exact_paraview_positions_agree_with_figures(bench_folder, script_file, 
     """
     simple = run_script(script_file, monkeypatch)
     (pieces, _), (interface, _), (clock, _) = simple.shown
-    files = times_and_files(clock.Input)
+    files = read_frames(clock.Input)
     with Series(bench_folder) as series:
         settings = make_film_settings(series)
         assert [time for time, _ in files] == [series.times[number] for number in settings.numbers]
         for number, (_, file) in list(zip(settings.numbers, files))[::4]:
             frame = series.frame(number)
             expected = settings.panels(frame)[0].places * 1e-3
-            blocks = blocks_at(pieces, file) + blocks_at(interface, file)
+            blocks = compute_blocks(pieces, file) + compute_blocks(interface, file)
             assert len(blocks) == len(NAMES)
             assert (
                 np.abs(np.concatenate([points[:, :2] for points, *_ in blocks]) - expected).max()
@@ -93,7 +93,7 @@ def test_exact_script_colours_stress_component(
 
     The pressure on the interface has the range of all frames, and the light changes neither colour.
     """
-    assert cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", component).code == 0
+    assert run_cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", component).code == 0
     simple = run_script(tmp_path / "play.py", monkeypatch)
     (pieces, _), (_, line), (clock, _) = simple.shown
     ranges = {
@@ -106,11 +106,11 @@ def test_exact_script_colours_stress_component(
     }
     ((low, high),) = ranges["shown"]
     assert low == -high and high > 0 and "motion and gap x " in clock.Format
-    files = times_and_files(clock.Input)
+    files = read_frames(clock.Input)
     with Series(bench_folder) as series:
         frames = [series.frame(number) for number in make_film_settings(series).numbers]
     for (_, _, cells), block in zip(
-        blocks_at(pieces, files[0][1]), (frames[0].blocks["lower"], frames[0].blocks["upper"])
+        compute_blocks(pieces, files[0][1]), (frames[0].blocks["lower"], frames[0].blocks["upper"])
     ):
         assert cells["shown"] == pytest.approx(1e-6 * block.cell_data["stress"][:, index], rel=1e-6)
     pressures = [frame.blocks["interface"].point_data["normal_stress"].max() for frame in frames]
@@ -124,19 +124,19 @@ def test_exact_script_colours_stress_component(
 
 def test_exact_script_shows_stick_and_slip(bench_folder, tmp_path, monkeypatch):
     """A script shows the status of the interface (open, stick, slip) with the values of every frame."""
-    assert cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", "status").code == 0
+    assert run_cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", "status").code == 0
     simple = run_script(tmp_path / "play.py", monkeypatch)
     _, (line, display), (clock, _) = simple.shown
     assert simple.coloured[id(display)] == ("POINTS", "status") and display.LineWidth == 6
     table = simple.tables["status"]
     assert table.Annotations == ["0", "open", "1", "sticks", "2", "slips"]
     assert len(table.IndexedColors) == 9
-    files = times_and_files(clock.Input)
+    files = read_frames(clock.Input)
     statuses = set()
     with Series(bench_folder) as series:
         for (_, file), number in zip(files, make_film_settings(series).numbers):
             expected = series.frame(number).blocks["interface"].point_data["status"]
-            ((_, points, _),) = blocks_at(line, file)
+            ((_, points, _),) = compute_blocks(line, file)
             assert points["status"].tolist() == expected.tolist()
             statuses |= set(expected.tolist())
     assert {1, 2} <= statuses <= {0, 1, 2}
@@ -144,9 +144,9 @@ def test_exact_script_shows_stick_and_slip(bench_folder, tmp_path, monkeypatch):
 
 def test_refuses_unknown_stress_component(bench_folder, tmp_path):
     """An unknown stress component is refused, and so is a component for a file other than a script."""
-    unknown = cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", "sigma")
+    unknown = run_cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", "sigma")
     assert unknown.code == 2 and "the stresses are von_mises, sigma_xx" in unknown.err
-    table = cli("export", bench_folder, "-o", tmp_path / "a.csv", "--of", "tau_xy")
+    table = run_cli("export", bench_folder, "-o", tmp_path / "a.csv", "--of", "tau_xy")
     assert table.code == 2 and "-o play.py" in table.err and not list(tmp_path.iterdir())
 
 
@@ -180,15 +180,15 @@ def test_refuses_script_without_fields_or_motion(bench_folder, script_file, tmp_
     (tmp_path / "alone.py").write_text(script_file.read_text("utf-8"), "utf-8")
     with pytest.raises(SystemExit, match="does not exist"):
         run_script(tmp_path / "alone.py", monkeypatch)
-    write_small(tmp_path / "still", 1)
-    answer = cli("export", tmp_path / "still", "-o", tmp_path / "a.py")
+    write_small_series(tmp_path / "still", 1)
+    answer = run_cli("export", tmp_path / "still", "-o", tmp_path / "a.py")
     assert answer.code == 2 and "no motion to show" in answer.err
-    answer = cli("export", bench_folder, "-o", tmp_path / "a.py", "--frame", "1")
+    answer = run_cli("export", bench_folder, "-o", tmp_path / "a.py", "--frame", "1")
     assert answer.code == 2 and "--frame" in answer.err
     (tmp_path / "lumped").mkdir()
-    answer = cli("export", tmp_path / "lumped", "-o", tmp_path / "a.py")
+    answer = run_cli("export", tmp_path / "lumped", "-o", tmp_path / "a.py")
     assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
-    answer = cli("export", bench_folder, "-o", tmp_path / "alone.py" / "a.py")
+    answer = run_cli("export", bench_folder, "-o", tmp_path / "alone.py" / "a.py")
     assert answer.code == 4 and "cannot be written" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["alone.py", "lumped", "still"]
 
@@ -200,8 +200,10 @@ def test_refuses_script_without_fields_or_motion(bench_folder, script_file, tmp_
 )
 def test_always_paraview_draws_every_frame(bench_folder, tmp_path):
     """ParaView draws a picture of each frame with moving pieces and two colour scales, and reads .vtu and .pvd files."""
-    answer = cli("export", bench_folder, "-o", tmp_path / "cycle.py")
-    assert answer.code == 0 and cli("export", bench_folder, "-o", tmp_path / "all.pvd").code == 0
+    answer = run_cli("export", bench_folder, "-o", tmp_path / "cycle.py")
+    assert (
+        answer.code == 0 and run_cli("export", bench_folder, "-o", tmp_path / "all.pvd").code == 0
+    )
     screen = [] if "DISPLAY" in os.environ else ["xvfb-run", "-a"]
     subprocess.run(
         [*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import BaseModel
 from reference import joint_laws, limits, records
-from reference.keys import FILE, Equations, effects_table, tables, text
+from reference.keys import FILE, Equations, format_effects, iterate_tables, text
 from scene_texts import SMALL_PATCH, STRUCTURE
 
 from patchfem import SceneError
@@ -21,7 +21,7 @@ def plain_keys() -> list:
     """Return (model, key) of all keys that contain no table."""
     return [
         (model, key)
-        for _, model in tables()
+        for _, model in iterate_tables()
         for key, name in attributes_by_key(model).items()
         if find_inner_table(model, name) is None or is_table_or_value(model, name)
     ]
@@ -36,7 +36,7 @@ def table_cells(header: str) -> list:
 
 def test_exact_committed_pages_agree_with_records():
     """The committed reference pages equal the pages that are generated from the records."""
-    for page in (records.Measures, records.Materials, limits, Equations, joint_laws):
+    for page in (records.MeasuresPage, records.MaterialsPage, limits, Equations, joint_laws):
         assert page.FILE.read_text("utf-8") == page.text(), "run python tests/support/reference"
     assert FILE.read_text("utf-8") == PAGE, "run python tests/support/reference"
 
@@ -72,12 +72,12 @@ def test_refuses_key_without_description():
 
 def test_exact_reference_is_complete():
     """The reference contains all tables, effects, materials, measures and units, and its example values are valid."""
-    for header, _ in tables():
+    for header, _ in iterate_tables():
         assert not header or f"`{header}`" in PAGE, header
     for page, names in (
-        (effects_table(), [name for name in EFFECTS if "structure.interface." not in name]),
-        (records.Materials.text(), MATERIALS),
-        (records.Measures.text(), [*STATIC, *MOTION]),
+        (format_effects(), [name for name in EFFECTS if "structure.interface." not in name]),
+        (records.MaterialsPage.text(), MATERIALS),
+        (records.MeasuresPage.text(), [*STATIC, *MOTION]),
     ):
         for name in names:
             assert f"| `{name}` |" in page, name
@@ -133,7 +133,7 @@ def test_exact_page_of_limits_agrees_with_refusals():
     assert {law.partition(",")[0] for law, _ in cells} == set(LAWS)
     refusals = {}
     for _, columns in limits.TABLES:
-        refusals |= limits.refusals(columns)
+        refusals |= limits.find_refusals(columns)
     lugre = 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"\n'
     shapes_below = "shapes on the lower piece"
     for law, friction_keys, column, sets, extra_tables in (
@@ -150,14 +150,14 @@ def test_exact_page_of_limits_agrees_with_refusals():
         except SceneError as error:
             message = str(error).rpartition(": ")[2]
             assert cell == "no" and refusals[law, column][0].rpartition(": ")[2] == message
-            assert message in limits.messages()
+            assert message in limits.format_messages()
     assert cells["coulomb", "`exact`"] == "yes" and cells["tanh", "`exact`"] == "no"
 
 
 def test_always_page_of_limits_has_integer_bounds():
     """The page of limits states the bounds of all keys with whole numbers."""
     page = limits.FILE.read_text("utf-8")
-    for header, model in tables():
+    for header, model in iterate_tables():
         for key, name in attributes_by_key(model).items():
             if model.model_fields[name].annotation is int:
                 assert f"| `{header.strip('[]')}.{key}` | whole number, >= " in page, key

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from page_data import charts_of, data_of, own_part, unheard
+from page_data import find_accessibility_errors, read_charts, read_page_data, strip_scripts
 
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
@@ -200,7 +200,7 @@ class PageParser(HTMLParser):
 @pytest.mark.parametrize("name", PAGES)
 def test_always_page_is_accessible_to_screen_readers(name, run_pages):
     """The pages of all kinds of runs have the labels and headings that screen readers need."""
-    assert unheard(run_pages[name][1]) == []
+    assert find_accessibility_errors(run_pages[name][1]) == []
 
 
 def join_captions(page) -> str:
@@ -217,7 +217,7 @@ def verdict_text(page) -> str:
 def test_always_page_is_self_contained(run_pages, name):
     """The page is one file below 3 MB without external resources; its links point to the page or to result files."""
     text = run_pages[name][1]
-    content = own_part(text)
+    content = strip_scripts(text)
     parsed = PageParser(content)
     assert not {"link", "iframe", "img", "object", "metadata"} & set(parsed.tags)
     assert all(link.startswith("#") or link in dict(report.RESULT_FILES) for link in parsed.links)
@@ -229,17 +229,17 @@ def test_always_page_is_self_contained(run_pages, name):
 def test_always_ids_are_unique_and_links_resolve(run_pages, name):
     """The ids of a page are unique, and each internal link and chart has its element."""
     text = run_pages[name][1]
-    parsed = PageParser(own_part(text))
+    parsed = PageParser(strip_scripts(text))
     assert len(parsed.ids) == len(set(parsed.ids))
     anchors = {link[1:] for link in parsed.links if link.startswith("#")}
-    anchors |= {chart["anchor"] for chart in data_of(text).get("charts", [])}
+    anchors |= {chart["anchor"] for chart in read_page_data(text).get("charts", [])}
     assert anchors and anchors <= set(parsed.ids)
 
 
 def test_exact_charts_agree_with_run(run_pages):
     """The charts contain the loop, the history and the pressure of the run in customary units, within 1e-5."""
     data, text = run_pages["rig"]
-    chart_by_title = charts_of(text)
+    chart_by_title = read_charts(text)
     loop = chart_by_title["Friction loop", "friction force"]["marks"][0]
     np.testing.assert_allclose(loop["x"], data.motion.loop["slide"] * 1e6, rtol=1e-8)
     np.testing.assert_allclose(loop["y"], data.motion.loop["force"], rtol=1e-8)
@@ -455,7 +455,7 @@ cycles = 20
     assert not exit_info.value.code and "<h1>swing</h1>" in text
     # without contact and friction the page shows only the motion
     assert "friction" not in join_captions(text)
-    assert [title for title, _ in charts_of(text)] == [
+    assert [title for title, _ in read_charts(text)] == [
         "Whole run",
         "Last 2 cycles",
         "Last 2 cycles",

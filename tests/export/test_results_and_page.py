@@ -8,8 +8,8 @@ import signal
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import CommandResult, cli
-from limits import limited
+from command_line import CommandResult, run_cli
+from limits import limit_file_size
 from scene_texts import BENCH, COATED
 
 from patchfem import plan
@@ -88,22 +88,22 @@ def test_exact_netcdf_file_equals_that_of_xarray(tmp_path):
 
 def test_exact_run_without_page_writes_all_results(scene_file, tmp_path):
     """With --no-page a run writes all results except report.html."""
-    answer = cli("run", scene_file, "-o", tmp_path / "out", "--no-page")
+    answer = run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and "without report.html" in answer.out
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
-    answer_json = cli("run", scene_file, "-o", tmp_path / "out", "--no-page", "--json")
+    answer_json = run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page", "--json")
     assert json.loads(answer_json.out)["outcome"] == "done" and not answer_json.err
 
 
 def test_exact_page_is_added_to_results(scene_file, tmp_path):
     """The page is added to the results and lists all measures; a later run without a page removes it."""
-    assert cli("run", scene_file, "-o", tmp_path / "out").code == 0
+    assert run_cli("run", scene_file, "-o", tmp_path / "out").code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE | {"report.html"}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.endswith("</html>\n") and all(name in page for name in summary["measures"])
     # the page of an earlier run is removed
-    assert cli("run", scene_file, "-o", tmp_path / "out", "--no-page").code == 0
+    assert run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page").code == 0
     assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
 
 
@@ -127,7 +127,7 @@ class ActingStream(io.StringIO):
 def run_with_action(scene, out, action) -> CommandResult:
     """Run a scene on the command line and call a function between the results and the page."""
     stream = ActingStream(action)
-    answer = cli("run", scene, "-o", out, stdout=stream)
+    answer = run_cli("run", scene, "-o", out, stdout=stream)
     assert stream.has_acted
     return answer
 
@@ -163,7 +163,7 @@ def test_always_page_without_memory_leaves_results(scene_file, tmp_path, monkeyp
         raise MemoryError
 
     monkeypatch.setattr(report, "run_page", exhaust_memory)
-    answer = cli("run", scene_file, "-o", tmp_path / "out")
+    answer = run_cli("run", scene_file, "-o", tmp_path / "out")
     assert answer.code == 4 and "out of memory" in answer.err
     assert "results: " in answer.out and "are complete except for" in answer.err
     check_results_without_page(tmp_path / "out")
@@ -171,8 +171,8 @@ def test_always_page_without_memory_leaves_results(scene_file, tmp_path, monkeyp
 
 def test_exact_full_disk_leaves_no_partial_page(scene_file, tmp_path):
     """If the disk is full, no part of a page remains; the results take 20 kB and the page more than 200 kB."""
-    with limited(200_000):
-        answer = cli("run", scene_file, "-o", tmp_path / "out")
+    with limit_file_size(200_000):
+        answer = run_cli("run", scene_file, "-o", tmp_path / "out")
     assert answer.code == 4 and "complete except for the page" in answer.err
     assert "report.html" in answer.err
     check_results_without_page(tmp_path / "out")
@@ -186,7 +186,9 @@ def test_refuses_page_in_results_of_another_run(scene_file, tmp_path):
     def replace_results():
         """Move the results away and write those of another run in their place."""
         os.replace(out, tmp_path / "first")
-        assert cli("run", scene_file, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
+        assert (
+            run_cli("run", scene_file, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
+        )
 
     answer = run_with_action(scene_file, out, replace_results)
     assert answer.code == 4 and "replaced by another run" in answer.err
@@ -209,7 +211,7 @@ def test_refuses_page_for_moved_folder(scene_file, tmp_path):
 def test_exact_page_of_patch_shows_both_pieces(tmp_path):
     """The page of a patch has three figures, one of them of both pieces with their coatings."""
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
-    assert cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
+    assert run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.count("<figure") == page.count("</figure>") == 3
     assert "Both pieces with their coatings" in page

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.export import page_data
@@ -43,7 +43,7 @@ def test_exact_rms_comes_first_with_interval(random_run, tmp_path):
     """
     path = tmp_path / "rig.toml"
     path.write_text(SCENE, "utf-8")
-    lines = cli("run", path, "-o", tmp_path / "out").out.splitlines()
+    lines = run_cli("run", path, "-o", tmp_path / "out").out.splitlines()
     first_row = lines[lines.index("motion") + 1]
     value, scatter = (1e6 * random_run.measures[name].value for name in (RMS, f"{RMS}_scatter"))
     match = re.fullmatch(

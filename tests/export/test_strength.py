@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.export.fields.strength import find_yielding
@@ -59,7 +59,7 @@ def find_yield_notes(tmp_path, peak: float, substrate: str = '"steel"') -> list:
     load = float(peak**2 * pi * RADIUS / MODULUS * WIDTH)
     scene = tmp_path / "hertz.toml"
     scene.write_text(SCENE.format(load=load, substrate=substrate))
-    assert cli("run", scene, "-o", tmp_path / "out", "--no-page", "-q").code == 0
+    assert run_cli("run", scene, "-o", tmp_path / "out", "--no-page", "-q").code == 0
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     return [note for note in summary["notes"] if "yield strength" in note]
 

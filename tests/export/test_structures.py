@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cli
-from scene_texts import DRIVE, PAIR, PLASTIC, POINT, STRUCTURE, friction_of
+from command_line import run_cli
+from scene_texts import DRIVE, PAIR, PLASTIC, POINT, STRUCTURE, make_friction_table
 from scipy.io import loadmat
 
 import patchfem as pf
@@ -19,7 +19,7 @@ RUB = POINT + PLASTIC + STRUCTURE
 def export_structure(folder, text: str, ending: str):
     """Return the model of a scene and the path of its export."""
     (folder / "rig.toml").write_text(text)
-    answer = cli("export", folder / "rig.toml", "-o", folder / f"rig{ending}")
+    answer = run_cli("export", folder / "rig.toml", "-o", folder / f"rig{ending}")
     assert answer.code == 0 and "friction element" in answer.out, answer.err
     return build(pf.load(folder / "rig.toml")), folder / f"rig{ending}"
 
@@ -82,12 +82,12 @@ def element_force(stiffness, limit, slide):
 @pytest.mark.parametrize("law", ["elastic-plastic", "iwan"])
 def test_exact_exported_elements_agree_with_bench(tmp_path, law):
     """Under a triangular slide the force of the exported elements agrees with the bench of the law within 0.2 %."""
-    _, path = export_structure(tmp_path, POINT + friction_of(law) + STRUCTURE, ".npz")
+    _, path = export_structure(tmp_path, POINT + make_friction_table(law) + STRUCTURE, ".npz")
     with np.load(path) as file:
         exported = {name: file[name] for name in file.files}
     text = (
         POINT
-        + friction_of(law)
+        + make_friction_table(law)
         + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\ncycles = 2\n'
     )
     loop = pf.run(text)
@@ -156,7 +156,7 @@ def test_exact_documentation_lists_exported_variables(tmp_path):
         for row in (line.split("|") for line in page.splitlines() if line.startswith("| `"))
     }
     shapes = {".mat": {}, ".npz": {}}
-    for text in (RUB, FORCED, POINT + friction_of("tanh") + STRUCTURE):
+    for text in (RUB, FORCED, POINT + make_friction_table("tanh") + STRUCTURE):
         for ending, shape_by_name in shapes.items():
             path = export_structure(tmp_path, text, ending)[1]
             values = loadmat(path) if ending == ".mat" else dict(np.load(path))
@@ -178,7 +178,7 @@ def test_exact_documentation_lists_exported_variables(tmp_path):
 
 def test_exact_tanh_element_has_reference_speed(tmp_path):
     """The element of the law tanh has its reference speed."""
-    _, path = export_structure(tmp_path, POINT + friction_of("tanh") + STRUCTURE, ".mat")
+    _, path = export_structure(tmp_path, POINT + make_friction_table("tanh") + STRUCTURE, ".mat")
     cell = loadmat(path)["nonlinear_elements"].ravel()[0]
     assert str(cell["type"][0, 0][0]) == "tanhDryFriction" and cell["eps"][0, 0].item() == 1e-3
 
@@ -223,7 +223,7 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
 def test_always_export_states_omitted_features(tmp_path, text, message):
     """The printed line of an export states the features of the scene that the file does not contain."""
     (tmp_path / "rig.toml").write_text(text)
-    answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.npz")
+    answer = run_cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.npz")
     assert answer.code == 0 and answer.out.endswith(message), answer.out
     with np.load(tmp_path / "rig.npz") as exported:
         assert exported["Omega"] == pytest.approx(
@@ -234,14 +234,14 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
 @pytest.mark.parametrize(
     "text, ending, message",
     [
-        (POINT + friction_of("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
+        (POINT + make_friction_table("coulomb") + STRUCTURE, ".mat", "law 'coulomb'"),
         (
-            POINT + friction_of("bouc-wen") + STRUCTURE,
+            POINT + make_friction_table("bouc-wen") + STRUCTURE,
             ".npz",
             "law 'bouc-wen' cannot be written as friction elements",
         ),
         (
-            POINT + friction_of("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
+            POINT + make_friction_table("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
             ".mat",
             "cannot be written with [structure.stiffening]",
         ),
@@ -251,7 +251,7 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
             "cannot be written with [structure.stiffening]",
         ),
         (
-            POINT + WAVE + friction_of("tanh") + STRUCTURE,
+            POINT + WAVE + make_friction_table("tanh") + STRUCTURE,
             ".npz",
             "cannot be written under a load that changes",
         ),
@@ -263,7 +263,7 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
         (
             POINT
             + '[normal.grooves]\nwavelength = "80 um"\namplitude = "1 um"\n'
-            + friction_of("tanh")
+            + make_friction_table("tanh")
             + STRUCTURE,
             ".npz",
             "cannot be written with [normal.grooves]",
@@ -279,7 +279,7 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
 def test_refuses_structure_without_exportable_form(tmp_path, text, ending, message):
     """Friction laws, loads and structures that friction elements cannot represent are refused, and no file is written."""
     (tmp_path / "rig.toml").write_text(text)
-    answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / f"rig{ending}")
+    answer = run_cli("export", tmp_path / "rig.toml", "-o", tmp_path / f"rig{ending}")
     assert (
         answer.code == 2 and message in answer.err and not (tmp_path / f"rig{ending}").exists()
     ), answer.err

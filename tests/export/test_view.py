@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import cli
-from exported import at, write_small
+from command_line import run_cli
+from exported import frame_values, write_small_series
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -132,14 +132,16 @@ def test_exact_panels_share_stress_scale(bench_folder):
 
 def test_exact_mixed_cells_are_drawn_completely(tmp_path):
     """Triangles and quadrilaterals are drawn with their full area, edges and stresses."""
-    small = write_small(tmp_path / "out")
+    small = write_small_series(tmp_path / "out")
     frame = read_frame(tmp_path / "out")
     assert cell_areas(frame).sum() == pytest.approx(2 * 2e-3 * 1e-3, rel=1e-9)
     outer, _ = outer_edges(frame, make_panels(frame)[0].cells)
     assert np.linalg.norm(np.diff(frame.points[outer], axis=1), axis=2).sum() == pytest.approx(
         4 * 3e-3, rel=1e-9
     )
-    mises = [at(small.blocks[side].cell_data["von_mises"], 2) for side in ("lower", "upper")]
+    mises = [
+        frame_values(small.blocks[side].cell_data["von_mises"], 2) for side in ("lower", "upper")
+    ]
     assert np.array_equal(frame.cell_data["von_mises"][:14], np.concatenate(mises))
 
 
@@ -170,7 +172,7 @@ def test_refuses_window_without_screen(bench_folder, monkeypatch):
     """Without a screen, `view` without a file is refused, and the message suggests a file."""
     for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
-    answer = cli("view", bench_folder)
+    answer = run_cli("view", bench_folder)
     assert answer.code == 4 and "no screen" in answer.err and "-o FILE.png" in answer.err
 
 
@@ -183,7 +185,7 @@ def test_refuses_window_without_opengl(bench_folder, tmp_path, monkeypatch, stan
     (tmp_path / "pyvista.py").write_text(stand_in)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.setenv("DISPLAY", ":99")
-    answer = cli("view", bench_folder)
+    answer = run_cli("view", bench_folder)
     assert answer.code == 4 and "no working OpenGL" in answer.err and message in answer.err
     assert "-o FILE.png" in answer.err
 
@@ -195,7 +197,7 @@ def test_exact_picture_names_its_frame(bench_folder, tmp_path):
         ("0", f"frame 0 (of 0 to {last}), 0 s"),
         (str(last), f"frame {last} (the last)"),
     ):
-        answer = cli("view", bench_folder, "-o", tmp_path / "a.svg", "--frame", frame)
+        answer = run_cli("view", bench_folder, "-o", tmp_path / "a.svg", "--frame", frame)
         assert answer.code == 0 and name in answer.out
 
 
@@ -214,6 +216,6 @@ def test_refuses_figure_with_invalid_options(
 ):
     """Figures of an unsupported file type, an absent frame or an invalid magnification are refused."""
     monkeypatch.chdir(tmp_path)
-    answer = cli("view", bench_folder, *arguments)
+    answer = run_cli("view", bench_folder, *arguments)
     assert answer.code == code and message in answer.err
     assert not list(tmp_path.iterdir())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from lab_modes import OMEGA, RESIDUE, SAMPLES, STEP, TIME, ZETA, driven, free
+from lab_modes import OMEGA, RESIDUE, SAMPLES, STEP, TIME, ZETA, driven_response, free_decay
 
 from patchfem.core import PatchfemError
 from patchfem.identify import identify_decay_modes, identify_driven_modes
@@ -17,7 +17,7 @@ HERTZ = OMEGA / (2 * np.pi)
 @pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
 def test_exact_a_record_gives_its_modes_back_where_the_windowed_estimate_does_not(quantity):
     """Segments of 0.26 s blur the 143 Hz peak, 1.1 Hz wide; the record itself has no window."""
-    force, response = driven(quantity)
+    force, response = driven_response(quantity)
     estimate = estimate_response(STEP, force, response)
     found = fit_driven_modes(STEP, force, response, quantity, estimate)
     np.testing.assert_allclose(found.frequency, HERTZ, rtol=1e-9)
@@ -60,7 +60,7 @@ def test_order_coherence_is_the_share_of_the_response_that_follows_the_input():
 
 
 def test_always_noise_leaves_the_damping_within_its_error():
-    force, response = driven("acceleration")
+    force, response = driven_response("acceleration")
     noisy = response + 0.1 * np.std(response) * np.random.default_rng(3).normal(size=SAMPLES)
     found = fit_driven_modes(
         STEP, force, noisy, "acceleration", estimate_response(STEP, force, noisy)
@@ -72,7 +72,7 @@ def test_always_noise_leaves_the_damping_within_its_error():
 
 @pytest.mark.parametrize("amplitudes", [(0.3, 0.2), (0.3, 0.0)])
 def test_exact_a_free_decay_gives_frequency_damping_and_decrement(amplitudes):
-    found = fit_decay(*free(amplitudes))
+    found = fit_decay(*free_decay(amplitudes))
     n = int(np.count_nonzero(amplitudes))
     np.testing.assert_allclose(found.frequency, HERTZ[:n], rtol=1e-10)
     np.testing.assert_allclose(found.damping, ZETA[:n], rtol=1e-8)
@@ -83,7 +83,7 @@ def test_exact_a_free_decay_gives_frequency_damping_and_decrement(amplitudes):
 
 
 def test_always_a_noisy_decay_lies_within_its_error():
-    time, value = free()
+    time, value = free_decay()
     rng = np.random.default_rng(4)
     for _ in range(2):
         found = fit_decay(time, value + 0.01 * rng.normal(size=time.size))
@@ -98,12 +98,12 @@ def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
     assert any("exponential, as with friction damping" in note for note in found.notes)
     # one mode, not the several that would make the line
     assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)
-    clean = identify_decay_modes(dict(zip(("time", "displacement"), free())), 0.0)
+    clean = identify_decay_modes(dict(zip(("time", "displacement"), free_decay())), 0.0)
     assert len(clean.notes) == 1 and "logarithmic decrement" in clean.descriptions[0]
 
 
 def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
-    force, response = driven("acceleration")
+    force, response = driven_response("acceleration")
     found = identify_driven_modes(
         {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
     )
@@ -115,7 +115,7 @@ def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
 
 def test_exact_base_motion_determines_participations_but_no_mass():
     """Absolute acceleration of a block that holds 0.9 of its mass in two modes: A = -base * output each."""
-    base, relative = driven("acceleration")
+    base, relative = driven_response("acceleration")
     found = identify_driven_modes(
         {"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2},
         None,
@@ -137,7 +137,7 @@ def test_exact_base_motion_determines_participations_but_no_mass():
 
 
 def test_refuses_records_by_name():
-    force, response = driven("acceleration")
+    force, response = driven_response("acceleration")
     with pytest.raises(PatchfemError, match="moves against the force"):
         identify_driven_modes(
             {"time": TIME, "force": -force, "acceleration": response}, None, None, (0, np.inf)

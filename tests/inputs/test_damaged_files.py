@@ -6,7 +6,7 @@ import random
 import numpy as np
 import pytest
 import pyuff
-from lab_files import SI, loop, record, written
+from lab_files import SI, elastic_plastic_loop, make_record, write_universal
 from scipy import sparse
 from scipy.io import mmwrite, savemat
 from test_matlab import matlab5_bytes as write_version_5
@@ -190,8 +190,10 @@ def read_matlab_73(path):
 
 def read_universal(path):
     """Write and read a universal file with one record."""
-    time, slide, _ = loop(20, 1)
-    return read_datasets(written(path.with_suffix(".uff"), [SI, record(time, slide, 8)]))
+    time, slide, _ = elastic_plastic_loop(20, 1)
+    return read_datasets(
+        write_universal(path.with_suffix(".uff"), [SI, make_record(time, slide, 8)])
+    )
 
 
 READERS = {

@@ -2,21 +2,24 @@
 
 import numpy as np
 import pytest
-from command_line import cli
-from lab_files import INCH, SI, loop, record, written
+from command_line import run_cli
+from lab_files import INCH, SI, elastic_plastic_loop, make_record, write_universal
 from scipy.io import savemat
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import parse_requests, read_loop, read_records, read_signal
 from patchfem.inputs.units import find_unit_factor
 
-TIME, SLIDE, FORCE = loop(20, 1)
+TIME, SLIDE, FORCE = elastic_plastic_loop(20, 1)
 
 
 def test_exact_universal_file_round_trip(tmp_path):
     """Time, displacement and force of a universal file are read back bit for bit."""
     records = read_records(
-        written(tmp_path / "a.uff", [SI, record(TIME, SLIDE, 8), record(TIME, FORCE, 13)]), []
+        write_universal(
+            tmp_path / "a.uff", [SI, make_record(TIME, SLIDE, 8), make_record(TIME, FORCE, 13)]
+        ),
+        [],
     )
     assert list(records.values) == ["time", "displacement", "force"] and not records.notes
     for name, expected in (("time", TIME), ("displacement", SLIDE), ("force", FORCE)):
@@ -27,10 +30,10 @@ def test_exact_universal_file_round_trip(tmp_path):
 def test_exact_universal_file_layouts(tmp_path, binary, spacing, digits):
     """Text and binary layouts of a universal file give the values to the digits that they contain."""
     datasets = [
-        record(TIME, values, quantity_type, binary=binary, abscissa_spacing=spacing)
+        make_record(TIME, values, quantity_type, binary=binary, abscissa_spacing=spacing)
         for values, quantity_type in ((SLIDE, 8), (FORCE, 13))
     ]
-    records = read_records(written(tmp_path / "a.unv", [SI, *datasets]), [])
+    records = read_records(write_universal(tmp_path / "a.unv", [SI, *datasets]), [])
     assert records.values["force"] == pytest.approx(FORCE, rel=1e-11)
     assert records.values["time"] == pytest.approx(TIME, rel=10 ** (1 - digits))
 
@@ -39,19 +42,21 @@ def test_exact_units_of_dataset_164_and_channel_labels(tmp_path):
     """Units of dataset 164 (inch, lbf) are converted; the unit of a channel label takes precedence."""
     datasets = [
         INCH,
-        record(TIME, SLIDE / 0.0254, 8),
-        record(TIME, FORCE / 4.4482216152605, 13),
-        record(TIME, SLIDE, 12, ordinate_axis_units_lab="g"),
-        record(TIME, SLIDE, 11, ordinate_axis_units_lab="?"),
+        make_record(TIME, SLIDE / 0.0254, 8),
+        make_record(TIME, FORCE / 4.4482216152605, 13),
+        make_record(TIME, SLIDE, 12, ordinate_axis_units_lab="g"),
+        make_record(TIME, SLIDE, 11, ordinate_axis_units_lab="?"),
     ]
-    records = read_records(written(tmp_path / "a.uff", datasets), [])
+    records = read_records(write_universal(tmp_path / "a.uff", datasets), [])
     assert records.values["displacement"] == pytest.approx(SLIDE, rel=1e-14)
     assert records.values["force"] == pytest.approx(FORCE, rel=1e-14)
     assert np.array_equal(records.values["acceleration"], SLIDE * 9.80665)
     assert records.values["velocity"] == pytest.approx(SLIDE * 0.0254, rel=1e-14)
     assert len(records.notes) == 1
     assert "'?' is not known; the unit of dataset 164 is used" in records.notes[0]
-    without_units = read_records(written(tmp_path / "b.uff", [record(TIME, FORCE, 13)]), [])
+    without_units = read_records(
+        write_universal(tmp_path / "b.uff", [make_record(TIME, FORCE, 13)]), []
+    )
     assert (
         np.array_equal(without_units.values["force"], FORCE)
         and "read as SI" in without_units.notes[0]
@@ -62,11 +67,11 @@ def test_exact_channels_by_label_node_and_number(tmp_path):
     """A channel can be chosen by its label, its node and direction, or its number."""
     datasets = [
         SI,
-        record(TIME, SLIDE, 8, id1="upper", rsp_node=12),
-        record(TIME, 2 * SLIDE, 8, id1="lower", rsp_dir=-1),
-        record(TIME, FORCE, 0, id1="bridge"),
+        make_record(TIME, SLIDE, 8, id1="upper", rsp_node=12),
+        make_record(TIME, 2 * SLIDE, 8, id1="lower", rsp_dir=-1),
+        make_record(TIME, FORCE, 0, id1="bridge"),
     ]
-    path = written(tmp_path / "a.uff", datasets)
+    path = write_universal(tmp_path / "a.uff", datasets)
     with pytest.raises(
         PatchfemError, match=r"2 channels contain displacement; choose .* 1 'upper' at 12:\+x"
     ):
@@ -148,8 +153,8 @@ def test_exact_unit_spellings_are_recognised(unit, factor):
 )
 def test_refuses_invalid_channel_map(tmp_path, requests, message):
     """An invalid channel map is refused with the request concerned."""
-    path = written(tmp_path / "a.uff", [SI, record(TIME, FORCE, 13)])
-    result = cli(
+    path = write_universal(tmp_path / "a.uff", [SI, make_record(TIME, FORCE, 13)])
+    result = run_cli(
         "import",
         path,
         "-o",
@@ -170,16 +175,21 @@ def replace_value(values, index=3, value=np.nan):
     "datasets, message",
     [
         ([SI], "no record over time"),
-        ([record(replace_value(TIME, value=0.0), FORCE, 13)], "of sample 4 is not later than"),
-        ([record(TIME, FORCE, 13), record(TIME + 1, SLIDE, 8)], "is sampled at other times than"),
-        ([record(TIME, FORCE + 1j, 13)], "complex"),
-        ([record(TIME, FORCE, 0)], "no channel label names a quantity"),
-        ([SI | {"length": 0.0}, record(TIME, FORCE, 13)], "must be > 0"),
+        ([make_record(replace_value(TIME, value=0.0), FORCE, 13)], "of sample 4 is not later than"),
+        (
+            [make_record(TIME, FORCE, 13), make_record(TIME + 1, SLIDE, 8)],
+            "is sampled at other times than",
+        ),
+        ([make_record(TIME, FORCE + 1j, 13)], "complex"),
+        ([make_record(TIME, FORCE, 0)], "no channel label names a quantity"),
+        ([SI | {"length": 0.0}, make_record(TIME, FORCE, 13)], "must be > 0"),
     ],
 )
 def test_refuses_invalid_universal_record(tmp_path, datasets, message):
     """A universal file with invalid records is refused with its name and the reason."""
-    result = cli("import", written(tmp_path / "a.uff", datasets), "-o", tmp_path / "o.csv")
+    result = run_cli(
+        "import", write_universal(tmp_path / "a.uff", datasets), "-o", tmp_path / "o.csv"
+    )
     assert result.code == 2 and message in result.err and str(tmp_path / "a.uff") in result.err
 
 
@@ -188,7 +198,7 @@ def test_refuses_non_finite_value(tmp_path):
 
     pyuff writes NaN as 0, so the bytes of one value are replaced.
     """
-    path = written(tmp_path / "a.uff", [record(TIME, SLIDE, 13)])
+    path = write_universal(tmp_path / "a.uff", [make_record(TIME, SLIDE, 13)])
     path.write_bytes(path.read_bytes().replace(SLIDE[3].tobytes(), np.array(np.nan).tobytes()))
     with pytest.raises(PatchfemError, match=r"a\.uff: force of sample 4 is nan"):
         read_records(path, [])
@@ -212,7 +222,7 @@ def test_refuses_non_finite_value(tmp_path):
 def test_refuses_invalid_table_with_line_number(tmp_path, text, message):
     """An invalid table is refused with the line of the fault."""
     (tmp_path / "a.csv").write_text(text)
-    result = cli("import", tmp_path / "a.csv", "-o", tmp_path / "o.csv")
+    result = run_cli("import", tmp_path / "a.csv", "-o", tmp_path / "o.csv")
     assert result.code == 2 and message in result.err and str(tmp_path / "a.csv") in result.err, (
         result.err
     )
@@ -236,7 +246,7 @@ def test_refuses_unsupported_missing_and_damaged_files(tmp_path):
         (["d.mat"], 4, "no such"),
         (["d.csv"], 4, "no such"),
     ):
-        result = cli("import", tmp_path / words[0], *words[1:], "-o", tmp_path / "o.csv")
+        result = run_cli("import", tmp_path / words[0], *words[1:], "-o", tmp_path / "o.csv")
         assert (
             result.code == code and message in result.err and "internal fault" not in result.err
         ), result.err
@@ -244,22 +254,24 @@ def test_refuses_unsupported_missing_and_damaged_files(tmp_path):
 
 def test_exact_imported_files_are_valid_drive_and_loop(tmp_path):
     """An imported acceleration is a valid drive, and with `--zero` an imported loop starts at 0."""
-    path = written(
+    path = write_universal(
         tmp_path / "a.uff",
         [
             SI,
-            record(TIME + 2, np.cos(300 * TIME), 12, ordinate_axis_units_lab="g"),
-            record(TIME + 2, SLIDE + 1e-6, 8),
-            record(TIME + 2, FORCE, 13),
+            make_record(TIME + 2, np.cos(300 * TIME), 12, ordinate_axis_units_lab="g"),
+            make_record(TIME + 2, SLIDE + 1e-6, 8),
+            make_record(TIME + 2, FORCE, 13),
         ],
     )
-    assert cli("import", path, "-o", tmp_path / "drive.csv", "--map", "acceleration=1").code == 0
+    assert (
+        run_cli("import", path, "-o", tmp_path / "drive.csv", "--map", "acceleration=1").code == 0
+    )
     time, value = read_signal(tmp_path / "drive.csv", "acceleration")
     assert np.array_equal(value, np.cos(300 * TIME) * 9.80665) and np.array_equal(
         time, TIME + 2 - 2
     )
     options = ("--map", "displacement=2,force=3", "--zero")
-    assert cli("import", path, "-o", tmp_path / "loop.csv", *options).code == 0
+    assert run_cli("import", path, "-o", tmp_path / "loop.csv", *options).code == 0
     records = read_loop(tmp_path / "loop.csv")
     assert records.time[0] == 0 and np.array_equal(records.reading, FORCE)
     assert np.array_equal(records.displacement, (SLIDE + 1e-6) - (SLIDE + 1e-6)[0])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import pyuff
-from lab_files import INCH, record, written
+from lab_files import INCH, make_record, write_universal
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_signal
@@ -59,12 +59,13 @@ def test_exact_signal_units_of_label_and_dataset_164(tmp_path):
     """A signal in g by its label, or in inch/s^2 by dataset 164, is converted to m/s^2."""
     times = np.arange(200) / 1e4
     acceleration = np.sin(OMEGA * times)
-    in_g = written(
-        tmp_path / "a.uff", [record(times, acceleration / 9.80665, 12, ordinate_axis_units_lab="g")]
+    in_g = write_universal(
+        tmp_path / "a.uff",
+        [make_record(times, acceleration / 9.80665, 12, ordinate_axis_units_lab="g")],
     )
-    in_inches = written(
+    in_inches = write_universal(
         tmp_path / "b.uff",
-        [INCH, record(times, acceleration / 0.0254, 12), record(times, acceleration, 8)],
+        [INCH, make_record(times, acceleration / 0.0254, 12), make_record(times, acceleration, 8)],
     )
     for path in (in_g, in_inches):
         assert read_signal(path, "acceleration")[1] == pytest.approx(

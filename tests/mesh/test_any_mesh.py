@@ -7,7 +7,16 @@ import time
 import meshio
 import numpy as np
 import pytest
-from any_mesh_cases import FORMATS, GRID, blocks, drawn, interface_node, move, stored, write_inp
+from any_mesh_cases import (
+    FORMATS,
+    GRID,
+    find_cell_blocks,
+    find_interface_node,
+    make_pair,
+    shift_points,
+    write_and_read_pair,
+    write_inp,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,7 +31,7 @@ KINDS = ("quads", "triangles", "mixed")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("form", FORMATS)
 def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
-    pair = stored(drawn(kind), tmp_path, form)
+    pair = write_and_read_pair(make_pair(kind), tmp_path, form)
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-12 * GRID.length
         assert (piece.length, piece.height, piece.coating_thickness) == pytest.approx(
@@ -44,10 +53,10 @@ def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
 
 
 def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
-    m = drawn("mixed")
+    m = make_pair("mixed")
     lift = np.maximum(np.abs(m.points[:, 0]) - 0.5e-3, 0) ** 2 / 0.02
     m.points[:, 1] += np.where(np.arange(len(lift)) < len(lift) // 2, -1, 1) * lift
-    pair = stored(m, tmp_path)
+    pair = write_and_read_pair(m, tmp_path)
     for piece in (pair.lower, pair.upper):
         assert piece.interface_depths == pytest.approx(
             np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15
@@ -56,15 +65,15 @@ def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
         assert piece.refine().interface_depths[1::2] == pytest.approx(
             (piece.interface_depths[1:] + piece.interface_depths[:-1]) / 2, abs=1e-18
         )
-    assert np.all(stored(drawn("mixed"), tmp_path).lower.interface_depths == 0)
+    assert np.all(write_and_read_pair(make_pair("mixed"), tmp_path).lower.interface_depths == 0)
 
 
 @pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_any_pair_is_written_and_read_back_bit_by_bit(kind, name, tmp_path):
-    m = drawn(kind)
+    m = make_pair(kind)
     m.points[m.points[:, 1] > 0] *= [1.0, 1.7]  # unlike pieces
-    pair = stored(m, tmp_path)
+    pair = write_and_read_pair(m, tmp_path)
     write_mesh(pair.lower, tmp_path / name, pair.upper)
     back = read_pieces(tmp_path / name)
     for mine, theirs in ((back.lower, pair.lower), (back.upper, pair.upper)):
@@ -93,7 +102,7 @@ def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
 def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
     order, shift, kind, tmp_path_factory
 ):
-    m = drawn(kind)
+    m = make_pair(kind)
     new = list(range(len(m.points)))
     order.shuffle(new)
     new = np.array(new)
@@ -108,7 +117,7 @@ def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
     for cells in (m.triangles, m.quads):
         for k in range(len(cells)):
             cells[k] = np.roll(cells[k][:: order.choice((-1, 1))], order.randrange(4))
-    pair = stored(m, tmp_path_factory.mktemp("any"))
+    pair = write_and_read_pair(m, tmp_path_factory.mktemp("any"))
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-14
         assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(
@@ -118,7 +127,7 @@ def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_exact_halved_piece_fills_the_same_place_with_four_times_the_cells(kind, tmp_path):
-    piece = stored(drawn(kind), tmp_path).upper
+    piece = write_and_read_pair(make_pair(kind), tmp_path).upper
     fine = piece.refine()
     assert fine.is_coating.size == 4 * piece.is_coating.size
     assert fine.areas().min() > 0
@@ -187,20 +196,20 @@ def share(m):
 
 SPOILT = {
     "off the line": (
-        lambda m: move(m, interface_node(m), (0, 2e-5)),
+        lambda m: shift_points(m, find_interface_node(m), (0, 2e-5)),
         "upper_interface is not the straight line y = 0",
     ),
     "shifted": (
-        lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)),
+        lambda m: shift_points(m, slice(len(m.points) // 2, None), (1e-5, 0)),
         "do not match .*; let both interfaces begin and end",
     ),
     "end node aside": (
-        lambda m: move(m, interface_node(m, k=-1), (1e-7, 0)),
+        lambda m: shift_points(m, find_interface_node(m, k=-1), (1e-7, 0)),
         "do not match .* 1e-07 m apart",
     ),
     "double node": (lambda m: double(m, m.quads[20, 0], 20), "coincide, the first at .*merge"),
     "double interface node": (
-        lambda m: twin(m, interface_node(m)),
+        lambda m: twin(m, find_interface_node(m)),
         "upper_interface has two nodes at x = .*; merge",
     ),
     "loose coating": (loosen, "9 pairs of nodes of the upper piece coincide"),
@@ -225,7 +234,7 @@ SPOILT = {
     ),
     "far at the interface": (
         lambda m: m.edges.__setitem__(
-            m.edge_tags == EDGE_TAGS["lower_far"], interface_node(m, "lower")
+            m.edge_tags == EDGE_TAGS["lower_far"], find_interface_node(m, "lower")
         ),
         "lower_far must contain two nodes or more",
     ),
@@ -237,7 +246,7 @@ SPOILT = {
     ),
     "foreign node": (
         lambda m: m.edges.__setitem__(
-            (np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0), interface_node(m)
+            (np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0), find_interface_node(m)
         ),
         "lower_far contains 1 nodes that belong to no cell",
     ),
@@ -257,7 +266,7 @@ SPOILT = {
         lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]),
         "1 cells are twisted or have no area",
     ),
-    "not finite": (lambda m: move(m, 7, (np.nan, 0)), "not finite"),
+    "not finite": (lambda m: shift_points(m, 7, (np.nan, 0)), "not finite"),
     "missing piece": (
         lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3),
         "no cells or nodes are tagged upper_substrate",
@@ -273,38 +282,38 @@ SPOILT = {
 @pytest.mark.parametrize("name", SPOILT)
 def test_refuses_a_spoilt_mesh_by_name(name, form, tmp_path):
     spoil, message = SPOILT[name]
-    m = drawn("quads")
+    m = make_pair("quads")
     spoil(m)
     begin = time.process_time()
     with pytest.raises(PatchfemError, match=message) as caught:
-        stored(m, tmp_path, form)
+        write_and_read_pair(m, tmp_path, form)
     assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
     assert time.process_time() - begin < 2
 
 
 def test_refuses_parts_joined_at_one_node_only(tmp_path):
-    m = drawn("quads")
+    m = make_pair("quads")
     last = m.quads[np.flatnonzero(m.quad_tags == CELL_TAGS["upper_substrate"])[-1]]
     m.points = np.concatenate([m.points, m.points[last[2]] + [[1e-3, 0], [1e-3, 1e-3], [0, 1e-3]]])
     count = len(m.points)
     m.quads = np.append(m.quads, [[last[2], count - 3, count - 2, count - 1]], axis=0)
     m.quad_tags = np.append(m.quad_tags, CELL_TAGS["upper_substrate"])
     with pytest.raises(PatchfemError, match="the upper piece falls into 2 parts"):
-        stored(m, tmp_path)
+        write_and_read_pair(m, tmp_path)
 
 
 def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
-    m = drawn("quads")
+    m = make_pair("quads")
     path = tmp_path / "pair.vtu"
     mesh = meshio.Mesh(
         np.column_stack([m.points, m.points[:, 0]]),
-        [(k, c) for k, c, _ in blocks(m)],
-        cell_data={"tag": [t for _, _, t in blocks(m)]},
+        [(k, c) for k, c, _ in find_cell_blocks(m)],
+        cell_data={"tag": [t for _, _, t in find_cell_blocks(m)]},
     )
     meshio.write(path, mesh)
     with pytest.raises(PatchfemError, match=r"not plane: its z values span 0\.002 m"):
         read_pieces(path)
-    mesh.cell_data = {"tag": [t + 100 for _, _, t in blocks(m)]}
+    mesh.cell_data = {"tag": [t + 100 for _, _, t in find_cell_blocks(m)]}
     meshio.write(path, mesh)
     with pytest.raises(
         PatchfemError, match=r"no cells or nodes are tagged .*cell array `tag`: 1 upper_substrate"
@@ -354,7 +363,7 @@ def test_refuses_decks_it_cannot_use(text, message, tmp_path):
 def test_refuses_truncations_in_bounded_time(form, tmp_path):
     ending, write = FORMATS[form]
     path = tmp_path / f"pair{ending}"
-    write(drawn("mixed"), path)
+    write(make_pair("mixed"), path)
     whole = path.read_bytes()
     for cut in range(0, int(0.9 * len(whole)), max(1, len(whole) // 40)):
         path.write_bytes(whole[:cut])
@@ -376,7 +385,7 @@ def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
     """Bytes of a file of this form changed at shares of its length: read to a mesh without faults, or refused."""
     ending, write = FORMATS[form]
     path = tmp_path / f"pair{ending}"
-    write(drawn("mixed"), path)
+    write(make_pair("mixed"), path)
     raw = bytearray(path.read_bytes())
     for place, byte in changes:
         raw[int(place * len(raw))] = byte

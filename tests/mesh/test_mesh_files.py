@@ -7,8 +7,8 @@ import time
 import meshio
 import numpy as np
 import pytest
-from any_mesh_cases import drawn, write_msh22
-from pair_meshes import pair_mesh
+from any_mesh_cases import make_pair, write_msh22
+from pair_meshes import make_pair_mesh
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.mesh import PieceMesh, TensorGrid, graded_grid, read_bodies, write_mesh
@@ -29,7 +29,7 @@ each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
 def store(path, pair, names=None, extra=(), edges=None):
     """Write points, quads and tags as they stand, so that a broken pair can be made."""
     points = np.column_stack([pair["points"], np.zeros(len(pair["points"]))])
-    pair = pair_mesh(SMALL) | pair if "edges" not in pair else pair
+    pair = make_pair_mesh(SMALL) | pair if "edges" not in pair else pair
     blocks = [("quad", pair["quads"]), ("line", pair["edges"]), *extra]
     mesh = meshio.Mesh(points, blocks)
     tags = [
@@ -91,7 +91,7 @@ def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, ca
 
 
 def test_always_a_coating_that_is_no_layer_leaves_no_tensor_grid(tmp_path):
-    pair = pair_mesh(SMALL)
+    pair = make_pair_mesh(SMALL)
     tags = pair["tags"].copy()
     tags[np.flatnonzero(tags == CELL_TAGS["upper_coating"])[2]] = CELL_TAGS["upper_substrate"]
     low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
@@ -100,8 +100,8 @@ def test_always_a_coating_that_is_no_layer_leaves_no_tensor_grid(tmp_path):
 
 def together(lower, upper):
     """The lower piece of one grid and the upper piece of another as one pair."""
-    lower = pair_mesh(lower)
-    upper = pair_mesh(upper)
+    lower = make_pair_mesh(lower)
+    upper = make_pair_mesh(upper)
     out = {}
     for part, tags, codes in (("quads", "tags", CELL_TAGS), ("edges", "edge_tags", EDGE_TAGS)):
         kept = [
@@ -130,7 +130,7 @@ def test_exact_unlike_pieces_on_the_same_columns_are_two_grids(other, tmp_path):
 
 
 def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_path):
-    pair = pair_mesh(SMALL)
+    pair = make_pair_mesh(SMALL)
     deepest = np.abs(pair["points"][pair["quads"], 1]).max(axis=1) > SMALL.depth[
         SMALL.coating_rows - 1
     ] * (1 + 1e-9)
@@ -144,7 +144,7 @@ def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_p
 def test_refuses_a_text_whose_cell_names_a_node_below_one(wrong, tmp_path):
     """A reader that counts back from the end takes node 0 for the last one, which lies in the upper piece."""
     path = tmp_path / "pair.msh"
-    mesh = drawn("quads")
+    mesh = make_pair("quads")
     write_msh22(mesh, path, binary=False)
     assert read_grid(path)
     lines = path.read_text().split("\n")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from any_mesh_cases import FORMATS, GRID, drawn, of_grid
+from any_mesh_cases import FORMATS, GRID, make_pair, mesh_of_grid
 
 from patchfem.mesh import PieceMesh, find_holes, measure_fixed_length, read_bodies
 from patchfem.mesh.files import EDGE_TAGS
@@ -31,17 +31,17 @@ def without(m, edges):
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_exact_the_same_grid_comes_from_every_format(form, tmp_path):
-    low, high = bodies(drawn("quads"), tmp_path, form)
+    low, high = bodies(make_pair("quads"), tmp_path, form)
     assert high is None and low.coating_rows == GRID.coating_rows
     assert low.x == pytest.approx(GRID.x, abs=1e-15) and low.depth == pytest.approx(
         GRID.depth, abs=1e-15
     )
-    assert all(isinstance(body, PieceMesh) for body in bodies(drawn("mixed"), tmp_path, form))
+    assert all(isinstance(body, PieceMesh) for body in bodies(make_pair("mixed"), tmp_path, form))
 
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
-    m = drawn("quads")
+    m = make_pair("quads")
     low, high = bodies(without(m, far_edges(m)[2:]), tmp_path, form)
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
     assert measure_fixed_length(low) == pytest.approx(
@@ -51,7 +51,7 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
 
 
 def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
-    piece = of_grid(GRID, 0.5, 3)
+    piece = mesh_of_grid(GRID, 0.5, 3)
     assert measure_fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
     bottom = piece.points[:, 1] == 1e-3
     left = piece.points[:, 0] == -1e-3
@@ -67,14 +67,14 @@ def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
 
 
 def test_always_a_grid_is_recognised_whatever_its_numbers_are():
-    assert recognise_grid(of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
-    assert recognise_grid(of_grid(GRID, 0.2)) is None
+    assert recognise_grid(mesh_of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
+    assert recognise_grid(mesh_of_grid(GRID, 0.2)) is None
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
 def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_none(split):
     """Two cells apart from one another inside the piece, then one more at its side."""
-    piece = of_grid(GRID, split, 3)
+    piece = mesh_of_grid(GRID, split, 3)
     assert find_holes(piece) == (0, 0.0)
     middle = np.concatenate(
         [piece.points[cells].mean(axis=1) for cells in (piece.triangles, piece.quads)]
@@ -104,7 +104,7 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
 @pytest.mark.parametrize(("turn", "right_half"), [(28.0, 1e-3), (32.0, 0.0)])
 def test_exact_a_far_face_ends_where_its_border_turns_by_thirty_degrees(turn, right_half):
     """The left half of a far face is inclined and fixed; the right half is free, and part of it or another face."""
-    piece = of_grid(GRID, 0.5, 3)
+    piece = mesh_of_grid(GRID, 0.5, 3)
     is_fixed = (piece.points[:, 1] == 1e-3) & (piece.points[:, 0] <= 0)
     slope = np.tan(np.radians(turn))
     points = piece.points.copy()

@@ -6,7 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from any_mesh_cases import FORMATS, GRID, drawn, interface_node, move, stored
+from any_mesh_cases import (
+    FORMATS,
+    GRID,
+    find_interface_node,
+    make_pair,
+    shift_points,
+    write_and_read_pair,
+)
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -42,7 +49,9 @@ FINER = graded_grid(2e-3, 1.5e-3, 1e-4, 1e-4)
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
-    pair = stored(unlike(drawn("quads"), drawn("triangles", FINER)), tmp_path, form)
+    pair = write_and_read_pair(
+        unlike(make_pair("quads"), make_pair("triangles", FINER)), tmp_path, form
+    )
     assert not pair.has_matching_nodes
     for piece, grid in ((pair.lower, GRID), (pair.upper, FINER)):
         assert np.abs(piece.x - grid.x).max() <= 1e-12 * grid.length
@@ -53,13 +62,13 @@ def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
 
 
 def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):
-    assert stored(drawn("mixed"), tmp_path).has_matching_nodes
-    near = drawn("quads")
-    aside = drawn("quads")
-    move(near, interface_node(near), (1e-13, 0))
-    move(aside, interface_node(aside), (1e-7, 0))
-    assert stored(near, tmp_path).has_matching_nodes
-    pair = stored(aside, tmp_path)
+    assert write_and_read_pair(make_pair("mixed"), tmp_path).has_matching_nodes
+    near = make_pair("quads")
+    aside = make_pair("quads")
+    shift_points(near, find_interface_node(near), (1e-13, 0))
+    shift_points(aside, find_interface_node(aside), (1e-7, 0))
+    assert write_and_read_pair(near, tmp_path).has_matching_nodes
+    pair = write_and_read_pair(aside, tmp_path)
     assert not pair.has_matching_nodes and np.abs(
         pair.upper.x - pair.lower.x
     ).max() == pytest.approx(1e-7, rel=1e-6)
@@ -70,9 +79,9 @@ def test_always_any_nodes_between_the_same_ends_are_read(cells, shift, tmp_path_
     x = np.concatenate([[0.0], np.cumsum(cells)]) / np.sum(cells)
     x = (x - 0.5) * 2e-3
     x[-1] = 1e-3
-    m = unlike(drawn("quads"), drawn("mixed", TensorGrid(x, GRID.depth, 0)))
+    m = unlike(make_pair("quads"), make_pair("mixed", TensorGrid(x, GRID.depth, 0)))
     m.points = np.add(m.points, [shift, 0.0])
-    pair = stored(m, tmp_path_factory.mktemp("unlike"))
+    pair = write_and_read_pair(m, tmp_path_factory.mktemp("unlike"))
     assert np.abs(pair.upper.x - x).max() <= 1e-15 and np.abs(pair.lower.x - GRID.x).max() <= 1e-15
 
 
@@ -83,8 +92,11 @@ def test_refuses_interfaces_of_other_lengths(factor, tmp_path):
         PatchfemError,
         match=r"do not match \(lengths 0\.002 and .*let both interfaces begin and end",
     ):
-        stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path)
+        write_and_read_pair(unlike(make_pair("quads"), make_pair("quads", grid)), tmp_path)
     grid = TensorGrid(FINER.x * (1 + 1e-10), FINER.depth, FINER.coating_rows)
     assert (
-        stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path).upper.x.size == FINER.x.size
+        write_and_read_pair(
+            unlike(make_pair("quads"), make_pair("quads", grid)), tmp_path
+        ).upper.x.size
+        == FINER.x.size
     )

@@ -11,8 +11,8 @@ import zlib
 import numpy as np
 import pytest
 import surfaces as write
-from command_line import cli
-from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, line_of
+from command_line import run_cli
+from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, find_line
 
 from patchfem import SceneError, load
 
@@ -32,7 +32,7 @@ def check_scene_with_file(folder, text: str, name: str, content, *options) -> tu
     (folder / "scene.toml").write_text(text.format(name))
     if content is not None:
         (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    answer = cli("check", folder / "scene.toml", *options)
+    answer = run_cli("check", folder / "scene.toml", *options)
     return answer.code, answer.err.splitlines()
 
 
@@ -48,7 +48,7 @@ FAULTS = {
     "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: there is no header, and units"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
                        "the profile is 4 mm long, but the patch is 12.7 mm"),
-    "profile, areal": (PROFILE, "a.x3p", write.x3p_of(write.scan()), "contact.profile.file",
+    "profile, areal": (PROFILE, "a.x3p", write.heights_to_x3p(write.draw_scan()), "contact.profile.file",
                        "an areal scan of 4 x 6 heights, but a single trace is needed"),
     "slide": (SLIDE, "p.csv", "time [s],displacement [um]\n0,0\n1,x\n", "slide.file",
               "p.csv:3: displacement: 'x' is not a finite number"),
@@ -72,11 +72,11 @@ def test_refuses_faulty_file_at_its_scene_line(tmp_path, text, name, content, ke
     scene."""
     code, lines = check_scene_with_file(tmp_path, text, name, content)
     assert code == 2 and len(lines) == 1, lines
-    number = line_of(text, "mesh = " if key == "contact.mesh" else "file = ")
+    number = find_line(text, "mesh = " if key == "contact.mesh" else "file = ")
     assert (
         lines[0].startswith(f"{tmp_path / 'scene.toml'}:{number}: {key}: ") and message in lines[0]
     )
-    answer = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
+    answer = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
     assert answer.code == 2 and answer.err.splitlines() == lines
 
 
@@ -137,10 +137,10 @@ def test_exact_valid_files_are_accepted(tmp_path):
     of a structure."""
     z = 0.2 * np.cos(np.arange(3200) / 400)
     code, lines = check_scene_with_file(
-        tmp_path, PROFILE + 'heights = "surface"\n', "scan.csv", write.dektak(z, 13000.0)
+        tmp_path, PROFILE + 'heights = "surface"\n', "scan.csv", write.make_dektak(z, 13000.0)
     )
     assert code == 0 and all(line.startswith("note: scan.csv: ") for line in lines), lines
-    answer = cli("check", tmp_path / "scene.toml", "--json")
+    answer = run_cli("check", tmp_path / "scene.toml", "--json")
     assert json.loads(answer.out)["kind"] == "patch"
     M = np.eye(2)
     K = np.array([[200.0, -100.0], [-100.0, 100.0]])
@@ -159,11 +159,11 @@ def test_exact_check_and_run_report_same_profile_notes(tmp_path):
         and "from the heights; to include a tilt" in lines[1]
     ), lines
     answer = json.loads(
-        cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out
+        run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out
     )
     expected = [text for text in (*answer["notes"], *answer["warnings"]) if "p.csv" in text]
     assert lines == [f"note: {text}" for text in expected]
-    assert json.loads(cli("check", tmp_path / "scene.toml", "--json").out)["notes"] == expected
+    assert json.loads(run_cli("check", tmp_path / "scene.toml", "--json").out)["notes"] == expected
 
 
 # ---- hostile files
@@ -171,9 +171,14 @@ def x3p_bomb() -> bytes:
     """Return an X3P file whose 64 MiB of zero heights are compressed to 65 KB."""
     heights = bytes(64 * 2**20)
     axes = (
-        write.axis("CX", increment=1e-6) + write.axis("CY", increment=1e-6) + write.axis("CZ", "A")
+        write.format_axis("CX", increment=1e-6)
+        + write.format_axis("CY", increment=1e-6)
+        + write.format_axis("CZ", "A")
     )
-    return write.x3p(write.main_xml(axes, write.matrix(4096, 2048) + write.link(heights)), heights)
+    return write.make_x3p(
+        write.make_main_xml(axes, write.format_matrix(4096, 2048) + write.format_link(heights)),
+        heights,
+    )
 
 
 def gzip_bomb() -> bytes:
@@ -185,7 +190,7 @@ def gzip_bomb() -> bytes:
 def x3p_with_entities(declarations: str) -> bytes:
     """Return an X3P file whose main.xml declares the given entities."""
     xml = f'<?xml version="1.0"?><!DOCTYPE a [{declarations}]><ISO5436_2><Record1>&b9;</Record1></ISO5436_2>'
-    return write.x3p(xml.encode())
+    return write.make_x3p(xml.encode())
 
 
 def entity_bomb() -> bytes:
@@ -215,21 +220,21 @@ class FolderMaker:
 
 def npy_with_pickle(folder) -> bytes:
     """Return a .npy file with a pickled object that would create the folder `made`."""
-    return write.npy(np.array([FolderMaker(folder / "made")], object))
+    return write.make_npy(np.array([FolderMaker(folder / "made")], object))
 
 
 HOSTILE = {
     "zip bomb": ("a.x3p", lambda _: x3p_bomb(), "unpacks to more than 200 times its packed size"),
     "gzip bomb": ("a.csv.gz", lambda _: gzip_bomb(), "more than 64 MiB of text"),
-    "bomb in zip": ("a.zip", lambda _: write.zipped({"a.csv": bytes(64 * 2**20)}), "more than 200 times its packed"),
-    "zip in zip": ("a.zip", lambda _: write.zipped({"a.zip": write.zipped({"a.csv": b"x"})}), "packed twice"),
+    "bomb in zip": ("a.zip", lambda _: write.make_zip({"a.csv": bytes(64 * 2**20)}), "more than 200 times its packed"),
+    "zip in zip": ("a.zip", lambda _: write.make_zip({"a.zip": write.make_zip({"a.csv": b"x"})}), "packed twice"),
     "entities": ("a.x3p", lambda _: entity_bomb(), "main.xml declares entities or a document type"),
     "external entity": ("a.x3p", lambda _: x3p_with_entities('<!ENTITY b9 SYSTEM "file:///etc/passwd">'),
                         "main.xml declares entities or a document type"),
-    "deep xml": ("a.x3p", lambda _: write.x3p(b"<a>" * 10**5), "nested deeper than 50"),
-    "path traversal": ("a.x3p", lambda _: write.x3p(write.main_xml(
-        write.axis("CX", increment=1e-6) + write.axis("CY", increment=1e-6) + write.axis("CZ", "A"),
-        write.matrix(6, 4) + write.link(b"", name="../../etc/passwd"))), "names a place outside the file"),
+    "deep xml": ("a.x3p", lambda _: write.make_x3p(b"<a>" * 10**5), "nested deeper than 50"),
+    "path traversal": ("a.x3p", lambda _: write.make_x3p(write.make_main_xml(
+        write.format_axis("CX", increment=1e-6) + write.format_axis("CY", increment=1e-6) + write.format_axis("CZ", "A"),
+        write.format_matrix(6, 4) + write.format_link(b"", name="../../etc/passwd"))), "names a place outside the file"),
     "29 TiB": ("a.npy", lambda _: npy_with_shape("(2000000000000, 2)"), "4000000000000 numbers are announced in"),
     "pickle": ("a.npy", npy_with_pickle, "contains Python objects, which are not loaded"),
 }  # fmt: skip

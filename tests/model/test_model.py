@@ -21,7 +21,7 @@ from scene_texts import (
     SMALL_PATCH,
     STRUCTURE,
     TRIANGLE,
-    line_of,
+    find_line,
 )
 
 from patchfem.core import Missing, PatchfemError
@@ -249,7 +249,7 @@ STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
 def test_refuses_scene_with_file_and_line_stated_once(text, key, line, expected):
     """Scene, model and plan raise the same message, which begins with the file and the line of the
     key."""
-    where = f"a.toml:{line_of(text, line)}: {key}: " if key else "a.toml: "
+    where = f"a.toml:{find_line(text, line)}: {key}: " if key else "a.toml: "
     scene = loads(text, "a.toml")
     messages = set()
     for call in (lambda: run(scene), lambda: run(build(scene)), lambda: run(plan(scene))):
@@ -271,7 +271,7 @@ def test_refuses_invalid_model_with_file_and_line_stated_once():
     for call in (build, plan, run):
         with pytest.raises(PatchfemError, match="rest_growth would be about 1e-") as caught:
             call(loads(text, "a.toml"))
-        where = f"a.toml:{line_of(text, '[friction.temperature]')}: friction.temperature: "
+        where = f"a.toml:{find_line(text, '[friction.temperature]')}: friction.temperature: "
         assert str(caught.value).startswith(where) and str(caught.value).count("a.toml") == 1
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import CROWNED_JOINT, DRIVE, JOINT_SHAKEN, KILOGRAM, POINT, friction_of
+from scene_texts import CROWNED_JOINT, DRIVE, JOINT_SHAKEN, KILOGRAM, POINT, make_friction_table
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
@@ -41,7 +41,7 @@ def viscous(zeta: float, omega: float, samples: int):
 def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
     """An oscillator released at 2 mm, whose last six cycles begin larger than the last one."""
     text = (
-        (POINT + friction_of("elastic-plastic")).replace("static = 0.3", "static = 0")
+        (POINT + make_friction_table("elastic-plastic")).replace("static = 0.3", "static = 0")
         + KILOGRAM
         + RELEASED
     )
@@ -127,7 +127,7 @@ def test_too_few_swings_or_one_that_grows_end_it():
 def test_exact_a_release_under_coulomb_friction():
     """The decay_ columns of result.nc: one frequency, the ratio in closed form, errors that hold."""
     data = pf.run(
-        POINT + friction_of("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED
+        POINT + make_friction_table("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED
     ).to_xarray()
     h = 0.3 * 115.6541 / (286 * np.pi) ** 2
     a = data.decay_amplitude.values
@@ -141,7 +141,7 @@ def test_a_release_of_an_iwan_joint_follows_its_balance():
     """The closed loop of the static curve misses what a swing that loses 2 pi zeta of itself leaves open: 4 zeta."""
     text = (
         POINT
-        + friction_of("iwan")
+        + make_friction_table("iwan")
         + KILOGRAM
         + RELEASED.replace("2 mm", "5 um").replace("30", "20")
     )

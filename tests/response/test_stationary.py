@@ -3,7 +3,7 @@ the scatter."""
 
 import numpy as np
 import pytest
-from random_shaking import CASES, NAMES, held, shaken
+from random_shaking import CASES, NAMES, normalized_measures, simulate_random_response
 from scipy.integrate import quad
 from scipy.signal import csd, welch
 from vibration_forms import shaken_rms
@@ -13,7 +13,7 @@ from patchfem.structure.noise import draw_random_record
 
 
 def test_exact_spectra_are_those_of_scipy():
-    window, drive = shaken(100.0, 0.02, 4.0, 3)
+    window, drive = simulate_random_response(100.0, 0.02, 4.0, 3)
     record = stationary.make_record(window, drive)
     found = stationary.compute_spectra(window, drive)
     size = 2 * (record.place.size // (2 * stationary.SEGMENTS_PER_RECORD))
@@ -57,7 +57,7 @@ def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):
 @pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
 def test_closed_forms_lie_inside_the_scatter_of_records(count):
     """200 records of the first case: the intervals of 95 % hold the truth of 95 % less three standard deviations."""
-    rows = np.array([held(*CASES[0], seed) for seed in range(count)])
+    rows = np.array([normalized_measures(*CASES[0], seed) for seed in range(count)])
     inside = np.abs(rows[..., 0] - 1) <= rows[..., 1]
     assert np.all(inside.mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)), dict(
         zip(NAMES, inside.mean(axis=0))

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from friction_forms import steady_bond_length
 from scene_texts import COULOMB, POINT
 from scipy.integrate import quad, solve_ivp
@@ -198,7 +198,7 @@ def test_exact_dwell_and_table_give_same_breakaway(tmp_path, kind):
     )
     (tmp_path / "scene.toml").write_text(text, "utf-8")
     (tmp_path / "path.csv").write_text(HEAD + "0,0\n0.04,40\n0.34,40\n0.36,60\n", "utf-8")
-    answer = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
+    answer = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     result = run(load(tmp_path / "scene.toml"))
     assert f"slide.kind={kind}" in result.plan.effects
@@ -247,5 +247,5 @@ def test_refuses_slide_with_more_steps_than_memory(tmp_path):
         POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "1 um"\nspeed = "1 mm/s"\n'
         "cycles = 1e9\n"
     )
-    answer = cli("plan", scene)
+    answer = run_cli("plan", scene)
     assert answer.code == 4 and "lower slide.cycles" in answer.err

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import DRIVE, FORCED, PAIR, POINT, friction_of, mistakes
+from scene_texts import DRIVE, FORCED, PAIR, POINT, list_mistakes, make_friction_table
 
 import patchfem as pf
 from patchfem.core import PatchfemError
@@ -51,7 +51,7 @@ STUCK = 'measured = "stuck"'
 def test_exact_stuck_frequency_of_plan_returns_free_frequency(law):
     """The stuck frequency that `plan` prints, given as a measured frequency, returns the free
     frequency of the mode."""
-    contact = POINT + friction_of(law)
+    contact = POINT + make_friction_table(law)
     free = pf.plan(contact + MODES % ("", 143.0, 0.8, 0.9) + DRIVE).as_json()["modes"][0]
     stuck = pf.plan(contact + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()[
         "modes"
@@ -64,7 +64,7 @@ def test_exact_two_stuck_modes_return_free_modes():
     """Frequencies and shapes of two modes measured with the stuck joint return the free modes; a
     bonded spring stays in both."""
     spring = '[structure.bonded]\nstiffness = "4e5 N/m"\n'
-    tail = POINT + friction_of("iwan") + spring + DRIVE
+    tail = POINT + make_friction_table("iwan") + spring + DRIVE
     text = tail + MODES % ("", 143.0, 0.8, 0.9) + SECOND % (400.0, 0.5, -0.2)
     free = pf.build(text).rig.modes
     rows = free.interfaces
@@ -143,15 +143,15 @@ def test_exact_stuck_patch_has_measured_frequency():
     "text, message",
     [
         (
-            POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE,
+            POINT + make_friction_table("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE,
             "stiffness of the joint is .* % of the stiffness.*multiply `slide` of every mode by 0.0",
         ),
         (
-            POINT + friction_of("coulomb") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
+            POINT + make_friction_table("coulomb") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
             "law 'coulomb' sticks rigidly",
         ),
         (
-            POINT + friction_of("tanh") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
+            POINT + make_friction_table("tanh") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE,
             "law 'tanh' has no stiffness",
         ),
         (
@@ -168,17 +168,17 @@ def test_refuses_stuck_modes_with_unsuitable_joint(text, message):
 
 def test_refuses_stuck_modes_without_constant_joint_stiffness():
     """Measured stuck modes are refused without friction, with masses instead of modes, and with a varying normal load."""
-    assert "add [friction]" in mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
-    messages = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
+    assert "add [friction]" in list_mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
+    messages = list_mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
     assert any(
         "structure.masses, because only modes can be measured" in message for message in messages
     )
     assert any(
         "a normal load that changes" in message
-        for message in mistakes(
+        for message in list_mistakes(
             POINT
             + 'amplitude = "10 N"\nfrequency = "50 Hz"\n'
-            + friction_of("iwan")
+            + make_friction_table("iwan")
             + MODES % (STUCK, 143.0, 1.0, 1.0)
             + DRIVE
         )

@@ -11,7 +11,7 @@ import re
 from itertools import product
 
 import pytest
-from scene_texts import COATED, DRIVE, MODE, SLIDE, only
+from scene_texts import COATED, DRIVE, MODE, SLIDE, get_only_mistake
 
 from patchfem import SceneError
 from patchfem.dynamics.march import march
@@ -251,5 +251,5 @@ def test_always_accepted_combinations_without_friction_run(effect):
 )
 def test_refuses_unsupported_combinations_at_check(text, sets, key, reason):
     """`check` refuses combinations that only a run could detect in earlier versions."""
-    message = only(text, *sets)
+    message = get_only_mistake(text, *sets)
     assert message.startswith(f"--set: {key}: ") and reason in message

@@ -5,7 +5,7 @@ The scenes are 200 random ones, a patch, runs with too few steps and bolted join
 """
 
 import pytest
-from remedies import drawn, ran, remedies_of, verdict
+from remedies import draw_scene, parse_remedies, run_tables, try_remedy
 from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
 
 from patchfem import build, run
@@ -31,13 +31,13 @@ def run_text(text: str):
 def test_always_printed_remedy_has_promised_effect(seed):
     """A remedy that is applied exactly as printed removes its warning, or halves the error it
     names, or reduces the error to three quarters if it promises only a refinement."""
-    tables = drawn(seed)
-    result = ran(tables)
+    tables = draw_scene(seed)
+    result = run_tables(tables)
     sentences = [] if result is None else [*result.warnings, *result.extra.get("notes", [])]
     verdicts = [
-        (verdict(tables, result, remedy), *remedy)
+        (try_remedy(tables, result, remedy), *remedy)
         for sentence in sentences
-        for remedy in remedies_of(sentence)
+        for remedy in parse_remedies(sentence)
     ]
     assert not [remedy for remedy in verdicts if remedy[0] in ("failed", "refused")]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from event_run import rows_of
+from event_run import collect_rows
 
 import patchfem as pf
 from patchfem.core import Missing
@@ -59,7 +59,7 @@ def count_pieces(model) -> int:
     """Return the number of linear pieces that the exact engine computes."""
     rig = model.rig
     return len(
-        rows_of(
+        collect_rows(
             rig.modes,
             rig.drive.signal,
             *np.transpose(coulomb_limits(model, None)),

@@ -183,7 +183,7 @@ def test_always_plans_agree_in_nine_of_ten_scenes(tmp_path):
     the law of the report keeps a block stuck, time agreed in 5 (before: 1), in 6 within a factor of
     2 (before: 4), and the worst plan is at least 33 times too long.
     """
-    scores = [trial.within() for trial in plan_trial.told(6000, 80, tmp_path)]
+    scores = [trial.is_within() for trial in plan_trial.measure_scenes(6000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
     assert time >= 0.9 and memory_ >= 0.9
 

@@ -8,7 +8,7 @@ from the independent integrator of `motion_reference`.
 from pathlib import Path
 
 import pytest
-from motion_scenes import spec, written
+from motion_scenes import draw_spec, write_scene
 
 from patchfem import run
 
@@ -52,10 +52,10 @@ def test_exact_random_scene_agrees_with_independent_program(
     seed, measure, reference, round_off, tmp_path
 ):
     """A measure of a random scene agrees with the independent integrator within its error."""
-    settings = spec(seed)
+    settings = draw_spec(seed)
     if seed == 5046:  # This tolerance uses all cells; a larger one uses fewer.
         settings["tolerance"] = 1e-6
-    result = run(written(settings, tmp_path)).measures[measure]
+    result = run(write_scene(settings, tmp_path)).measures[measure]
     assert abs(result.value - reference) <= result.error + round_off
     # The error of converged steps is at most 1 % of the floor. Measures of an event may have a
     # relative error of 1e-7, and 1e-4 of their floor.
@@ -68,5 +68,5 @@ def test_exact_random_scene_agrees_with_independent_program(
 def test_exact_iwan_slip_instants_have_first_order_errors(measure, reference, tmp_path):
     """The stiffness of the Iwan law jumps from cell to cell, so instants of slip have errors of
     first order in the cells. An estimate of second order was 1.4 times too small here."""
-    result = run(written(spec(97000034), tmp_path)).measures[measure]
+    result = run(write_scene(draw_spec(97000034), tmp_path)).measures[measure]
     assert abs(result.value - reference) <= result.error <= 0.01

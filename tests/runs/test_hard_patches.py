@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import PIECE
 
 from patchfem import run
@@ -321,18 +321,20 @@ def test_always_command_line_reports_faults_without_traceback(tmp_path):
     input; no traceback is printed."""
     path = tmp_path / "hard.toml"
     path.write_text(BLOCKS + '[contact.crown]\nradius = "1 mm"\n', "utf-8")
-    code, out, err = cli("run", path, "-o", tmp_path / "out", "--set", COARSE, "--json")
+    code, out, err = run_cli("run", path, "-o", tmp_path / "out", "--set", COARSE, "--json")
     assert code == 3 and "NaN" not in out and "Infinity" not in out and "Traceback" not in err
     assert all(np.isfinite(m["value"]) for m in json.loads(out)["measures"].values())
     # A single node carries the load.
     assert json.loads(out)["contact"]["stretches"] == [[0.0, 0.0]]
-    assert ", at x = 0 mm; peak" in cli("run", path, "-o", tmp_path / "out", "--set", COARSE).out
+    assert (
+        ", at x = 0 mm; peak" in run_cli("run", path, "-o", tmp_path / "out", "--set", COARSE).out
+    )
     for sets, exit_code, message in (
         (f"contact.load_line.offset={SIZE / 2} m", 2, "contact.load_line.offset"),
         ("contact.load=-1 N", 2, "contact.load"),
         ("contact.profile.file=none.csv", 2, "none.csv"),
     ):
-        code, _, err = cli("run", path, "-o", tmp_path / "out2", "--set", COARSE, "--set", sets)
+        code, _, err = run_cli("run", path, "-o", tmp_path / "out2", "--set", COARSE, "--set", sets)
         assert code == exit_code and message in err and "Traceback" not in err, (sets, code, err)
 
 

@@ -3,7 +3,7 @@ rig."""
 
 import numpy as np
 import pytest
-from scene_texts import BENCH, PATCH, RIG, only
+from scene_texts import BENCH, PATCH, RIG, get_only_mistake
 from scipy.integrate import solve_ivp
 
 from patchfem.runs.run import run
@@ -110,5 +110,7 @@ def test_exact_stuck_rig_vibrates_with_holder_spring():
 
 def test_refuses_holder_spring_with_negative_order_bonds():
     """A holder spring is refused with initial bonds of negative order."""
-    message = only(RIG, HOLDER_SPRING[0], "friction.reading=report", "friction.order=-0.5")
+    message = get_only_mistake(
+        RIG, HOLDER_SPRING[0], "friction.reading=report", "friction.order=-0.5"
+    )
     assert "contact.holder.tangential_stiffness" in message and "initial_bonds" in message

@@ -9,7 +9,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.runs.patch import faces
@@ -371,7 +371,7 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
     """The dataset, the plan, the report, the exports and the summary contain every interface."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "chain.toml").write_text(CHAIN)
-    answer = cli("run", "chain.toml", "-o", "out")
+    answer = run_cli("run", "chain.toml", "-o", "out")
     assert answer.code == 0 and "pressure_peak_2" in answer.out
     with xr.open_dataset("out/result.nc") as data:
         for number, load in ((1, 100.0), (2, 60.0)):
@@ -383,7 +383,7 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
                 data["frame_time"], data["time"], data["friction_force"][number - 1]
             )
             np.testing.assert_allclose(force[1:], expected[1:], atol=1e-4 * np.abs(expected).max())
-    stiffness_chain = json.loads(cli("plan", "chain.toml", "--probe", "--json").out)[
+    stiffness_chain = json.loads(run_cli("plan", "chain.toml", "--probe", "--json").out)[
         "stiffness_chain"
     ]
     for key, name in (
@@ -393,13 +393,13 @@ def test_always_files_contain_fields_of_every_interface(tmp_path, monkeypatch, c
         assert stiffness_chain[key] == pytest.approx(chain_result.measures[name].value, rel=1e-2)
     page = (tmp_path / "out/report.html").read_text()
     assert "Pressure on interface 1-0" in page and "Pressure on interface 2-1" in page
-    assert cli("export", "out/interfaces/2-1", "-o", "fields.csv").code == 0
-    view_answer = cli("view", "out", "-o", "v.png")
+    assert run_cli("export", "out/interfaces/2-1", "-o", "fields.csv").code == 0
+    view_answer = run_cli("view", "out", "-o", "v.png")
     assert view_answer.code == 4 and "out/interfaces/1-0" in view_answer.err
     summary = json.loads((tmp_path / "out/summary.json").read_text())
     assert summary["numerics"]["interface_nodes_2"] == data.sizes["x_2"]
     assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
-    assert cli("export", "chain.toml", "-o", "elements.npz").code == 0
+    assert run_cli("export", "chain.toml", "-o", "elements.npz").code == 0
     assert np.load("elements.npz", allow_pickle=True)
 
 
@@ -483,5 +483,5 @@ def test_refuses_unsupported_keys_of_interface_patch(old, new, message, tmp_path
     text = CHAIN.replace(old, new)
     assert text != CHAIN
     (tmp_path / "chain.toml").write_text(text)
-    answer = cli("check", str(tmp_path / "chain.toml"))
+    answer = run_cli("check", str(tmp_path / "chain.toml"))
     assert answer.code == 2 and message in answer.err and "chain.toml:" in answer.err, answer.err

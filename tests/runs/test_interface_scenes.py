@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
+from command_line import run_cli
 from march_paths import share_one_loop
 
 from patchfem.response import EVENT_KIND_NAMES
@@ -122,7 +122,7 @@ def run_scene(tmp_path_factory):
         if (text, arguments) not in results:
             path = base / f"scene{len(results)}.toml"
             path.write_text(text, "utf-8")
-            answer = cli("run", path, "-o", base / path.stem, "--json", *arguments)
+            answer = run_cli("run", path, "-o", base / path.stem, "--json", *arguments)
             assert answer.code == 0, answer.err
             with xr.open_dataset(base / path.stem / "result.nc") as data:
                 results[text, arguments] = json.loads(answer.out), data.load()

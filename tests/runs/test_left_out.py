@@ -5,8 +5,8 @@ import json
 
 import numpy as np
 import pytest
-from any_mesh_cases import FORMATS, drawn
-from command_line import cli
+from any_mesh_cases import FORMATS, make_pair
+from command_line import run_cli
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
 
 from patchfem import build, plan
@@ -43,7 +43,7 @@ def run_text(text, estimate=True):
 def test_exact_notes_appear_in_output_summary_and_report(tmp_path):
     """A note is printed and written to the summary and the report."""
     (tmp_path / "a.toml").write_text(COATED)
-    answer = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
+    answer = run_cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
     [note] = json.loads((tmp_path / "out" / "summary.json").read_text())["notes"]
     assert f"note: {note}" in answer.err
     assert f"Note: {note}" in (tmp_path / "out" / "report.html").read_text()
@@ -54,7 +54,7 @@ def test_exact_notes_appear_in_output_summary_and_report(tmp_path):
 def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_path):
     """A mesh whose face `lower_far` is fixed on 2 of its 16 edges (1.6 of 12.8 mm) gives a note, in
     three file formats."""
-    m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
+    m = make_pair("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
     fixed_edges = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
     removed = fixed_edges[np.argsort(m.points[m.edges[fixed_edges], 0].mean(axis=1))][n_fixed:]
     m.edges, m.edge_tags = np.delete(m.edges, removed, axis=0), np.delete(m.edge_tags, removed)
@@ -82,7 +82,7 @@ def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_pat
 
 def test_exact_note_states_area_of_mesh_hole(tmp_path):
     """A note states the area of a hole of two elements of 0.8 mm in the lower piece."""
-    m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
+    m = make_pair("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
     centres = m.points[m.quads].mean(axis=1)
     rows = np.unique(centres[centres[:, 1] < 0, 1])
     hole_row = rows[len(rows) // 2]

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scene_texts import COATED, COULOMB, SLIDE
-from wedges import falling
+from wedges import singularity_exponent
 
 import patchfem as pf
 from patchfem import build
@@ -93,7 +93,7 @@ def test_order_of_corner_pressure_agrees_with_wedge_exponent(tables, angles, pri
     """The pressure grows towards the corner of a narrow piece with the exponent of the two wedges that meet there."""
     model = build_patch_model(BLOCK + tables)
     assert model.has_singular_ends
-    expected = falling(*angles)
+    expected = singularity_exponent(*angles)
     assert printed is None or expected == pytest.approx(printed, abs=5e-5)
     patch = solve_on_columns(
         model, graded_columns(model.pieces.length / 2, model.pieces.length / 2, 1e-8)

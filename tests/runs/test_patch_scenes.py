@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COATED, PIECE
 
 from patchfem import build, plan
@@ -316,7 +316,7 @@ def test_refuses_mesh_with_other_dimensions_than_scene(tmp_path):
         ["mesh", faulty_scene.path, "-o", tmp_path / "other.msh"],
         ["cost", faulty_scene.path, "--over", "element_size", "-q"],
     ):
-        message = cli(*command).err
+        message = run_cli(*command).err
         assert (
             f"{faulty_scene.path}:4: contact.height: 0.009 m" in message
             and message.count("scene.toml") == 1
@@ -474,7 +474,7 @@ def test_exact_summary_states_contact_intervals(tmp_path, shape, ends, pattern):
             keys='load = "26 lbf"\nelement_size = "0.0635 mm"', material=STEEL, tables=shape
         )
     )
-    answer = cli("run", path, "-o", tmp_path / "out", "--no-page")
+    answer = run_cli("run", path, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and re.search(pattern, answer.out, re.M), answer.out[:300]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     contact = summary["contact"]
@@ -507,5 +507,5 @@ def test_exact_patch_without_load_has_no_contact(tmp_path):
         TEXT.format(keys='load = "0 N"\nelement_size = "0.5 mm"', material=STEEL, tables=""),
         "utf-8",
     )
-    answer = cli("run", path, "-o", tmp_path / "out", "--json")
+    answer = run_cli("run", path, "-o", tmp_path / "out", "--json")
     assert answer.code == 0 and json.loads(answer.out)["outcome"] == "no_contact"

@@ -17,13 +17,13 @@ from support.scene_texts import (
     SECOND,
     SHEAR,
     SWEEP,
-    friction_of,
-    only,
+    get_only_mistake,
+    make_friction_table,
 )
 
 import patchfem as pf
 
-IWAN = friction_of("iwan")
+IWAN = make_friction_table("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
 # Measures that consist of round-off.
 ROUND_OFF_MEASURES = ("energy_balance", "work_check", "energy_created", "drift_per_cycle")
@@ -195,12 +195,12 @@ def test_refuses_exact_method_with_nonlinear_spring_or_varying_load():
     stiffening = (
         POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact
     )
-    assert "no exact solution exists with [structure.stiffening]" in only(stiffening)
+    assert "no exact solution exists with [structure.stiffening]" in get_only_mistake(stiffening)
     varying_load = (
         POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
     )
-    assert "no exact solution exists with normal.amplitude" in only(varying_load)
-    assert "no exact solution exists for law 'tanh'" in only(
+    assert "no exact solution exists with normal.amplitude" in get_only_mistake(varying_load)
+    assert "no exact solution exists for law 'tanh'" in get_only_mistake(
         POINT
         + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n'
         + MODE

@@ -4,7 +4,7 @@ the NumPy law."""
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
+from command_line import run_cli
 from scene_texts import NONLOCAL, POINT, SMALL_PATCH, TRIANGLE
 
 from patchfem import build, plan
@@ -117,7 +117,7 @@ def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_
     scene = write_path_scene(
         L_SHAPE, SMALL_PATCH + STRIPS + LONGER_BONDS + "[accuracy]\nsteps_per_cycle = 100\n"
     )
-    answer = cli("run", scene.path, "-o", tmp_path / "out")
+    answer = run_cli("run", scene.path, "-o", tmp_path / "out")
     assert answer.code == 0, answer.err
     result = run(scene, estimate=False)
     with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:

@@ -6,9 +6,9 @@ import json
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
-from plane_chains import chain, compare_chain
-from plane_chains import text as text_of
+from command_line import run_cli
+from plane_chains import compare_chain, draw_chain
+from plane_chains import format_scene as text_of
 
 import patchfem as pf
 
@@ -150,7 +150,7 @@ def test_always_errors_of_plane_chains_cover_independent_integration(tmp_path):
 def test_exact_plane_friction_closes_energy_and_stays_in_circle(tmp_path):
     """The energies of a plane interface balance, and the friction force stays within the circle of
     radius mu N."""
-    spec = chain(2)
+    spec = draw_chain(2)
     result = run_scene(tmp_path, "chain", text_of(spec))
     assert result.measures.energy_balance.value < 1e-9
     assert result.measures.energy_created.value < 1e-12
@@ -174,11 +174,11 @@ def test_exact_plane_friction_closes_energy_and_stays_in_circle(tmp_path):
 def test_always_commands_support_plane_interfaces(tmp_path):
     """The commands check, plan, run and sweep support plane interfaces, and the files contain both directions."""
     path = tmp_path / "chain.toml"
-    path.write_text(text_of(chain(2)))
-    assert cli("check", path).code == 0
-    plan_answer = cli("plan", path, "--json")
+    path.write_text(text_of(draw_chain(2)))
+    assert run_cli("check", path).code == 0
+    plan_answer = run_cli("plan", path, "--json")
     assert plan_answer.code == 0 and json.loads(plan_answer.out)["engine"] == "march"
-    run_answer = cli("run", path, "-o", tmp_path / "out")
+    run_answer = run_cli("run", path, "-o", tmp_path / "out")
     assert run_answer.code == 0, run_answer.err
     assert (
         "slip_amplitude_3"
@@ -189,7 +189,7 @@ def test_always_commands_support_plane_interfaces(tmp_path):
         force = np.hypot(data.friction_force, data.lateral_force)
         assert force.shape == data.lateral_displacement.shape and float(force.max()) > 0.5
         assert data.lateral_velocity.attrs["units"] == "m s-1"
-    sweep_answer = cli(
+    sweep_answer = run_cli(
         "sweep",
         path,
         "--over",
@@ -276,5 +276,5 @@ def test_refuses_plane_interface_with_patch_file_or_backbone(tmp_path):
         pf.PatchfemError, match="a backbone with interfaces that slide in a plane is not supported"
     ):
         pf.backbone(tmp_path / "good.toml")
-    answer = cli("export", tmp_path / "good.toml", "-o", tmp_path / "rig.mat")
+    answer = run_cli("export", tmp_path / "good.toml", "-o", tmp_path / "rig.mat")
     assert answer.code == 2 and "cannot be written with structure.interface.lateral" in answer.err

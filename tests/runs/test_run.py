@@ -11,8 +11,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
-from limits import limited
+from command_line import run_cli
+from limits import limit_file_size
 from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
@@ -47,7 +47,7 @@ def run_case(tmp_path_factory):
         if name not in results:
             path = base / f"{name}.toml"
             path.write_text(SCENES[name], "utf-8")
-            answer = cli("run", path, "-o", base / name, "--json")
+            answer = run_cli("run", path, "-o", base / name, "--json")
             assert answer.code == 0, answer.err
             results[name] = base / name, answer
         return results[name]
@@ -371,14 +371,14 @@ def test_exact_rigid_patch_agrees_with_point_contact(monkeypatch):
 def test_exact_written_mesh_gives_same_patch(write_scene, tmp_path):
     """The patch on a mesh that was written to a file agrees with the patch on the generated mesh."""
     scene = write_scene(SMALL_PATCH)
-    answer = cli("mesh", scene, "-o", tmp_path / "pair.msh")
+    answer = run_cli("mesh", scene, "-o", tmp_path / "pair.msh")
     assert answer.code == 0 and "pair.msh" in answer.out
     generated = run(load(scene), estimate=False).measures
     from_file = run(load(scene, ["contact.mesh=pair.msh"]), estimate=False).measures
     for key in generated:
         assert from_file[key].value == pytest.approx(generated[key].value, rel=1e-9, abs=1e-18), key
     assert (
-        cli(
+        run_cli(
             "run",
             scene,
             "--set",
@@ -405,7 +405,7 @@ def test_always_shipped_scenes_load_and_plan(path):
 
 def test_exact_json_of_plan_has_groups_and_stiffness(write_scene):
     """The JSON output of a plan contains the dimensionless groups and the stiffness of each link."""
-    answer = cli("plan", write_scene(SCENES["rig patch"]), "--json")
+    answer = run_cli("plan", write_scene(SCENES["rig patch"]), "--json")
     output = json.loads(answer.out)
     assert answer.code == 0
     assert {
@@ -429,19 +429,19 @@ def test_exact_json_of_plan_has_groups_and_stiffness(write_scene):
 def test_refuses_faulty_scene_with_one_line_per_fault(write_scene, tmp_path):
     """Each fault of a scene is reported in one line with its place, by run and by check, and nothing is written."""
     scene = write_scene(SMALL_PATCH.replace('"12.7 mm"', '"12,7 mm"', 1).replace("angle", "angel"))
-    answer = cli("run", scene, "-o", tmp_path / "out")
+    answer = run_cli("run", scene, "-o", tmp_path / "out")
     assert answer.code == 2 and answer.out == ""
     lines = answer.err.splitlines()
     assert len(lines) >= 2 and all(line.startswith(f"{scene}:") for line in lines)
-    assert cli("check", scene).err == answer.err and not (tmp_path / "out").exists()
+    assert run_cli("check", scene).err == answer.err and not (tmp_path / "out").exists()
 
 
 def test_refuses_resume_mesh_and_exact_method_without_support(write_scene, tmp_path):
     """A run without wear cannot be resumed, a point has no mesh, and a nonlocal law has no exact solution."""
     scene = write_scene(POINT + COULOMB + STRUCTURE)
-    assert "only a run with [wear]" in cli("run", scene, "--resume").err
-    assert cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
-    answer = cli(
+    assert "only a run with [wear]" in run_cli("run", scene, "--resume").err
+    assert run_cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
+    answer = run_cli(
         "run",
         write_scene(POINT + NONLOCAL + STRUCTURE),
         "--set",
@@ -455,7 +455,7 @@ def test_refuses_resume_mesh_and_exact_method_without_support(write_scene, tmp_p
 def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
     """A run with a too long bond list, or with a results folder inside a file, ends with exit code 4."""
     scene = write_scene(POINT + NONLOCAL + STRUCTURE)
-    answer = cli(
+    answer = run_cli(
         "run",
         scene,
         "--set",
@@ -466,7 +466,7 @@ def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
         tmp_path / "out",
     )
     assert answer.code == 4 and "list of bonds" in answer.err
-    assert cli("run", write_scene(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
+    assert run_cli("run", write_scene(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
 
 
 def test_exact_failing_run_keeps_previous_results_folder(write_scene, tmp_path):
@@ -477,12 +477,12 @@ def test_exact_failing_run_keeps_previous_results_folder(write_scene, tmp_path):
     def read_files():
         return {path.name: path.read_bytes() for path in out.iterdir()}
 
-    assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5").code == 0
+    assert run_cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5").code == 0
     before = read_files()
-    with limited(1000):  # The limit leaves no space for a results file.
-        answer = cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5")
+    with limit_file_size(1000):  # The limit leaves no space for a results file.
+        answer = run_cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=5")
     assert answer.code == 4 and read_files() == before
-    assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=6").code == 0
+    assert run_cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=6").code == 0
     assert read_files()["summary.json"] != before["summary.json"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
 
@@ -500,7 +500,7 @@ def test_exact_unconverged_run_is_written_and_marked(write_scene, tmp_path, monk
         return run_case
 
     monkeypatch.setattr(marching.Run, "_march_steps", march_steps_with_fault)
-    answer = cli(
+    answer = run_cli(
         "run", write_scene(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5"
     )
     assert answer.code == 3 and "above the permitted" in answer.err
@@ -518,12 +518,12 @@ def test_refuses_to_replace_other_folders(write_scene, tmp_path, monkeypatch):
     user_folder.mkdir()
     (user_folder / "data.txt").write_text("years of work", "utf-8")
     for target in (user_folder, user_folder / "data.txt", tmp_path):
-        answer = cli("run", scene, "-o", target)
+        answer = run_cli("run", scene, "-o", target)
         assert answer.code == 2 and len(answer.err.splitlines()) == 1
     assert (user_folder / "data.txt").read_text("utf-8") == "years of work"
     monkeypatch.chdir(user_folder)
     for target in (".", "..", ""):
-        assert cli("run", scene, "-o", target).code == 2
+        assert run_cli("run", scene, "-o", target).code == 2
     (tmp_path / ".next.writer").write_text("1", "utf-8")  # The number of a running process.
-    locked_answer = cli("run", scene, "-o", tmp_path / "next")
+    locked_answer = run_cli("run", scene, "-o", tmp_path / "next")
     assert locked_answer.code == 4 and "another run" in locked_answer.err

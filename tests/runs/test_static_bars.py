@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scene_texts import PIECE
-from static_scenes import JUDGED, KINDS, drawn, judged_rows, solve_reference, text_of
+from static_scenes import JUDGED, KINDS, draw_scene, format_scene, reliable_rows, solve_reference
 
 import patchfem as pf
 from patchfem import build
@@ -140,7 +140,7 @@ def test_always_errors_cover_contact_interval_of_one_element(
     only on the finer meshes. The error of the stiffness was 6 times too small in an earlier
     version."""
     previous_error = np.inf
-    text = text_of(drawn(seed))
+    text = format_scene(draw_scene(seed))
     for tolerance in (1e-3, 1e-4) if seed == 7017 else (1e-2, 1e-3):
         measure = run_measures(text, tolerance)[name]
         assert (
@@ -163,12 +163,12 @@ MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 def test_always_errors_of_random_patch_cover_independent_program(seed):
     """For one random scene of each kind, the errors cover an independent program, apart from
     MISSES, and do not grow as the tolerance decreases."""
-    scene = drawn(seed)
+    scene = draw_scene(seed)
     reference, reference_error = solve_reference(scene, 2e-3)
     previous_errors = dict.fromkeys(JUDGED, np.inf)
     for tolerance in (1e-2, 1e-3, 1e-4):
-        measures_ = run_measures(text_of(scene), tolerance)
-        rows = judged_rows(measures_, reference, reference_error)
+        measures_ = run_measures(format_scene(scene), tolerance)
+        rows = reliable_rows(measures_, reference, reference_error)
         misses = [row for row in rows if not row.holds]
         assert {(row.name, tolerance) for row in misses} <= MISSES.get(seed, set())
         assert all(row.true_error <= MAX_MISS * row.error + row.doubt for row in misses)

@@ -6,7 +6,7 @@ In a sweep of the load the stiffness stays constant.
 
 import numpy as np
 import pytest
-from scene_texts import FORCED, MODE, PAIR, POINT, SHEAR, SMALL_PATCH, TRIANGLE, mistakes
+from scene_texts import FORCED, MODE, PAIR, POINT, SHEAR, SMALL_PATCH, TRIANGLE, list_mistakes
 
 import patchfem as pf
 from patchfem.scene import loads
@@ -103,7 +103,7 @@ def test_exact_load_sweep_keeps_stiffness():
 def test_refuses_stiffness_with_incompatible_keys(sets, key, message):
     """A stiffness is refused with a bond length, a varying load, grooves and zero friction."""
     text = format_both_ways(RIG)[0]
-    messages = mistakes(format_both_ways(RIG)[0], *sets)
+    messages = list_mistakes(format_both_ways(RIG)[0], *sets)
     assert len(messages) == 1 and f": {key}: " in messages[0] and message in messages[0]
     if "give" in message:  # The advice of the message works.
         loads(
@@ -115,10 +115,10 @@ def test_refuses_stiffness_with_approach_or_worn_bonds():
     """A stiffness is refused with a prescribed approach and with a bond length that changes with wear."""
     text = format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0].replace('load = "26 lbf"', "")
     text += '[contact.approach]\ndistance = "0.2 um"\n'
-    assert "or contact.load in place of [contact.approach]" in mistakes(text)[0]
+    assert "or contact.load in place of [contact.approach]" in list_mistakes(text)[0]
     worn = (
         format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0]
         + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e5\n'
         '[wear.friction]\ndepth = ["0 um", "1 um"]\nbond_length_factor = [1, 2]\n'
     )
-    assert "give friction.bond_length" in mistakes(worn)[0]
+    assert "give friction.bond_length" in list_mistakes(worn)[0]

@@ -2,9 +2,9 @@
 the tolerance."""
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH, POINT
-from tolerance_forecasts import cured, misses
+from tolerance_forecasts import apply_proposal, exceeds_tolerance
 
 import patchfem as pf
 from patchfem.scene import read_template
@@ -95,9 +95,13 @@ def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, remedy, tmp
     """If the plan predicts that a run misses its tolerance, the run misses it, and with the remedy
     it meets it."""
     prediction = forecast_tolerance(text)
-    assert prediction["missed"] and prediction["cure"].items() >= remedy.items() and misses(text)
-    remedied = cured(text, prediction["cure"])
-    assert not misses(remedied)
+    assert (
+        prediction["missed"]
+        and prediction["cure"].items() >= remedy.items()
+        and exceeds_tolerance(text)
+    )
+    remedied = apply_proposal(text, prediction["cure"])
+    assert not exceeds_tolerance(remedied)
     assert forecast_tolerance(remedied) | {"asked": 0} == {
         "asked": 0,
         "missed": False,
@@ -106,7 +110,7 @@ def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, remedy, tmp
     }
     scene = tmp_path / "scene.toml"
     scene.write_text(text, "utf-8")
-    assert f"says     {prediction['sentence']}\n" in cli("plan", scene).out
+    assert f"says     {prediction['sentence']}\n" in run_cli("plan", scene).out
 
 
 @pytest.mark.share(1, 2, 3)
@@ -124,7 +128,7 @@ def test_exact_forecast_of_missed_tolerance_has_working_remedy(text, remedy, tmp
 )
 def test_always_met_tolerance_is_not_predicted_as_missed(text):
     """The plan predicts no missed tolerance for runs that meet it."""
-    assert not forecast_tolerance(text)["missed"] and not misses(text)
+    assert not forecast_tolerance(text)["missed"] and not exceeds_tolerance(text)
 
 
 def test_exact_remedy_of_unreachable_tolerance_is_larger_tolerance():
@@ -134,4 +138,4 @@ def test_exact_remedy_of_unreachable_tolerance_is_larger_tolerance():
         prediction["cure"] == {"accuracy.tolerance": 1e-3}
         and "by any mesh" in prediction["sentence"]
     )
-    assert not misses(cured(add_tolerance(PATCH, 1e-8), prediction["cure"]))
+    assert not exceeds_tolerance(apply_proposal(add_tolerance(PATCH, 1e-8), prediction["cure"]))

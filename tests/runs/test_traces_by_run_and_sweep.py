@@ -6,7 +6,7 @@ import json
 import h5py
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 
@@ -98,14 +98,14 @@ radius = "2 mm"
 """
     )
     (tmp_path / "scene.toml").write_text(text)
-    answer = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
+    answer = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     assert (answer.code, summary["outcome"]) == (3, "not_converged")
     assert "is as large as the value, so it is not known" in answer.out and "0 to" in answer.out
     assert any("at least its value" in text for text in summary["warnings"])
     sweep = pf.sweep(tmp_path / "scene.toml", {"contact.load": ["1 N", "1.1 N"]})
     assert set(sweep.outcome.values.tolist()) == {"not_converged"}
-    answer = cli(
+    answer = run_cli(
         "sweep", tmp_path / "scene.toml", "--over", "contact.load=1 N", "-o", tmp_path / "s"
     )
     assert answer.code == 3 and "1 not_converged" in answer.out

@@ -3,7 +3,7 @@ load."""
 
 import numpy as np
 import pytest
-from scene_texts import BENCH, RIG, STRUCTURE, only
+from scene_texts import BENCH, RIG, STRUCTURE, get_only_mistake
 
 from patchfem.contact.unilateral import solve_forces
 from patchfem.dynamics import make_contact_sets
@@ -107,9 +107,9 @@ def test_exact_rig_under_varying_load_closes_energy(law):
 
 def test_refuses_normal_motion_of_point_contact():
     """Modes with normal motion are refused with a point contact, and an exact method with a varying load."""
-    message = only(POINT, "structure.mode.axial.normal=0.1")
+    message = get_only_mistake(POINT, "structure.mode.axial.normal=0.1")
     assert message.startswith("--set: structure.mode.axial.normal: ")
     assert "use [contact] in place of" in message
-    assert "no exact solution exists with normal.amplitude" in only(
+    assert "no exact solution exists with normal.amplitude" in get_only_mistake(
         POINT, *VARYING_LOAD, "accuracy.method=exact"
     )

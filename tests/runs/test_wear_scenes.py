@@ -9,9 +9,19 @@ import numpy as np
 import pytest
 import wear_scenes
 import xarray as xr
-from command_line import cli
-from pieces import bare, refined_middle
-from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE, mistakes, only
+from command_line import run_cli
+from pieces import make_bare_layers, make_refined_grid
+from scene_texts import (
+    COATED,
+    COULOMB,
+    MODE,
+    NONLOCAL,
+    POINT,
+    SHEAR,
+    STRUCTURE,
+    get_only_mistake,
+    list_mistakes,
+)
 from scipy.optimize import brentq
 
 import patchfem as pf
@@ -158,7 +168,7 @@ def worn_folder(tmp_path_factory):
     """Return the results folder of a worn bench."""
     scene = tmp_path_factory.mktemp("worn") / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
-    answer = cli("run", scene, "-o", scene.parent / "out", "-q")
+    answer = run_cli("run", scene, "-o", scene.parent / "out", "-q")
     assert answer.code == 0, answer.err
     return scene.parent / "out"
 
@@ -220,9 +230,9 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
     half = hertz_half_width(line, radius, young / (1 - 0.32**2) / 2)
     peak = hertz_peak(line, radius, young / (1 - 0.32**2) / 2)
     stick = half * np.sqrt(0.4)
-    grid = refined_middle(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
+    grid = make_refined_grid(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
     nn, _, _ = interface_compliance(
-        make_piece(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32)))
+        make_piece(grid.x, grid.depth, grid.coating_rows, make_bare_layers((young, 0.32)))
     )
     x = grid.x
     area = grid.tributary_lengths() * width
@@ -281,7 +291,7 @@ def test_exact_recommended_tolerance_refines_mesh_under_wear():
 
 def test_refuses_wear_without_steady_motion():
     """Wear is refused for a static patch and for a release, which has no steady motion."""
-    assert any("wear" in line for line in mistakes(TILTED + WEAR))
+    assert any("wear" in line for line in list_mistakes(TILTED + WEAR))
     release = (
         POINT
         + COULOMB
@@ -289,7 +299,7 @@ def test_refuses_wear_without_steady_motion():
         + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n'
         + WEAR
     )
-    assert "steady motion" in only(release)
+    assert "steady motion" in get_only_mistake(release)
 
 
 def test_always_unbounded_motion_has_no_wear():
@@ -333,12 +343,12 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
 
     with monkeypatch.context() as patched:
         patched.setattr(evolve, "save_state", save_and_record)
-        assert cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
+        assert run_cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
     assert len(states) >= 2
     for state in states:
         (tmp_path / "out.partial").mkdir()
         (tmp_path / "out.partial" / "wear.npz").write_bytes(state)
-        resumed = cli("run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page")
+        resumed = run_cli("run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page")
         assert resumed.code == 0 and "held the state" not in resumed.err
         for name in ("result.nc", "fields.vtkhdf", "scene.resolved.toml"):
             assert (tmp_path / "out" / name).read_bytes() == (
@@ -397,14 +407,14 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patched:
         patched.setattr(evolve, "save_state", save_and_interrupt)
-        answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
+        answer = run_cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]
-    other = cli(
+    other = run_cli(
         "run", scene, "-o", tmp_path / "out", "--resume", "--set", "wear.coefficient=2e-14 m^2/N"
     )
     assert other.code == 2 and "another scene" in other.err
-    assert cli("run", scene, "-o", tmp_path / "out", "--resume", "--no-page").code == 0
+    assert run_cli("run", scene, "-o", tmp_path / "out", "--resume", "--no-page").code == 0
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
 
 
@@ -418,7 +428,7 @@ def test_exact_new_run_reports_discarded_state_once(tmp_path, quiet, state, n_me
     (tmp_path / "out.partial").mkdir()
     if state:
         (tmp_path / "out.partial" / state).write_bytes(b"kept")
-    answer = cli("run", scene, "-o", tmp_path / "out", "--no-page", *quiet)
+    answer = run_cli("run", scene, "-o", tmp_path / "out", "--no-page", *quiet)
     assert answer.code == 0, answer.err
     assert (
         answer.err.count("out.partial held the state of an interrupted run, which is now discarded")
@@ -431,24 +441,24 @@ def test_refuses_to_resume_without_valid_state(tmp_path):
     """Resuming is refused without a saved state, with a damaged one, and for a scene without wear."""
     scene = tmp_path / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
-    answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
+    answer = run_cli("run", scene, "-o", tmp_path / "out", "--resume")
     assert answer.code == 2 and "no interrupted run" in answer.err
     (tmp_path / "out.partial").mkdir(exist_ok=True)
     archive = io.BytesIO()
     np.savez(archive, key=np.zeros(1000))
     for damaged in (archive.getvalue()[:-200], b"", b"PK nothing"):
         (tmp_path / "out.partial" / "wear.npz").write_bytes(damaged)
-        answer = cli("run", scene, "-o", tmp_path / "out", "--resume")
+        answer = run_cli("run", scene, "-o", tmp_path / "out", "--resume")
         assert answer.code == 2 and "cannot be read" in answer.err
     assert answer.code == 2 and "cannot be read" in answer.err and "Traceback" not in answer.err
     scene.write_text(TILTED + COULOMB + SINE)
-    assert cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2
+    assert run_cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2
 
 
 def test_exact_wear_at_step_agrees_with_independent_program():
-    """The reference is `wear_scenes.answer`, an independent finite-element program that integrates
+    """The reference is `wear_scenes.solve_scene`, an independent finite-element program that integrates
     Archard's law."""
-    measures = run_text(wear_scenes.text_of(wear_scenes.draw(522015))).measures
+    measures = run_text(wear_scenes.format_scene(wear_scenes.draw_scene(522015))).measures
     for name, reference, uncertainty in (
         ("approach", 1.1330e-6, 3.3e-10),
         ("normal_stiffness", 2.90147e9, 2e5),

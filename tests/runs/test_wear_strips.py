@@ -5,8 +5,8 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli
-from scene_texts import COATED, COULOMB, MODE, PIECE, mistakes
+from command_line import run_cli
+from scene_texts import COATED, COULOMB, MODE, PIECE, list_mistakes
 
 import patchfem as pf
 from patchfem.runs.rig.strips import estimate_lateral_motion
@@ -133,7 +133,7 @@ def test_exact_files_contain_worn_depth_of_every_strip(tmp_path):
     """The dataset and the field file contain the worn depth of every strip."""
     scene = tmp_path / "strips.toml"
     scene.write_text(TILTED + ROLLED + COULOMB + SINE + WEAR + LARGE_TOLERANCE)
-    assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
+    assert run_cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
     with (
         xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data,
         h5py.File(tmp_path / "out" / "fields.vtkhdf") as file,
@@ -157,4 +157,4 @@ def test_exact_files_contain_worn_depth_of_every_strip(tmp_path):
 def test_refuses_wear_of_strips_with_shear():
     """Wear of strips with [contact.shear] is refused."""
     sheared = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + BASE_DRIVE + WEAR
-    assert any("contact.strips with [contact.shear]" in line for line in mistakes(sheared))
+    assert any("contact.strips with [contact.shear]" in line for line in list_mistakes(sheared))

@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from test_worn_friction import ALPHA, AREA, DEPTH, LOAD, MU, PATH, SCENE
 
 import patchfem as pf
@@ -124,7 +124,7 @@ def test_refuses_worn_depth_of_other_pieces(earlier_run_folder, sets, message):
             earlier_run_folder / "new"
         )
         shutil.copy(earlier_run_folder / "new" / "result.nc", earlier_run_folder / "new.nc")
-    answer = cli(
+    answer = run_cli(
         "check",
         earlier_run_folder / "a.toml",
         *(word for assignment in sets for word in ("--set", assignment)),

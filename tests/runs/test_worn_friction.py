@@ -3,7 +3,7 @@ refusals."""
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem import SceneError
@@ -193,7 +193,7 @@ def test_exact_sweep_over_friction_tables(tmp_path):
     """A sweep can vary the table of friction over depth."""
     scene = tmp_path / "a.toml"
     scene.write_text(SCENE)
-    answer = cli(
+    answer = run_cli(
         "sweep",
         scene,
         "--over",

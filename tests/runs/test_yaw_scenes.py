@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from march_paths import share_one_loop
-from scene_texts import DRIVE, MODE, PIECE, mistakes
+from scene_texts import DRIVE, MODE, PIECE, list_mistakes
 
 from patchfem import load
 from patchfem.runs.run import run
@@ -80,7 +80,7 @@ def test_refuses_yaw_without_strips_or_with_bond_list():
     text = TEXT.format(law="coulomb", keys="", yaw="30 rad/m", roll="0 rad", method="auto")
     assert any(
         "structure.mode.yaw.yaw" in line and "contact.strips" in line
-        for line in mistakes(text.replace('[contact.strips]\ncount = 4\nroll = "0 rad"\n', ""))
+        for line in list_mistakes(text.replace('[contact.strips]\ncount = 4\nroll = "0 rad"\n', ""))
     )
     with_bond_list = TEXT.format(
         law="nonlocal",
@@ -89,7 +89,7 @@ def test_refuses_yaw_without_strips_or_with_bond_list():
         roll="0 rad",
         method="auto",
     )
-    assert any("structure.mode.yaw.yaw" in line for line in mistakes(with_bond_list))
+    assert any("structure.mode.yaw.yaw" in line for line in list_mistakes(with_bond_list))
 
 
 SHEARED_TEXT = (
@@ -239,11 +239,11 @@ def test_refuses_unsupported_strips_with_shear():
         text = SHEARED_TEXT.format(
             law=law, strips=STRIPS.format("0 rad"), yaw=YAW_MODE, method="auto"
         )
-        assert any(key in line for line in mistakes(text))
+        assert any(key in line for line in list_mistakes(text))
     with_holder = SHEARED_TEXT.format(
         law='"coulomb"',
         strips=STRIPS.format("0 rad") + '[contact.holder]\ntangential_stiffness = "5e6 N/m"\n',
         yaw="",
         method="auto",
     )
-    assert any("contact.strips" in line for line in mistakes(with_holder))
+    assert any("contact.strips" in line for line in list_mistakes(with_holder))

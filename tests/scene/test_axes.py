@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from scene_texts import BENCH, DRIVE, KILOGRAM, line_of, mistakes
+from scene_texts import BENCH, DRIVE, KILOGRAM, find_line, list_mistakes
 
 import patchfem as pf
 from patchfem.core import PatchfemError
@@ -196,16 +196,16 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
     text = (
         BENCH + '[sweep]\n"friction.static" = "0.1, a"\n"normal.lod" = "1 N"\n"normal.load" = 3\n'
     )
-    found = mistakes(text)
+    found = list_mistakes(text)
     for start, says in (
         ('"friction.static"', "sweep.friction.static: a plain number"),
         ('"normal.lod"', "sweep.normal.lod: not a key of a scene; did you mean 'load'?"),
         ('"normal.load"', "sweep.normal.load: the values must be a string"),
     ):
-        line = line_of(text, start)
+        line = find_line(text, start)
         assert any(one.startswith(f"a.toml:{line}: {says}") for one in found), (says, found)
     assert len(found) == 3
-    assert "a.toml:10: sweep: keys with their values" in mistakes(BENCH + "[sweep]\n")[0]
+    assert "a.toml:10: sweep: keys with their values" in list_mistakes(BENCH + "[sweep]\n")[0]
 
 
 def test_refuses_one_run_of_many_cases():

@@ -3,7 +3,7 @@
 import time
 
 import pytest
-from scene_texts import BENCH, COULOMB, PATCH, POINT, RIG, STRUCTURE, mistakes
+from scene_texts import BENCH, COULOMB, PATCH, POINT, RIG, STRUCTURE, list_mistakes
 
 from patchfem.scene import Tables, load, loads
 from patchfem.scene.keys.types import attributes_by_key, find_inner_table, iterate_annotation_parts
@@ -44,7 +44,7 @@ def _unbounded(model, at):
     ],
 )
 def test_refuses_whole_numbers_that_nothing_can_hold(text, key, size):
-    message = next(one for one in mistakes(text, f"{key}={size}") if f" {key}: " in one)
+    message = next(one for one in list_mistakes(text, f"{key}={size}") if f" {key}: " in one)
     assert "must be <= " in message and len(message) < 250
 
 
@@ -66,11 +66,11 @@ def test_refuses_whole_numbers_that_nothing_can_hold(text, key, size):
     ],
 )
 def test_refuses_numbers_that_overflow_what_is_made_of_them(text, sets, says):
-    assert says in mistakes(text, sets)[0]
+    assert says in list_mistakes(text, sets)[0]
 
 
 def test_refuses_signs_that_no_file_can_hold():
-    found = mistakes(
+    found = list_mistakes(
         'title = "a\\u0000b"\n' + POINT + COULOMB + STRUCTURE.replace("axial", "ax\\u0007ial")
     )
     assert [one.split(", which")[0] for one in found] == [
@@ -80,14 +80,14 @@ def test_refuses_signs_that_no_file_can_hold():
 
 
 def test_refuses_words_of_set_that_are_no_text():
-    assert mistakes(PATCH, "contact.load=26 lbf\udcff") == [
+    assert list_mistakes(PATCH, "contact.load=26 lbf\udcff") == [
         "--set: contact.load=26 lbf\\udcff: contains bytes that are not UTF-8 text; save the file as UTF-8"
     ]
 
 
 @pytest.mark.parametrize("word", ["x" * 3000 + " = 1\n", "[" + "x" * 3000 + "]\n"])
 def test_exact_a_long_name_is_cut(word):
-    [message] = mistakes(POINT + COULOMB + STRUCTURE + word)
+    [message] = list_mistakes(POINT + COULOMB + STRUCTURE + word)
     assert len(message) < 300 and "x" * 40 in message and "...: unknown" in message
 
 
@@ -101,7 +101,7 @@ def test_exact_a_long_name_is_cut(word):
 )
 def test_refuses_a_key_of_many_parts_at_once(text, line):
     begin = time.process_time()
-    assert mistakes(text) == [f"a.toml:{line}: a key has more than 50 parts; write table.key"]
+    assert list_mistakes(text) == [f"a.toml:{line}: a key has more than 50 parts; write table.key"]
     assert time.process_time() - begin < 1  # the square of the parts: 30 s
 
 
@@ -113,7 +113,7 @@ def test_always_dots_in_a_text_are_no_parts():
 
 
 def test_refuses_more_masses_than_can_be_solved_at_the_line_that_counts_them():
-    [message] = mistakes("# many\n" + MASSES.format(", ".join(['"1 kg"'] * 20_000)))
+    [message] = list_mistakes("# many\n" + MASSES.format(", ".join(['"1 kg"'] * 20_000)))
     assert message.startswith("a.toml:3: structure.masses: 20000 entries are more")
     assert "9.6 GB" in message
 
@@ -121,7 +121,7 @@ def test_refuses_more_masses_than_can_be_solved_at_the_line_that_counts_them():
 @pytest.mark.slow
 def test_always_twenty_thousand_mistakes_are_told_one_by_one():
     begin = time.process_time()
-    found = mistakes(POINT + "".join(f"k{k} = 1\n" for k in range(20_000)))
+    found = list_mistakes(POINT + "".join(f"k{k} = 1\n" for k in range(20_000)))
     assert sum("unknown key" in one for one in found) == 20_000
     assert time.process_time() - begin < 5  # 1.3 s; each compared with all others: 40 s
 

@@ -21,7 +21,7 @@ from scene_texts import (
     PLASTIC,
     POINT,
 )
-from torture.toml import known, text_of
+from torture.toml import list_schema_keys, to_toml
 
 from patchfem.core import Missing, NotConverged, PatchfemError
 from patchfem.runs.plan import plan
@@ -90,7 +90,7 @@ def leaves() -> list:
     """(path, values to try) of every key of the schema that is no file."""
     return [
         (path, values(path, kind))
-        for path, kind, model in known()
+        for path, kind, model in list_schema_keys()
         if model is None and path[-1] != "file" and ".".join(map(str, path)) not in NEVER
     ]
 
@@ -152,7 +152,7 @@ def answer(text: str) -> tuple:
 def silent(scene: str) -> list:
     """Keys that stand in a scene without a word and change no bit, at none of their values."""
     tables = tomllib.loads(SCENES[scene])
-    base = answer(text_of(tables))
+    base = answer(to_toml(tables))
     out = []
     for path, tried in leaves():
         name = ".".join(map(str, path))
@@ -161,7 +161,7 @@ def silent(scene: str) -> list:
             if (changed := with_key(tables, path, value)) is None:
                 continue
             try:
-                taken = answer(text_of(changed)) == base
+                taken = answer(to_toml(changed)) == base
             except (SceneError, PatchfemError, Missing, NotConverged):
                 continue
             if not taken:

@@ -9,7 +9,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.scene import (
@@ -93,7 +93,7 @@ def test_always_a_law_answers_the_wish_and_says_what_it_assumes(know, want):
     ],
 )
 def test_always_a_second_wish_that_the_law_does_not_answer_is_named(know, want, law, unanswered):
-    answer = cli("new", "joint", "--know", know, "--want", want)
+    answer = run_cli("new", "joint", "--know", know, "--want", want)
     assert f"# law: {law};" in answer.out and "not used" not in answer.out
     advice = f"not answered by this law: {unanswered}; ask again with --want {unanswered}"
     assert advice in answer.out
@@ -150,18 +150,18 @@ def test_exact_the_loss_in_micro_slip_is_a_power_of_the_amplitude(name, power):
 
 @pytest.mark.parametrize("words", REFUSED)
 def test_refuses_what_is_no_answer(words):
-    answer = cli("new", *words.split())
+    answer = run_cli("new", *words.split())
     assert answer.code == 2 and REFUSED[words] in answer.err and not answer.out
 
 
 def test_always_the_file_has_the_scene_and_the_screen_the_sentences(tmp_path):
     path = tmp_path / "joint.toml"
     words = ("new", "joint", "--know", "loop", "--want", "loss")
-    answer = cli(*words, "-o", path)
-    assert path.read_text("utf-8") == cli(*words).out and load(path).friction.law == "bouc-wen"
+    answer = run_cli(*words, "-o", path)
+    assert path.read_text("utf-8") == run_cli(*words).out and load(path).friction.law == "bouc-wen"
     assert "law: bouc-wen; keys: static, stiffness, exponent, shape" in answer.out
     assert "what it cannot do: " in answer.out and f"next: patchfem run {path}" in answer.out
-    assert "already exists" in cli(*words, "-o", path).err
+    assert "already exists" in run_cli(*words, "-o", path).err
 
 
 def converse(*answers: bytes) -> tuple[int, str]:
@@ -182,7 +182,7 @@ def converse(*answers: bytes) -> tuple[int, str]:
 
 def test_always_questions_are_asked_on_a_terminal():
     code, screen = converse(b"loop, Roughness\n", b"loss\n")
-    scene = cli("new", "joint", "--know", "loop,roughness", "--want", "loss").out
+    scene = run_cli("new", "joint", "--know", "loop,roughness", "--want", "loss").out
     assert code == 0 and scene in screen
     assert all(f"  {word} " in screen for word in (*KNOWLEDGE, *WISHES))
     code, screen = converse(b"\x04")  # end of file

@@ -6,7 +6,7 @@ from itertools import islice, product
 from pathlib import Path
 
 import pytest
-from scene_texts import BENCH, LINEAR, PATCH, RIG, line_of, mistakes, only
+from scene_texts import BENCH, LINEAR, PATCH, RIG, find_line, get_only_mistake, list_mistakes
 
 from patchfem.scene import load, loads
 from patchfem.scene.scene import SceneError
@@ -147,7 +147,7 @@ PLAIN = [
 
 @pytest.mark.parametrize("text, sets, key, says", REFUSED + PLAIN)
 def test_refuses_what_no_run_can_do(text, sets, key, says):
-    message = only(text, *sets)
+    message = get_only_mistake(text, *sets)
     assert message.startswith(f"--set: {key}: ") and says in message
     assert (UNBUILT in message) == ((text, sets, key, says) in REFUSED)
 
@@ -156,16 +156,16 @@ def test_refuses_at_the_line_of_the_file():
     text = RIG.replace("[friction]", "[contact.shear]\n[friction]\nbreakaway = 0.1")
     text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
     text += '[accuracy]\nmethod = "exact"\n'
-    assert mistakes(text) == [
-        f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' with friction.breakaway and [contact.shear] "
+    assert list_mistakes(text) == [
+        f"a.toml:{find_line(text, 'on =')}: contact.tilt.on: 'lower' with friction.breakaway and [contact.shear] "
         "is not supported yet; put the shapes on the upper piece",
-        f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' with "
+        f"a.toml:{find_line(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' with "
         "[contact.shear]; use 'march' or leave `method` out",
     ]
 
 
 def test_refuses_combinations_beside_the_list_of_keys():
-    found = mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8", "friction.breakaway=0.1")
+    found = list_mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8", "friction.breakaway=0.1")
     assert sorted(message.split(": ")[1] for message in found) == [
         "contact.strips",
         "contact.tilt.on",
@@ -174,9 +174,9 @@ def test_refuses_combinations_beside_the_list_of_keys():
 
 def test_refuses_a_rig_in_which_nothing_slides():
     text = RIG.replace("slide = 0.8", "slide = 0.0").replace("slide = 0.1", "slide = 0.0")
-    message = only(text)
+    message = get_only_mistake(text)
     assert message.startswith(
-        f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: `slide` is 0 in every mode"
+        f"a.toml:{find_line(text, 'slide')}: structure.mode.axial.slide: `slide` is 0 in every mode"
     )
     assert loads(RIG, sets=["structure.mode.axial.slide=0"]).structure.mode[1].slide == 0.1
     assert loads(text[text.index("[structure]") :]).kind == "linear"
@@ -185,10 +185,10 @@ def test_refuses_a_rig_in_which_nothing_slides():
 def test_refuses_a_duration_below_a_quarter_of_a_cycle():
     text = LINEAR.replace("cycles = 200", 'duration = "1 ms"')
     assert (
-        f"a.toml:{line_of(text, 'duration')}: drive.duration: the run must last at least a"
-        in only(text)
+        f"a.toml:{find_line(text, 'duration')}: drive.duration: the run must last at least a"
+        in get_only_mistake(text)
     )
-    assert only(text).endswith("duration >= 0.00174825 s is needed, not 0.001 s")
+    assert get_only_mistake(text).endswith("duration >= 0.00174825 s is needed, not 0.001 s")
     assert loads(text, sets=["drive.duration=1.75 ms"]).drive.duration == 1.75e-3
     assert loads(LINEAR, sets=["drive.cycles=0.25"]).drive.cycles == 0.25
 
@@ -259,7 +259,7 @@ def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
     ],
 )
 def test_refuses_a_hash_in_a_set_as_part_of_its_value(one, key, says):
-    message = only(RIG, one)
+    message = get_only_mistake(RIG, one)
     assert message.startswith(f"--set: {key}: ") and says in message
 
 
@@ -267,12 +267,14 @@ def test_exact_a_number_of_a_set_may_begin_or_end_with_its_point():
     for text in (".3", "+.3e0", "3.e-1"):
         assert loads(RIG, sets=[f"friction.static={text}"]).friction.static == 0.3
     assert loads(RIG, sets=["title=.3"]).title == ".3"
-    assert "without a unit" in only(RIG, "contact.load=.3")
+    assert "without a unit" in get_only_mistake(RIG, "contact.load=.3")
 
 
 def test_exact_a_hash_reads_the_same_in_a_set_and_in_the_file():
-    in_file = only(RIG.replace('"26 lbf"', '"26#"'))
-    assert in_file.partition(": ")[2] == only(RIG, "contact.load=26#").partition(": ")[2]
+    in_file = get_only_mistake(RIG.replace('"26 lbf"', '"26#"'))
+    assert (
+        in_file.partition(": ")[2] == get_only_mistake(RIG, "contact.load=26#").partition(": ")[2]
+    )
     assert (
         loads(RIG, sets=["title=run #3"]).title
         == loads(RIG, sets=['title="run #3"']).title

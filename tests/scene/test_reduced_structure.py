@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from command_line import cli
-from scene_texts import line_of
+from command_line import run_cli
+from scene_texts import find_line
 from scipy import sparse
 from scipy.io import mmwrite
 
@@ -157,7 +157,7 @@ def test_exact_named_nodes_move_along_x_alone(folder):
     model = pf.build(pf.load(_written(folder, text.replace("modes = 4", "modes = 38"))))
     np.testing.assert_allclose((model.rig.modes.base**2).sum(), 20 * 0.02, rtol=1e-9)
     (folder / "scene.toml").write_text(text.replace("25:x", "25:z"))
-    answer = cli("check", folder / "scene.toml")
+    answer = run_cli("check", folder / "scene.toml")
     assert answer.code == 2 and "the files have no 25:z; node 25 has x" in answer.err
 
 
@@ -214,9 +214,9 @@ REFUSED = {
 def test_refuses_with_the_line_of_the_key(folder, key, old, new):
     assert old in SCENE
     text = SCENE.replace(old, new, 1)
-    answer = cli("run", _written(folder, text), "-o", folder / "out")
+    answer = run_cli("run", _written(folder, text), "-o", folder / "out")
     assert answer.code == 2, answer.err
-    line = f"scene.toml:{line_of(text, f'{key} = ')}: structure.reduced.{key}: "
+    line = f"scene.toml:{find_line(text, f'{key} = ')}: structure.reduced.{key}: "
     assert line in answer.err and REFUSED[key, old, new] in answer.err, answer.err
 
 
@@ -241,7 +241,7 @@ def test_refuses_with_the_line_of_the_key(folder, key, old, new):
 def test_refuses_places_that_are_not_there(folder, old, new, says):
     text = SCENE.replace(old, new)
     text = text.replace('load = "50 N"\n', "") if "normal" in new else text
-    answer = cli("check", _written(folder, text))
+    answer = run_cli("check", _written(folder, text))
     assert answer.code == 2 and says in answer.err, answer.err
 
 
@@ -255,7 +255,7 @@ OTHER = '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\nstatic = 0.
 def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
     """What is advised, for one interface or several, is a scene that can run."""
     for text in (SCENE, SCENE.replace("[drive]", OTHER)):
-        answer = cli("check", _written(folder, PATCH + text))
+        answer = run_cli("check", _written(folder, PATCH + text))
         assert answer.code == 2
         assert "move [contact] into the interface that it presses" in answer.err
         own = PATCH.replace("[contact", "[structure.interface.contact")
@@ -264,7 +264,7 @@ def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
         text = text.replace(
             "[[structure.interface]]\nbetween = [2", own + "[[structure.interface]]\nbetween = [2"
         )
-        answer = cli("check", _written(folder, text.replace("[drive]", own + "[drive]")))
+        answer = run_cli("check", _written(folder, text.replace("[drive]", own + "[drive]")))
         assert answer.code == 0, answer.err
 
 

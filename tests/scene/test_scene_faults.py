@@ -13,7 +13,7 @@ from scene_texts import (
     PLASTIC,
     POINT,
     TRIANGLE,
-    mistakes,
+    list_mistakes,
 )
 
 from patchfem.scene import load, loads
@@ -56,7 +56,7 @@ SHAKEN = POINT + COULOMB + MODE + DRIVE
     ],
 )
 def test_refuses_with_the_line_the_key_and_the_remedy(text, says):
-    found = mistakes(text)
+    found = list_mistakes(text)
     assert len(found) == len(says)
     assert all(re.match(pattern, mistake) for pattern, mistake in zip(says, found))
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, line_of, only
+from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, find_line, get_only_mistake
 
 from patchfem.core import PatchfemError
 from patchfem.model import build, compute_named_motions, locate_errors
@@ -210,14 +210,14 @@ def test_exact_starts_of_a_scene():
      "structure.start", "[structure.start] and drive.displacement exclude each other"),
 ])  # fmt: skip
 def test_refuses_masses_that_are_not_there(sets, key, says):
-    message = only(RUB + MASSES, *sets)
+    message = get_only_mistake(RUB + MASSES, *sets)
     assert message.startswith(f"--set: {key}: ") and says in message
 
 
 def test_refuses_at_the_line_of_the_file():
     text = (RUB + MASSES).replace("between = [2, 0]", "between = [2, 5]")
-    assert only(text).startswith(
-        f"a.toml:{line_of(text, 'between = [2, 5]')}: structure.interface[1].between: "
+    assert get_only_mistake(text).startswith(
+        f"a.toml:{find_line(text, 'between = [2, 5]')}: structure.interface[1].between: "
     )
 
 
@@ -234,7 +234,7 @@ def test_refuses_at_the_line_of_the_file():
      STRUCTURE[STRUCTURE.index("[drive]"):], "structure.file", "the name ends in '.csv'"),
 ])  # fmt: skip
 def test_refuses_what_does_not_go_together(text, key, says):
-    message = only(text)
+    message = get_only_mistake(text)
     assert f": {key}: " in message and says in message
 
 
@@ -396,7 +396,7 @@ MODES = (
 )
 def test_exact_items_count_from_one_where_people_read_and_write(key, message, text):
     text = POINT + text if text is MODES else text
-    assert only(text, f"{key}=-1").startswith(f"--set: {message}")
+    assert get_only_mistake(text, f"{key}=-1").startswith(f"--set: {message}")
 
 
 def test_exact_a_remark_counts_a_mode_whose_name_is_a_number_from_one():
@@ -438,13 +438,13 @@ PUSH = '[drive]\nkind = "force"\nfrequency = "90 Hz"\nforce = "300 N"\ncycles = 
 
 def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode():
     """sqrt(k/m)/(2 pi) = 41.0936 Hz and c/(2 sqrt(k m)) = 0.00775 of 3 kg on 200 kN/m with 12 N s/m; one message."""
-    message = only(BLOCK + COULOMB + SPRING + DAMPER + PUSH)
+    message = get_only_mistake(BLOCK + COULOMB + SPRING + DAMPER + PUSH)
     assert ": structure.masses: " in message
     assert 'moving_mass = "3 kg"' in message
     assert "[normal]" not in message
     assert '[[structure.mode]] with frequency = "41.0936 Hz"' in message
     assert "damping = 0.00775" in message
-    assert "its damping ratio" in only(BLOCK + COULOMB + SPRING + PUSH)
+    assert "its damping ratio" in get_only_mistake(BLOCK + COULOMB + SPRING + PUSH)
 
 
 @pytest.mark.parametrize("rest", ['masses = ["1 kg", "2 kg"]\n', 'moving_mass = "3 kg"\n'])

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pieces import LOAD, TILTS, coated_pair, rough
-from slip_paths import elements, histories
+from pieces import LOAD, TILTS, draw_gap, make_coated_pair
+from slip_paths import draw_paths, jenkins_forces
 
 from patchfem.contact import press, tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
@@ -21,7 +21,7 @@ MU = 0.3
 
 def friction_limit(cells, angle):
     """Return the friction limit of every node of a tilted coated patch, (m,) [N]."""
-    pair = coated_pair(cells)
+    pair = make_coated_pair(cells)
     return MU * press(pair, tilt(pair.interface.x, angle), LOAD).sigma_n * pair.interface.weight
 
 
@@ -29,7 +29,7 @@ def friction_limit(cells, angle):
 def test_exact_scaled_limits_equal_recomputed_elements(factor):
     """Elements whose limits are scaled by a factor equal elements computed for the scaled friction
     limits, within 1e-11."""
-    pair = coated_pair(20)
+    pair = make_coated_pair(20)
     limit = friction_limit(20, 1e-4)
     scaled = scale_limits(jenkins_set(pair.tangential, limit), factor)
     recomputed = jenkins_set(pair.tangential, factor * limit)
@@ -98,7 +98,7 @@ def solve_all_points(c, limit, path):
 def test_exact_elements_have_friction_limit_and_stick_stiffness(cells, angle):
     """The elements carry the friction limit of the patch within 1e-12, and their total stiffness is
     that of full stick within 1e-11."""
-    pair = coated_pair(cells)
+    pair = make_coated_pair(cells)
     limit = friction_limit(cells, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-12)
@@ -114,15 +114,15 @@ def test_exact_elements_have_friction_limit_and_stick_stiffness(cells, angle):
 def test_exact_elements_agree_with_solution_of_all_points(angle):
     """The force of the elements agrees with the solution for all 101 nodes within 1e-10 of the
     friction limit, for 20 histories of 40 reversals. The largest difference measured is 9e-15."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.n_reluctant == 0
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)]
-    for path in histories(20, group.yield_displacement[-1]):
+    for path in draw_paths(20, group.yield_displacement[-1]):
         difference = np.abs(
-            solve_all_points(c, limit[touching], path) - elements(group, path)
+            solve_all_points(c, limit[touching], path) - jenkins_forces(group, path)
         ).max()
         assert difference <= 1e-10 * limit.sum()
 
@@ -133,15 +133,15 @@ def test_exact_elements_with_bonds_agree_with_all_points(angle, length):
     """The force of elements with bonds agrees with the solution for all points within 1e-10 of the
     friction limit. At each point a bond of stiffness limit/length acts in series with the
     compliance of the bodies."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, angle)
     group = jenkins_set(pair.tangential, limit, length)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)] + np.diag(length / limit[touching])
     assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-12)
-    for path in histories(3, group.yield_displacement[-1]):
+    for path in draw_paths(3, group.yield_displacement[-1]):
         difference = np.abs(
-            solve_all_points(c, limit[touching], path) - elements(group, path)
+            solve_all_points(c, limit[touching], path) - jenkins_forces(group, path)
         ).max()
         assert difference <= 1e-10 * limit.sum()
 
@@ -151,15 +151,15 @@ def test_exact_corner_nodes_with_negative_row_sum_are_excluded(angle):
     """Corner nodes whose initial force has the wrong sign are left out until their neighbours slip.
     The force then agrees with the solution for all 201 nodes within 5e-9 of the friction limit
     (measured: 6e-10)."""
-    pair = coated_pair(200)
+    pair = make_coated_pair(200)
     limit = friction_limit(200, angle)
     group = jenkins_set(pair.tangential, limit)
     assert group.n_reluctant > 0 and group.stiffness.min() > 0
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)]
-    for path in histories(3, group.yield_displacement[-1]):
+    for path in draw_paths(3, group.yield_displacement[-1]):
         difference = np.abs(
-            solve_all_points(c, limit[touching], path) - elements(group, path)
+            solve_all_points(c, limit[touching], path) - jenkins_forces(group, path)
         ).max()
         assert difference <= 5e-9 * limit.sum()
 
@@ -167,7 +167,7 @@ def test_exact_corner_nodes_with_negative_row_sum_are_excluded(angle):
 def test_exact_point_forces_agree_with_box_problem():
     """The force at every point, computed from the stretch of the elements, agrees with the
     box-constrained solution within 1e-10 of the friction limit."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, 1e-4)
     group = jenkins_set(pair.tangential, limit)
     c = pair.tangential[np.ix_(group.points, group.points)]
@@ -187,15 +187,17 @@ def test_always_elements_are_exact_for_rough_gaps(seed, bond_length):
     """For random rough gaps the force of the elements agrees with the solution for all points
     within 1e-10 of the friction limit."""
     rng = np.random.default_rng(seed)
-    pair = coated_pair(40)
-    gap = rough(rng, pair.interface.x, 10 ** rng.uniform(-8, -5))
+    pair = make_coated_pair(40)
+    gap = draw_gap(rng, pair.interface.x, 10 ** rng.uniform(-8, -5))
     limit = MU * press(pair, gap, LOAD).sigma_n * pair.interface.weight
     group = jenkins_set(pair.tangential, limit, bond_length)
     assert group.stiffness @ group.yield_displacement == pytest.approx(limit.sum(), rel=1e-11)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)] + np.diag(bond_length / limit[touching])
-    path = next(histories(1, group.yield_displacement[-1], seed % 1000))
-    difference = np.abs(solve_all_points(c, limit[touching], path) - elements(group, path)).max()
+    path = next(draw_paths(1, group.yield_displacement[-1], seed % 1000))
+    difference = np.abs(
+        solve_all_points(c, limit[touching], path) - jenkins_forces(group, path)
+    ).max()
     assert difference <= 1e-10 * limit.sum()
 
 
@@ -203,7 +205,7 @@ def test_always_elements_are_exact_for_rough_gaps(seed, bond_length):
 def test_exact_initial_stroke_satisfies_ciavarella_jaeger_theorem(shape):
     """The initial loading curve satisfies F(q) = mu [N - P(delta - q/mu)] within 1e-10 if C_tt =
     C_nn (Ciavarella and Jaeger). P is the normal load at an approach."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     x = pair.interface.x
     gap = crown(x, 2.0) if shape == "crown" else tilt(x, 1e-4)
     full = press(pair, gap, LOAD)
@@ -223,7 +225,7 @@ def test_exact_initial_stroke_satisfies_ciavarella_jaeger_theorem(shape):
 def test_exact_stick_stiffness_agrees_with_uncondensed_bodies(angle, bonded):
     """The stick stiffness agrees within 1e-8 with two complete bodies that are bonded over the
     contact."""
-    pair = coated_pair(200)
+    pair = make_coated_pair(200)
     limit = friction_limit(200, angle)
     assert tangential_stiffness(pair.tangential, limit > 0) == pytest.approx(bonded, rel=1e-8)
 
@@ -271,7 +273,7 @@ def solve_with_modes(modes, limit, length, slide):
 @pytest.mark.parametrize("angle", TILTS)
 def test_exact_all_shear_modes_reproduce_compliance(angle):
     """All shear modes together reproduce the compliance and the resultant force within 1e-12."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, angle)
     modes = shear_modes(pair.tangential, limit, 1e-6, 10**6)
     touching = np.flatnonzero(limit > 0)
@@ -290,7 +292,7 @@ def test_exact_all_shear_modes_reproduce_compliance(angle):
 def test_exact_first_shear_modes_are_the_softest(cells):
     """The first shear modes are the softest eigenvectors of D^1/2 C D^1/2, where D contains the
     friction limits. With 200 points or more an iterative solver computes only these modes."""
-    pair = coated_pair(cells)
+    pair = make_coated_pair(cells)
     limit = friction_limit(cells, 1e-5)
     modes = shear_modes(pair.tangential, limit, 1e-6, 8)
     root = np.sqrt(limit[modes.points])
@@ -307,7 +309,7 @@ def test_exact_first_shear_modes_are_the_softest(cells):
 @pytest.mark.parametrize("angle", TILTS)
 def test_always_backbone_error_falls_with_number_of_modes(angle, length):
     """The backbone error never rises with the number of shear modes and is small for 8 modes."""
-    pair = coated_pair(200)
+    pair = make_coated_pair(200)
     limit = friction_limit(200, angle)
     errors = np.array(
         [shear_modes(pair.tangential, limit, length, n).backbone_error for n in (1, 2, 4, 8, 16)]
@@ -322,7 +324,7 @@ def test_always_backbone_error_falls_with_number_of_modes(angle, length):
 def test_always_short_bonds_use_enough_modes(angle):
     """For bond lengths of 1e-2 and 1e-3 of the slide at gross slip, the backbone error falls with
     the number of modes. For bonds that are too short to resolve, all permitted modes are used."""
-    pair = coated_pair(60)
+    pair = make_coated_pair(60)
     limit = friction_limit(60, angle)
     gross_slip_slide = limit.sum() / tangential_stiffness(pair.tangential, limit > 0)
     for fraction, max_error in ((1e-2, 1e-3), (1e-3, 5e-3)):
@@ -341,7 +343,7 @@ def test_always_short_bonds_use_enough_modes(angle):
 def test_always_number_of_modes_is_minimal(angle, tolerance):
     """The chosen number of modes meets the tolerance, and one mode less does not (within a factor
     of 1.3)."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, angle)
     modes = fewest_modes(pair.tangential, limit, 1e-6, tolerance)
     count = modes.stiffness.size
@@ -357,7 +359,7 @@ def test_exact_backbone_error_is_the_resultant_error(angle):
     """The stated backbone error is the largest error of the resultant over 24 slides, within 1e-12,
     relative to the solution for all points."""
     length = 1e-6
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, angle)
     touching = limit > 0
     c = pair.tangential[np.ix_(touching, touching)]
@@ -378,7 +380,7 @@ def test_always_reduced_points_preserve_backbone(angle):
     """16 or 32 integration points reproduce the backbone within 2e-5 of the friction limit at 72
     slides, three times as many as were used to choose them. With a tolerance of 1e-16 all points
     remain."""
-    pair = coated_pair(200)
+    pair = make_coated_pair(200)
     limit = friction_limit(200, angle)
     modes = shear_modes(pair.tangential, limit, 1e-6, 4)
     reduced, reduced_limit, _ = fewest_gauss_points(modes, pair.interface.x[modes.points], 1e-5)
@@ -400,7 +402,7 @@ def test_always_reduced_points_preserve_backbone(angle):
 def test_refuses_unstable_slip_weakening():
     """Slip weakening above the stability limit of the patch is refused, and just below the limit it
     is accepted."""
-    pair = coated_pair(100)
+    pair = make_coated_pair(100)
     limit = friction_limit(100, 1e-4)
     length = 1e-7
     touching = limit > 0
@@ -422,13 +424,13 @@ def test_refuses_unstable_slip_weakening():
 def test_refuses_patch_without_friction():
     """A patch whose friction limit is zero at every point is refused."""
     with pytest.raises(PatchfemError, match="the friction limit is 0 at every point"):
-        jenkins_set(coated_pair(40).tangential, np.zeros(41))
+        jenkins_set(make_coated_pair(40).tangential, np.zeros(41))
 
 
 def test_exact_single_node_gives_one_element():
     """A single node in contact gives one element with the stiffness and the yield slide of this
     node."""
-    pair = coated_pair(40)
+    pair = make_coated_pair(40)
     limit = np.zeros(41)
     limit[7] = 2.0
     group = jenkins_set(pair.tangential, limit)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, bare, coated_pair
+from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, make_bare_layers, make_coated_pair
 
 from patchfem.contact import coupled_stiffness, tangential_stiffness
 from patchfem.core import Compliance, Interface
@@ -21,7 +21,7 @@ def dissimilar_bodies() -> tuple:
     )
     low, high = (
         interface_compliance(make_piece(grid.x, grid.depth, grid.coating_rows, layers))
-        for grid, layers in zip(grids, (COATED, bare((70e9, 0.3))))
+        for grid, layers in zip(grids, (COATED, make_bare_layers((70e9, 0.3))))
     )
     x = grids[0].x
     pieces = Compliance(
@@ -49,7 +49,7 @@ def test_exact_coupled_stiffness_agrees_with_schur_complement():
 def test_exact_coupled_stiffness_in_limiting_cases():
     """Without coupling the stiffness is that of similar bodies within 1e-12; without contact it is
     zero."""
-    pair = coated_pair(60)
+    pair = make_coated_pair(60)
     no_coupling = 0 * pair.normal
     active = np.arange(pair.interface.x.size) < 40
     assert coupled_stiffness(pair, no_coupling, active) == pytest.approx(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import PatchfemError
 from patchfem.structure import compute_receptance, masses
@@ -15,7 +15,7 @@ from patchfem.structure.bonded import add_spring, remove_springs
 
 def sdof_basis(omega=3.0, zeta=0.01, slide=0.8, mass=2.0):
     """Return the basis of a single mode."""
-    return basis_of(omega, zeta, [slide], mass=mass)
+    return make_modal_basis(omega, zeta, [slide], mass=mass)
 
 
 @given(st.integers(0, 10**6))
@@ -65,7 +65,7 @@ def test_always_removing_springs_restores_basis(seed):
     k = rng.uniform(0.1, 5, n_faces)
     c = rng.uniform(0, 0.3)
     omega = np.sort(rng.uniform(1, 4, n))
-    base = basis_of(
+    base = make_modal_basis(
         omega, rng.uniform(0, 0.1, n), rows, rng.uniform(-1, 1, n), rng.uniform(-1, 1, n), mass=2.0
     )
     bonded = add_spring(base, k[0], c)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 from scene_texts import MODE, PLASTIC, POINT
 from scipy.integrate import quad
 
@@ -19,7 +19,7 @@ OMEGA = 2 * np.pi * 143
 
 def sdof_basis(omega=OMEGA, zeta=0.003, base=1.0):
     """Return the basis of a single mode."""
-    return basis_of(omega, zeta, [1.0], [base], mass=0.9)
+    return make_modal_basis(omega, zeta, [1.0], [base], mass=0.9)
 
 
 # ---- signals

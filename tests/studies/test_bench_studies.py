@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from study_module import study
+from study_module import load_study
 
 
 def check_speeds(rows):
@@ -17,7 +17,7 @@ def check_speeds(rows):
 
 @pytest.mark.slow
 def test_exact_friction_against_speed_is_the_lorentzian_and_g_of_it(tmp_path):
-    rows = study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
+    rows = load_study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
     check_speeds(rows)
     assert rows[0]["stretch"] == pytest.approx(0.51, rel=1e-12)  # half way at v_c = sqrt(a_s l_k)
     assert "<svg" in (tmp_path / "picture.svg").read_text()
@@ -25,7 +25,7 @@ def test_exact_friction_against_speed_is_the_lorentzian_and_g_of_it(tmp_path):
 
 @pytest.mark.slow
 def test_exact_the_whole_study_of_friction_against_speed():
-    rows = study("bench/stribeck.py").main(path=None)
+    rows = load_study("bench/stribeck.py").main(path=None)
     check_speeds(rows)
     fast = {
         row["slip"]: {p: row[p][0] / row["promised"] - 1 for p in (0, 1)}
@@ -53,7 +53,9 @@ def peak_after(part, start, before):
 
 
 def test_exact_ageing_is_exponential_and_the_peak_stays_below_it(tmp_path):
-    rows = study("bench/ageing.py").main((0.1, 10.0), (0.5, 5.0), tmp_path / "picture.svg", 1200)
+    rows = load_study("bench/ageing.py").main(
+        (0.1, 10.0), (0.5, 5.0), tmp_path / "picture.svg", 1200
+    )
     assert "<svg" in (tmp_path / "picture.svg").read_text()
     for row in (row for row in rows if row["reading"] == "stretch"):
         slow = (1 + 0.5 * 1e-6 / (2e-6 * row["part"] * 2e-6)) / (
@@ -79,7 +81,7 @@ def test_exact_ageing_is_exponential_and_the_peak_stays_below_it(tmp_path):
 
 @pytest.mark.slow
 def test_exact_the_longest_bonds_of_the_ageing_study():
-    study_ = study("bench/ageing.py")
+    study_ = load_study("bench/ageing.py")
     before, rested, peak = study_.dwell(10.0, 50.0)
     assert before == rested and (peak - before) / (
         study_.aged(10.0, 50.0) - before

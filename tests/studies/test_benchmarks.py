@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_module import assert_contains, study_fixture
+from study_module import assert_contains, make_study_fixture
 
-beam = study_fixture("benchmarks/brake_reuss.py")
-wear = study_fixture("benchmarks/ti64_wear.py")
+beam = make_study_fixture("benchmarks/brake_reuss.py")
+wear = make_study_fixture("benchmarks/ti64_wear.py")
 FOLDER = Path(os.environ.get("PATCHFEM_DATA") or "no folder")
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from study_module import study_fixture
+from study_module import make_study_fixture
 
-orders = study_fixture("contact/order_four.py")
+orders = make_study_fixture("contact/order_four.py")
 
 
 def test_exact_the_weights_of_a_cell_are_positive_and_integrate_degree_seven(orders):

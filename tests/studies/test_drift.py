@@ -3,11 +3,11 @@
 import friction_forms
 import numpy as np
 import pytest
-from study_module import study_fixture
+from study_module import make_study_fixture
 
 from patchfem.friction import FirstOrderBonds
 
-table = study_fixture("drift/drift_table.py")
+table = make_study_fixture("drift/drift_table.py")
 
 
 def test_exact_drift_of_the_stretch_is_the_closed_form(table):

@@ -4,14 +4,14 @@ import friction_forms
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from study_module import study, study_fixture
+from study_module import load_study, make_study_fixture
 
 from patchfem.friction import FirstOrderBonds
 
-table = study_fixture("friction_ladder/ladder.py")
+table = make_study_fixture("friction_ladder/ladder.py")
 
 
-ladder = study_fixture("friction_ladder/ladder_cycles.py")
+ladder = make_study_fixture("friction_ladder/ladder_cycles.py")
 
 
 @pytest.fixture(scope="module")
@@ -139,5 +139,5 @@ def test_always_the_table_of_the_ladder(table, capsys):
 
 @pytest.mark.slow
 def test_always_the_picture_names_its_curves(tmp_path):
-    text = study("friction_ladder/picture.py").main(tmp_path / "x.svg", (0.3, 3.0)).read_text()
+    text = load_study("friction_ladder/picture.py").main(tmp_path / "x.svg", (0.3, 3.0)).read_text()
     assert all(word in text for word in ("amplitude [bond lengths]", "LuGre", "Iwan 20, reversals"))

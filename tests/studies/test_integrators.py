@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 from report_methods import accepted_force_error
-from study_module import study_fixture
+from study_module import make_study_fixture
 
 from patchfem.core import Missing
 
-failure = study_fixture("integrators/failure.py")
+failure = make_study_fixture("integrators/failure.py")
 
 
 def test_exact_two_masses_by_the_event_engine(failure):
@@ -60,7 +60,7 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     assert "Newmark" in capsys.readouterr().out
 
 
-work = study_fixture("integrators/work_precision.py")
+work = make_study_fixture("integrators/work_precision.py")
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,9 @@
 import re
 
 import pytest
-from study_module import study
+from study_module import load_study
 
-mesh_file = study("patch/from_file.py")
+mesh_file = load_study("patch/from_file.py")
 
 
 @pytest.mark.slow

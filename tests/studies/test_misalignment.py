@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from study_module import study, study_fixture
+from study_module import load_study, make_study_fixture
 
 from patchfem.closed_forms import contact as exact
 from patchfem.runs.patch.press import press_patch
@@ -15,7 +15,7 @@ from patchfem.runs.patch.values import values
 LOAD, LENGTH = 26 * 4.4482216152605, 12.7e-3
 
 
-fixtures = study_fixture("misalignment/fixtures.py")
+fixtures = make_study_fixture("misalignment/fixtures.py")
 
 
 @pytest.fixture(scope="module")
@@ -23,13 +23,13 @@ def tilted(fixtures):
     return fixtures.tilted
 
 
-conclusion = study_fixture("misalignment/conclusion_5.py")
+conclusion = make_study_fixture("misalignment/conclusion_5.py")
 
 
-roll = study_fixture("misalignment/roll.py")
+roll = make_study_fixture("misalignment/roll.py")
 
 
-rough = study_fixture("misalignment/rough_skin.py")
+rough = make_study_fixture("misalignment/rough_skin.py")
 
 
 @pytest.fixture(scope="module")
@@ -251,7 +251,7 @@ def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
 
 @pytest.mark.slow
 def test_always_the_picture_names_its_curves(tmp_path):
-    picture = study("misalignment/picture.py")
+    picture = load_study("misalignment/picture.py")
     text = picture.main(tmp_path / "x.svg", np.array([1e-5, 1e-4])).read_text()
     for word in (
         "misalignment [mrad]",
@@ -266,7 +266,7 @@ def test_always_the_picture_names_its_curves(tmp_path):
 # ---- in motion
 
 
-moving = study_fixture("misalignment/in_motion.py")
+moving = make_study_fixture("misalignment/in_motion.py")
 
 
 @pytest.fixture(scope="module")

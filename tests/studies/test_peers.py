@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from study_module import study, study_fixture
+from study_module import load_study, make_study_fixture
 
 from patchfem.closed_forms import contact as exact
 from patchfem.core import Missing
@@ -15,7 +15,7 @@ from patchfem.core import Missing
 GETFEM = "PATCHFEM_GETFEM_PYTHON"
 
 
-hertz = study_fixture("peers/hertz_getfem.py")
+hertz = make_study_fixture("peers/hertz_getfem.py")
 
 
 def without(name) -> bool:
@@ -27,7 +27,7 @@ def without(name) -> bool:
 
 
 def test_exact_errors_of_the_closed_forms_themselves_vanish():
-    hertz = study("peers/hertz_pair.py")
+    hertz = load_study("peers/hertz_pair.py")
     x = hertz.make_grid(16).x
     hertzian = exact.hertz_pressure(x, hertz.LOAD, hertz.RADIUS, hertz.MODULUS)
     assert np.abs(hertz.compute_errors(x, hertzian)).max() <= 1e-12

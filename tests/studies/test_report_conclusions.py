@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from study_module import study_fixture
+from study_module import make_study_fixture
 
 import patchfem as pf
 
-ten = study_fixture("report/conclusions.py")
+ten = make_study_fixture("report/conclusions.py")
 
 
 def test_exact_the_phases_of_the_block(ten):

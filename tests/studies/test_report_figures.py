@@ -4,14 +4,14 @@ import json
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scipy.integrate import solve_ivp
-from study_module import assert_contains, study
+from study_module import assert_contains, load_study
 from vibration_forms import bounded_input, decay_rest, sliding_amplitude
 
 
 def test_figures_2_and_3_motions_of_one_block(capsys):
-    one = study("report/figures_2_3.py")
+    one = load_study("report/figures_2_3.py")
     rows, stopped = one.main(None)
     at = {(r.onset, r.level): r for r in rows}
     for onset in one.ONSETS:  # sliding without a stop has a closed form
@@ -47,7 +47,7 @@ def test_figures_2_and_3_motions_of_one_block(capsys):
 
 
 def test_figures_2_and_3_where_the_stops_end_and_what_jumps():
-    one = study("report/figures_2_3.py")
+    one = load_study("report/figures_2_3.py")
     assert one.steady(4.14, 5.28).stuck > 0 == one.steady(4.14, 5.31).stuck
     assert_contains(one.ANSWER, "from 5.3 g on")
     assert_contains(one.VERDICT, "in part", "4.14 g", "5.3 g")
@@ -70,7 +70,7 @@ def frame_rubs(time, state):
 
 
 def test_figure_5_ringing_of_the_block():
-    one = study("report/figure_5.py")
+    one = load_study("report/figure_5.py")
     exact, euler = one.main((0.04, 0.1, 0.2), path=None)
     span = 16 * np.pi * 10
     far = solve_ivp(
@@ -112,7 +112,7 @@ def test_figure_5_ringing_of_the_block():
 
 
 def test_figures_10_to_12_ringing_of_two_masses():
-    one = study("report/figures_10_12.py")
+    one = load_study("report/figures_10_12.py")
     rows = {r.ratio: r for r in one.main((0.3, 0.4, 0.5), path=None)}
     slow, resonant, fast = (rows[ratio] for ratio in one.FIGURES.values())
     # one harmonic
@@ -139,7 +139,7 @@ def test_figures_10_to_12_ringing_of_two_masses():
 
 
 def test_figure_15_rest_of_a_released_block():
-    one = study("report/figure_15.py")
+    one = load_study("report/figure_15.py")
     rows, (time, x, failed) = one.main(None)
     # a few units in the last place of x0, by where a processor rounds
     assert max(r.error for r in rows) <= 1e-15
@@ -180,7 +180,7 @@ def test_figure_15_rest_of_a_released_block():
 
 @pytest.mark.slow
 def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
-    one = study("report/figures_30_31.py")
+    one = load_study("report/figures_30_31.py")
     ((sets, row),) = one.main((2,), 4, None).values()
     assert_contains(one.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
     assert one.count_held(sets, row) >= 7 and not any(
@@ -199,7 +199,9 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
         ]
         assert (after < before).all() and before == pytest.approx(total)
     files = [str(path) for path in one.write(one.middle(sets), tmp_path)]
-    found = json.loads(cli("compare", *files, "-o", tmp_path / "out", "--json").out)["directions"]
+    found = json.loads(run_cli("compare", *files, "-o", tmp_path / "out", "--json").out)[
+        "directions"
+    ]
     for way, part in zip("xy", one.middle(sets).parts):
         assert found[way]["amplitude_ratio"]["value"] == pytest.approx(
             part.amplitude_ratio.value, rel=1e-5
@@ -208,7 +210,7 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
 
 @pytest.mark.slow
 def test_figures_30_and_31_counts_of_all_sets(tmp_path):
-    one = study("report/figures_30_31.py")
+    one = load_study("report/figures_30_31.py")
     six, twelve = one.main(path=tmp_path / "x.svg").values()
     x, y, less, earlier = one.counts(six[0])
     assert_contains(one.ANSWER, f"In {x} of 20 such sets", f"lower; in {y} sets", f"In {less} sets")

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from study_module import assert_contains, study, study_fixture
+from study_module import assert_contains, load_study, make_study_fixture
 
 import patchfem as pf
 
-figures = study_fixture("report/figures_28_29.py")
+figures = make_study_fixture("report/figures_28_29.py")
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,7 @@ def test_figures_28_and_29_where_the_block_leaves(figures):
 def test_figures_28_and_29_what_the_other_models_do_at_8_g(figures):
     """A rigid block slides without a stop above 1.2792 of its onset, 4.14 g; the second path bounds it."""
     scene = (
-        study("report/figure_27.py")
+        load_study("report/figure_27.py")
         .scene("second path")
         .replace('method = "march"', 'method = "harmonic"')
     )

@@ -1,8 +1,8 @@
 """The items of the report: every path is there, every verdict is one, and the page is what the list says."""
 
-from study_module import ROOT, study_fixture
+from study_module import ROOT, make_study_fixture
 
-items = study_fixture("report/items.py")
+items = make_study_fixture("report/items.py")
 
 
 def test_always_the_page_is_the_list(items):

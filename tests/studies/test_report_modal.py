@@ -2,19 +2,19 @@
 
 import numpy as np
 import pytest
-from study_module import assert_contains, study
+from study_module import assert_contains, load_study
 
 
 def test_exact_a_block_that_friction_holds_transmits_the_base():
     """Below slip, at 0.8 g rms with peaks below the onset of 4.14 g, H1 is 1 at every frequency."""
-    held = study("report/figure_27.py").row("rigid block", 0.8, 4.0)
+    held = load_study("report/figure_27.py").row("rigid block", 0.8, 4.0)
     assert np.abs(held.seen.h - 1).max() < 1e-12 and held.slide < 1e-9
 
 
 def test_always_h1_of_a_linear_rig_is_its_transmissibility():
     """A damping of .03, so that windows of 1 s resolve the peak: 19 of them scatter by a few percent."""
-    modal = study("report/modal_test.py")
-    text = (study("report/figure_26.py").FOLDER / "block.toml").read_text("utf-8")
+    modal = load_study("report/modal_test.py")
+    text = (load_study("report/figure_26.py").FOLDER / "block.toml").read_text("utf-8")
     text = text[text.index("[structure]") :].replace("0.003", "0.03").replace("harmonic", "exact")
     seen = modal.h1(modal.run_random_test(text, 10.0, 0.1), 1.0).between(60, 260)
     frequency, damping, left = modal.fit_mode(seen)
@@ -27,14 +27,14 @@ def test_always_h1_of_a_linear_rig_is_its_transmissibility():
 
 def test_always_a_hard_driven_block_is_damped_as_linearisation_says():
     """sqrt(2/pi) mu N/(m sigma_v) is the damper of Coulomb friction under a normal velocity, which this nearly is."""
-    figure = study("report/figure_27.py")
+    figure = load_study("report/figure_27.py")
     row = figure.row("rigid block", 20.0, 10.0)
     assert row.damping == pytest.approx(figure.linearised_damping(row.speed), rel=0.1)
     assert row.frequency == pytest.approx(143, rel=5e-3)
 
 
 def test_figure_26_the_steady_curve():
-    figure = study("report/figure_26.py")
+    figure = load_study("report/figure_26.py")
     free = figure.curve()
     own = 2 * np.pi * np.array([143.0, 73.0, 129.0])
     share = np.array([0.99, 0.01, 0.0025])
@@ -56,7 +56,7 @@ def test_figure_26_the_steady_curve():
 
 @pytest.mark.slow
 def test_figure_26_the_random_test(tmp_path, capsys):
-    figure = study("report/figure_26.py")
+    figure = load_study("report/figure_26.py")
     free, seen, (frequency, damping, _) = figure.main(tmp_path / "x.svg")
     low = 1 - np.abs(seen.h).max() / free.peak[1]
     assert_contains(
@@ -70,7 +70,7 @@ def test_figure_26_the_random_test(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_figure_27_the_sentence(tmp_path, capsys):
-    figure = study("report/figure_27.py")
+    figure = load_study("report/figure_27.py")
     rows = {(r.model, r.level): r for r in figure.main(tmp_path / "x.svg")}
     more = {
         case: [rows[case], *(figure.row(*case, seed=seed) for seed in (2, 3, 4))]

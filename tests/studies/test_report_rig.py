@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from study_module import assert_contains, study
+from study_module import assert_contains, load_study
 
 import patchfem as pf
 
 
 def test_figure_8_the_piece_swings_as_its_closed_form():
     """Up to 20 Hz it breaks away from rest; the piece's friction is Coulomb's, the cell's the spring's."""
-    figure = study("report/figure_8.py")
+    figure = load_study("report/figure_8.py")
     for frequency in (5.0, 10.0, 20.0):
         one = figure.loop(frequency)
         assert one.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
@@ -22,7 +22,7 @@ def test_figure_8_the_piece_swings_as_its_closed_form():
 
 def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
     """Over a cycle the fixture stores nothing and its damper takes little: both loops have the area of the ledger."""
-    figure = study("report/figure_8.py")
+    figure = load_study("report/figure_8.py")
     one = figure.loop(10.0)
     area = abs(np.trapezoid(one.friction, one.slip)) / (4 * figure.LIMIT * figure.STROKE)
     assert area == pytest.approx(one.work, rel=2e-3)
@@ -31,7 +31,7 @@ def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
 
 @pytest.mark.slow
 def test_figure_8_the_sentence(tmp_path, capsys):
-    figure = study("report/figure_8.py")
+    figure = load_study("report/figure_8.py")
     loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
     assert_contains(
         figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz"
@@ -57,7 +57,7 @@ def test_figure_8_the_sentence(tmp_path, capsys):
 
 
 def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
-    sweeps = study("report/sweeps.py")
+    sweeps = load_study("report/sweeps.py")
     one = sweeps.sweep_level("rigid block", 4.0)
     assert one.displacement.max() < 1e-9 and one.distortion.max() < 2e-3
     assert one.acceleration == pytest.approx(4.0, rel=2e-3)
@@ -66,7 +66,7 @@ def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
 
 @pytest.mark.slow
 def test_sweeps_the_sentence(tmp_path, capsys):
-    sweeps = study("report/sweeps.py")
+    sweeps = load_study("report/sweeps.py")
     found = sweeps.main(tmp_path / "x.svg")
     told = {
         "rigid block": ("in the model of a rigid block", 0),
@@ -94,7 +94,7 @@ def test_sweeps_the_sentence(tmp_path, capsys):
 
 def test_always_a_level_ends_in_its_steady_motion():
     """The series of levels, marched, against the harmonic balance of each level alone."""
-    steps = study("report/steps.py")
+    steps = load_study("report/steps.py")
     for one in steps.steps(143.0, steps.raise_levels(143.0))[1:]:
         found = pf.run(
             steps.text(),
@@ -109,7 +109,7 @@ def test_always_a_level_ends_in_its_steady_motion():
 
 @pytest.mark.slow
 def test_steps_the_sentence(tmp_path, capsys):
-    steps = study("report/steps.py")
+    steps = load_study("report/steps.py")
     found, fits = steps.main(tmp_path / "x.svg")
     every = [one for row in found.values() for one in row]
     stable = [np.log(one.read[1] / one.gauge) for one in every if one.read[1] and not one.unstable]
@@ -133,14 +133,14 @@ def test_steps_the_sentence(tmp_path, capsys):
 
 def test_always_friction_far_off_the_axis_lets_go_at_135_hz_first():
     """At 7.25 g grooves hold at 135 and 143 Hz; with 0.30 of yaw they let go at 135 Hz alone."""
-    ways = study("report/runaways.py")
+    ways = load_study("report/runaways.py")
     for name, left in (("grooves", [False, False]), ("grooves, yaw 0.30", [True, False])):
         assert [ways.motion(name, f, 7.25)[0] for f in (135.0, 143.0)] == left
 
 
 def test_exact_friction_alone_slides_without_a_stop_from_den_hartogs_level_on():
     """Without a stop from 1.2792 times the limit on at 143 Hz: at 1.2 it stays, at 1.4 it does not."""
-    ways = study("report/runaways.py")
+    ways = load_study("report/runaways.py")
     limit = 0.4 * 26 * 4.4482216 / 1.123 / ways.G
     stays, leaves = (ways.motion("friction alone", 143.0, share * limit) for share in (1.2, 1.4))
     assert not stays[0] and leaves[0] and stays[1] < 1
@@ -148,7 +148,7 @@ def test_exact_friction_alone_slides_without_a_stop_from_den_hartogs_level_on():
 
 @pytest.mark.slow
 def test_runaways_the_sentence(tmp_path, capsys):
-    ways = study("report/runaways.py")
+    ways = load_study("report/runaways.py")
     rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
     near = rows["grooves, yaw 0.25"]
     far = rows["grooves, yaw 0.30"]
@@ -192,7 +192,7 @@ def test_runaways_the_sentence(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
-    engaged = study("report/engaged.py")
+    engaged = load_study("report/engaged.py")
     for mode, touches in engaged.CASES.items():
         peak = {
             touch: engaged.random_turn(mode, touch, engaged.STUCK_LEVEL, 4.0, 5).peak
@@ -204,7 +204,7 @@ def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
 
 def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
     """H1 of the yaw mode below a tenth of its frequency's width: share/(omega0^2 - omega^2) of the base."""
-    engaged = study("report/engaged.py")
+    engaged = load_study("report/engaged.py")
     one = engaged.random_turn("yaw", "one point on the axis", engaged.SLIDING_LEVEL, 16.0)
     part = (one.f >= 40) & (one.f <= 110)
     w = 2 * np.pi * one.f[part]
@@ -215,7 +215,7 @@ def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
 
 @pytest.mark.slow
 def test_engaged_the_sentence(tmp_path, capsys):
-    engaged = study("report/engaged.py")
+    engaged = load_study("report/engaged.py")
     turns, tests = engaged.main(tmp_path / "x.svg")
     peak = {(one.mode, one.touch, one.level): one.peak for one in turns}
     left = {

@@ -2,9 +2,9 @@
 
 import json
 
-from study_module import ROOT, study, study_fixture
+from study_module import ROOT, load_study, make_study_fixture
 
-page = study_fixture("report/table.py")
+page = make_study_fixture("report/table.py")
 
 
 def test_always_the_page_is_what_the_studies_say(page):
@@ -29,7 +29,7 @@ def test_always_every_study_of_a_figure_has_a_word_on_it(page):
 
 
 def test_exact_the_words_of_a_module_without_running_it(page):
-    module = study("report/figures_28_29.py")
+    module = load_study("report/figures_28_29.py")
     one = next(one for one in page.studies() if one.path == "report/figures_28_29.py")
     assert one[1:] == (
         " ".join(module.__doc__.split("\n\n")[0].split()),

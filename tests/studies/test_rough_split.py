@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from study_module import study, study_fixture
+from study_module import load_study, make_study_fixture
 
 from patchfem.closed_forms import contact as closed_forms
 
-own = study_fixture("contact/own_patch.py")
+own = make_study_fixture("contact/own_patch.py")
 
 
 def test_exact_a_laterally_free_column_is_a_bar(own):
@@ -36,7 +36,7 @@ def test_the_own_program_finds_a_hertz_contact(own):
 @pytest.mark.slow
 def test_all_programs_agree_on_a_trace(tmp_path):
     """A trace that is not among the twenty; the split agrees within its errors."""
-    rough = study("contact/rough_split.py")
+    rough = load_study("contact/rough_split.py")
     matrices = []
     for every in (2, 4):
         columns = rough.STEPS // every

@@ -10,7 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from chromium import Chromium, program
+from chromium import Chromium, find_chromium
 
 import patchfem as pf
 from patchfem.effects import EFFECTS
@@ -185,7 +185,7 @@ def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(
     tried, dead = check.links(tmp_path)
     assert dead == check.mute(tmp_path) == [] and tried > 1000
     assert [text for page in check.PAGES for text in check.faults(page)] == []
-    if program() is not None:
+    if find_chromium() is not None:
         assert console_errors(tmp_path, tmp_path_factory.mktemp("chromium")) == []
 
 

@@ -1,11 +1,11 @@
 """The sentences of the speed studies, from few cases."""
 
 import pytest
-from study_module import study
+from study_module import load_study
 
 
 def test_always_lanes_answer_a_hundred_times_the_cases_of_an_integrator_as_well_as_their_bars_say():
-    rows = study("speed/cases_per_second.py").main(128, 1, (100, 400), (1e-6,))
+    rows = load_study("speed/cases_per_second.py").main(128, 1, (100, 400), (1e-6,))
     rows = {(one["way"], one["knob"]): one for one in rows}
     lanes = rows["lanes, with bars", "1e-3"]
     whole = rows["DOP853 with events", "1e-06"]
@@ -25,6 +25,6 @@ def test_always_lanes_answer_a_hundred_times_the_cases_of_an_integrator_as_well_
     ],
 )
 def test_always_a_family_of_sweeps_is_measured_and_meets_its_tolerance(name, count, least):
-    (one,) = study("speed/cases_per_second.py").families(3, (name,), 1, 0.064)
+    (one,) = load_study("speed/cases_per_second.py").families(3, (name,), 1, 0.064)
     assert one["cases"] == count
     assert one["rate"] > least and one["best"] == one["rate"] and one["known"] > 0.9

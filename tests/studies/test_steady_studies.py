@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from study_module import study, study_fixture
+from study_module import load_study, make_study_fixture
 
-march = study_fixture("steady/against_march.py")
+march = make_study_fixture("steady/against_march.py")
 
 
 @pytest.mark.share(0, 3)
@@ -58,7 +58,7 @@ def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
 # ---- the fold
 
 
-fold = study_fixture("steady/fold.py")
+fold = make_study_fixture("steady/fold.py")
 
 
 @pytest.mark.slow
@@ -89,7 +89,7 @@ def test_exact_jumps_bracket_the_folds(fold, tmp_path):
 # ---- the backbone
 
 
-backbone = study_fixture("steady/backbone.py")
+backbone = make_study_fixture("steady/backbone.py")
 
 
 @pytest.mark.slow
@@ -107,5 +107,5 @@ def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
         < 0.02
         < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
     )
-    text = study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
+    text = load_study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cli
-from study_module import study
+from command_line import run_cli
+from study_module import load_study
 
 STUDIES = Path(__file__).parents[2] / "studies"
 
@@ -14,7 +14,7 @@ STUDIES = Path(__file__).parents[2] / "studies"
 @pytest.mark.slow
 def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
     """Of a motion of one cycle: what is said of the pressed patch does not hang on it."""
-    module = study("rig/tilt.py")
+    module = load_study("rig/tilt.py")
     said = " ".join(module.__doc__.split())
     rows = module.main((0.0, 1e-4, 1e-3), 1)
     (_, some, most), stiff = (
@@ -36,7 +36,7 @@ def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
 
 @pytest.mark.slow
 def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
-    flat, tilted = study("rig/tilt.py").main((0.0, 1e-3))
+    flat, tilted = load_study("rig/tilt.py").main((0.0, 1e-3))
     assert flat["contact_fraction"][0] == 1 and tilted["contact_fraction"][0] < 0.03
     assert tilted["tangential_stiffness"][0] == pytest.approx(1.197e8, rel=0.005)
     assert tilted["thresholds"][1] == pytest.approx(339e-9, rel=0.02)
@@ -46,7 +46,7 @@ def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
 
 
 def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
-    found = study("rig/readings.py").main(5, tmp_path / "x.svg")
+    found = load_study("rig/readings.py").main(5, tmp_path / "x.svg")
     for elastic in (False, True):
         (report, a), (stretch, b) = (
             found[reading, elastic]["relative_displacement_amplitude"]
@@ -58,7 +58,7 @@ def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
 
 @pytest.mark.slow
 def test_the_sentence_on_the_printed_law_on_elastic_pieces():
-    found = study("rig/readings.py").main(200, None)
+    found = load_study("rig/readings.py").main(200, None)
     name = "relative_displacement_amplitude"
     more = "energy_created"
     for (reading, elastic), value in (
@@ -74,7 +74,7 @@ def test_the_sentence_on_the_printed_law_on_elastic_pieces():
 
 
 def test_always_the_fixture_decides_the_contact_fraction():
-    fixtures = study("misalignment/fixtures.py")
+    fixtures = load_study("misalignment/fixtures.py")
     for spring, half in ((None, 2.95e-5), (1e4, 7.55e-5), (1e3, 4.89e-4)):
         assert fixtures.tilt_for(0.5, spring, 14) == pytest.approx(half, rel=0.03)
     assert fixtures.case(1e-3, 1e2)["contact_fraction"] == 1
@@ -82,7 +82,7 @@ def test_always_the_fixture_decides_the_contact_fraction():
 
 
 def test_figure_13_curves_of_the_study(tmp_path):
-    one = study("report/figure_13.py")
+    one = load_study("report/figure_13.py")
     rows = {row["order"]: row for row in one.main(tmp_path / "figure.svg")}
     assert list(rows) == [-0.5, 0.0, 1.0, 2.0]
     assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
@@ -99,7 +99,7 @@ def test_figure_13_curves_of_the_study(tmp_path):
 
 
 def test_figure_14_curve_of_the_study(tmp_path):
-    one = study("report/figure_14.py")
+    one = load_study("report/figure_14.py")
     rows = one.main(tmp_path / "figure.svg")
     assert [weight for _, weight, _ in rows] == pytest.approx([0.3989, 0.2420, 0.0540, 0], abs=5e-5)
     assert [share for *_, share in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
@@ -117,7 +117,7 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6, and no other differs by more than 4 %.
     """
     monkeypatch.setattr("patchfem.campaigns.cost.N_TIMINGS", 1)
-    said = cli(
+    said = run_cli(
         "cost",
         STUDIES / "rig/pieces.toml",
         "--over",

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from study_module import ROOT, study
+from study_module import ROOT, load_study
 
 G, MIL, LBF = 9.80665, 25.4e-6, 4.4482216152605
 MASS, LOAD, STRETCH = 1.19396625, 26 * LBF, 0.243e-6  # kg, N, m by which the point gives way
@@ -82,7 +82,7 @@ def scores(values: dict, gain: float, fundamental: bool) -> dict:
 )
 def test_table_1_scores_of_a_rung_from_its_equations_alone(rung, reading):
     """Both within 1e-3 of what the program answers at the same numbers; Fig. 27: a critically damped mode at 148 Hz."""
-    row = study("table_1/fitting.py").read_records()[rung, reading, "143", ""]
+    row = load_study("table_1/fitting.py").read_records()[rung, reading, "143", ""]
     given = dict(zip((key.rpartition(".")[2] for key in row["keys"]), row["values"]))
     stiff = {
         "stiffness": given.get("stiffness", MASS * ((2 * np.pi * 148) ** 2 - AXIAL**2)),

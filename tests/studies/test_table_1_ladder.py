@@ -3,7 +3,7 @@ from its records."""
 
 import numpy as np
 import pytest
-from study_module import ROOT, study, study_fixture
+from study_module import ROOT, load_study, make_study_fixture
 
 from patchfem.campaigns.rows.cells import read_readings
 from patchfem.campaigns.rows.computed import ModelReadings
@@ -12,7 +12,7 @@ from patchfem.core import NotConverged
 ROOT2 = "fundamental x sqrt2"
 
 
-fitting = study_fixture("table_1/fitting.py")
+fitting = make_study_fixture("table_1/fitting.py")
 
 
 def test_always_every_rung_can_be_asked_under_every_reading(fitting):
@@ -78,7 +78,7 @@ def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
 
 def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
     """Without friction, per base acceleration at 150 Hz: block and tip of two masses, and by the modes of `rods`."""
-    derived = study("table_1/derived.py")
+    derived = load_study("table_1/derived.py")
     share = 0.3
     mass = 0.05
     omega = 2 * np.pi * 150
@@ -176,7 +176,7 @@ def test_always_a_cell_of_every_rung_is_what_its_numbers_give(fitting, records):
 def test_always_the_readme_holds_what_the_scores_give(records):
     """Sentences and tables between their marks; nothing else stands there."""
     text = (ROOT / "table_1" / "README.md").read_text("utf-8")
-    for name, lines in study("table_1/table.py").parts(records).items():
+    for name, lines in load_study("table_1/table.py").parts(records).items():
         assert "\n".join([f"<!-- {name} -->", *lines, "<!-- end -->"]) in text, name
 
 
@@ -216,7 +216,7 @@ def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, re
 def test_table_1_the_scores_that_the_study_tells(records, fitting):
     """What the words of README.md say of the numbers beside them, and of ladder.py; spring and yaw within 0.002 of what
     another program reached: .074 and .166."""
-    table = study("table_1/table.py")
+    table = load_study("table_1/table.py")
     one = {name: records[*key, "143", ""] for name, key in table.NAMED_FITS.items()}
     none = {name: (held, left) for name, _, _, held, left, _ in table.nulls()}
     constant = none["constant"]
@@ -264,7 +264,7 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
 def test_table_1_onset_runaway_and_slip_of_the_path_of_figure_27(records):
     """README.md at 143 Hz: 4.2 g, no runaway, 49 degrees."""
     values = records["path of Fig. 27", "peak x stuck", "143", ""]["values"]
-    found = study("table_1/levels.py").row("path of Fig. 27", "peak x stuck", values, 143.0)
+    found = load_study("table_1/levels.py").row("path of Fig. 27", "peak x stuck", values, 143.0)
     assert (found["onset"], found["runaway"]) == (4.2, None) and found[
         "slip_phase"
     ] == pytest.approx(49, abs=1)
@@ -273,7 +273,7 @@ def test_table_1_onset_runaway_and_slip_of_the_path_of_figure_27(records):
 @pytest.mark.slow
 def test_table_1_the_grooves_run_away_first_where_the_rig_did_last(records):
     """From 8.75 g at 135 Hz down to 8.25 g at 155 Hz; the rig was unstable at 135 Hz from 6 g."""
-    levels = study("table_1/levels.py")
+    levels = load_study("table_1/levels.py")
     fit = ("grooves, lift and yaw", "fundamental x gain")
     question = levels.RUNGS[fit[0]].question(fit[1])
     values = records[*fit, "143", ""]["values"]

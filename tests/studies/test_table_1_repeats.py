@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from study_module import study_fixture
+from study_module import make_study_fixture
 
-repeats = study_fixture("report/repeats.py")
+repeats = make_study_fixture("report/repeats.py")
 
 
 def test_exact_the_table_in_the_order_of_its_columns(repeats):

@@ -4,9 +4,9 @@ import re
 
 import numpy as np
 import pytest
-from study_module import study_fixture
+from study_module import make_study_fixture
 
-bands = study_fixture("wear/bands.py")
+bands = make_study_fixture("wear/bands.py")
 
 
 def sentence(bands, rows, within):
@@ -46,7 +46,7 @@ def test_always_the_sentence_on_bands_in_full(bands):
     assert all(r.scatter < 0.03 for r in rows)
 
 
-story = study_fixture("wear/rig_story.py")
+story = make_study_fixture("wear/rig_story.py")
 
 
 def told(story, rows, within):

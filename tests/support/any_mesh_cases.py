@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import meshio
 import numpy as np
-from pair_meshes import pair_mesh
+from pair_meshes import make_pair_mesh
 from scipy.spatial import Delaunay
 
 from patchfem.mesh import PieceMesh, graded_grid, read_pieces
@@ -15,7 +15,7 @@ from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 NO_QUADS = np.empty((0, 4), np.int64)
 
 
-def of_grid(grid, split=0.0, seed=None):
+def mesh_of_grid(grid, split=0.0, seed=None):
     """Return a structured grid as an unstructured mesh.
 
     A fraction `split` of its quadrilaterals is cut into triangles; `seed` renumbers the nodes.
@@ -26,27 +26,27 @@ def of_grid(grid, split=0.0, seed=None):
     node = np.arange(nx * ny)
     if seed is not None:
         node = np.random.default_rng(seed).permutation(nx * ny)
-    place = np.empty_like(points)
-    place[node] = points
+    renumbered = np.empty_like(points)
+    renumbered[node] = points
     node = node.reshape(nx, ny)
     quads = np.stack(
         [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
         axis=1,
     )
-    coat = grid.is_coating_cell().ravel()
-    cut = np.random.default_rng(1).random(len(quads)) < split
-    triangles = quads[cut][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    is_coating = grid.is_coating_cell().ravel()
+    is_split = np.random.default_rng(1).random(len(quads)) < split
+    triangles = quads[is_split][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     return PieceMesh(
-        place,
+        renumbered,
         triangles,
-        quads[~cut],
-        np.concatenate([np.repeat(coat[cut], 2), coat[~cut]]),
+        quads[~is_split],
+        np.concatenate([np.repeat(is_coating[is_split], 2), is_coating[~is_split]]),
         node[:, 0],
         node[:, -1],
     )
 
 
-def cloud(half_length, height, size, coating=0.0):
+def triangulate_graded_rows(half_length, height, size, coating=0.0):
     """Return a Delaunay mesh of rows of points with spacing size(x, depth).
 
     One row lies on the lower face of the coating.
@@ -55,10 +55,12 @@ def cloud(half_length, height, size, coating=0.0):
     depth = 0.0
     while depth < height:
         step = size(0.0, depth)
-        below = coating if depth < coating * (1 - 1e-9) else height
-        rest = max(1, round((below - depth) / step))
+        next_interface = coating if depth < coating * (1 - 1e-9) else height
+        steps_left = max(1, round((next_interface - depth) / step))
         depth = (
-            below if rest == 1 else depth + min(step, (below - depth) / 2 if rest == 2 else step)
+            next_interface
+            if steps_left == 1
+            else depth + min(step, (next_interface - depth) / 2 if steps_left == 2 else step)
         )
         levels.append(depth)
     rows = []
@@ -68,10 +70,10 @@ def cloud(half_length, height, size, coating=0.0):
             [[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))]
         )
         count = max(4, round(number[-1] / 2) * 2)
-        want = np.linspace(0, number[-1], count + 1)
+        targets = np.linspace(0, number[-1], count + 1)
         if k % 2:
-            want = np.concatenate([[0.0], (want[1:] + want[:-1]) / 2, want[-1:]])
-        x = np.interp(want, number, fine)
+            targets = np.concatenate([[0.0], (targets[1:] + targets[:-1]) / 2, targets[-1:]])
+        x = np.interp(targets, number, fine)
         rows.append(np.stack([(x - x[::-1]) / 2, np.full(x.size, y)], axis=1))
     points = np.concatenate(rows)
     cells = Delaunay(points).simplices
@@ -91,9 +93,9 @@ GRID = graded_grid(2e-3, 1e-3, 2.5e-4, 1e-4)
 NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
 
 
-def drawn(kind="mixed", grid=GRID):
+def make_pair(kind="mixed", grid=GRID):
     """Return points, cells, edges and tags of the mesh of a pair; kind "mixed" splits every other quadrilateral."""
-    pair = pair_mesh(grid)
+    pair = make_pair_mesh(grid)
     split = {"quads": np.zeros, "triangles": np.ones}.get(kind, lambda n, t: np.arange(n) % 2 == 0)
     split = split(len(pair["quads"]), bool)
     cut = pair["quads"][split]
@@ -108,22 +110,23 @@ def drawn(kind="mixed", grid=GRID):
     )
 
 
-def blocks(m):
+def find_cell_blocks(m):
     """Return (cell type, cells, tags) of the triangles, quadrilaterals and lines that the mesh contains."""
-    every = [
+    blocks = [
         ("triangle", m.triangles, m.triangle_tags),
         ("quad", m.quads, m.quad_tags),
         ("line", m.edges, m.edge_tags),
     ]
-    return [block for block in every if len(block[1])]
+    return [block for block in blocks if len(block[1])]
 
 
 def write_msh22(m, path, binary=True):
     """Write a mesh in Gmsh format 2.2 with meshio."""
     mesh = meshio.Mesh(
-        np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)]
+        np.column_stack([m.points, np.zeros(len(m.points))]),
+        [(k, c) for k, c, _ in find_cell_blocks(m)],
     )
-    tags = [np.asarray(t, np.int32) for _, _, t in blocks(m)]
+    tags = [np.asarray(t, np.int32) for _, _, t in find_cell_blocks(m)]
     mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
     mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
     mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
@@ -132,7 +135,7 @@ def write_msh22(m, path, binary=True):
 
 def write_msh41(m, path):
     """Write a mesh as text in Gmsh format 4.1 with one entity per tag, as Gmsh itself does."""
-    parts = [(k, c[t == tag], int(tag)) for k, c, t in blocks(m) for tag in np.unique(t)]
+    parts = [(k, c[t == tag], int(tag)) for k, c, t in find_cell_blocks(m) for tag in np.unique(t)]
     dims = {"line": 1, "triangle": 2, "quad": 2}
     curves, areas = (list(dict.fromkeys(p[2] for p in parts if dims[p[0]] == d)) for d in (1, 2))
     text = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(NAMES))]
@@ -156,9 +159,10 @@ def write_msh41(m, path):
 def write_vtu(m, path):
     """Write a mesh as a VTK file whose cell array `tag` holds the tags."""
     mesh = meshio.Mesh(
-        np.column_stack([m.points, np.zeros(len(m.points))]), [(k, c) for k, c, _ in blocks(m)]
+        np.column_stack([m.points, np.zeros(len(m.points))]),
+        [(k, c) for k, c, _ in find_cell_blocks(m)],
     )
-    mesh.cell_data = {"tag": [np.asarray(t) for _, _, t in blocks(m)]}
+    mesh.cell_data = {"tag": [np.asarray(t) for _, _, t in find_cell_blocks(m)]}
     meshio.write(path, mesh, file_format="vtu")
 
 
@@ -168,7 +172,7 @@ def write_inp(m, path, lines=True, capitals=True):
     # Node numbers are not consecutive, as is permitted in this format.
     text += [f"{3 * k + 5}, {x!r}, {y!r}" for k, (x, y) in enumerate(m.points.tolist())]
     number = 0
-    for kind, cells, tags in blocks(m):
+    for kind, cells, tags in find_cell_blocks(m):
         for tag in np.unique(tags):
             name = NAMES[int(tag)].upper() if capitals else NAMES[int(tag)]
             if kind == "line" and not lines:
@@ -191,7 +195,7 @@ def write_med(m, path):
     """Write a mesh as a MED file in which every family of cells belongs to one group."""
     import meshio
 
-    found = blocks(m)
+    found = find_cell_blocks(m)
     names = sorted({int(tag) for _, _, tags in found for tag in tags})
     mesh = meshio.Mesh(m.points, [(kind, cells) for kind, cells, _ in found])
     mesh.cell_data = {"cell_tags": [-np.asarray(tags, int) for _, _, tags in found]}
@@ -210,19 +214,19 @@ FORMATS = {
 }
 
 
-def stored(m, folder, form="gmsh 2.2 binary"):
+def write_and_read_pair(m, folder, form="gmsh 2.2 binary"):
     """Write the mesh of a pair to a file, read the file, and return the two meshes."""
     path = folder / f"pair{FORMATS[form][0]}"
     FORMATS[form][1](m, path)
     return read_pieces(path)
 
 
-def move(m, at, by):
+def shift_points(m, at, by):
     """Shift the points with indices `at` by the vector `by`."""
     m.points[at] += by
 
 
-def interface_node(m, side="upper", k=3):
+def find_interface_node(m, side="upper", k=3):
     """Return the index of the k-th interface node of a body, counted along x."""
     nodes = np.unique(m.edges[m.edge_tags == EDGE_TAGS[f"{side}_interface"]])
     return nodes[np.argsort(m.points[nodes, 0])][k]

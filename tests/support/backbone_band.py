@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 from campaigns import Row
-from decay_fits import sliders
+from decay_fits import make_sliders
 
 import patchfem as pf
 from patchfem.campaigns import compute_backbone
@@ -59,7 +59,7 @@ class Joint(NamedTuple):
     numbers: dict
 
 
-class Reading(NamedTuple):
+class SteadyPoint(NamedTuple):
     """Amplitude [m], frequency [Hz] and damping ratio of a steady response, with the uncertainties of the last two."""
 
     amplitude: float
@@ -73,36 +73,41 @@ def draw_joint(seed: int) -> Joint:
     """Draw the random joint of a seed."""
     rng = np.random.default_rng(seed)
 
-    def even(low, high, size=None):
+    def log_uniform(low, high, size=None):
         """Draw from a log-uniform distribution."""
         return np.exp(rng.uniform(np.log(low), np.log(high), size))
 
     count = 1 + (seed // 6) % 3
     law = LAWS[seed % 6]
-    mass = float(even(0.3, 3))
-    ratios = np.append(1.0, np.cumprod(even(1.25, 2.5, count - 1)))
-    omega = 2 * np.pi * float(even(50, 300)) * ratios
+    mass = float(log_uniform(0.3, 3))
+    ratios = np.append(1.0, np.cumprod(log_uniform(1.25, 2.5, count - 1)))
+    omega = 2 * np.pi * float(log_uniform(50, 300)) * ratios
     signs = rng.choice([-1.0, 1.0], (2, count - 1))
     slide = np.append(1.0, signs[0] * rng.uniform(0.2, 1, count - 1))
     output = np.append(1.0, signs[1] * rng.uniform(0.2, 1, count - 1))
-    load = float(even(20, 500))
-    static = float(even(0.2, 0.6))
-    stiffness = float(even(0.05, 1)) * mass * omega[0] ** 2
+    load = float(log_uniform(20, 500))
+    static = float(log_uniform(0.2, 0.6))
+    stiffness = float(log_uniform(0.05, 1)) * mass * omega[0] ** 2
     slip = static * load / stiffness
     numbers = {
         "elastic-plastic": {"bond_length": slip},
         "iwan": {"stiffness": stiffness, "chi": float(rng.uniform(-0.8, -0.1)), "beta": 0.5},
         "bouc-wen": {"stiffness": stiffness, "exponent": float(rng.uniform(1, 3))},
-        "lugre": {"stiffness": stiffness, "stribeck_speed": slip * omega[0] * float(even(0.3, 3))},
-        "tanh": {"reference_speed": slip * omega[0] * float(even(0.3, 3))},
+        "lugre": {
+            "stiffness": stiffness,
+            "stribeck_speed": slip * omega[0] * float(log_uniform(0.3, 3)),
+        },
+        "tanh": {"reference_speed": slip * omega[0] * float(log_uniform(0.3, 3))},
         "coulomb": {},
     }[law]
     if law == "lugre":
         numbers["kinetic"] = static * float(rng.uniform(0.8, 1))
-    return Joint(law, mass, omega, even(2e-3, 2e-2, count), slide, output, load, static, numbers)
+    return Joint(
+        law, mass, omega, log_uniform(2e-3, 2e-2, count), slide, output, load, static, numbers
+    )
 
 
-def write_scene(joint: Joint) -> dict:
+def scene_of_joint(joint: Joint) -> dict:
     """Return the scene tables of a joint."""
     modes = [
         {
@@ -122,7 +127,7 @@ def write_scene(joint: Joint) -> dict:
     }
 
 
-def law_numbers(joint: Joint) -> tuple:
+def law_parameters(joint: Joint) -> tuple:
     """Return stiffness (s,) [N/m] and slip force (s,) [N] of the sliders.
 
     Other laws have their parameters in the first array.
@@ -130,7 +135,7 @@ def law_numbers(joint: Joint) -> tuple:
     limit = joint.static * joint.load
     numbers = joint.numbers
     if joint.law == "iwan":
-        return sliders("iwan", numbers["stiffness"], limit, numbers["chi"])
+        return make_sliders("iwan", numbers["stiffness"], limit, numbers["chi"])
     if joint.law == "elastic-plastic":
         return np.array([limit / numbers["bond_length"]]), np.array([limit])
     if joint.law == "bouc-wen":
@@ -144,25 +149,25 @@ def law_numbers(joint: Joint) -> tuple:
 
 
 @numba.njit
-def step_law(kind, numbers, limits, state, move, speed):
+def step_law(kind, numbers, limits, state, displacement, speed):
     """Return the friction force after a displacement step at a given speed, and update the state in place."""
     if kind <= 1:
         force = 0.0
         for k in range(numbers.size):
-            state[k] = min(max(state[k] + numbers[k] * move, -limits[k]), limits[k])
+            state[k] = min(max(state[k] + numbers[k] * displacement, -limits[k]), limits[k])
             force += state[k]
         return force
     if kind == 2:  # Bouc-Wen with both weights 1/2, by the midpoint rule.
         middle = state[0]
         for part in (0.5, 1.0):
-            fall = abs(middle) ** numbers[1] * (0.5 * np.sign(move * middle) + 0.5)
-            middle = state[0] + part * move * numbers[0] / limits[0] * (1 - fall)
+            saturation = abs(middle) ** numbers[1] * (0.5 * np.sign(displacement * middle) + 0.5)
+            middle = state[0] + part * displacement * numbers[0] / limits[0] * (1 - saturation)
         state[0] = middle
         return limits[0] * middle
     if kind == 3:  # LuGre without damping, by the midpoint rule
         g = numbers[2] + (limits[0] - numbers[2]) * np.exp(-((speed / numbers[1]) ** 2))
-        half = state[0] + 0.5 * (move - numbers[0] * abs(move) * state[0] / g)
-        state[0] += move - numbers[0] * abs(move) * half / g
+        half = state[0] + 0.5 * (displacement - numbers[0] * abs(displacement) * state[0] / g)
+        state[0] += displacement - numbers[0] * abs(displacement) * half / g
         return numbers[0] * state[0]
     return limits[0] * np.tanh(speed / numbers[0])
 
@@ -177,35 +182,35 @@ def march(kind, numbers, limits, state, modes, mass, drive, steps, cycles, motio
     size, frequency = drive
     dt = 2 * np.pi / frequency / steps
     total = cycles * steps
-    weaker = 1 / (1 + zeta * omega * dt)
-    compliance = (slide * slide * weaker).sum() / mass
+    damping_factor = 1 / (1 + zeta * omega * dt)
+    compliance = (slide * slide * damping_factor).sum() / mass
     for n in range(total):
-        push = size * np.cos(2 * np.pi * (n % steps) / steps)
-        pull = -omega * omega * q + push * output / mass
-        v[:] = ((1 - zeta * omega * dt) * v + dt * pull) * weaker
+        drive_force = size * np.cos(2 * np.pi * (n % steps) / steps)
+        acceleration = -omega * omega * q + drive_force * output / mass
+        v[:] = ((1 - zeta * omega * dt) * v + dt * acceleration) * damping_factor
         if kind == 5:
             speed = (slide * v).sum()
             impulse = min(max(speed / compliance, -limits[0] * dt), limits[0] * dt)
-            v[:] -= slide * impulse / mass * weaker
+            v[:] -= slide * impulse / mass * damping_factor
         else:
-            v[:] -= dt * slide * force / mass * weaker
+            v[:] -= dt * slide * force / mass * damping_factor
         q[:] += dt * v
         if kind != 5:
             speed = (slide * v).sum()
             force = step_law(kind, numbers, limits, state, speed * dt, speed)
-        late = n - (total - 2 * steps)
-        if late >= 0:
-            motion[late] = q
+        sample = n - (total - 2 * steps)
+        if sample >= 0:
+            motion[sample] = q
     return force
 
 
-def march_steady(joint: Joint, force: float, frequency: float, start: float) -> Reading:
+def march_steady(joint: Joint, force: float, frequency: float, start: float) -> SteadyPoint:
     """March a joint under a sinusoidal force at the output until its cycles repeat, and evaluate its last cycle.
 
     force [N], frequency [Hz], start: displacement of the first mode [m].
     """
     steps = STEPS.get(joint.law, MOST_STEPS)
-    numbers, limits = law_numbers(joint)
+    numbers, limits = law_parameters(joint)
     state = np.zeros(numbers.size)
     modes = np.array([joint.omega, joint.zeta, joint.slide, joint.output])
     omega = 2 * np.pi * frequency
@@ -232,26 +237,30 @@ def march_steady(joint: Joint, force: float, frequency: float, start: float) -> 
             v,
             friction,
         )
-        before, after = (read_cycle(joint, part, force, omega) for part in np.split(motion, 2))
+        previous, last = (evaluate_cycle(joint, part, force, omega) for part in np.split(motion, 2))
         # The transient decays by at least exp(-2 pi zeta) per cycle.
-        rest = 1 / max(1 - np.exp(-2 * np.pi * joint.zeta.min()), 1e-3)
-        change = rest * np.abs(np.subtract(after, before))
-        if (change <= REPEATS * np.abs(after)).all():
+        remaining_cycles = 1 / max(1 - np.exp(-2 * np.pi * joint.zeta.min()), 1e-3)
+        change = remaining_cycles * np.abs(np.subtract(last, previous))
+        if (change <= REPEATS * np.abs(last)).all():
             break
-    return Reading(*after, change[1], change[2])
+    return SteadyPoint(*last, change[1], change[2])
 
 
-def read_cycle(joint: Joint, motion, force: float, omega: float) -> tuple:
+def evaluate_cycle(joint: Joint, motion, force: float, omega: float) -> tuple:
     """Return amplitude [m], frequency [Hz] and damping ratio of a cycle (steps, n) of modal coordinates."""
     steps = len(motion)
     output = motion @ joint.output
     # Each sample is taken at the end of its step, so its phase is one step later than its index.
-    turn = np.exp(-2j * np.pi * np.arange(1, steps + 1) / steps) * 2 / steps
-    modal = turn @ motion
-    work = force * np.conj(turn @ output) / (joint.mass * np.sum(np.abs(modal) ** 2))
+    first_harmonic = np.exp(-2j * np.pi * np.arange(1, steps + 1) / steps) * 2 / steps
+    modal = first_harmonic @ motion
+    work = force * np.conj(first_harmonic @ output) / (joint.mass * np.sum(np.abs(modal) ** 2))
     square = omega**2 + work.real
-    own = np.sqrt(max(square, 0.0))
-    return np.ptp(output) / 2, own / (2 * np.pi), work.imag / (2 * max(square, 1e-300))
+    natural_frequency = np.sqrt(max(square, 0.0))
+    return (
+        np.ptp(output) / 2,
+        natural_frequency / (2 * np.pi),
+        work.imag / (2 * max(square, 1e-300)),
+    )
 
 
 def band_rows(band, name: str, points) -> list:
@@ -262,12 +271,12 @@ def band_rows(band, name: str, points) -> list:
     rows = []
     x = np.log(band.amplitude)
     for amplitude, *values in points:
-        at = np.log(amplitude)
-        if not x[0] - 1e-9 <= at <= x[-1] + 1e-9 or not np.isfinite(values).all():
+        log_amplitude = np.log(amplitude)
+        if not x[0] - 1e-9 <= log_amplitude <= x[-1] + 1e-9 or not np.isfinite(values).all():
             continue
         for k, quantity in enumerate(("frequency", "damping")):
-            low = np.interp(at, x, getattr(band, f"{quantity}_low"))
-            high = np.interp(at, x, getattr(band, f"{quantity}_high"))
+            low = np.interp(log_amplitude, x, getattr(band, f"{quantity}_low"))
+            high = np.interp(log_amplitude, x, getattr(band, f"{quantity}_high"))
             middle = (low + high) / 2
             rows.append(
                 Row(f"{name}_{quantity}", middle, (high - low) / 2, 0.0, values[k], values[2 + k])
@@ -275,7 +284,7 @@ def band_rows(band, name: str, points) -> list:
     return rows
 
 
-def steady_points(joint: Joint, curve) -> list:
+def march_steady_points(joint: Joint, curve) -> list:
     """Return steady responses whose forces aim at some amplitudes of a curve."""
     points = []
     for fraction in FRACTIONS:
@@ -292,7 +301,7 @@ def steady_points(joint: Joint, curve) -> list:
 def compare_band(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the band of a joint with steady responses and a decay; see `campaigns`."""
     joint = draw_joint(seed)
-    scene = write_scene(joint)
+    scene = scene_of_joint(joint)
     model = pf.build(
         scene | {"drive": {"kind": "force", "frequency": 100.0, "force": 1.0, "cycles": 9}}
     )
@@ -307,7 +316,7 @@ def compare_band(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     if "balance" not in backbone.curves:
         return line | {"refused": str(backbone.missing)}
     curve = backbone.curves["balance"]
-    points = steady_points(joint, curve)
+    points = march_steady_points(joint, curve)
     line["rows"] += band_rows(band, "steady", points)
     begin = process_time()
     decay = compute_backbone(model, "mode1", curve.amplitude[::N_DECAY], ("decay",), errors=False)

@@ -5,7 +5,7 @@
     python tests/support/campaigns.py compare BEFORE AFTER
 
 `run` adds one line of JSON to FILE for each seed that FILE does not contain, so that a run that was stopped goes on.
-`--truth` takes the reference values from an earlier FILE, also of another version of the package. `score` prints the
+`--truth` takes the reference values from an earlier FILE, also of another version of the package. `compute_score` prints the
 share of errors that hold, for each measure and each engine. `compare` prints two files side by side for the scenes that
 both contain. Choose seeds that nobody used (tests/README.md), and write them down before the run.
 
@@ -118,10 +118,10 @@ def measure_rows(measures, truths: dict, doubts: dict, names=None) -> list:
         Names that count; all if omitted.
     """
     return [
-        Row(name, one.value, one.error, one.floor, truths[name], doubts.get(name, 0.0))
-        for name, one in measures.items()
+        Row(name, measure.value, measure.error, measure.floor, truths[name], doubts.get(name, 0.0))
+        for name, measure in measures.items()
         if name in truths
-        and None not in (one.value, one.error)
+        and None not in (measure.value, measure.error)
         and (names is None or name in names)
     ]
 
@@ -132,27 +132,27 @@ def strip_number(name: str) -> str:
     return head if number.isdigit() else name
 
 
-def rows_of(line: dict) -> list:
+def read_rows(line: dict) -> list:
     """Return the rows of a stored line."""
     return [Row(*row) for row in line["rows"]]
 
 
-def fraction(values: list) -> float:
+def true_fraction(values: list) -> float:
     """Return the fraction of the values other than None that are true."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known else float("nan")
 
 
-def score(lines: list) -> Score:
+def compute_score(lines: list) -> Score:
     """Return the score of the lines that have rows."""
-    scenes = [rows_of(line) for line in lines if line["rows"]]
+    scenes = [read_rows(line) for line in lines if line["rows"]]
     rows = [row for scene in scenes for row in scene]
     return Score(
         n_scenes=len(scenes),
-        right_scenes=fraction([all(row.holds for row in scene) for scene in scenes]),
+        right_scenes=true_fraction([all(row.holds for row in scene) for scene in scenes]),
         n_errors=len(rows),
-        held=fraction([row.holds for row in rows]),
-        sharp=fraction([row.is_sharp for row in rows]),
+        held=true_fraction([row.holds for row in rows]),
+        sharp=true_fraction([row.is_sharp for row in rows]),
     )
 
 
@@ -160,7 +160,7 @@ def print_score(lines: list) -> None:
     """Print the errors that do not hold, then the fractions for each measure and each engine."""
     by_name = defaultdict(list)
     for line in lines:
-        for row in rows_of(line):
+        for row in read_rows(line):
             by_name[strip_number(row.name)].append(row)
             if not row.holds:
                 print(
@@ -168,27 +168,29 @@ def print_score(lines: list) -> None:
                     *row,
                 )
     for name, rows in sorted(by_name.items()):
-        held = fraction([row.holds for row in rows])
-        sharp = fraction([row.is_sharp for row in rows])
-        print(f"{name:34s} {len(rows):5d} errors, {held:6.1%} hold, {sharp:6.1%} are sharp")
-    for engine in [*engines_of(lines), None]:
-        some = [line for line in lines if engine in (None, line.get("engine"))]
-        print(f"{engine or 'all':12s}", describe(score(some)))
+        fraction_held = true_fraction([row.holds for row in rows])
+        sharp = true_fraction([row.is_sharp for row in rows])
+        print(
+            f"{name:34s} {len(rows):5d} errors, {fraction_held:6.1%} hold, {sharp:6.1%} are sharp"
+        )
+    for engine in [*list_engines(lines), None]:
+        selected = [line for line in lines if engine in (None, line.get("engine"))]
+        print(f"{engine or 'all':12s}", describe_score(compute_score(selected)))
     for line in lines:
         if not line["rows"]:
             print(f"not compared: seed {line['seed']}, {line.get('refused', line.get('outcome'))}")
 
 
-def engines_of(lines: list) -> list:
+def list_engines(lines: list) -> list:
     """Return the names of the engines of the lines that have rows."""
     return sorted({line.get("engine") or "" for line in lines if line["rows"]} - {""})
 
 
-def describe(shares: Score) -> str:
+def describe_score(result: Score) -> str:
     """Return a score as a sentence."""
     return (
-        f"{shares.n_scenes} scenes, all errors hold in {shares.right_scenes:.1%}; {shares.n_errors} errors, "
-        f"{shares.held:.1%} hold, {shares.sharp:.1%} are sharp"
+        f"{result.n_scenes} scenes, all errors hold in {result.right_scenes:.1%}; {result.n_errors} errors, "
+        f"{result.held:.1%} hold, {result.sharp:.1%} are sharp"
     )
 
 
@@ -197,21 +199,24 @@ def print_comparison(before: list, after: list) -> None:
     old = {line["seed"]: line for line in before}
     pairs = [(old[line["seed"]], line) for line in after if line["seed"] in old]
     pairs = [pair for pair in pairs if all(line["rows"] for line in pair)]
-    for engine in [*engines_of([new for _, new in pairs]), None]:
-        some = [pair for pair in pairs if engine in (None, pair[1].get("engine"))]
+    for engine in [*list_engines([new for _, new in pairs]), None]:
+        selected = [pair for pair in pairs if engine in (None, pair[1].get("engine"))]
         print(engine or "all")
         for label, column in (("before", 0), ("after", 1)):
-            print(f"    {label:7s}", describe(score([pair[column] for pair in some])))
+            print(
+                f"    {label:7s}",
+                describe_score(compute_score([pair[column] for pair in selected])),
+            )
         for key in ("seconds", "steps"):
             ratios = [
-                new[key] / first[key] for first, new in some if first.get(key) and new.get(key)
+                new[key] / first[key] for first, new in selected if first.get(key) and new.get(key)
             ]
             if ratios:
                 print(
                     f"    {key} after/before: median {np.median(ratios):.3f}, largest {max(ratios):.2f}"
                 )
         counts = [
-            sum(len(pair[column].get("warnings") or ()) for pair in some) for column in (0, 1)
+            sum(len(pair[column].get("warnings") or ()) for pair in selected) for column in (0, 1)
         ]
         print(f"    warnings: {counts[0]} before, {counts[1]} after")
 

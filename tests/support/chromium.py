@@ -26,7 +26,7 @@ FLAGS = (
 PATIENCE = 60  # Time without a message [s] after which the browser counts as hung.
 
 
-def program() -> str | None:
+def find_chromium() -> str | None:
     """Return the path of the installed Chromium or Chrome, or None."""
     return next(
         (
@@ -60,7 +60,7 @@ class Chromium:
             for pair in ((null, 1), (null, 2), (far[0], 3), (far[1], 4))
         ]
         words = [
-            program(),
+            find_chromium(),
             *FLAGS,
             f"--user-data-dir={home / 'user'}",
             "--remote-debugging-pipe",
@@ -71,7 +71,7 @@ class Chromium:
             os.close(one)
         self.session = None
         self.target = next(
-            one for one in self.ask("Target.getTargets")["targetInfos"] if one["type"] == "page"
+            one for one in self.call("Target.getTargets")["targetInfos"] if one["type"] == "page"
         )
         self.target = self.target["targetId"]
         self._attach()
@@ -79,13 +79,13 @@ class Chromium:
     def _attach(self) -> None:
         """Attach a new session to the current page."""
         self.session = None
-        self.session = self.ask("Target.attachToTarget", targetId=self.target, flatten=True)[
+        self.session = self.call("Target.attachToTarget", targetId=self.target, flatten=True)[
             "sessionId"
         ]
         for part in ("Page", "Runtime"):
-            self.ask(f"{part}.enable")
+            self.call(f"{part}.enable")
 
-    def _next(self) -> dict:
+    def _receive(self) -> dict:
         """Return the next message of the browser, and record script errors and events."""
         while b"\0" not in self.buffer:
             if not select.select([self.into], [], [], PATIENCE)[0]:
@@ -106,74 +106,74 @@ class Chromium:
             self.events.append(said["method"])
         return said
 
-    def ask(self, method: str, **params) -> dict:
+    def call(self, method: str, **params) -> dict:
         """Send a command of the DevTools protocol and return its result."""
         self.number += 1
         message = {"id": self.number, "method": method, "params": params}
         message |= {"sessionId": self.session} if self.session else {}
         os.write(self.out, json.dumps(message).encode() + b"\0")
-        while (said := self._next()).get("id") != self.number:
+        while (said := self._receive()).get("id") != self.number:
             pass
         assert "error" not in said, said
         return said["result"]
 
-    def asked(self, event: str, method: str, **params) -> None:
+    def call_and_wait(self, event: str, method: str, **params) -> None:
         """Send a command and wait for an event, which may arrive before the result."""
         self.events.clear()
-        self.ask(method, **params)
+        self.call(method, **params)
         while event not in self.events:
-            self._next()
+            self._receive()
 
     def visit(self, path: Path, width: int = 1200, height: int = 900) -> "Chromium":
         """Load a page from a folder that also contains its scripts and styles."""
-        self._fresh()
-        self.sized(width, height)
+        self._open_new_tab()
+        self.set_size(width, height)
         self.faults = []
-        self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
+        self.call_and_wait("Page.loadEventFired", "Page.navigate", url=path.as_uri())
         return self
 
-    def opened(
+    def open_html(
         self, text: str, width: int = 1200, height: int = 900, dark: bool = False
     ) -> "Chromium":
         """Load a page given as HTML and wait until its charts are drawn."""
-        self._fresh()
-        self.sized(width, height)
-        self.themed(dark)
-        self._to(text)
-        self.settled()
+        self._open_new_tab()
+        self.set_size(width, height)
+        self.set_theme(dark)
+        self._load_html(text)
+        self.wait_for_charts()
         return self
 
-    def after(self, text: str, milliseconds: float) -> str:
+    def html_after(self, text: str, milliseconds: float) -> str:
         """Return the HTML of a page after some milliseconds of virtual time."""
-        self._fresh()
-        self.sized(1200, 900)
-        self._to(text)
-        self.asked(
+        self._open_new_tab()
+        self.set_size(1200, 900)
+        self._load_html(text)
+        self.call_and_wait(
             "Emulation.virtualTimeBudgetExpired",
             "Emulation.setVirtualTimePolicy",
             policy="pauseIfNetworkFetchesPending",
             budget=milliseconds,
         )
-        return self.js("document.documentElement.outerHTML")
+        return self.evaluate("document.documentElement.outerHTML")
 
-    def _fresh(self) -> None:
+    def _open_new_tab(self) -> None:
         """Replace the page by a new one, because the virtual clock of the old page may have stopped."""
         old = self.target
         self.session = None
-        self.target = self.ask("Target.createTarget", url="about:blank")["targetId"]
-        self.ask("Target.closeTarget", targetId=old)
+        self.target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self.call("Target.closeTarget", targetId=old)
         self._attach()
 
-    def _to(self, text: str) -> None:
+    def _load_html(self, text: str) -> None:
         """Write HTML to a file and load it."""
         path = self.home / f"page{self.number}.html"
         path.write_text(text, "utf-8")
         self.faults = []
-        self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
+        self.call_and_wait("Page.loadEventFired", "Page.navigate", url=path.as_uri())
 
-    def settled(self) -> None:
+    def wait_for_charts(self) -> None:
         """Wait until the page is unpacked and every BokehJS chart is drawn."""
-        self.js("""new Promise((done) => {
+        self.evaluate("""new Promise((done) => {
             const stands = () => !document.getElementById('library') &&
                 [...document.querySelectorAll('.chart')].every((one) => one.firstElementChild?.shadowRoot);
            const look = () => stands() ? requestAnimationFrame(() => requestAnimationFrame(done)) : setTimeout(look, 9);
@@ -181,7 +181,7 @@ class Chromium:
 
     def broken_words(self) -> list:
         """Return the words outside code that a line break divides."""
-        return self.js("""(() => {
+        return self.evaluate("""(() => {
             const words = [];
             const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
             while (walk.nextNode()) {
@@ -198,9 +198,9 @@ class Chromium:
             return words;
         })()""")
 
-    def sized(self, width: int, height: int) -> None:
+    def set_size(self, width: int, height: int) -> None:
         """Set the size of the window [px]."""
-        self.ask(
+        self.call(
             "Emulation.setDeviceMetricsOverride",
             width=width,
             height=height,
@@ -208,25 +208,27 @@ class Chromium:
             mobile=False,
         )
 
-    def themed(self, dark: bool, media: str = "") -> None:
+    def set_theme(self, dark: bool, media: str = "") -> None:
         """Set the preferred color scheme and the media type."""
-        self.ask(
+        self.call(
             "Emulation.setEmulatedMedia",
             media=media,
             features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}],
         )
 
-    def js(self, text: str):
+    def evaluate(self, text: str):
         """Return the value of a JavaScript expression in the page; a promise is awaited."""
-        found = self.ask("Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True)
+        found = self.call(
+            "Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True
+        )
         assert "exceptionDetails" not in found, found["exceptionDetails"]
         return found["result"].get("value")
 
-    def pointed(self, x: float, y: float, kind: str = "mouseMoved", **more) -> None:
+    def send_pointer(self, x: float, y: float, kind: str = "mouseMoved", **more) -> None:
         """Move or press the pointer at a position in the window."""
-        self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
+        self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **more)
 
-    def pressed(self, key: str) -> None:
+    def press_key(self, key: str) -> None:
         """Press a key on the focused element."""
         code = {
             "ArrowRight": 39,
@@ -240,7 +242,7 @@ class Chromium:
         }[key]
         for kind in ("keyDown", "keyUp"):
             text = {"text": key} if key == " " and kind == "keyDown" else {}
-            self.ask(
+            self.call(
                 "Input.dispatchKeyEvent",
                 type=kind,
                 key=key,
@@ -249,24 +251,24 @@ class Chromium:
                 **text,
             )
 
-    def picture(self, path: Path | None = None, whole: bool = False) -> bytes:
+    def take_screenshot(self, path: Path | None = None, whole: bool = False) -> bytes:
         """Return the window as a PNG image, or the full page if `whole` is set."""
         found = base64.b64decode(
-            self.ask("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
+            self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
         )
         if path is not None:
             Path(path).write_bytes(found)
         return found
 
-    def printed(self) -> bytes:
+    def print_pdf(self) -> bytes:
         """Return the page as a PDF."""
-        return base64.b64decode(self.ask("Page.printToPDF", printBackground=True)["data"])
+        return base64.b64decode(self.call("Page.printToPDF", printBackground=True)["data"])
 
     def close(self) -> None:
         """End the browser."""
         try:
             self.session = None
-            self.ask("Browser.close")
+            self.call("Browser.close")
         except (EOFError, OSError):  # The browser may close the pipe before it answers.
             pass
         os.close(self.out), os.close(self.into)

@@ -48,7 +48,7 @@ class CommandResult(NamedTuple):
     err: str
 
 
-def cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
+def run_cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
     """Run `patchfem WORDS` in this process; `stdout` may be a stream that receives the output."""
     out = io.StringIO() if stdout is None else stdout
     err = io.StringIO()
@@ -61,23 +61,23 @@ def cli(*words, stdout: io.StringIO | None = None) -> CommandResult:
     return CommandResult(end.value.code or 0, out.getvalue(), err.getvalue())
 
 
-def loaded(code: str, *words) -> set:
+def modules_after(code: str, *words) -> set:
     """Return the names in sys.modules after `code` was run in a new interpreter."""
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code, *map(str, words)],
         capture_output=True,
         text=True,
         env=os.environ | {"MPLBACKEND": "svg"},
         timeout=120,
     )
-    assert done.returncode == 0, done.stderr
-    return set(json.loads(done.stdout.splitlines()[-1]))
+    assert process.returncode == 0, process.stderr
+    return set(json.loads(process.stdout.splitlines()[-1]))
 
 
-def loaded_again(code: str, *words) -> set:
+def modules_after_cached(code: str, *words) -> set:
     """Return the modules that `code` loads once all compiled code is cached; a run that had to compile is repeated."""
-    modules = loaded(code, *words)
-    return loaded(code, *words) if "numba" in modules else modules
+    modules = modules_after(code, *words)
+    return modules_after(code, *words) if "numba" in modules else modules
 
 
 def has_code_of(modules: set, name: str) -> bool:
@@ -93,7 +93,7 @@ def has_code_of(modules: set, name: str) -> bool:
     )
 
 
-def absent(modules: set, *names) -> None:
+def assert_not_loaded(modules: set, *names) -> None:
     """Assert that none of the named folders, modules and packages, nor any package in ALWAYS, is loaded."""
     assert not [name for name in {*ALWAYS, *names} if has_code_of(modules, name)]
 

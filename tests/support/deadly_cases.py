@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 @dataclass(frozen=True)
-class Deadly:
+class KillingMeasure:
     """Measure that kills its worker process in certain cases: always, or only the first time."""
 
     numbers: tuple

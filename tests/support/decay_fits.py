@@ -59,7 +59,7 @@ cycles = 20
 """
 
 
-class Made(NamedTuple):
+class DecayCase(NamedTuple):
     """Decay on disk: text of its true scene; free: key -> (low, high); start and truth: key -> value."""
 
     scene: str
@@ -68,18 +68,18 @@ class Made(NamedTuple):
     truth: dict
 
 
-def sliders(law: str, stiffness: float, force: float, chi: float) -> tuple:
+def make_sliders(law: str, stiffness: float, force: float, chi: float) -> tuple:
     """Return stiffness (s,) [N/m] and slip force (s,) [N] of the sliders of the joint."""
     if law == "elastic-plastic":
         return np.array([stiffness]), np.array([force])
-    most = force * (1 + BETA) / (stiffness * (BETA + (chi + 1) / (chi + 2)))
+    max_displacement = force * (1 + BETA) / (stiffness * (BETA + (chi + 1) / (chi + 2)))
     edges = np.linspace(0, 1, SLIDERS + 1) ** (1 / (1 + chi / 2))
     k = np.append(np.diff(edges ** (chi + 1)), BETA) / (1 + BETA)
     moment = np.append((chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2)), BETA) / (1 + BETA)
-    return stiffness * k, stiffness * most * moment
+    return stiffness * k, stiffness * max_displacement * moment
 
 
-def released(k, limit, damping: float, start: float) -> tuple:
+def simulate_release(k, limit, damping: float, start: float) -> tuple:
     """Return times (n,) [s] and motion (n,) [m] of the block released from rest at `start` [m] with an unloaded joint."""
     step = 2 * np.pi / OWN / STEPS
     out = np.empty(STEPS // KEPT * PERIODS)
@@ -99,30 +99,30 @@ def released(k, limit, damping: float, start: float) -> tuple:
     return step * KEPT * np.arange(out.size), out
 
 
-def made(seed: int, place: Path) -> Made:
-    """Write the decay of a seed to `place`; a decay that ends within three half cycles is drawn again."""
+def write_decay(seed: int, path: Path) -> DecayCase:
+    """Write the decay of a seed to `path`; a decay that ends within three half cycles is drawn again."""
     rng = np.random.default_rng(seed)
 
-    def even(low, high) -> float:
+    def log_uniform(low, high) -> float:
         """Draw from a log-uniform distribution."""
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
     law = ("iwan", "elastic-plastic")[seed % 2]
-    record = place.with_name("record.csv")
+    record = path.with_name("record.csv")
     while True:
-        damping = even(1e-3, 3e-3)
-        stiffness = even(0.1, 2) * MASS * OWN**2
-        force = even(10, 80)
+        damping = log_uniform(1e-3, 3e-3)
+        stiffness = log_uniform(0.1, 2) * MASS * OWN**2
+        force = log_uniform(10, 80)
         chi = float(rng.uniform(-0.8, -0.1))
-        start = even(2, 10) * force / stiffness
-        time, x = released(*sliders(law, stiffness, force, chi), damping, start)
-        x = x + even(2e-4, 2e-3) * start * rng.standard_normal(x.size)
+        start = log_uniform(2, 10) * force / stiffness
+        time, x = simulate_release(*make_sliders(law, stiffness, force, chi), damping, start)
+        x = x + log_uniform(2e-4, 2e-3) * start * rng.standard_normal(x.size)
         record.write_text(
             "time [s],displacement [m]\n"
             + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(), x.tolist()))
         )
         try:
-            imported.convert_file(record, place, (), False, imported.EstimateOptions(decay=True))
+            imported.convert_file(record, path, (), False, imported.EstimateOptions(decay=True))
             break
         except PatchfemError:
             continue
@@ -138,69 +138,79 @@ def made(seed: int, place: Path) -> Made:
         else f'bond_length = "{force / stiffness!r} m"'
     )
     free = {}
-    begin = {}
+    start_values = {}
     for key, value in truth.items():
-        low = value / even(1.5, 60)
+        low = value / log_uniform(1.5, 60)
         free[key] = (-0.95, 0.0) if key == "friction.chi" else (low, 100 * low)
-        begin[key] = (
-            float(rng.uniform(-0.95, 0.0)) if key == "friction.chi" else even(low, 100 * low)
+        start_values[key] = (
+            float(rng.uniform(-0.95, 0.0)) if key == "friction.chi" else log_uniform(low, 100 * low)
         )
-    return Made(
-        SCENE.format(law=law, static=static, keys=keys, damping=damping), free, begin, truth
+    return DecayCase(
+        SCENE.format(law=law, static=static, keys=keys, damping=damping), free, start_values, truth
     )
 
 
-def chi_square(fitted) -> float:
+def chi_square(fit) -> float:
     """Return the sum of squared normalized residuals of a FittedCurve."""
-    measured = fitted.measured
-    return float(np.square((fitted.model - measured.value) / measured.error).sum())
+    measured = fit.measured
+    return float(np.square((fit.model - measured.value) / measured.error).sum())
 
 
-def least(one: Made, place: Path, wanted: list) -> float:
+def minimize_from_truth(case: DecayCase, path: Path, keys: list) -> float:
     """Return chi square after a descent from the true values, with all curves by harmonic balance."""
-    amplitude, measured, error = read_curve(place)
-    base = BaseScene(pf.load(one.scene))
+    amplitude, measured, error = read_curve(path)
+    base = BaseScene(pf.load(case.scene))
 
     def residual(values) -> np.ndarray:
         model = build(
-            base.override(
-                [key.format_assignment(float(value)) for key, value in zip(wanted, values)]
-            )
+            base.override([key.format_assignment(float(value)) for key, value in zip(keys, values)])
         )
         curve = compute_backbone(
             model, "", np.unique(amplitude), ("balance",), errors=False
         ).curves["balance"]
         return ((np.array([curve.frequency, curve.damping]) - measured) / error).ravel()
 
-    box = make_space([key.low for key in wanted], [key.high for key in wanted])
+    box = make_space([key.low for key in keys], [key.high for key in keys])
     return descend(
         UnitCubeResidual(residual, box, is_quick=True),
-        box.unit(list(one.truth.values())),
-        range(len(wanted)),
+        box.unit(list(case.truth.values())),
+        range(len(keys)),
     ).cost
 
 
 def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the chi square of a fit with the minimum near the truth; see `campaigns`."""
-    place = folder / "decay.csv"
-    one = made(seed, place)
+    path = folder / "decay.csv"
+    case = write_decay(seed, path)
     free = [
         f"{key}={low!r}{UNITS.get(key, '')}..{high!r}{UNITS.get(key, '')}"
-        for key, (low, high) in one.free.items()
+        for key, (low, high) in case.free.items()
     ]
-    best = earlier["least"] if earlier else least(one, place, read_ranges(free)[0])
+    min_chi_square = (
+        earlier["least"] if earlier else minimize_from_truth(case, path, read_ranges(free)[0])
+    )
     sets = {
-        key: f"{value!r}{UNITS[key]}" if key in UNITS else value for key, value in one.start.items()
+        key: f"{value!r}{UNITS[key]}" if key in UNITS else value
+        for key, value in case.start.items()
     }
-    begin = process_time()
+    started = process_time()
     try:
-        fitted = fit_curve(pf.load(one.scene, **sets), place, free)
+        fitted = fit_curve(pf.load(case.scene, **sets), path, free)
     except PatchfemError as reason:
-        return {"rows": [], "refused": str(reason), "least": best}
+        return {"rows": [], "refused": str(reason), "least": min_chi_square}
     chi = chi_square(fitted)
     return {
-        "seconds": process_time() - begin,
+        "seconds": process_time() - started,
         "steps": fitted.keys.fit.counts.evaluations,
-        "least": best,
-        "rows": [Row("chi_square", max(chi, best), NEAR * best, 0.0, best, 0.0)],
+        "least": min_chi_square,
+        "rows": [
+            Row(
+                "chi_square",
+                max(chi, min_chi_square),
+                NEAR * min_chi_square,
+                0.0,
+                min_chi_square,
+                0.0,
+            )
+        ],
     }

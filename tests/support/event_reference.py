@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 
-class Stretch(NamedTuple):
+class DrivePiece(NamedTuple):
     """Smooth piece of a drive that begins at `start` [s].
 
     value: function of t; amplitude: largest value; omega: largest angular frequency.
@@ -21,11 +21,11 @@ class Stretch(NamedTuple):
     constant: float = 0.0
 
 
-def stretches(drive, count: int) -> list:
+def split_drive(drive, count: int) -> list:
     """Return the first smooth pieces of a drive without segments, each with its own formula."""
     starts = [0.0, *map(float, drive.breaks)][:count]
 
-    def value(number):
+    def make_value(number):
         """Return the drive in a piece as a function of time."""
         # The sampled drive is linear between samples and is extended beyond them.
         if hasattr(drive, "time"):
@@ -36,12 +36,14 @@ def stretches(drive, count: int) -> list:
         return lambda x: float(drive.values(x))
 
     return [
-        Stretch(start, value(k), drive.max_acceleration, drive.rate)
+        DrivePiece(start, make_value(k), drive.max_acceleration, drive.rate)
         for k, start in enumerate(starts)
     ]
 
 
-def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False):
+def choose_directions(
+    interfaces, mass, pull, active, signs, static, kinetic, tol, most_sliding=False
+):
     """Return the slip directions of all interfaces; those in `active` have zero slip velocity.
 
     `pull` (n,) is the acceleration without friction. Among consistent combinations the one with the
@@ -56,71 +58,71 @@ def choose(faces, mass, pull, active, signs, static, kinetic, tol, most_sliding=
         trial = np.array(signs)
         trial[active] = option
         stuck = np.flatnonzero(trial == 0)
-        known = pull - faces.T @ (np.abs(trial) * trial * kinetic) / mass
-        force = np.zeros(len(faces))
+        known = pull - interfaces.T @ (np.abs(trial) * trial * kinetic) / mass
+        force = np.zeros(len(interfaces))
         if stuck.size:
-            rows = faces[stuck]
+            rows = interfaces[stuck]
             force[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
-        accel = faces @ (known - faces.T @ force / mass)
-        good = all(
+        accel = interfaces @ (known - interfaces.T @ force / mass)
+        is_consistent = all(
             abs(force[c]) <= static[c] * (1 + tol)
             if trial[c] == 0
             else trial[c] * accel[c] > -tol * static[c]
             for c in active
         )
-        if good:
+        if is_consistent:
             return trial
     raise AssertionError("no choice")
 
 
 def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_sliding=False):
     """Return [(time, directions, z, v)] at the start of every smooth piece and at the end."""
-    faces = np.asarray(modes.interfaces)
+    interfaces = np.asarray(modes.interfaces)
     mass = modes.mass
     n = modes.omega.size
     static, kinetic = (
-        np.broadcast_to(np.asarray(x, float), (len(faces),)) for x in (static, kinetic)
+        np.broadcast_to(np.asarray(x, float), (len(interfaces),)) for x in (static, kinetic)
     )
     square = modes.omega**2
     dampers = modes.damping_matrix
     scale = max(abs(s.constant) + abs(s.amplitude) for s in segments) or 1.0
 
-    def accel(part, t):
+    def base_acceleration(part, t):
         """Return the base acceleration in a piece of the drive."""
-        if isinstance(part, Stretch):
+        if isinstance(part, DrivePiece):
             return part.value(t)
         return part.constant + part.amplitude * np.sin(part.omega * (t - part.start) + part.phase)
 
-    def pull(part, t, z, v):
+    def free_acceleration(part, t, z, v):
         """Return the modal accelerations without friction."""
-        return -square * z - dampers @ v - modes.base * accel(part, t)
+        return -square * z - dampers @ v - modes.base * base_acceleration(part, t)
 
-    def forces_of(signs, part, t, z, v):
+    def friction_forces(signs, part, t, z, v):
         """Return the friction forces of all interfaces for given slip directions."""
-        known = pull(part, t, z, v) - faces.T @ (signs * kinetic) / mass
+        known = free_acceleration(part, t, z, v) - interfaces.T @ (signs * kinetic) / mass
         out = signs * kinetic
         stuck = np.flatnonzero(signs == 0)
         if stuck.size:
-            rows = faces[stuck]
+            rows = interfaces[stuck]
             out = out.astype(float)
             out[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
         return out
 
     t = 0.0
     number = 0
-    out = []
+    states = []
     y = np.concatenate([z, v])
-    signs = np.sign(np.where(np.abs(faces @ v) > 1e-13, faces @ v, 0.0)).astype(int)
+    signs = np.sign(np.where(np.abs(interfaces @ v) > 1e-13, interfaces @ v, 0.0)).astype(int)
     active = list(np.flatnonzero(signs == 0))
-    fastest = max(modes.omega.max(), *(s.omega for s in segments), np.linalg.norm(dampers, 2))
+    max_rate = max(modes.omega.max(), *(s.omega for s in segments), np.linalg.norm(dampers, 2))
     while t < end:
         part = segments[number]
         stop = min(end, segments[number + 1].start if number + 1 < len(segments) else end)
         if active:
-            signs = choose(
-                faces,
+            signs = choose_directions(
+                interfaces,
                 mass,
-                pull(part, t, y[:n], y[n:]),
+                free_acceleration(part, t, y[:n], y[n:]),
                 active,
                 signs,
                 static,
@@ -128,56 +130,61 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
                 1e-9,
                 most_sliding,
             )
-        out.append((t, tuple(signs), y[:n].copy(), y[n:].copy()))
+        states.append((t, tuple(signs), y[:n].copy(), y[n:].copy()))
 
         def slope(t, y, signs=signs, part=part):
-            force = forces_of(signs, part, t, y[:n], y[n:])
-            return np.concatenate([y[n:], pull(part, t, y[:n], y[n:]) - faces.T @ force / mass])
+            force = friction_forces(signs, part, t, y[:n], y[n:])
+            return np.concatenate(
+                [y[n:], free_acceleration(part, t, y[:n], y[n:]) - interfaces.T @ force / mass]
+            )
 
         events = []
         for c, s in enumerate(signs):
             if s:
-                events.append((lambda t, y, c=c, s=s: s * (faces[c] @ y[n:])))
+                events.append((lambda t, y, c=c, s=s: s * (interfaces[c] @ y[n:])))
             else:
                 for side in (1, -1):
                     events.append(
                         (
                             lambda t, y, c=c, side=side, signs=signs, part=part: (
-                                static[c] - side * forces_of(signs, part, t, y[:n], y[n:])[c]
+                                static[c] - side * friction_forces(signs, part, t, y[:n], y[n:])[c]
                             )
                         )
                     )
         for f in events:
             f.terminal = True
             f.direction = -1
-        done = solve_ivp(
+        solution = solve_ivp(
             slope,
             (t, stop),
             y,
             "DOP853",
             events=events,
             rtol=rtol,
-            atol=1e-15 * scale / fastest**2,
-            max_step=0.1 / fastest,
+            atol=1e-15 * scale / max_rate**2,
+            max_step=0.1 / max_rate,
         )
-        t = done.t[-1]
-        y = done.y[:, -1].copy()
+        t = solution.t[-1]
+        y = solution.y[:, -1].copy()
         active = list(np.flatnonzero(signs == 0))
-        if done.status == 0:
+        if solution.status == 0:
             number += t >= stop and number + 1 < len(segments)
             continue
-        k = next(i for i, hit in enumerate(done.t_events) if hit.size)
+        k = next(i for i, hit in enumerate(solution.t_events) if hit.size)
         names = [(c, side) for c, s in enumerate(signs) for side in ((0,) if s else (1, -1))]
         face, side = names[k]
-        force = forces_of(signs, part, t, y[:n], y[n:])
+        force = friction_forces(signs, part, t, y[:n], y[n:])
         if side == 0:
             active = sorted({*active, face})
-        speed = faces @ y[n:]
-        size = np.abs(faces) @ np.abs(y[n:])
+        speed = interfaces @ y[n:]
+        speed_scale = np.abs(interfaces) @ np.abs(y[n:])
         active = sorted(
-            {*active, *(c for c, s in enumerate(signs) if s and abs(speed[c]) < 1e-11 * size[c])}
+            {
+                *active,
+                *(c for c, s in enumerate(signs) if s and abs(speed[c]) < 1e-11 * speed_scale[c]),
+            }
         )
-        rows = faces[active]
+        rows = interfaces[active]
         y[n:] -= np.linalg.pinv(rows) @ (rows @ y[n:])
         signs = np.array(signs)
         if side:
@@ -185,8 +192,8 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
             active = [c for c in active if c != face]
             if abs(force[face]) < static[face] * (1 - 1e-9):
                 raise AssertionError("released below its limit")
-    out.append((end, tuple(signs), y[:n].copy(), y[n:].copy()))
-    return out
+    states.append((end, tuple(signs), y[:n].copy(), y[n:].copy()))
+    return states
 
 
 def march_reference(modes, drive, limit, end, z, v, steps):
@@ -195,19 +202,19 @@ def march_reference(modes, drive, limit, end, z, v, steps):
     Impulses within +-limit h either prevent the mean slip of an interface or oppose it; static and
     kinetic friction equal limit (i,).
     """
-    faces = np.asarray(modes.interfaces)
+    interfaces = np.asarray(modes.interfaces)
     n = modes.omega.size
     h = end / steps
-    left = np.linalg.inv(
+    inverse = np.linalg.inv(
         np.eye(n) + h / 2 * modes.damping_matrix + h * h / 4 * np.diag(modes.omega**2)
     )
-    gram = faces @ left @ faces.T / modes.mass
-    force = np.zeros(len(faces))
+    gram = interfaces @ inverse @ interfaces.T / modes.mass
+    force = np.zeros(len(interfaces))
     t = h * (np.arange(steps) + 0.5)
     drives = drive.values(t)
     out = [z]
     for k in range(steps):
-        free = left @ (
+        free = inverse @ (
             v
             + h
             * (
@@ -216,18 +223,18 @@ def march_reference(modes, drive, limit, end, z, v, steps):
                 - modes.damping_matrix @ v / 2
             )
         )
-        want = faces @ (free + v) / 2
+        mean_speed = interfaces @ (free + v) / 2
         for _ in range(200):
             before = force.copy()
-            for c in range(len(faces)):
+            for c in range(len(interfaces)):
                 force[c] = np.clip(
-                    force[c] + (want[c] - h / 2 * gram[c] @ force) / (h / 2 * gram[c, c]),
+                    force[c] + (mean_speed[c] - h / 2 * gram[c] @ force) / (h / 2 * gram[c, c]),
                     -limit[c],
                     limit[c],
                 )
             if np.abs(force - before).max() < 1e-13 * limit.max():
                 break
-        new = free - h * left @ (faces.T @ force) / modes.mass
+        new = free - h * inverse @ (interfaces.T @ force) / modes.mass
         z = z + h * (v + new) / 2
         v = new
         out.append(z)

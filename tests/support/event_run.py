@@ -9,31 +9,36 @@ from patchfem.dynamics.events import histories, stick_steady
 from patchfem.dynamics.events.positions_kernels import ROW_BEGIN, Column
 
 
-def groups_of(modes, static, kinetic) -> list:
+def make_groups(modes, static, kinetic) -> list:
     """Return one rigid element per interface, from limits [N] that are scalars or have shape (i,)."""
     count = len(modes.interfaces)
     pairs = zip(np.broadcast_to(static, count), np.broadcast_to(kinetic, count))
-    return [make_coulomb_elements(float(one), float(other)) for one, other in pairs]
+    return [
+        make_coulomb_elements(float(static_limit), float(kinetic_limit))
+        for static_limit, kinetic_limit in pairs
+    ]
 
 
 def simulate(
     modes, drive, static, kinetic, cycles, window=10, travel=np.inf, progress=None, start=None
 ):
     """Call `histories.simulate` with Coulomb friction."""
-    groups = groups_of(modes, static, kinetic)
+    groups = make_groups(modes, static, kinetic)
     return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
 
 
-def steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
+def solve_steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
     """Call `stick_steady.solve_steady` with Coulomb friction."""
     return stick_steady.solve_steady(
-        modes, drive, groups_of(modes, static, kinetic), start, cycles, periods
+        modes, drive, make_groups(modes, static, kinetic), start, cycles, periods
     )
 
 
-def period_map(modes, drive, static, kinetic, state, periods=1):
+def map_period(modes, drive, static, kinetic, state, periods=1):
     """Call `stick_steady.map_period` with Coulomb friction."""
-    return stick_steady.map_period(modes, drive, groups_of(modes, static, kinetic), state, periods)
+    return stick_steady.map_period(
+        modes, drive, make_groups(modes, static, kinetic), state, periods
+    )
 
 
 @dataclass(frozen=True)
@@ -49,11 +54,11 @@ class Signal:
     rates: tuple
     weights: tuple
 
-    def many(self, t):
+    def evaluate(self, t):
         """Return values (j,) at times t (j,) [s] after the start of the phase."""
-        return self._of(self.columns, np.asarray(t, float))
+        return self._evaluate_columns(self.columns, np.asarray(t, float))
 
-    def _of(self, columns, t):
+    def _evaluate_columns(self, columns, t):
         """Return the weighted sum of some columns at times t (j,) [s]."""
         at = self.rows[0, 0] + t
         owner = np.clip(
@@ -69,14 +74,14 @@ class Signal:
 
     def __call__(self, t):
         """Return the value at one time t [s]."""
-        return float(self.many(np.array([t]))[0])
+        return float(self.evaluate(np.array([t]))[0])
 
     def rate(self):
         """Return the time derivative as a signal."""
         return Signal(self.run, self.rows, self.rates, (), self.weights)
 
 
-def combine(signals, factors) -> Signal:
+def combine_signals(signals, factors) -> Signal:
     """Return the sum of signals of the same phase, weighted with `factors`."""
     first = signals[0]
     return Signal(
@@ -115,37 +120,45 @@ class Phase:
         return self.forces[0]
 
 
-def rows_of(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
+def collect_rows(modes, drive, static, kinetic, cycles, start=None, begin=0) -> tuple:
     """Return the run and the rows of all its pieces, from rest or `start`; the clock begins at cycle `begin`."""
-    groups = groups_of(modes, static, kinetic)
-    one = histories.start_event_run(modes, drive, groups, cycles, int(cycles) + 2, start=start)
-    one.time_state.now[0] = begin
+    groups = make_groups(modes, static, kinetic)
+    event_run = histories.start_event_run(
+        modes, drive, groups, cycles, int(cycles) + 2, start=start
+    )
+    event_run.time_state.now[0] = begin
     rows = []
-    one.run_to(cycles, one._make_row_collector(rows))
-    return one, np.concatenate(rows)
+    event_run.run_to(cycles, event_run._make_row_collector(rows))
+    return event_run, np.concatenate(rows)
 
 
-def run(modes, drive, static, kinetic, duration, start=None) -> list:
+def run_phases(modes, drive, static, kinetic, duration, start=None) -> list:
     """Return the phases of a run of `duration` [s]; the last one ends there."""
-    one, rows = rows_of(modes, drive, static, kinetic, duration / drive.period, start)
-    begins = np.flatnonzero(rows[:, 4] >= ROW_BEGIN.stick_or_slip)
+    event_run, rows = collect_rows(modes, drive, static, kinetic, duration / drive.period, start)
+    first_rows = np.flatnonzero(rows[:, 4] >= ROW_BEGIN.stick_or_slip)
     n = len(modes.omega)
-    i = len(one.groups)
-    out = []
-    for first, end in zip([0, *begins[begins > 0]], [*begins[begins > 0], len(rows)]):
+    i = len(event_run.groups)
+    phases = []
+    for first, end in zip(
+        [0, *first_rows[first_rows > 0]], [*first_rows[first_rows > 0], len(rows)]
+    ):
         part = rows[first:end]
-        ways = tuple(
-            int(part[0, one._column_index(f, Column.DIRECTION)]) if group.static else 1
-            for f, group in enumerate(one.groups)
+        directions = tuple(
+            int(part[0, event_run._column_index(f, Column.DIRECTION)]) if group.static else 1
+            for f, group in enumerate(event_run.groups)
         )
-        modal = [Signal(one, part, (k,), (n + k,), (1.0,)) for k in range(n)]
-        forces = [Signal(one, part, (2 * n + 1 + 6 * f + 2,), (), (1.0,)) for f in range(i)]
-        out.append(Phase(part[0, 0], part[0, 2], part[:, 1].sum(), ways, modal, forces, part))
-    return out
+        modal = [Signal(event_run, part, (k,), (n + k,), (1.0,)) for k in range(n)]
+        forces = [Signal(event_run, part, (2 * n + 1 + 6 * f + 2,), (), (1.0,)) for f in range(i)]
+        phases.append(
+            Phase(part[0, 0], part[0, 2], part[:, 1].sum(), directions, modal, forces, part)
+        )
+    return phases
 
 
-def starts(done) -> np.ndarray:
+def release_phases(result) -> np.ndarray:
     """Return the phases, modulo pi, at which the first interface is released in the window of an EventRunResult."""
-    log = done.log
-    late = (log.interface == 0) & (np.abs(log.kind) == 1) & (log.time > done.window.time[0])
-    return log.phase[late] % np.pi
+    log = result.log
+    is_in_window = (
+        (log.interface == 0) & (np.abs(log.kind) == 1) & (log.time > result.window.time[0])
+    )
+    return log.phase[is_in_window] % np.pi

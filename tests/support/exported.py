@@ -41,7 +41,7 @@ steps_per_cycle = 40
 )
 
 
-def body(sign: float, frames: int, rng) -> dict:
+def make_body(sign: float, frames: int, rng) -> dict:
     """Return the data of a body of three columns of two quadrilaterals, one of them split.
 
     The number of a node is 3 * column + row.
@@ -65,7 +65,7 @@ def body(sign: float, frames: int, rng) -> dict:
     }
 
 
-def write_small(folder, frames: int = 3, seed: int = 0, times=None):
+def write_small_series(folder, frames: int = 3, seed: int = 0, times=None):
     """Write a results folder that contains only fields.vtkhdf, and return the data passed to the writer."""
     rng = np.random.default_rng(seed)
     gap = rng.random((frames, 4)) * 1e-6
@@ -74,7 +74,7 @@ def write_small(folder, frames: int = 3, seed: int = 0, times=None):
         "gap": gap,
         "status": rng.integers(0, 3, (frames, 4)),
     }
-    pair = body(-1.0, frames, rng), body(1.0, frames, rng)
+    pair = make_body(-1.0, frames, rng), make_body(1.0, frames, rng)
     blocks = build_blocks(*pair, np.array([-1e-3, -0.2e-3, 0.3e-3, 1e-3]), interface)
     times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
     folder.mkdir(exist_ok=True)
@@ -82,7 +82,7 @@ def write_small(folder, frames: int = 3, seed: int = 0, times=None):
     return SimpleNamespace(blocks=blocks, times=times, pair=pair, interface=interface)
 
 
-def waves(frames: int, across: int, deep: int) -> Block:
+def make_wave_block(frames: int, across: int, deep: int) -> Block:
     """Return a block of quadrilaterals with smooth fields that move along x, as in a sliding body."""
     x, y = np.meshgrid(
         np.linspace(0, 12.7e-3, across + 1), np.linspace(0, 6.35e-3, deep + 1), indexing="ij"
@@ -92,25 +92,29 @@ def waves(frames: int, across: int, deep: int) -> Block:
         -1, 4
     )
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    at = points[quads].mean(axis=1)
-    turn = np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
-    mises = 8e6 * np.exp(-(((at[:, 0] - 2e-3 * (2 + turn)) / 3e-3) ** 2) - at[:, 1] / 2e-3)
-    move = np.zeros((frames, x.size, 3), np.float32)
-    move[..., 0] = 1e-5 * turn + 1e-7 * np.cos(300 * points[:, 0]) * np.exp(-points[:, 1] / 3e-3)
-    move[..., 1] = (
+    centroids = points[quads].mean(axis=1)
+    phase_sine = np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
+    mises = 8e6 * np.exp(
+        -(((centroids[:, 0] - 2e-3 * (2 + phase_sine)) / 3e-3) ** 2) - centroids[:, 1] / 2e-3
+    )
+    displacement = np.zeros((frames, x.size, 3), np.float32)
+    displacement[..., 0] = 1e-5 * phase_sine + 1e-7 * np.cos(300 * points[:, 0]) * np.exp(
+        -points[:, 1] / 3e-3
+    )
+    displacement[..., 1] = (
         -1e-6
-        * np.exp(-(((points[:, 0] - 2e-3 * (2 + turn)) / 4e-3) ** 2))
+        * np.exp(-(((points[:, 0] - 2e-3 * (2 + phase_sine)) / 4e-3) ** 2))
         * (1 - points[:, 1] / 7e-3)
     )
     stress = np.zeros((frames, len(quads), 6), np.float32)
-    for number, share in enumerate((-0.7, -1.1, -0.5, 0.3)):
-        stress[..., number] = share * mises * np.cos(number + 200 * at[:, 0])
+    for number, factor in enumerate((-0.7, -1.1, -0.5, 0.3)):
+        stress[..., number] = factor * mises * np.cos(number + 200 * centroids[:, 0])
     return Block(
         points,
         quads.ravel(),
         np.arange(len(quads) + 1) * 4,
         np.full(len(quads), 9, np.uint8),
-        {"displacement": move},
+        {"displacement": displacement},
         {
             "stress": stress,
             "von_mises": mises.astype(np.float32),
@@ -119,9 +123,9 @@ def waves(frames: int, across: int, deep: int) -> Block:
     )
 
 
-def write_waves(path, frames: int, across: int, deep: int) -> Block:
+def write_wave_series(path, frames: int, across: int, deep: int) -> Block:
     """Write a series with the single block of `make_wave_block`, and return the block."""
-    block = waves(frames, across, deep)
+    block = make_wave_block(frames, across, deep)
     vtkhdf.write_series(
         path,
         {"lower": block},
@@ -132,6 +136,6 @@ def write_waves(path, frames: int, across: int, deep: int) -> Block:
     return block
 
 
-def at(values, frame: int):
+def frame_values(values, frame: int):
     """Return one frame of an array that may be constant in time."""
     return values[frame if len(values) > 1 else 0]

@@ -18,7 +18,7 @@ from force_control import drift, slides  # noqa: F401  (force control: one door 
 GAUSS = np.polynomial.legendre.leggauss(12)
 
 
-class Walk(NamedTuple):
+class PathHistory(NamedTuple):
     """Histories of a law along a path: step means, tractions after each step, energies per area."""
 
     mean: np.ndarray
@@ -28,17 +28,17 @@ class Walk(NamedTuple):
     state: object
 
 
-def triangle(amplitude, cycles, per_stroke, start=0.0):
+def triangle_path(amplitude, cycles, per_stroke, start=0.0):
     """Return the knots of a triangle wave with `per_stroke` equal steps between reversals.
 
     It begins at -amplitude if start < 0, else at 0.
     """
-    one = np.linspace(-amplitude, amplitude, per_stroke + 1)
-    cycle = np.concatenate([one[1:], one[::-1][1:]])
-    whole = np.concatenate([[-amplitude], *[cycle] * cycles])
+    stroke = np.linspace(-amplitude, amplitude, per_stroke + 1)
+    cycle = np.concatenate([stroke[1:], stroke[::-1][1:]])
+    path = np.concatenate([[-amplitude], *[cycle] * cycles])
     if start < 0:
-        return whole
-    return np.concatenate([np.linspace(0, -amplitude, per_stroke // 2 + 1)[:-1], whole])
+        return path
+    return np.concatenate([np.linspace(0, -amplitude, per_stroke // 2 + 1)[:-1], path])
 
 
 def upper_pressure(sigma):
@@ -52,7 +52,7 @@ def lower_pressure(x, wave, floor=0.0):
     return lambda q: np.maximum(np.sin(2 * np.pi * (np.asarray(x) + q) / wave) + floor, 0.0)
 
 
-def walk(law, path, pressure, dt=1.0):
+def march_path(law, path, pressure, dt=1.0):
     """March `law` along the knots `path`; `pressure` maps a displacement to (m,) values; dt: scalar or per step."""
     times = np.broadcast_to(dt, len(path) - 1)
     state = law.start(pressure(path[0]))
@@ -61,34 +61,36 @@ def walk(law, path, pressure, dt=1.0):
         step = law.step(state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k]))
         state = step.state
         rows.append((step.mean, law.traction(state), step.dissipated, law.stored_energy(state)))
-    return Walk(*(np.array(part) for part in zip(*rows)), state)
+    return PathHistory(*(np.array(part) for part in zip(*rows)), state)
 
 
-class Pulled(NamedTuple):
+class PathTractions(NamedTuple):
     """Tractions of a law after each step of a path, and its last state."""
 
     traction: np.ndarray
     state: object
 
 
-def pulled(law, path, pressure, dt=1.0) -> Pulled:
+def march_tractions(law, path, pressure, dt=1.0) -> PathTractions:
     """March like `march_path` without means and energies, which takes a tenth of the time for a sum over bonds."""
     times = np.broadcast_to(dt, len(path) - 1)
     state = law.start(pressure(path[0]))
     rows = []
     for k, dq in enumerate(np.diff(path)):
-        given = state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k])
-        state = law.advance(*given) if isinstance(law, Quadrature) else law.step(*given).state
+        arguments = state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k])
+        state = (
+            law.advance(*arguments) if isinstance(law, Quadrature) else law.step(*arguments).state
+        )
         rows.append(law.traction(state))
-    return Pulled(np.array(rows), state)
+    return PathTractions(np.array(rows), state)
 
 
-def rates(law, speed):
+def bond_length_rates(law, speed):
     """Return the growth rates of the bond length at rest and in slip (2.10) at a constant speed [1/s]."""
     return law.rest_growth / max(abs(speed), law.rest_speed), abs(speed) / law.slip_growth
 
 
-def lengths_by_hand(law, path, times):
+def reference_bond_lengths(law, path, times):
     """Return the bond lengths at the knots and in the middle of each step.
 
     They solve 2.10 at constant speed in closed form.
@@ -100,81 +102,88 @@ def lengths_by_hand(law, path, times):
             middles.append(knots[-1])
             knots.append(knots[-1])
             continue
-        a, b = rates(law, dq / dt)
+        a, b = bond_length_rates(law, dq / dt)
         goal = law.length * (a + law.ratio * b) / (a + b)
         middles.append(goal + (knots[-1] - goal) * np.exp(-(a + b) * dt / 2))
         knots.append(goal + (knots[-1] - goal) * np.exp(-(a + b) * dt))
     return np.array(knots), np.array(middles)
 
 
-def bonds_of_strokes(law, path, dt, longest):
+def integrate_bonds(law, path, dt, max_piece):
     """Yield (step, weights, stretches u, forces) of the bonds formed in each step of `path`.
 
     Each piece has 12 Gauss points. No bond is dropped or merged. Reading "stretch": damage uses the
     bond length in the middle of a step; reading "report": each bond integrates its own length from
-    zero through every later step. `longest` is the largest piece of a step in bond lengths; the
+    zero through every later step. `max_piece` is the largest piece of a step in bond lengths; the
     forces are (x/eps)^p exp(-x/eps) with x = |u| or the distance R.
     """
     steps = np.diff(path)
     times = np.broadcast_to(dt, len(steps)).astype(float)
-    _, middles = lengths_by_hand(law, path, times)
+    _, middles = reference_bond_lengths(law, path, times)
     y, w = GAUSS
-    harm_after = np.append(np.cumsum((np.abs(steps) / middles)[::-1])[::-1], 0.0)
+    damage_after = np.append(np.cumsum((np.abs(steps) / middles)[::-1])[::-1], 0.0)
     travel_after = np.append(np.cumsum(np.abs(steps)[::-1])[::-1], 0.0)
     for k, dq in enumerate(steps):
         if dq == 0:
             continue
-        cuts = set(np.linspace(0, 1, int(np.ceil(abs(dq) / (longest * middles[k]))) + 1))
-        turn = (path[-1] - path[k]) / dq
-        if 0 < turn < 1:
-            cuts.add(turn)
-        cuts = np.array(sorted(cuts))
-        part = (cuts[:-1, None] + np.diff(cuts)[:, None] * (1 + y) / 2).ravel()
-        weight = (np.diff(cuts)[:, None] * w / 2).ravel() * abs(dq) / law.length
+        breaks = set(np.linspace(0, 1, int(np.ceil(abs(dq) / (max_piece * middles[k]))) + 1))
+        zero_crossing = (path[-1] - path[k]) / dq
+        if 0 < zero_crossing < 1:
+            breaks.add(zero_crossing)
+        breaks = np.array(sorted(breaks))
+        part = (breaks[:-1, None] + np.diff(breaks)[:, None] * (1 + y) / 2).ravel()
+        weight = (np.diff(breaks)[:, None] * w / 2).ravel() * abs(dq) / law.length
         u = path[-1] - (path[k] + part * dq)
         travel = travel_after[k + 1] + (1 - part) * abs(dq)
         if law.reading == "stretch":
-            harm = harm_after[k + 1] + (1 - part) * abs(dq) / middles[k]
-            yield k, weight, u, (np.abs(u) / middles[k]) ** law.order * np.exp(-harm)
+            damage = damage_after[k + 1] + (1 - part) * abs(dq) / middles[k]
+            yield k, weight, u, (np.abs(u) / middles[k]) ** law.order * np.exp(-damage)
             continue
-        own = np.full(part.size, law.length)
+        bond_length = np.full(part.size, law.length)
         if law.has_growth:
-            own = np.zeros(part.size)
+            bond_length = np.zeros(part.size)
             for j in range(k, len(steps)):
                 span = times[j] * (1 - part if j == k else 1.0)
-                a, b = rates(law, steps[j] / times[j])
+                a, b = bond_length_rates(law, steps[j] / times[j])
                 goal = law.length * (a + law.ratio * b) / (a + b)
-                own = goal + (own - goal) * np.exp(-(a + b) * span)
-        yield k, weight, u, (travel / own) ** law.order * np.exp(-travel / own)
+                bond_length = goal + (bond_length - goal) * np.exp(-(a + b) * span)
+        yield k, weight, u, (travel / bond_length) ** law.order * np.exp(-travel / bond_length)
 
 
-def sum_by_hand(law, path, pressure, dt=1.0):
+def reference_traction(law, path, pressure, dt=1.0):
     """Return the traction (m,) over mu_s at the end of `path`: 2.17 as an explicit sum over bonds."""
     total = np.zeros_like(pressure(path[0]), float)
-    for k, weight, u, force in bonds_of_strokes(law, path, dt, 0.5):
+    for k, weight, u, force in integrate_bonds(law, path, dt, 0.5):
         mean = (pressure(path[k]) + pressure(path[k + 1])) / 2
         total += mean * (weight @ (np.sign(u) * force))
-    cohort = path[-1] - path[0]
-    if law.initial and cohort != 0:
+    net_displacement = path[-1] - path[0]
+    if law.initial and net_displacement != 0:
         steps = np.abs(np.diff(path))
         x = steps.sum() / law.length
         size = x
-        harm = x
+        damage = x
         if law.reading == "stretch":
-            size = abs(cohort) / law.length
-            harm = (steps / lengths_by_hand(law, path, np.broadcast_to(dt, steps.size))[1]).sum()
-        total += law.initial * pressure(path[0]) * np.sign(cohort) * size**law.order * np.exp(-harm)
+            size = abs(net_displacement) / law.length
+            damage = (
+                steps / reference_bond_lengths(law, path, np.broadcast_to(dt, steps.size))[1]
+            ).sum()
+        total += (
+            law.initial
+            * pressure(path[0])
+            * np.sign(net_displacement)
+            * size**law.order
+            * np.exp(-damage)
+        )
     return total / gamma(law.order + 1)
 
 
-def energy_by_hand(law, path, dt=1.0):
+def reference_energy(law, path, dt=1.0):
     """Return the stored energy at the end of `path` [m] per mu_s N.
 
     It is force times stretch at constant damage, summed over bonds.
     """
     total = sum(
-        weight @ (force * np.abs(u))
-        for _, weight, u, force in bonds_of_strokes(law, path, dt, 0.25)
+        weight @ (force * np.abs(u)) for _, weight, u, force in integrate_bonds(law, path, dt, 0.25)
     )
     return total / gamma(law.order + 1) / (law.order + 1 if law.reading == "stretch" else 1.0)
 

@@ -1,58 +1,58 @@
 """Structures and a simple time march for tests of harmonic balance."""
 
 import numpy as np
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 from scipy.linalg import expm
 
 from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
 from patchfem.friction import Bonds, TanhLaw, points_element
 
 
-def of_speed(limit, speed):
+def make_speed_law(limit, speed):
     """Return the law limit tanh(v/speed)."""
     return SpeedLaw(TanhLaw(limit, speed).element(1.0))
 
 
-def bonds(limit, length):
+def make_bond_law(limit, length):
     """Return the law of bonds, F = limit u with du/dq = sgn(v) - u per unit of length."""
     return FlowLaw(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
 
 
-def sdof(xi=0.003, omega=1.0, mass=1.0):
+def make_sdof(xi=0.003, omega=1.0, mass=1.0):
     """Return a modal basis with a single mode."""
-    return basis_of(omega, xi, mass=mass)
+    return make_modal_basis(omega, xi, mass=mass)
 
 
-def five(damping=None, zeta=0.02):
+def make_five_modes(damping=None, zeta=0.02):
     """Return a basis of five modes with the first frequency at 1 rad/s."""
     omega = np.array([1.0, 2.3, 3.9, 6.1, 8.8])
     slide = np.array([1.0, 0.7, -0.5, 0.4, 0.3])
     base = np.array([1.0, 0.3, 0.2, -0.1, 0.1])
-    return basis_of(
+    return make_modal_basis(
         omega, zeta, slide, base, [1.0, -0.6, 0.4, 0.5, -0.2], mass=2.0, damping=damping
     )
 
 
-def many(count=100, total=6.0, limit=1.2):
+def make_elements(count=100, total=6.0, limit=1.2):
     """Return stiffnesses and yield displacements of parallel elements with a given total stiffness and force limit."""
     k = np.full(count, total / count)
     w = np.linspace(0.2, 1.8, count)
     return k, w * limit / (k @ w)
 
 
-def plain_jenkins(places, stiffness, limit):
+def jenkins_forces(path, stiffness, limit):
     """Return the forces of parallel Jenkins elements along a path from the virgin state at 0, and the last stretches."""
     stretch = np.zeros(len(stiffness))
     last = 0.0
     out = []
-    for q in places:
+    for q in path:
         stretch = np.clip(stretch + q - last, -limit, limit)
         last = q
         out.append(stiffness @ stretch)
     return np.array(out), stretch
 
 
-def march(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
+def march_exactly(modes, drive, stiffness, limit, state, stretch, steps, cycles=1):
     """Propagate the modes exactly under a force that is linear in each step, found by fixed-point iteration.
 
     Returns rows (z, v) and forces.

@@ -1,6 +1,6 @@
 """Imports of the package, found in its source files without importing them.
 
-`imports` lists what one file imports: every statement, also inside functions and under
+`list_imports` lists what one file imports: every statement, also inside functions and under
 TYPE_CHECKING, and every compiled module that is loaded by its literal name. `import_graph` joins
 the lists of all files.
 """
@@ -25,7 +25,7 @@ class Import(NamedTuple):
     is_text: bool  # whether the name of the module is a text, as in `compiled.load("dynamics.loop_kernels")`
 
 
-def sources(root: Path, folder: str = PACKAGE) -> dict:
+def read_sources(root: Path, folder: str = PACKAGE) -> dict:
     """Read the source files of a folder: {dotted name inside the folder: text}, "" for its top."""
     tree = {}
     for path in sorted((Path(root) / folder).rglob("*.py")):
@@ -53,13 +53,13 @@ def folders_and_modules(names: tuple) -> frozenset:
     return frozenset(".".join(part[:k]) for part in parts for k in range(1, len(part) + 1))
 
 
-def imports(name: str, text: str, tree: dict) -> tuple:
+def list_imports(name: str, text: str, tree: dict) -> tuple:
     """Return the imports of the file with the dotted name `name`; np.load("data.npz") is not an import."""
-    return _imports(name, text, tuple(tree))
+    return _list_imports(name, text, tuple(tree))
 
 
 @cache
-def _imports(name: str, text: str, names: tuple) -> tuple:
+def _list_imports(name: str, text: str, names: tuple) -> tuple:
     """Return the imports of a file, given the dotted names of all files; cached."""
     known = folders_and_modules(names)
     is_package = any(other.startswith(f"{name}.") for other in names)
@@ -113,7 +113,9 @@ def import_graph(tree: dict) -> dict:
     graph = {}
     for name, text in tree.items():
         targets = {
-            one.target for one in imports(name, text, tree) if one.is_own and one.target in tree
+            imported.target
+            for imported in list_imports(name, text, tree)
+            if imported.is_own and imported.target in tree
         }
         graph[name] = targets - {name, ""}
     return graph

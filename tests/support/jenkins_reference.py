@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 
-class Reference:
+class JenkinsReference:
     """Modes (core.ModalBasis) on elements (stiffness (t,), yield displacement (t,)) at every interface, from rest."""
 
     def __init__(self, modes, drive, elements, rtol=1e-12, atol=1e-14, method="DOP853"):
@@ -24,7 +24,7 @@ class Reference:
         self.restarts = 0
         self.peak = 0.0
 
-    def forces(self, z, frozen):
+    def friction_forces(self, z, frozen):
         """Return the friction force of every interface; `frozen` holds the displacements at the last restart."""
         slide = self.faces @ z
         return np.array(
@@ -36,7 +36,7 @@ class Reference:
             ]
         )
 
-    def go(self, end: float) -> np.ndarray:
+    def march_to(self, end: float) -> np.ndarray:
         """March to the time `end` [s] and return the state (2 n,)."""
         modes = self.modes
         n = self.modes.omega.size
@@ -54,7 +54,7 @@ class Reference:
                         -modes.damping_matrix @ v
                         - modes.omega**2 * z
                         - modes.base * push
-                        - self.forces(z, frozen) @ self.faces / modes.mass,
+                        - self.friction_forces(z, frozen) @ self.faces / modes.mass,
                     ]
                 )
 
@@ -93,10 +93,10 @@ class Reference:
                 events=events,
             )
             self.restarts += 1
-            self._land(found, frozen)
+            self._update_elements(found, frozen)
         return self.state
 
-    def _land(self, found, frozen):
+    def _update_elements(self, found, frozen):
         """Update the stretches and slip directions of the elements at the end of a piece."""
         n = self.modes.omega.size
         self.peak = max(self.peak, np.abs(self.modes.output @ found.y[:n]).max())

@@ -35,7 +35,7 @@ RUBBED = ("groove", "edge", "run-in", "dropouts", "bent")  # Kinds with both wor
 
 
 @dataclass(frozen=True)
-class Pair:
+class TracePair:
     """Two traces and their true difference.
 
     worn: depths [m] at the points of the trace after, positive where material was removed.
@@ -51,38 +51,38 @@ class Pair:
     spoilt: tuple = (0, 0)  # Number of points of dust or dropouts in each trace.
 
 
-def surface(draw, length: float, style: str):
+def draw_surface(rng, length: float, style: str):
     """Return x and heights [m] at the spacing of the finest trace: self-affine, turned, or with a plateau."""
     step = 0.25e-6
     count = int(2 ** np.ceil(np.log2(length / step)))
     wave = np.fft.rfftfreq(count, step)
-    hurst = draw.uniform(0.6, 0.9)
-    roll = 1 / draw.uniform(60e-6, 300e-6)
-    tip = 1 / draw.uniform(4e-6, 10e-6)
+    hurst = rng.uniform(0.6, 0.9)
+    roll = 1 / rng.uniform(60e-6, 300e-6)
+    tip = 1 / rng.uniform(4e-6, 10e-6)
     power = np.maximum(wave, roll) ** (-1 - 2 * hurst) / (1 + (wave / tip) ** 6)
     power[0] = 0.0
-    heights = np.fft.irfft(np.sqrt(power) * np.exp(2j * np.pi * draw.random(wave.size)), count)
+    heights = np.fft.irfft(np.sqrt(power) * np.exp(2j * np.pi * rng.random(wave.size)), count)
     heights *= 1 / heights.std()
     x = step * np.arange(count)
     if style == "turned":
-        feed = draw.uniform(60e-6, 110e-6)
-        phase = 2 * np.pi * x / feed + 0.25 * np.cumsum(draw.normal(size=count)) * np.sqrt(
+        feed = rng.uniform(60e-6, 110e-6)
+        phase = 2 * np.pi * x / feed + 0.25 * np.cumsum(rng.normal(size=count)) * np.sqrt(
             step / feed
         )
         heights = np.cos(phase) + 0.2 * np.cos(2 * phase + 0.7) + 0.25 * heights
     elif style == "plateau":
         heights = np.where(heights > 0, 0.3 * heights, heights)
-    return x, heights / heights.std() * draw.uniform(0.2e-6, 2.5e-6)
+    return x, heights / heights.std() * rng.uniform(0.2e-6, 2.5e-6)
 
 
-def trough(x, start: float, stop: float, depth: float, ramp: float):
+def track_depth(x, start: float, stop: float, depth: float, ramp: float):
     """Return a worn track of a given depth whose sides are `ramp` wide."""
     into = np.clip((x - start) / ramp, 0, 1)
     out = np.clip((stop - x) / ramp, 0, 1)
     return depth * (3 * into**2 - 2 * into**3) * (3 * out**2 - 2 * out**3)
 
 
-def pair(kind: str, seed: int) -> Pair:
+def draw_pair(kind: str, seed: int) -> TracePair:
     """Draw the pair of a kind for a seed."""
     draw = np.random.default_rng([seed, KINDS.index(kind)])
     style = ("self-affine", "turned", "plateau")[draw.integers(3)]
@@ -90,7 +90,7 @@ def pair(kind: str, seed: int) -> Pair:
     spacing = draw.choice([0.5e-6, 1e-6, 2e-6])
     reach = draw.uniform(-0.04, 0.04) * length
     margin = 0.06 * length
-    x, new = surface(draw, (3.2 if kind == "elsewhere" else 1.0) * length + 2 * margin, style)
+    x, new = draw_surface(draw, (3.2 if kind == "elsewhere" else 1.0) * length + 2 * margin, style)
     start = margin
     rms = new.std()
     depth = draw.uniform(0.5, 4) * rms
@@ -98,15 +98,15 @@ def pair(kind: str, seed: int) -> Pair:
     if kind == "even":
         wear += depth
     elif kind == "wedge":
-        share = (x - start) / length
-        wear += depth * (share if draw.random() < 0.5 else 1 - share)
+        fraction = (x - start) / length
+        wear += depth * (fraction if draw.random() < 0.5 else 1 - fraction)
     elif kind in ("groove", "exchanged", "bent", "dropouts"):
         a = start + draw.uniform(0.2, 0.4) * length
         b = a + draw.uniform(0.2, 0.35) * length
-        wear += trough(x, a, b, depth, draw.uniform(20e-6, 150e-6))
+        wear += track_depth(x, a, b, depth, draw.uniform(20e-6, 150e-6))
     elif kind == "edge":  # The wear begins inside the trace and continues beyond its end.
         a = start + draw.uniform(0.25, 0.6) * length
-        wear += trough(x, a, x[-1] + 1e-3, depth, draw.uniform(20e-6, 150e-6))
+        wear += track_depth(x, a, x[-1] + 1e-3, depth, draw.uniform(20e-6, 150e-6))
     old = new - wear
     if kind == "run-in":  # The peaks are worn and the valleys are not.
         level = np.quantile(new, draw.uniform(0.5, 0.85))
@@ -115,17 +115,17 @@ def pair(kind: str, seed: int) -> Pair:
     elif kind == "deposits":
         for _ in range(draw.integers(1, 4)):
             a = start + draw.uniform(0.05, 0.8) * length
-            grown = trough(
+            deposit = track_depth(
                 x, a, a + draw.uniform(0.03, 0.12) * length, draw.uniform(0.5, 3) * rms, 30e-6
             )
-            old = old + grown
-            wear = wear - grown
+            old = old + deposit
+            wear = wear - deposit
     noise = draw.uniform(1e-9, 8e-9)
     begin = start + reach
     if kind == "elsewhere":
         begin = start + draw.uniform(1.2, 2.0) * length
 
-    def traced(heights, place, spacing, gain=1.0, stretch=1.0):
+    def sample_trace(heights, place, spacing, gain=1.0, stretch=1.0):
         """Return points, heights and surface positions of a trace that starts at `place`."""
         points = np.arange(0, length, spacing)
         inside = place + stretch * points
@@ -139,8 +139,8 @@ def pair(kind: str, seed: int) -> Pair:
     second = draw.choice([0.5e-6, 1e-6, 2e-6]) if kind == "scale" else spacing
     gain = draw.uniform(0.97, 1.03) if kind == "scale" else 1.0
     stretch = draw.uniform(0.99, 1.01) if kind == "scale" else 1.0
-    xb, zb, _ = traced(new, start, spacing)
-    xa, za, inside = traced(old, begin, second, gain, stretch)
+    xb, zb, _ = sample_trace(new, start, spacing)
+    xa, za, inside = sample_trace(old, begin, second, gain, stretch)
     worn = np.interp(inside, x, wear)
     spoilt = [0, 0]
     if kind == "dust":
@@ -167,12 +167,12 @@ def pair(kind: str, seed: int) -> Pair:
     after = (xa, za)
     if kind == "exchanged":
         before, after, worn = after, before, -np.interp(xb + start, inside, worn)
-    return Pair(kind, seed, before, after, worn, begin - start, tuple(spoilt))
+    return TracePair(kind, seed, before, after, worn, begin - start, tuple(spoilt))
 
 
-def profiles(one: Pair) -> tuple:
+def make_profiles(pair: TracePair) -> tuple:
     """Return both traces as `Profile`."""
     return tuple(
         Profile(*map(frozen_array, trace), name)
-        for trace, name in ((one.before, "before"), (one.after, "after"))
+        for trace, name in ((pair.before, "before"), (pair.after, "after"))
     )

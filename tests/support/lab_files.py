@@ -36,7 +36,7 @@ INCH = SI | {
 }
 
 
-def record(time, values, kind, **more) -> dict:
+def make_record(time, values, kind, **more) -> dict:
     """Return a binary universal dataset of a time response at node 1, +x, with uneven spacing."""
     return {
         "type": 58,
@@ -56,7 +56,7 @@ def record(time, values, kind, **more) -> dict:
     }
 
 
-def written(path, sets):
+def write_universal(path, sets):
     """Write datasets to a universal file with pyuff.
 
     Mode "overwrite" of pyuff loses a binary first dataset, so the file is deleted and written in
@@ -67,7 +67,7 @@ def written(path, sets):
     return path
 
 
-def loop(count=80, cycles=2) -> tuple:
+def elastic_plastic_loop(count=80, cycles=2) -> tuple:
     """Return (time, displacement, force) of an elastic-plastic point along a sine of 10 um at 100 Hz.
 
     The forces are exact at every sample.

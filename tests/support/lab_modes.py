@@ -13,7 +13,7 @@ OMEGA, ZETA, RESIDUE = (
 TIME = STEP * np.arange(SAMPLES)
 
 
-def driven(quantity: str, seed: int = 1) -> tuple:
+def driven_response(quantity: str, seed: int = 1) -> tuple:
     """Return (input, response) of the modes from rest to sines with random phases.
 
     The sines are at all lines of the record up to 730 Hz. The steady response is a sum over the
@@ -29,18 +29,18 @@ def driven(quantity: str, seed: int = 1) -> tuple:
     power = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]
     for w, z, a in zip(OMEGA, ZETA, RESIDUE):
         steady = spectrum * a / (w * w + lines**2 + 2 * z * w * lines)
-        place = np.fft.irfft(steady, SAMPLES)[0]
+        displacement = np.fft.irfft(steady, SAMPLES)[0]
         speed = np.fft.irfft(lines * steady, SAMPLES)[0]
         pole = complex(-z * w, w * np.sqrt(1 - z * z))
         # The transient is Re(start exp(pole t)) with this start.
-        start = complex(-place, (speed - pole.real * place) / pole.imag)
+        start = complex(-displacement, (speed - pole.real * displacement) / pole.imag)
         total += np.fft.irfft(lines**power * steady, SAMPLES) + np.real(
             pole**power * start * np.exp(pole * TIME)
         )
     return np.fft.irfft(spectrum, SAMPLES), total
 
 
-def free(amplitudes=(0.3, 0.2), offset=0.01, count=3000) -> tuple:
+def free_decay(amplitudes=(0.3, 0.2), offset=0.01, count=3000) -> tuple:
     """Return (time, displacement) of the modes released from rest."""
     time = TIME[:count]
     return time, offset + sum(

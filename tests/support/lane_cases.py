@@ -101,7 +101,9 @@ def draw_points(law: str, seed: int, count: int) -> list:
             "structure.mode.axial.slide": float(r.choice([1, -0.7])),
             "structure.mode.axial.output": float(r.choice([1, -1.3])),
         }
-        sets |= of_law(law, r, sets["normal.load"], push / (2 * np.pi * sets["drive.frequency"]))
+        sets |= draw_law_keys(
+            law, r, sets["normal.load"], push / (2 * np.pi * sets["drive.frequency"])
+        )
         model = pf.build(base.override(format_assignments(sets)))
         if not lanes.refuses(model):
             out.append(model)
@@ -113,10 +115,10 @@ def draw_patches(family: str, seed: int, count: int) -> list:
     r = np.random.default_rng(seed)
     base = get_base_scene(pf.load(PATCH))
     sets = [{key: float(draw(r)) for key, draw in FAMILIES[family].items()} for _ in range(count)]
-    return [pf.build(base.override(format_assignments(one))) for one in sets]
+    return [pf.build(base.override(format_assignments(values))) for values in sets]
 
 
-def of_law(law: str, r, load: float, speed: float) -> dict:
+def draw_law_keys(law: str, r, load: float, speed: float) -> dict:
     """Draw the keys of a law for a load [N] and a typical speed [m/s]."""
     if law == "iwan":
         return {
@@ -147,7 +149,7 @@ def of_law(law: str, r, load: float, speed: float) -> dict:
     return {}
 
 
-def rows(found, ones) -> list[list]:
+def compare_answers(found, singles) -> list[list]:
     """Return the rows of each case of two Answers: values and errors of the first beside those of the second.
 
     A value that only one of them has is NaN in the other and does not hold. A ringing measure that
@@ -157,22 +159,22 @@ def rows(found, ones) -> list[list]:
     out = []
     for case in range(len(found)):
         names = {name for name in found.values if found.has(name, case)}
-        names |= {name for name in ones.values if ones.has(name, case)}
-        some = []
+        names |= {name for name in singles.values if singles.has(name, case)}
+        case_rows = []
         for name in sorted(names):
             value, truth = (
-                float(one.values[name][case]) if name in one.values else np.nan
-                for one in (found, ones)
+                float(answers.values[name][case]) if name in answers.values else np.nan
+                for answers in (found, singles)
             )
             error, doubt = (
-                float(one.errors[name][case]) if name in one.errors else np.nan
-                for one in (found, ones)
+                float(answers.errors[name][case]) if name in answers.errors else np.nan
+                for answers in (found, singles)
             )
             if np.isnan(truth) and (np.isnan(value) or name in lane_ringing.RINGING_MEASURES):
                 continue
             error, doubt = np.nan_to_num([error, doubt]).tolist()
-            some.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
-        out.append(some)
+            case_rows.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
+        out.append(case_rows)
     return out
 
 
@@ -183,21 +185,23 @@ def compare_cases(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     models = (
         draw_points(group, seed, N_CASES) if group in LAWS else draw_patches(group, seed, N_PATCHES)
     )
-    begin = process_time()
+    started = process_time()
     found = pf.run_many(models)
-    seconds = process_time() - begin
+    seconds = process_time() - started
     singles = models if group in LAWS else meshes.with_shared_meshes(models)
-    mine = [
+    lane_cases = [
         case for case in range(N_SINGLES) if found.numerics.get(case, {}).get("engine") == "lanes"
     ]
-    ones = one_by_one.solve([singles[case] for case in mine])
-    same = [found.outcome[case] == outcome for case, outcome in zip(mine, ones.outcome)]
-    pairs = rows(found.select(np.array(mine)), ones)
+    single_answers = one_by_one.solve([singles[case] for case in lane_cases])
+    same_outcome = [
+        found.outcome[case] == outcome for case, outcome in zip(lane_cases, single_answers.outcome)
+    ]
+    pairs = compare_answers(found.select(np.array(lane_cases)), single_answers)
     return {
         "group": group,
         "engine": "lanes",
         "seconds": seconds,
         "cases": len(models),
-        "other_outcomes": same.count(False),
-        "rows": [row for some in pairs for row in some],
+        "other_outcomes": same_outcome.count(False),
+        "rows": [row for case_rows in pairs for row in case_rows],
     }

@@ -37,43 +37,53 @@ coefficient = "{damper} N s/m"
 """
 
 
-def table(law: str) -> str:
+def friction_table(law: str) -> str:
     """Return the table [friction] with the keys `law`."""
     return "[friction]\n" + law
 
 
-def bench_along(law: str, time, slide, *sets):
+def run_bench_along_path(law: str, time, slide, *sets):
     """Return the BenchRun of a law along displacements (k,) [m] at equally spaced times (k,) [s]."""
     return bench.run(
-        build(loads(POINT + table(law) + SINE, sets=sets)), None, 4, path=(time, slide, 0, 0.0)
+        build(loads(POINT + friction_table(law) + SINE, sets=sets)),
+        None,
+        4,
+        path=(time, slide, 0, 0.0),
     )
 
 
-def rig(law: str, *sets, cycles: int = 60, steps: int = 0):
+def run_rig(law: str, *sets, cycles: int = 60, steps: int = 0):
     """Return the Result of one mode under a base sine at its resonance."""
     more = f"[accuracy]\nsteps_per_cycle = {steps}\n" if steps else ""
     mode = MODE.replace("damping = 0.003", "damping = 0.02")
     return run(
         loads(
-            POINT + table(law) + mode + DRIVE.replace("cycles = 30", f"cycles = {cycles}") + more,
+            POINT
+            + friction_table(law)
+            + mode
+            + DRIVE.replace("cycles = 30", f"cycles = {cycles}")
+            + more,
             sets=sets,
         )
     )
 
 
-def released(law: str, *sets):
+def run_release(law: str, *sets):
     """Return the response of one mode that is released from a displacement of 60 um."""
     start = 'start.displacement = ["60 um"]\n'
     motion = '[drive]\nkind = "free"\ncycles = 3\n'
     return run(
         loads(
-            POINT + table(law) + MODE.replace("[structure]\n", "[structure]\n" + start) + motion,
+            POINT
+            + friction_table(law)
+            + MODE.replace("[structure]\n", "[structure]\n" + start)
+            + motion,
             sets=sets,
         )
     ).response
 
 
-def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
+def run_two_masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100):
     """Return the Result of two equal masses, one or both of them on an interface with the law."""
     faces = "".join(
         f'[[structure.interface]]\nbetween = [{k}, 0]\nload = "100 N"\n{law}'
@@ -86,15 +96,15 @@ def masses(law: str, interfaces: int, *sets, cycles: int = 20, steps: int = 100)
 
 PLAIN = """
 import json, sys
-from law_runs import masses
-runs = [masses(sys.argv[1], count, cycles=2, steps=50) for count in (2, 1)]
+from law_runs import run_two_masses
+runs = [run_two_masses(sys.argv[1], count, cycles=2, steps=50) for count in (2, 1)]
 both, alone = (run.response for run in runs)
 print(json.dumps([both.extra["slides"].T.tolist(), alone.slide.tolist(),
                   [run.measures["friction_force_peak"].value for run in runs]]))
 """
 
 
-def plain_masses(law: str):
+def run_two_masses_uncompiled(law: str):
     """Run `run_two_masses` in a process without compilation.
 
     Returns displacements (2, t) with both interfaces, displacement (t,) with one, and the peak
@@ -113,10 +123,10 @@ def plain_masses(law: str):
     return np.array(both), np.array(alone), pulls
 
 
-def fitted(folder, law: str, loop: tuple, free: str):
+def fit_law(folder, law: str, loop: tuple, free: str):
     """Return the fit of a law to the loop (time [s], displacement [m], force [N])."""
     path = folder / "scene.toml"
-    path.write_text(POINT + table(law) + SINE, "utf-8")
+    path.write_text(POINT + friction_table(law) + SINE, "utf-8")
     with open(folder / "loop.csv", "w", newline="") as file:
         out = csv.writer(file)
         out.writerow(["time [s]", "displacement [m]", "force [N]"])
@@ -124,7 +134,7 @@ def fitted(folder, law: str, loop: tuple, free: str):
     return fit_loop(load(path), folder / "loop.csv", [free])
 
 
-def shrinking(count: int = 400, cycles: int = 3, amplitude: float = 10e-6):
+def shrinking_sine(count: int = 400, cycles: int = 3, amplitude: float = 10e-6):
     """Return (time, displacement) of a sine of 100 Hz with decreasing amplitude, which leaves minor loops open."""
     time = np.arange(count * cycles + 1) / count / 100
     return time, amplitude * (1 - 0.6 * time / time[-1]) * np.sin(2 * np.pi * 100 * time)

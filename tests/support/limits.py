@@ -6,7 +6,7 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def limited(size: int):
+def limit_file_size(size: int):
     """Limit the size of files that this process writes to `size` bytes.
 
     Bytecode is not written either, because a truncated file would break later processes.

@@ -23,7 +23,7 @@ for kernel in (list_kernels.list_mean, list_kernels.list_force, list_kernels.lis
         kernel.enable_caching()
 
 
-class Listed(NamedTuple):
+class ListHistory(NamedTuple):
     """Step means, forces after the steps, forces predicted for their ends, energies after them, and the status array."""
 
     mean: np.ndarray
@@ -33,7 +33,7 @@ class Listed(NamedTuple):
     status: np.ndarray
 
 
-def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
+def make_empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     """Return a list of bonds before any displacement, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff_age(law.order, tail) if tail else np.inf, merge)
     now = make_clocks(law)
@@ -50,15 +50,15 @@ def empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     )
 
 
-def follow_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
+def march_list(law, path, times=1.0, merge=0.0, tail=0.0, capacity=60_000):
     """March the list along the knots `path`; times: scalar or one per step."""
-    held = empty_list(law, tail, merge, capacity)
+    bond_list = make_empty_list(law, tail, merge, capacity)
     rows = []
-    status = held.status
+    status = bond_list.status
     for dq, dt in zip(np.diff(path), np.broadcast_to(np.asarray(times, float), len(path) - 1)):
         v = dq / dt if dt > 0 else 0.0
-        mean = list_kernels.list_mean(dq, held, v, dt)
-        ahead = list_kernels.list_force(dq, held, v, dt)
-        assert list_kernels.list_step(dq, held, v, v, dt)
+        mean = list_kernels.list_mean(dq, bond_list, v, dt)
+        ahead = list_kernels.list_force(dq, bond_list, v, dt)
+        assert list_kernels.list_step(dq, bond_list, v, v, dt)
         rows.append((mean, status[STATUS.force], ahead, status[STATUS.energy]))
-    return Listed(*np.array(rows).T, status)
+    return ListHistory(*np.array(rows).T, status)

@@ -8,7 +8,7 @@ from patchfem.surface.scans.errors import draw_scan_errors
 from patchfem.surface.scans.wear import find_change
 
 
-def aligned(depth, noise: float) -> ScanAlignment:
+def make_alignment(depth, noise: float) -> ScanAlignment:
     """Return the alignment of two scans whose depths (m, n) [m] have noise of a standard deviation [m]."""
     with np.errstate(invalid="ignore"):
         used = np.abs(depth) <= MAX_UNWORN * noise

@@ -1,7 +1,7 @@
 """Modal basis with one mode, and the compiled march along a prescribed path."""
 
 import numpy as np
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.dynamics import STEP_TOL, JointsModel, element_model, load_instances
 from patchfem.friction import TanhLaw
@@ -16,23 +16,23 @@ ALL = (
 
 def share_one_loop(monkeypatch) -> None:
     """Make joints of all laws march in the compiled loop that contains the laws of ALL."""
-    own = JointsModel.laws.fget
+    own_laws = JointsModel.laws.fget
     monkeypatch.setattr(
-        JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own(model)})))
+        JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own_laws(model)})))
     )
 
 
-def rate_model(limit: float, speed: float):
+def make_tanh_model(limit: float, speed: float):
     """Return the ContactModel of friction limit tanh(v/speed), limit [N], speed [m/s]."""
     return element_model(TanhLaw(limit, speed).element(1.0))
 
 
-def one_mode(omega, zeta, mass):
+def make_one_mode(omega, zeta, mass):
     """Return a modal basis with one mode."""
-    return basis_of(omega, zeta, mass=mass)
+    return make_modal_basis(omega, zeta, mass=mass)
 
 
-def follow(model, path, dt=0.3):
+def follow_path(model, path, dt=0.3):
     """March a model along a prescribed path with loops.follow_path.
 
     Returns (force at the samples, step means, slip), (dissipated, stored), unconverged steps,

@@ -26,7 +26,7 @@ COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio.
 FINE = 5e-4  # Ratio of a cell at a contact edge to the contact width.
 
 
-def missing_shear(compliance, right) -> np.ndarray:
+def solve_missing_shear(compliance, right) -> np.ndarray:
     """Solve f >= 0, compliance f >= right, f (compliance f - right) = 0 by an active-set method."""
     active = right > 0
     for _ in range(200):
@@ -41,7 +41,7 @@ def missing_shear(compliance, right) -> np.ndarray:
     raise RuntimeError("active set cycles")
 
 
-class Bench:
+class RandomBench:
     """Random bench in SI units: bodies, shapes, friction law, amplitude and tolerance."""
 
     def __init__(self, seed):
@@ -73,10 +73,10 @@ class Bench:
         """Scene for `static_reference`."""
         base = (self.young, self.poisson)
         layers = (COATING if self.thick else base, base)
-        piece = static.PieceInterface(self.length, self.height, self.thick, layers)
+        piece = static.BodySection(self.length, self.height, self.thick, layers)
         curvature = 1 / self.radius if self.crowned else 0.0
         tilt = self.angle if self.tilted else 0.0
-        return static.Scene(
+        return static.PatchScene(
             self.length, self.width, "strain", piece, piece, self.load, tilt, curvature
         )
 
@@ -105,12 +105,12 @@ class Bench:
         return "\n".join(out).replace("np.float64(", "").replace(")", "")
 
 
-class Reference:
+class PartialSlipReference:
     """Solution of a bench on the columns of a refinement step of `static_reference`."""
 
     def __init__(self, bench, edges, lap):
         self.bench = bench
-        pressed = static.press(bench.scene, edges, FINE, lap)
+        pressed = static.press_scene(bench.scene, edges, FINE, lap)
         self.edges = pressed.edges
         index = np.flatnonzero(pressed.force > 0)
         self.shear = pressed.tangential[np.ix_(index, index)] / bench.width
@@ -125,7 +125,9 @@ class Reference:
         slides = amplitude * (np.arange(161) / 160) ** 2
         lack = np.array(
             [
-                self.stiffness * q - self.limit.sum() + missing_shear(self.shear, free - q).sum()
+                self.stiffness * q
+                - self.limit.sum()
+                + solve_missing_shear(self.shear, free - q).sum()
                 for q in slides
             ]
         )
@@ -133,26 +135,28 @@ class Reference:
         curve = PchipInterpolator(slides, np.maximum(lack, 0.0))
         area = curve.antiderivative()
 
-        def loop(a):
+        def loop_area(a):
             """Return the area of the loop of an amplitude by Masing's rule."""
             return float(4 * a * curve(a) - 8 * area(a))
 
         force = self.stiffness * amplitude - float(curve(amplitude))
         stored = (
             float(-area(amplitude) - 4 * area(amplitude / 2) + amplitude * curve(amplitude))
-            - loop(amplitude) / 4
-            - loop(amplitude / 2) / 2
+            - loop_area(amplitude) / 4
+            - loop_area(amplitude / 2) / 2
         )
         lost = (
-            loop(amplitude) / 4 + (bench.cycles - 0.5) * loop(amplitude) + loop(amplitude / 2) / 2
+            loop_area(amplitude) / 4
+            + (bench.cycles - 0.5) * loop_area(amplitude)
+            + loop_area(amplitude / 2) / 2
         )
         angle = (np.arange(4000) + 0.5) * np.pi / 4000
         back = curve(amplitude) - 2 * curve(amplitude * (1 - np.cos(angle)) / 2)
         end = float(curve(amplitude) - 2 * curve(amplitude / 2))
         return {
             "tangential_stiffness": self.stiffness,
-            "loop_area": loop(amplitude),
-            "slip_amplitude": loop(amplitude) / (4 * self.limit.sum()),
+            "loop_area": loop_area(amplitude),
+            "slip_amplitude": loop_area(amplitude) / (4 * self.limit.sum()),
             "friction_force_peak": force,
             "secant_stiffness": force / amplitude,
             "energy_stored": stored,
@@ -167,12 +171,12 @@ class Reference:
 
 def solve_bench(seed: int) -> tuple:
     """Return a bench, its measures on the fine grid, and their differences from a coarser grid."""
-    bench = Bench(seed)
+    bench = RandomBench(seed)
     edges = static.find_edges(bench.scene)
     for lap in static.LAPS[:2]:
-        coarse = Reference(bench, edges, lap)
+        coarse = PartialSlipReference(bench, edges, lap)
         edges = coarse.edges
-    fine = Reference(bench, edges, static.LAPS[2])
+    fine = PartialSlipReference(bench, edges, static.LAPS[2])
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
     found = fine.measures()
     other = coarse.measures()
@@ -182,7 +186,7 @@ def solve_bench(seed: int) -> tuple:
 def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare a bench with its reference; see `campaigns`."""
     if earlier and "true" in earlier:
-        bench = Bench(seed)
+        bench = RandomBench(seed)
         true = earlier["true"]
         doubt = earlier["doubt"]
         bench.amplitude = earlier["amplitude"]

@@ -5,7 +5,9 @@ import numpy as np
 from patchfem.core import ModalBasis
 
 
-def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None):
+def make_modal_basis(
+    omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0, damping=None
+):
     """Return a basis from scalars or lists; `base` and `output` default to the first interface.
 
     faces: participation (n,) of the only interface, or (i, n) of all.
@@ -27,13 +29,13 @@ def basis_of(omega, zeta=0.0, faces=((1.0,),), base=None, output=None, mass=1.0,
     )
 
 
-def random_basis(rng, n, faces, coupled=True, rigid=False):
+def make_random_modal_basis(rng, n, faces, coupled=True, rigid=False):
     """Return a random basis of n modes, with coupled damping or a rigid-body mode on request."""
     omega = rng.uniform(0.3, 3, n)
     root = rng.normal(size=(n, n)) * 0.15
     if rigid:
         omega[0] = 0.0
-    return basis_of(
+    return make_modal_basis(
         omega,
         0.01,
         rng.normal(size=(faces, n)),

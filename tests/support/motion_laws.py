@@ -35,14 +35,14 @@ class Law:
         self.keys = keys
         self.side = 1  # Side of the law's second switching surface, if it has one.
 
-    def begin(self, v: float, accel: float) -> None:
+    def set_initial_mode(self, v: float, accel: float) -> None:
         """Set the mode for a motion that begins with velocity v and acceleration accel."""
         self.mode = 1 if (v if v != 0 else accel) >= 0 else -1
 
-    def resume(self, s) -> None:
+    def set_initial_side(self, s) -> None:
         """Set `side` for a motion that begins in a state s other than 0."""
 
-    def take_branch(self, s, v: float, way: float) -> None:
+    def choose_branch(self, s, v: float, way: float) -> None:
         """Choose the branch of the rate equation at a state s and a velocity v; `way` is the direction, +-1."""
         self.mode = way
 
@@ -50,7 +50,7 @@ class Law:
         """Return the event functions: values whose decrease through zero is an event."""
         return [self.mode * v]
 
-    def turned(self, k: int, s, v, accel: float):
+    def apply_event(self, k: int, s, v, accel: float):
         """Change the mode at event k and return the state."""
         # The mode changes here, not by the sign of the velocity, which round-off may keep.
         self.mode = -self.mode
@@ -73,7 +73,7 @@ class Law:
         return s[0] if self.size else 0.0
 
 
-class Tanh(Law):
+class TanhLaw(Law):
     """F = mu N tanh(v/v_0)."""
 
     size = 0
@@ -91,12 +91,12 @@ class Tanh(Law):
         return v
 
 
-class Plastic(Law):
+class ElasticPlasticLaw(Law):
     """F' = mu N v/eps, |F| <= mu N: elastic in mode 0, slipping in modes +-1."""
 
     split_by_mode = True
 
-    def begin(self, v, accel):
+    def set_initial_mode(self, v, accel):
         """Begin in the elastic mode."""
         self.mode = 0
 
@@ -117,7 +117,7 @@ class Plastic(Law):
         eps = self.keys["bond_length"]
         return [eps - s[0], eps + s[0]] if self.mode == 0 else [self.mode * v]
 
-    def turned(self, k, s, v, accel):
+    def apply_event(self, k, s, v, accel):
         """Yield, or return to the elastic mode."""
         if self.mode:
             self.mode = 0
@@ -130,7 +130,7 @@ class Plastic(Law):
         return 0.5 * self.limit * s[0] ** 2 / self.keys["bond_length"]
 
 
-class Stretch(Law):
+class StretchLaw(Law):
     """z' = v - |v| z/eps, F = mu N z/eps_0; with growth, eps follows 2.10.
 
     The speed |v| has a lower bound in a_s/|v|.
@@ -165,9 +165,9 @@ class Stretch(Law):
             ]
         )
 
-    def take_branch(self, s, v, way):
+    def choose_branch(self, s, v, way):
         """Choose the direction, and the side of the speed limit of ageing."""
-        super().take_branch(s, v, way)
+        super().choose_branch(s, v, way)
         if self.grows:
             self.side = 1 if self.mode * v > self.keys["rest_speed"] else -1
 
@@ -175,9 +175,9 @@ class Stretch(Law):
         """Return the rate of the irreversible displacement [m/s]."""
         return self.mode * v * s[0] / (s[1] if self.grows else self.keys["bond_length"])
 
-    def begin(self, v, accel):
+    def set_initial_mode(self, v, accel):
         """Set direction and side for the start of a motion."""
-        super().begin(v, accel)
+        super().set_initial_mode(v, accel)
         self.side = 1 if self.grows and abs(v) > self.keys["rest_speed"] else -1
 
     def guards(self, s, v, t):
@@ -185,15 +185,15 @@ class Stretch(Law):
         rest = [self.side * (self.mode * v - self.keys["rest_speed"])] if self.grows else []
         return [self.mode * v, *rest]
 
-    def turned(self, k, s, v, accel):
+    def apply_event(self, k, s, v, accel):
         """Reverse the direction, or cross the speed limit of ageing."""
         if k:
             self.side = -self.side
             return s
-        return super().turned(k, s, v, accel)
+        return super().apply_event(k, s, v, accel)
 
 
-class Maturing(Stretch):
+class MaturingLaw(StretchLaw):
     """Bonds of which only a fraction m has formed: z' = m v - |v| z/eps, m' = |v| (1 - m)/eps."""
 
     def __init__(self, limit, **keys):
@@ -211,7 +211,7 @@ class Maturing(Stretch):
         return np.array([s[1] * v - speed * s[0] / length, speed * (1 - s[1]) / length])
 
 
-class BoucWen(Law):
+class BoucWenLaw(Law):
     """z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)), F = mu N z."""
 
     def force(self, s, v, t):
@@ -221,10 +221,10 @@ class BoucWen(Law):
     def rate(self, s, v, t):
         """Return the rate of z."""
         n = self.keys["exponent"]
-        share = self.keys["shape"]
+        shape = self.keys["shape"]
         eps = self.limit / self.keys["stiffness"]
-        way = self.mode * self.side
-        return np.array([v / eps * (1 - abs(s[0]) ** n * (share * way + 1 - share))])
+        sign = self.mode * self.side
+        return np.array([v / eps * (1 - abs(s[0]) ** n * (shape * sign + 1 - shape))])
 
     def split(self, s, v, t):
         """Return the rate of the irreversible displacement [m/s]."""
@@ -238,30 +238,30 @@ class BoucWen(Law):
         """Return the slip velocity and z, each times its sign."""
         return [self.mode * v, self.side * s[0]]
 
-    def begin(self, v, accel):
+    def set_initial_mode(self, v, accel):
         """Set direction and sign of z for the start of a motion."""
-        super().begin(v, accel)
+        super().set_initial_mode(v, accel)
         self.side = self.mode
 
-    def resume(self, s):
+    def set_initial_side(self, s):
         """Set the sign of z for a start in a state other than 0."""
         if s[0]:
             self.side = 1 if s[0] > 0 else -1
 
-    def take_branch(self, s, v, way):
+    def choose_branch(self, s, v, way):
         """Choose the direction and the sign of z."""
-        super().take_branch(s, v, way)
+        super().choose_branch(s, v, way)
         self.side = 1 if s[0] > 0 else -1
 
-    def turned(self, k, s, v, accel):
+    def apply_event(self, k, s, v, accel):
         """Reverse the direction, or change the sign of z."""
         if k:
             self.side = -self.side
             return s
-        return super().turned(k, s, v, accel)
+        return super().apply_event(k, s, v, accel)
 
 
-class LuGre(Law):
+class LuGreLaw(Law):
     """z' = v - k |v| z/g, F = k z + s_1 z' + s_2 v."""
 
     def rate(self, s, v, t):
@@ -287,7 +287,7 @@ class LuGre(Law):
         return v - self.rate(s, v, t)[0]
 
 
-class Iwan(Law):
+class IwanLaw(Law):
     """Segalman's sliders by Masing's rules; the state is the relative displacement, and a stack holds the reversals."""
 
     def __init__(self, limit, **keys):
@@ -301,7 +301,7 @@ class Iwan(Law):
         # (displacement, force, mean stretch) at reversals; the first is the virgin state.
         self.turns = [(0.0, 0.0, 0.0)]
 
-    def loading(self, u: float) -> float:
+    def initial_loading(self, u: float) -> float:
         """Return the force of the initial loading at a displacement u >= 0."""
         chi = self.keys["chi"]
         u = min(u, self.top)
@@ -310,7 +310,7 @@ class Iwan(Law):
         )
         return self.density * inside + self.last * u
 
-    def stretch(self, u: float) -> float:
+    def mean_stretch(self, u: float) -> float:
         """Return the mean stretch of the sliders on the initial loading at u, weighted by their limits."""
         chi = self.keys["chi"]
         u = min(u, self.top)
@@ -319,31 +319,31 @@ class Iwan(Law):
         )
         return (self.density * inside + self.last * self.top * u) / self.limit
 
-    def held(self, u: float) -> float:
+    def mean_stretch_rate(self, u: float) -> float:
         """Return the derivative of this mean stretch with respect to the displacement."""
         chi = self.keys["chi"]
         u = min(u, self.top)
         inside = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
         return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
 
-    def masing(self, s, of, start: int) -> float:
-        """Return a function `of` of the initial loading, continued from the last reversal by Masing's rules.
+    def apply_masing(self, s, function, index: int) -> float:
+        """Return a function `function` of the initial loading, continued from the last reversal by Masing's rules.
 
-        start: index of the value of this function in a reversal.
+        index: index of the value of this function in a reversal.
         """
-        turn = self.turns[-1]
-        way = s[0] - self.turns[-1][0]
+        reversal = self.turns[-1]
+        displacement = s[0] - self.turns[-1][0]
         if len(self.turns) == 1:
-            return np.sign(s[0]) * of(abs(s[0]))
-        return turn[start] + np.sign(way) * 2 * of(abs(way) / 2)
+            return np.sign(s[0]) * function(abs(s[0]))
+        return reversal[index] + np.sign(displacement) * 2 * function(abs(displacement) / 2)
 
     def force(self, s, v, t):
         """Return the friction force [N]."""
-        return self.masing(s, self.loading, 1)
+        return self.apply_masing(s, self.initial_loading, 1)
 
     def reversible(self, s) -> float:
         """Return the reversible part of the relative displacement [m]."""
-        return self.masing(s, self.stretch, 2)
+        return self.apply_masing(s, self.mean_stretch, 2)
 
     def rate(self, s, v, t):
         """Return the rate of the displacement."""
@@ -351,8 +351,8 @@ class Iwan(Law):
 
     def split(self, s, v, t):
         """Return the rate of the irreversible displacement [m/s]."""
-        way = abs(s[0]) if len(self.turns) == 1 else abs(s[0] - self.turns[-1][0]) / 2
-        return v * (1 - self.held(way))
+        displacement = abs(s[0]) if len(self.turns) == 1 else abs(s[0] - self.turns[-1][0]) / 2
+        return v * (1 - self.mean_stretch_rate(displacement))
 
     def guards(self, s, v, t):
         """Return the slip velocity and the distance to the end of the present loop."""
@@ -364,7 +364,7 @@ class Iwan(Law):
             out.append(self.mode * (-self.turns[1][0] - s[0]))
         return out
 
-    def turned(self, k, s, v, accel):
+    def apply_event(self, k, s, v, accel):
         """Push a reversal onto the stack, or remove a closed loop from it."""
         if k == 0:
             # A start in the other direction is not a reversal.
@@ -378,7 +378,7 @@ class Iwan(Law):
         return s
 
 
-class Report(Law):
+class ReportLaw(Law):
     """Eq. 2.17 as printed: F = mu N int (R/eps)^p exp(-R/eps) sgn(u) dR/eps.
 
     u is the displacement since a bond formed. Between reversals of the path u changes its sign at
@@ -400,16 +400,16 @@ class Report(Law):
         path = s[1]
         eps = self.keys["bond_length"]
         p = self.order
-        places = np.array([*self.turns, (path, q)])
-        rho = (path - places[:, 0]) / eps
-        u = q - places[:, 1]
+        points = np.array([*self.turns, (path, q)])
+        rho = (path - points[:, 0]) / eps
+        u = q - points[:, 1]
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
         # Age of the bond that formed at the present position, if the stroke passed it.
-        passed = rho[:-1] - np.abs(u[:-1]) / eps
+        crossing_age = rho[:-1] - np.abs(u[:-1]) / eps
         inside = u[:-1] * u[1:] < 0
-        middle = np.where(inside, gammainc(p + 1, np.maximum(passed, 0.0)), sums[1:])
-        way = np.where(u[:-1] != 0, np.sign(u[:-1]), np.sign(u[1:]))
-        total = way @ (sums[:-1] - middle) + np.sign(u[1:]) @ (middle - sums[1:])
+        middle = np.where(inside, gammainc(p + 1, np.maximum(crossing_age, 0.0)), sums[1:])
+        sign = np.where(u[:-1] != 0, np.sign(u[:-1]), np.sign(u[1:]))
+        total = sign @ (sums[:-1] - middle) + np.sign(u[1:]) @ (middle - sums[1:])
         first = (path / eps) ** p * np.exp(-path / eps) / gamma(p + 1) * np.sign(q)
         return self.limit * (total + first)
 
@@ -421,18 +421,18 @@ class Report(Law):
         """Return 0; slip is not distinguished in this law."""
         return 0.0
 
-    def turned(self, k, s, v, accel):
+    def apply_event(self, k, s, v, accel):
         """Store a reversal and drop those that are too old to matter."""
         turns = [*self.turns, (float(s[1]), float(s[0]))]
-        old = s[1] - 60 * self.keys["bond_length"]
+        oldest_path = s[1] - 60 * self.keys["bond_length"]
         self.turns, self.mode = (
-            [a for a, b in pairwise(turns) if b[0] > old] + turns[-1:],
+            [a for a, b in pairwise(turns) if b[0] > oldest_path] + turns[-1:],
             -self.mode,
         )
         return s
 
 
-class Coulomb(Law):
+class CoulombLaw(Law):
     """|F| <= static while sticking; the kinetic force against the velocity while slipping."""
 
     size = 0
@@ -444,7 +444,7 @@ class Coulomb(Law):
         self.kinetic = limit * keys.get("kinetic", keys["static"]) / keys["static"]
         self.mode = 0
 
-    def begin(self, v, accel):
+    def set_initial_mode(self, v, accel):
         """Begin in the direction of the velocity, or stuck."""
         self.mode = int(np.sign(v))
 
@@ -458,15 +458,15 @@ class Coulomb(Law):
 
 
 LAWS = {
-    "coulomb": Coulomb,
-    "weakening": Coulomb,
-    "convolution": Coulomb,
-    "elastic-plastic": Plastic,
-    "iwan": Iwan,
-    "tanh": Tanh,
-    "bouc-wen": BoucWen,
-    "lugre": LuGre,
-    "stretch": Stretch,
-    "growing": Stretch,
-    "report": Report,
+    "coulomb": CoulombLaw,
+    "weakening": CoulombLaw,
+    "convolution": CoulombLaw,
+    "elastic-plastic": ElasticPlasticLaw,
+    "iwan": IwanLaw,
+    "tanh": TanhLaw,
+    "bouc-wen": BoucWenLaw,
+    "lugre": LuGreLaw,
+    "stretch": StretchLaw,
+    "growing": StretchLaw,
+    "report": ReportLaw,
 }

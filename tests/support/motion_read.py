@@ -25,13 +25,13 @@ class Window:
         for one in stretches:
             if one.times[-1] <= begin or one.times[-1] <= one.times[0]:
                 continue
-            self.restore(one)
+            self.restore_laws(one)
             inside = borders[(borders > one.times[0]) & (borders < one.times[-1])]
             cuts = np.unique(np.concatenate([np.clip(one.times, begin, end), inside]))
             for low, high in pairwise(cuts):
                 t = (low + high) / 2 + (high - low) / 2 * np.concatenate([[-1.0], NODES, [1.0]])
                 w = (high - low) / 2 * np.concatenate([[0.0], WEIGHTS, [0.0]])
-                self._take(columns, one, t, w)
+                self._append_values(columns, one, t, w)
         self.t, self.w, self.y = (np.concatenate(columns[name]) for name in ("t", "w", "y"))
         self.f, self.split, self.back, self.a = (
             np.concatenate(columns[name]) for name in ("f", "split", "back", "a")
@@ -42,23 +42,23 @@ class Window:
         self.q, self.v = self.y[:, :n] @ faces.T, self.y[:, n : 2 * n] @ faces.T
         self.out = self.y[:, :n] @ motion.plant.output
 
-    def restore(self, one) -> None:
+    def restore_laws(self, piece) -> None:
         """Set the laws to the modes and reversals of a smooth piece."""
         for k, law in enumerate(self.motion.laws):
-            law.mode, law.side = one.modes[k]
-            if one.turns:
-                law.turns = one.turns[k]
+            law.mode, law.side = piece.modes[k]
+            if piece.turns:
+                law.turns = piece.turns[k]
 
-    def _take(self, columns, one, t, w) -> None:
+    def _append_values(self, columns, piece, t, w) -> None:
         """Append the values at times t with weights w of a smooth piece."""
         m = self.motion
-        Y = one.solution(t).T
-        self.parts.append((one, t))
+        Y = piece.solution(t).T
+        self.parts.append((piece, t))
         rates = Y[:, m.n : 2 * m.n] @ m.plant.faces.T
         columns["t"].append(t)
         columns["w"].append(w)
         columns["y"].append(Y)
-        columns["f"].append(np.array([m.forces(a, y) for a, y in zip(t, Y)]))
+        columns["f"].append(np.array([m.friction_forces(a, y) for a, y in zip(t, Y)]))
         columns["a"].append(np.array([self.acceleration(a, y) for a, y in zip(t, Y)]))
         columns["split"].append(
             np.array(
@@ -76,27 +76,29 @@ class Window:
     def acceleration(self, t, y) -> float:
         """Return the absolute acceleration of the output [m s-2]."""
         m = self.motion
-        own = m.plant.output @ m.slope(t, y)[m.n : 2 * m.n]
+        own = m.plant.output @ m.derivative(t, y)[m.n : 2 * m.n]
         return own + m.drive(t) if m.moving else own
 
-    def top(self, values, of, where=None) -> float:
+    def find_maximum(self, values, function, mask=None) -> float:
         """Return the maximum over the window, refined in the steps in which it lies.
 
         Parameters
         ----------
         values : array
             Values at the nodes.
-        of : callable
+        function : callable
             of(t, y) -> value.
-        where : array of bool, optional
+        mask : array of bool, optional
             Nodes that count; by default all. A step lies completely inside or outside.
         """
-        values = values if where is None else np.where(where, values, -np.inf)
+        values = values if mask is None else np.where(mask, values, -np.inf)
         each = NODES.size + 2
-        best = float(values.max())
-        beside = np.concatenate([[-np.inf], values, [-np.inf]])
+        maximum = float(values.max())
+        padded = np.concatenate([[-np.inf], values, [-np.inf]])
         peaks = np.flatnonzero(
-            (values >= beside[:-2]) & (values >= beside[2:]) & (values >= best - NEAR * abs(best))
+            (values >= padded[:-2])
+            & (values >= padded[2:])
+            & (values >= maximum - NEAR * abs(maximum))
         )
         for k in peaks[np.argsort(-values[peaks])[:MOST]]:
             for part in {
@@ -104,22 +106,22 @@ class Window:
                 min((k + 1) // each, len(self.parts) - 1),
                 max((k - 1) // each, 0),
             }:
-                one, t = self.parts[part]
-                if where is not None and not where[part * each + 1 : part * each + each - 1].all():
+                piece, t = self.parts[part]
+                if mask is not None and not mask[part * each + 1 : part * each + each - 1].all():
                     continue  # The next cycle begins in this step and may have a larger maximum.
                 inside = min(max(k - part * each, 0), each - 1)
-                self.restore(one)
-                found = minimize_scalar(
-                    lambda x, one=one: -of(x, one.solution(x)),
+                self.restore_laws(piece)
+                optimum = minimize_scalar(
+                    lambda x, one=piece: -function(x, one.solution(x)),
                     method="bounded",
                     bounds=(t[max(inside - 1, 0)], t[min(inside + 1, each - 1)]),
                     options={"xatol": 1e-7 * (t[-1] - t[0])},
                 )
-                best = max(best, float(-found.fun))
-        return best
+                maximum = max(maximum, float(-optimum.fun))
+        return maximum
 
 
-def measures(motion: Motion, stretches, period: float, cycles: float, window: int) -> dict:
+def compute_measures(motion: Motion, stretches, period: float, cycles: float, window: int) -> dict:
     """Return the measures over the last `window` cycles; those of a second interface end in _2.
 
     Parameters
@@ -139,22 +141,24 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     w = Window(motion, stretches, end - window * period, end, window)
     n = motion.n
     out = {}
-    high = w.top(w.out, lambda t, y: p.output @ y[:n])
-    low = w.top(-w.out, lambda t, y: -p.output @ y[:n])
-    last = _last_cycle(w, motion, period) if s["drive"] == "free" else None
+    high = w.find_maximum(w.out, lambda t, y: p.output @ y[:n])
+    low = w.find_maximum(-w.out, lambda t, y: -p.output @ y[:n])
+    last = _last_cycle_amplitude(w, motion, period) if s["drive"] == "free" else None
     out["relative_displacement_amplitude"] = (high + low) / 2 if last is None else last
-    out["absolute_acceleration_peak"] = w.top(np.abs(w.a), lambda t, y: abs(w.acceleration(t, y)))
+    out["absolute_acceleration_peak"] = w.find_maximum(
+        np.abs(w.a), lambda t, y: abs(w.acceleration(t, y))
+    )
     sine = s["drive"] in ("sine", "force", "levels")
     for k, law in enumerate(motion.laws):
-        tail = f"_{k + 1}" if k else ""
-        out[f"friction_force_peak{tail}"] = w.top(
-            np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.forces(t, y)[k])
+        suffix = f"_{k + 1}" if k else ""
+        out[f"friction_force_peak{suffix}"] = w.find_maximum(
+            np.abs(w.f[:, k]), lambda t, y, k=k: abs(motion.friction_forces(t, y)[k])
         )
         slip = w.q[:, k] - w.back[:, k]
         part = motion.parts[k]
         face = p.faces[k]
-        ends = [
-            w.top(
+        extremes = [
+            w.find_maximum(
                 sign * slip,
                 lambda t, y, law=law, part=part, face=face, sign=sign: (
                     sign * (face @ y[:n] - law.reversible(y[part]))
@@ -163,11 +167,11 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
             for sign in (1, -1)
         ]
         if law.splits:
-            out[f"slip_amplitude{tail}"] = sum(ends) / 2
-        out[f"loop_area{tail}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
+            out[f"slip_amplitude{suffix}"] = sum(extremes) / 2
+        out[f"loop_area{suffix}"] = float(np.sum(w.w * w.f[:, k] * w.v[:, k])) / window
         if not law.splits:
             continue
-        out[f"stick_fraction{tail}"], starts = _stuck(w, law, k)
+        out[f"stick_fraction{suffix}"], starts = _stick_fraction(w, law, k)
         if k == 0 and sine and starts.size:
             out["slip_start_phase"] = float(
                 np.angle(np.mean(np.exp(2j * 2 * np.pi / period * starts))) / 2 % np.pi
@@ -180,13 +184,13 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
         out["drift_per_cycle"] = (means[1] - means[0]) / (window - 1)
     else:
         out["drift_per_cycle"] = w.q[-1, 0] - w.q[0, 0]
-    out |= works(motion, stretches, 0.0, end)
+    out |= compute_works(motion, stretches, 0.0, end)
     if sine:
-        out |= _periodic(w, motion, period, window)
+        out |= _harmonic_measures(w, motion, period, window)
     return out
 
 
-def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
+def _last_cycle_amplitude(w: Window, motion: Motion, period: float) -> float | None:
     """Return half the peak-to-peak output of the last whole cycle; None if there is none.
 
     Seen from the end, a position is a reversal if the output has returned from it by more than a
@@ -195,51 +199,58 @@ def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
     n = motion.n
     row = motion.plant.output
     each = NODES.size + 2
-    places = []
+    extremes = []
     rate = w.y[:, n : 2 * n] @ row
-    way = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
-    for a, b in pairwise(np.flatnonzero(way)):
-        if way[a] == way[b]:
+    direction = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
+    for a, b in pairwise(np.flatnonzero(direction)):
+        if direction[a] == direction[b]:
             continue
-        one, t = w.parts[a // each]
+        piece, t = w.parts[a // each]
         if b == a + 1 and b % each:
-            w.restore(one)
-            at = brentq(
-                lambda x, one=one: row @ one.solution(x)[n : 2 * n],
+            w.restore_laws(piece)
+            zero = brentq(
+                lambda x, one=piece: row @ one.solution(x)[n : 2 * n],
                 t[a % each],
                 t[b % each],
                 xtol=1e-16,
             )
-            places.append(float(row @ one.solution(at)[:n]))
+            extremes.append(float(row @ piece.solution(zero)[:n]))
         else:  # The reversal coincides with an event.
-            places.append(float(w.out[a : b + 1][np.argmin(np.abs(rate[a : b + 1]))]))
-    least = 0.25 * np.ptp(w.out[w.t >= w.end - period])
-    back = [float(w.out[-1]), *places[::-1]]
-    if not least > 0:
-        return least
-    top = next((k for k, one in enumerate(back) if abs(one - back[0]) > least), len(back))
-    turns = []
-    while top < len(back) and len(turns) < 3:
-        side = np.sign(back[top] - (turns[-1] if turns else back[0]))
-        for k in range(top, len(back)):
-            top = k if side * (back[k] - back[top]) > 0 else top
-            if side * (back[top] - back[k]) > least:
-                turns.append(back[top])
-                top = k
+            extremes.append(float(w.out[a : b + 1][np.argmin(np.abs(rate[a : b + 1]))]))
+    min_range = 0.25 * np.ptp(w.out[w.t >= w.end - period])
+    positions = [float(w.out[-1]), *extremes[::-1]]
+    if not min_range > 0:
+        return min_range
+    extreme = next(
+        (k for k, piece in enumerate(positions) if abs(piece - positions[0]) > min_range),
+        len(positions),
+    )
+    reversals = []
+    while extreme < len(positions) and len(reversals) < 3:
+        side = np.sign(positions[extreme] - (reversals[-1] if reversals else positions[0]))
+        for k in range(extreme, len(positions)):
+            extreme = k if side * (positions[k] - positions[extreme]) > 0 else extreme
+            if side * (positions[extreme] - positions[k]) > min_range:
+                reversals.append(positions[extreme])
+                extreme = k
                 break
         else:
             break
-    return None if len(turns) < 3 else max(abs(turns[0] - turns[1]), abs(turns[1] - turns[2])) / 2
+    return (
+        None
+        if len(reversals) < 3
+        else max(abs(reversals[0] - reversals[1]), abs(reversals[1] - reversals[2])) / 2
+    )
 
 
-def works(motion: Motion, stretches, begin: float, end: float) -> dict:
+def compute_works(motion: Motion, stretches, begin: float, end: float) -> dict:
     """Return the work of a single interface between two times [s], and the dissipated part.
 
     The latter is left out if the law has no stored energy.
     """
     if len(motion.laws) > 1:
         return {}
-    law, (first, last) = motion.laws[0], (at(stretches, t) for t in (begin, end))
+    law, (first, last) = motion.laws[0], (evaluate_state(stretches, t) for t in (begin, end))
     out = {"friction_work": float(last[-1] - first[-1])}
     if law.set_valued or motion.s["law"] == "tanh":
         return out | {"energy_dissipated": out["friction_work"]}
@@ -251,54 +262,54 @@ def works(motion: Motion, stretches, begin: float, end: float) -> dict:
     )
 
 
-def at(stretches, time: float) -> np.ndarray:
+def evaluate_state(stretches, time: float) -> np.ndarray:
     """Return the state at a time [s]."""
-    one = next((one for one in stretches if one.times[-1] >= time), stretches[-1])
-    return one.solution(max(time, one.times[0]))
+    piece = next((piece for piece in stretches if piece.times[-1] >= time), stretches[-1])
+    return piece.solution(max(time, piece.times[0]))
 
 
-def _stuck(w: Window, law, k: int) -> tuple:
+def _stick_fraction(w: Window, law, k: int) -> tuple:
     """Return the fraction of time in which the interface sticks, and the starts of slip (j,) [s].
 
     It sticks while less than half of the displacement rate is irreversible.
     """
     if law.split_by_mode:
         stuck = w.stuck[:, k]
-        share = float(np.sum(w.w * stuck)) / (w.end - w.begin)
-        return share, w.t[1:][stuck[:-1] & ~stuck[1:]]
+        stick_fraction = float(np.sum(w.w * stuck)) / (w.end - w.begin)
+        return stick_fraction, w.t[1:][stuck[:-1] & ~stuck[1:]]
     if law.size == 0:
         return 0.0, np.empty(0)
     motion = w.motion
     part = w.motion.parts[k]
     face = w.motion.plant.faces[k]
 
-    def above(t, y):
+    def slip_margin(t, y):
         """Return the irreversible fraction of the displacement rate minus one half."""
         v = face @ y[motion.n : 2 * motion.n]
         return abs(law.split(y[part], v, t) / v) - 0.5 if v else -0.5
 
     with np.errstate(divide="ignore", invalid="ignore"):
         values = np.where(w.v[:, k] == 0, -0.5, np.abs(w.split[:, k] / w.v[:, k]) - 0.5)
-    below = 0.0
+    stick_time = 0.0
     starts = []
-    for number, (one, t) in enumerate(w.parts):
+    for number, (piece, t) in enumerate(w.parts):
         row = values[number * t.size : (number + 1) * t.size]
-        w.restore(one)
-        turns = [
-            brentq(lambda x, one=one: above(x, one.solution(x)), t[j], t[j + 1], xtol=1e-16)
+        w.restore_laws(piece)
+        crossings = [
+            brentq(lambda x, one=piece: slip_margin(x, one.solution(x)), t[j], t[j + 1], xtol=1e-16)
             if row[j] and row[j + 1]
             else t[j + (row[j + 1] == 0)]
             for j in np.flatnonzero((row[:-1] < 0) != (row[1:] < 0))
         ]
-        sides = np.array([t[0], *turns, t[-1]])
-        below += float(np.diff(sides)[int(row[0] >= 0) :: 2].sum())
-        starts += turns[int(row[0] >= 0) :: 2]
+        times = np.array([t[0], *crossings, t[-1]])
+        stick_time += float(np.diff(times)[int(row[0] >= 0) :: 2].sum())
+        starts += crossings[int(row[0] >= 0) :: 2]
         if number and values[number * t.size - 1] < 0 <= row[0]:  # The slip starts at an event.
             starts.append(t[0])
-    return below / (w.end - w.begin), np.array(starts)
+    return stick_time / (w.end - w.begin), np.array(starts)
 
 
-def _secant(w: Window, motion: Motion, period: float, window: int) -> float | None:
+def _mean_secant_stiffness(w: Window, motion: Motion, period: float, window: int) -> float | None:
     """Return the mean secant stiffness of the cycles, for laws whose force does not jump.
 
     It is the difference of the forces at the largest and smallest displacement over that of the
@@ -306,16 +317,21 @@ def _secant(w: Window, motion: Motion, period: float, window: int) -> float | No
     """
     out = []
     for c in range(window):
-        mine = np.flatnonzero((w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period))
-        ends = [_turn(w, motion, mine[np.argmax(sign * w.q[mine, 0])]) for sign in (-1, 1)]
-        if None in ends:
+        in_cycle = np.flatnonzero(
+            (w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period)
+        )
+        extremes = [
+            _find_reversal(w, motion, in_cycle[np.argmax(sign * w.q[in_cycle, 0])])
+            for sign in (-1, 1)
+        ]
+        if None in extremes:
             return None
-        low, high = ends
+        low, high = extremes
         out.append((high[1] - low[1]) / (high[0] - low[0]))
     return float(np.mean(out))
 
 
-def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
+def _find_reversal(w: Window, motion: Motion, k: int) -> tuple | None:
     """Return (displacement, force) at a reversal next to node k; None if there is none."""
     each = NODES.size + 2
     face = motion.plant.faces[0]
@@ -324,52 +340,54 @@ def _turn(w: Window, motion: Motion, k: int) -> tuple | None:
     for low in (k - 1, k):
         if low < 0 or low // each != (low + 1) // each or w.v[low, 0] * w.v[low + 1, 0] >= 0:
             continue
-        one, t = w.parts[low // each]
-        w.restore(one)
-        turn = brentq(
-            lambda x, one=one: face @ one.solution(x)[motion.n : 2 * motion.n],
+        piece, t = w.parts[low // each]
+        w.restore_laws(piece)
+        time = brentq(
+            lambda x, one=piece: face @ one.solution(x)[motion.n : 2 * motion.n],
             t[low % each],
             t[low % each + 1],
             xtol=1e-16,
         )
-        y = one.solution(turn)
-        return face @ y[: motion.n], motion.forces(turn, y)[0]
-    rest = 1e-9 * np.abs(w.v[:, 0]).max()  # The event of a reversal lies at a node.
-    return (w.q[k, 0], w.f[k, 0]) if abs(w.v[k, 0]) <= rest else None
+        y = piece.solution(time)
+        return face @ y[: motion.n], motion.friction_forces(time, y)[0]
+    zero_speed = 1e-9 * np.abs(w.v[:, 0]).max()  # The event of a reversal lies at a node.
+    return (w.q[k, 0], w.f[k, 0]) if abs(w.v[k, 0]) <= zero_speed else None
 
 
-def _periodic(w: Window, motion: Motion, period: float, window: int) -> dict:
+def _harmonic_measures(w: Window, motion: Motion, period: float, window: int) -> dict:
     """Return stiffness and damping of the first interface, and the distortion of the acceleration."""
     omega = 2 * np.pi / period
     q = w.q[:, 0]
     f = w.f[:, 0]
 
-    def part(values, order=1):
+    def harmonic(values, order=1):
         """Return the complex amplitude of a harmonic of the drive."""
         return 2 * np.sum(w.w * values * np.exp(-1j * order * omega * w.t)) / (w.end - w.begin)
 
-    first, third = (abs(part(w.a, order)) for order in (1, 3))
+    first, third = (abs(harmonic(w.a, order)) for order in (1, 3))
     out = {
         "absolute_acceleration_fundamental": float(first),
         "acceleration_distortion": float(third / first),
     }
-    first = part(q)
+    first = harmonic(q)
     if np.ptp(q) == 0:
         return out
-    out["equivalent_stiffness"] = float((part(f) / first).real)
+    out["equivalent_stiffness"] = float((harmonic(f) / first).real)
     if not motion.laws[0].set_valued:
-        secant = _secant(w, motion, period, window)
+        secant = _mean_secant_stiffness(w, motion, period, window)
         out |= {} if secant is None else {"secant_stiffness": secant}
     if motion.plant.first > 0:
-        each = []
+        extremes = []
         face = motion.plant.faces[0]
         for c in range(window):
-            mine = (w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period)
-            each += [
-                w.top(sign * q, lambda t, y, sign=sign: sign * (face @ y[: motion.n]), mine)
+            in_cycle = (w.t >= w.begin + c * period) & (w.t <= w.begin + (c + 1) * period)
+            extremes += [
+                w.find_maximum(
+                    sign * q, lambda t, y, sign=sign: sign * (face @ y[: motion.n]), in_cycle
+                )
                 for sign in (1, -1)
             ]
         area = float(np.sum(w.w * f * w.v[:, 0])) / window
-        half = sum(each) / (2 * window)
+        half = sum(extremes) / (2 * window)
         out["equivalent_damping"] = area / (2 * np.pi * motion.plant.first * half**2)
     return out

@@ -34,20 +34,20 @@ class ModalSystem(NamedTuple):
     fastest: float
 
 
-def plant_of(s: dict) -> ModalSystem:
+def make_system(s: dict) -> ModalSystem:
     """Return the modal system of a spec."""
     if s["several"]:
         m = s["masses"]
         K = np.zeros((2, 2))
         C = np.zeros((2, 2))
         for (i, j), k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
-            row = _row(i, j)
+            row = _difference_row(i, j)
             K = K + k * np.outer(row, row)
             C = C + c * np.outer(row, row)
         M = np.diag(m["mass"])
         output = np.array([1.0, 0.0])
-        faces = np.array([_row(*pair) for pair in m["pairs"]])
-        base = -s["mass"] * output if forced(s) else np.array(m["mass"])
+        faces = np.array([_difference_row(*pair) for pair in m["pairs"]])
+        base = -s["mass"] * output if is_driven_by_force(s) else np.array(m["mass"])
         first = 0.0
     else:
         column = {key: np.array([mode[key] for mode in s["modes"]]) for key in s["modes"][0]}
@@ -61,18 +61,18 @@ def plant_of(s: dict) -> ModalSystem:
         b = s.get("bonded", {"stiffness": 0.0, "damping": 0.0})
         K = K + b["stiffness"] * faces.T @ faces
         C = C + b["damping"] * faces.T @ faces
-        base = -mass * output if forced(s) else mass * column["base"]
+        base = -mass * output if is_driven_by_force(s) else mass * column["base"]
         first = mass * (omega[0] / column["slide"][0]) ** 2
     fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
     return ModalSystem(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
 
 
-def forced(s: dict) -> bool:
+def is_driven_by_force(s: dict) -> bool:
     """Return whether a force drives the rig of a spec, rather than its base."""
     return s.get("forced", s["drive"] == "force")
 
 
-def _row(i: int, j: int) -> np.ndarray:
+def _difference_row(i: int, j: int) -> np.ndarray:
     """Return the row of the displacement of mass i relative to mass j; 0 is the base."""
     out = np.zeros(3)
     out[i] += 1
@@ -80,7 +80,7 @@ def _row(i: int, j: int) -> np.ndarray:
     return out[1:]
 
 
-def drive_of(s: dict):
+def make_drive(s: dict):
     """Return the drive of a spec.
 
     Returns
@@ -101,79 +101,81 @@ def drive_of(s: dict):
         return (
             (lambda t: size * np.sin(2 * np.pi * (w["from"] * t + slope * t * t / 2))),
             [],
-            not forced(s),
+            not is_driven_by_force(s),
         )
     if kind == "levels":
         length = s["cycles"] / s["frequency"]
         last = len(s["levels"]) - 1
 
-        def value(t):
+        def acceleration_at(t):
             """Return the base acceleration of a drive with several levels."""
             return s["levels"][min(int(t / length * (1 + 1e-12)), last)] * np.sin(omega * t)
 
-        return value, [length * (k + 1) for k in range(last)], True
+        return acceleration_at, [length * (k + 1) for k in range(last)], True
     if kind == "file":
-        time, value = map(np.array, s["record"])
+        time, acceleration_at = map(np.array, s["record"])
         return (
-            (lambda t: float(np.interp(t, time, value, right=0.0))),
+            (lambda t: float(np.interp(t, time, acceleration_at, right=0.0))),
             time[1:].tolist(),
-            not forced(s),
+            not is_driven_by_force(s),
         )
     return (lambda t: size * np.sin(omega * t)), [], kind != "force"
 
 
-class TooLong(Exception):
+class TooManySteps(Exception):
     """Raised if a motion takes more steps than are permitted."""
 
 
-def stretched(
-    motion, t: float, y, stop: float, guards, tolerances: tuple, most: float = np.inf
+def integrate_to_event(
+    motion, t: float, y, stop: float, guards, tolerances: tuple, max_steps: float = np.inf
 ) -> tuple:
     """Integrate from t [s] to the first event function that decreases through zero, or to `stop` [s].
 
     The event functions are evaluated LOOKS times in every step, on its dense output; a value that
     decreases and increases between two evaluations is not noticed.
     """
-    first, (rtol, atol) = motion.longest(y, motion.slope(t, y)), tolerances
+    first, (rtol, atol) = motion.max_step(y, motion.derivative(t, y)), tolerances
     solver = DOP853(
-        motion.slope, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t)
+        motion.derivative, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t)
     )
     times = [t]
     parts = []
-    before = np.array([guard[2](t, y) for guard in guards])
+    previous = np.array([guard[2](t, y) for guard in guards])
     while solver.status == "running":
-        solver.max_step = motion.longest(solver.y, solver.f)
+        solver.max_step = motion.max_step(solver.y, solver.f)
         assert solver.step() is None, "the integrator gave up"
         part = solver.dense_output()
         begin = solver.t_old
         parts.append(part)
-        for at in np.linspace(begin, solver.t, LOOKS + 1)[1:]:
-            after = np.array([guard[2](at, part(at)) for guard in guards])
-            fell = np.flatnonzero((before > 0) & (after <= 0) | (before == 0) & (after < 0))
-            if fell.size:
+        for time in np.linspace(begin, solver.t, LOOKS + 1)[1:]:
+            values = np.array([guard[2](time, part(time)) for guard in guards])
+            decreased = np.flatnonzero(
+                (previous > 0) & (values <= 0) | (previous == 0) & (values < 0)
+            )
+            if decreased.size:
                 roots = [
                     brentq(
                         lambda x, g=guards[k][2], y=part: g(x, y(x)),
                         begin,
-                        at,
+                        time,
                         xtol=4e-16,
                         rtol=4e-15,
                     )
-                    if before[k] > 0
+                    if previous[k] > 0
                     else begin
-                    for k in fell
+                    for k in decreased
                 ]
                 hit = max(min(roots), np.nextafter(times[-1], np.inf))
-                return OdeSolution([*times, hit], parts), guards[fell[int(np.argmin(roots))]]
-            before = after
-            begin = at
+                return OdeSolution([*times, hit], parts), guards[decreased[int(np.argmin(roots))]]
+            previous = values
+            begin = time
         times.append(solver.t)
-        if len(times) > most:
-            raise TooLong("steps without end")
+        if len(times) > max_steps:
+            raise TooManySteps("steps without end")
     return OdeSolution(times, parts), None
 
 
-class Stretch(NamedTuple):
+class SmoothPiece(NamedTuple):
     """Smooth piece of a motion between events: modes, reversals, dense solution, times of its steps."""
 
     modes: tuple
@@ -190,9 +192,9 @@ class Motion:
 
     def __init__(self, s: dict, share: float = 0.04):
         self.s = s
-        self.plant = plant_of(s)
+        self.plant = make_system(s)
         self.share = share
-        self.drive, self.breaks, self.moving = drive_of(s)
+        self.drive, self.breaks, self.moving = make_drive(s)
         loads = s["masses"]["loads"] if s["several"] else [s["load"]]
         self.laws = [LAWS[s["law"]](s["keys"]["static"] * load, **s["keys"]) for load in loads]
         self.n = self.plant.M.shape[0]
@@ -212,7 +214,7 @@ class Motion:
                 y[part] = law.start()
         return y
 
-    def pull(self, t, y):
+    def force_without_friction(self, t, y):
         """Return the modal forces without friction."""
         p = self.plant
         x = y[: self.n]
@@ -220,9 +222,11 @@ class Motion:
         out = -p.K @ x - p.C @ v - p.base * self.drive(t)
         return out - p.cubic * (p.output @ x) ** 3 * p.output if p.cubic else out
 
-    def forces(self, t, y, pull=None):
+    def friction_forces(self, t, y, force_without=None):
         """Return the friction forces of all interfaces [N]."""
-        pull = self.pull(t, y) if pull is None else pull
+        force_without = (
+            self.force_without_friction(t, y) if force_without is None else force_without
+        )
         rates = self.plant.faces @ y[self.n : 2 * self.n]
         if not self.laws[0].set_valued:
             return np.array(
@@ -232,15 +236,17 @@ class Motion:
         stuck = [k for k, law in enumerate(self.laws) if not law.mode]
         if stuck:
             rows = self.plant.faces[stuck]
-            rest = pull - self.plant.faces.T @ out
-            out[stuck] = np.linalg.solve(rows @ self.inverse @ rows.T, rows @ self.inverse @ rest)
+            unbalanced = force_without - self.plant.faces.T @ out
+            out[stuck] = np.linalg.solve(
+                rows @ self.inverse @ rows.T, rows @ self.inverse @ unbalanced
+            )
         return out
 
-    def slope(self, t, y):
+    def derivative(self, t, y):
         """Return the time derivative of the state."""
-        pull = self.pull(t, y)
+        pull = self.force_without_friction(t, y)
         v = y[self.n : 2 * self.n]
-        force = self.forces(t, y, pull)
+        force = self.friction_forces(t, y, pull)
         rates = self.plant.faces @ v
         out = np.empty_like(y)
         out[: self.n] = v
@@ -250,9 +256,9 @@ class Motion:
         out[-1] = force @ rates
         return out
 
-    def accelerations(self, t, y):
+    def interface_accelerations(self, t, y):
         """Return the relative accelerations at the interfaces."""
-        return self.plant.faces @ self.slope(t, y)[self.n : 2 * self.n]
+        return self.plant.faces @ self.derivative(t, y)[self.n : 2 * self.n]
 
     def guards(self) -> list:
         """Return the event functions of the present modes.
@@ -270,7 +276,7 @@ class Motion:
                             k,
                             side,
                             lambda t, y, k=k, side=side, law=law: (
-                                law.limit - side * self.forces(t, y)[k]
+                                law.limit - side * self.friction_forces(t, y)[k]
                             ),
                         )
                     )
@@ -296,7 +302,7 @@ class Motion:
                     )
         return out
 
-    def choose(self, t, y, active) -> None:
+    def choose_modes(self, t, y, active) -> None:
         """Choose the modes of the set-valued interfaces in `active`, none of which slides.
 
         It is the first consistent choice.
@@ -306,8 +312,8 @@ class Motion:
         ):
             for k, mode in zip(active, option):
                 self.laws[k].mode = mode
-            force = self.forces(t, y)
-            accel = self.accelerations(t, y)
+            force = self.friction_forces(t, y)
+            accel = self.interface_accelerations(t, y)
             scale = max(law.limit for law in self.laws) * 1e-9
             if all(
                 abs(force[k]) <= self.laws[k].limit + scale
@@ -318,7 +324,7 @@ class Motion:
                 return
         raise AssertionError("no choice")
 
-    def longest(self, y, slope) -> float:
+    def max_step(self, y, slope) -> float:
         """Return the longest step [s] of the integrator from a state y with its derivative.
 
         It is a fraction of the shortest period. The displacement, or the change of the velocity, is
@@ -328,19 +334,27 @@ class Motion:
         out = self.share / max(self.plant.fastest, self.s["frequency"])
         n = self.n
         speed = np.abs(self.plant.faces @ y[n : 2 * n]).max()
-        gain = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
+        acceleration = np.abs(self.plant.faces @ slope[n : 2 * n]).max() + 1e-300
         if self.s["law"] in ("stretch", "growing", "bouc-wen", "lugre", "report"):
             # Limit of the displacement |v| h + |a| h^2/2 in a step.
-            way = 30 * self.share * min(law.scale() for law in self.laws)
-            out = min(out, 2 * way / (speed + np.sqrt(speed**2 + 2 * gain * way)))
+            max_displacement = 30 * self.share * min(law.scale() for law in self.laws)
+            out = min(
+                out,
+                2
+                * max_displacement
+                / (speed + np.sqrt(speed**2 + 2 * acceleration * max_displacement)),
+            )
         if self.s["law"] in ("tanh", "lugre"):
-            unit = self.s["keys"][
+            reference_speed = self.s["keys"][
                 "reference_speed" if self.s["law"] == "tanh" else "stribeck_speed"
             ]
-            out = min(out, max(speed - 5 * unit, 12 * self.share * unit) / gain)
+            out = min(
+                out,
+                max(speed - 5 * reference_speed, 12 * self.share * reference_speed) / acceleration,
+            )
         return out
 
-    def run(self, end: float, rtol: float, start=None, most: float = np.inf) -> list:
+    def run(self, end: float, rtol: float, start=None, max_steps: float = np.inf) -> list:
         """Return the smooth pieces of the motion from 0 to `end` [s].
 
         Parameters
@@ -350,12 +364,12 @@ class Motion:
             Relative error of a step.
         start : array, optional
             Initial state; by default that of the scene.
-        most : float
+        max_steps : float
             Number of steps above which TooLong is raised.
         """
         t = 0.0
         y = self.start() if start is None else np.append(start, 0.0)
-        out = []
+        pieces = []
         n = self.n
         stops = [b for b in self.breaks if 0 < b < end * (1 - 1e-12)] + [end]
         reach = self.s["size"] / self.s["seeded"] ** 2
@@ -366,53 +380,59 @@ class Motion:
         atol[-1] = rtol * 1e-2 * reach * self.laws[0].limit
         rates = self.plant.faces @ y[n : 2 * n]
         for law, v, a in zip(self.laws, rates, np.zeros(len(self.laws))):
-            law.begin(v, a)
+            law.set_initial_mode(v, a)
         if not self.laws[0].set_valued:
-            for law, v, a in zip(self.laws, rates, self.accelerations(t, y)):
-                law.begin(v, a)
+            for law, v, a in zip(self.laws, rates, self.interface_accelerations(t, y)):
+                law.set_initial_mode(v, a)
             for law, part in zip(self.laws, self.parts):
-                law.resume(y[part])
+                law.set_initial_side(y[part])
         else:
-            self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
-        same = count = 0
+            self.choose_modes(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
+        n_short_pieces = count = 0
         for stop in stops:
             while t < stop:
                 guards = self.guards()
                 modes = tuple((law.mode, law.side) for law in self.laws)
                 state = [list(law.turns) for law in self.laws if hasattr(law, "turns")]
-                done, hit = stretched(self, t, y, stop, guards, (rtol, atol), most - count)
-                out.append(Stretch(modes, state, done, done.ts))
-                count += done.ts.size
-                if count > most:
-                    raise TooLong
-                same = same + 1 if done.t_max - t < 1e-9 / self.s["frequency"] else 0
+                solution, hit = integrate_to_event(
+                    self, t, y, stop, guards, (rtol, atol), max_steps - count
+                )
+                pieces.append(SmoothPiece(modes, state, solution, solution.ts))
+                count += solution.ts.size
+                if count > max_steps:
+                    raise TooManySteps
+                n_short_pieces = (
+                    n_short_pieces + 1 if solution.t_max - t < 1e-9 / self.s["frequency"] else 0
+                )
                 # Such a motion would stick: the printed law of order 0 that starts from rest.
-                if same >= 50:
-                    raise TooLong("events without end")
-                t = float(done.t_max)
-                y = done(t)
+                if n_short_pieces >= 50:
+                    raise TooManySteps("events without end")
+                t = float(solution.t_max)
+                y = solution(t)
                 if hit is not None:
-                    self.turn(t, y, *hit[:2])
+                    self.apply_event(t, y, *hit[:2])
                 elif self.laws[0].set_valued and t < end:
-                    self.choose(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
-        return out
+                    self.choose_modes(t, y, [k for k, law in enumerate(self.laws) if law.mode == 0])
+        return pieces
 
-    def turn(self, t, y, k: int, g: int) -> None:
+    def apply_event(self, t, y, k: int, g: int) -> None:
         """Apply event g of interface k to the modes and the state."""
         law = self.laws[k]
         n = self.n
         face = self.plant.faces[k]
         if law.set_valued and law.mode == 0:
             law.mode = g
-            others = [j for j, one in enumerate(self.laws) if one.mode == 0 and j != k]
+            others = [j for j, other_law in enumerate(self.laws) if other_law.mode == 0 and j != k]
             if others:
-                self.choose(t, y, others)
+                self.choose_modes(t, y, others)
             return
         v = y[n : 2 * n]
         if law.set_valued:
             v -= self.inverse @ face * (face @ v) / (face @ self.inverse @ face)
             law.mode = 0
-            self.choose(t, y, [j for j, one in enumerate(self.laws) if one.mode == 0])
+            self.choose_modes(
+                t, y, [j for j, other_law in enumerate(self.laws) if other_law.mode == 0]
+            )
             return
-        accel = self.accelerations(t, y)[k]
-        y[self.parts[k]] = law.turned(g, y[self.parts[k]], face @ v, accel)
+        accel = self.interface_accelerations(t, y)[k]
+        y[self.parts[k]] = law.apply_event(g, y[self.parts[k]], face @ v, accel)

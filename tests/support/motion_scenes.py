@@ -1,7 +1,7 @@
 """Random scenes of rigs, with every law, drive and structure, for program and reference.
 
-`spec(seed)` draws the numbers, `text(spec)` writes the scene, and `record(spec)` is the table of a
-drive from a file. `held_out(count)` gives rigs for each of the methods, with seeds to which no
+`draw_spec(seed)` draws the numbers, `format_scene(spec)` writes the scene, and `format_record(spec)` is the table of a
+drive from a file. `draw_unseen_specs(count)` gives rigs for each of the methods, with seeds to which no
 number of the program was fitted.
 """
 
@@ -48,14 +48,14 @@ def draw_log_uniform(r, low: float, high: float) -> float:
     return float(np.exp(r.uniform(np.log(low), np.log(high))))
 
 
-def spec(seed: int) -> dict:
+def draw_spec(seed: int) -> dict:
     """Return the numbers of the random scene of a seed by name, in SI units."""
     r = np.random.default_rng(seed)
     law = str(r.choice(LAWS))
     drive = str(r.choice(DRIVES))
-    own = draw_log_uniform(r, 20, 400)
+    natural_frequency = draw_log_uniform(r, 20, 400)
     mass = draw_log_uniform(r, 0.2, 2)
-    omega = 2 * np.pi * own
+    omega = 2 * np.pi * natural_frequency
     size = draw_log_uniform(r, 5, 80)
     out = {
         "seed": seed,
@@ -63,19 +63,19 @@ def spec(seed: int) -> dict:
         "drive": drive,
         "mass": mass,
         "size": size,
-        "frequency": own * float(r.choice([1.0, r.uniform(0.5, 1.6)])),
+        "frequency": natural_frequency * float(r.choice([1.0, r.uniform(0.5, 1.6)])),
         "tolerance": float(r.choice([1e-3, 1e-2])),
         "cycles": int(r.choice([12, 20, 40])),
         "seeded": omega,
     }
-    out["modes"] = _modes(r, own)
+    out["modes"] = _draw_modes(r, natural_frequency)
     base = out["modes"][0]["base"]
     out["load"] = mass * size * base / 0.3 * draw_log_uniform(r, 0.15, 1.1)
     reach = size * base / omega**2
     out |= draw_law_keys(r, law, out["load"], reach, reach * omega)
-    _structure(r, out, omega)
-    _drive(r, out, own, reach)
-    _contact(r, out)
+    _draw_structure(r, out, omega)
+    _draw_drive(r, out, natural_frequency, reach)
+    _draw_contact(r, out)
     if (
         drive in ("sine", "force", "free", "step")
         and law in ("coulomb", "weakening")
@@ -104,7 +104,7 @@ METHODS = {
 }
 
 
-def held_out(count: int) -> list:
+def draw_unseen_specs(count: int) -> list:
     """Return specs of `count` rigs with 1 to 4 modes, for each method in turn.
 
     The march and harmonic balance are named in the scene; otherwise the program chooses the method.
@@ -113,13 +113,13 @@ def held_out(count: int) -> list:
     out = []
     for k in range(count):
         method = tuple(METHODS)[k % len(METHODS)]
-        out.append(next(s for s in map(spec, seeds) if fits(s, method)))
+        out.append(next(s for s in map(draw_spec, seeds) if suits_method(s, method)))
         out[-1].pop("method", None)
         out[-1] |= {"method": method} if method in ("march", "harmonic") else {}
     return out
 
 
-def fits(s: dict, method: str) -> bool:
+def suits_method(s: dict, method: str) -> bool:
     """Return whether a method can compute a spec, and is chosen or can be named for it."""
     if s["law"] not in METHODS[method]:
         return False
@@ -137,17 +137,17 @@ def fits(s: dict, method: str) -> bool:
     )
 
 
-def _modes(r, own: float) -> list:
-    """Draw the modes of a rig whose first natural frequency is `own` [Hz]."""
+def _draw_modes(r, frequency: float) -> list:
+    """Draw the modes of a rig whose first natural frequency is `frequency` [Hz]."""
     count = int(r.choice([1, 1, 2, 3, 4]))
     out = []
-    left = 1.0
+    base_remainder = 1.0
     for k in range(count):
         base = float(r.uniform(0.65, 0.9) if k == 0 else r.uniform(-0.25, 0.25))
-        left -= base**2
+        base_remainder -= base**2
         out.append(
             {
-                "frequency": own if k == 0 else own * draw_log_uniform(r, 0.4, 4),
+                "frequency": frequency if k == 0 else frequency * draw_log_uniform(r, 0.4, 4),
                 "base": base,
                 "damping": float(
                     r.choice([0.003, 0.01, 0.05, 0.2] + [0.0] * (k == 0 and count == 1))
@@ -200,7 +200,7 @@ def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
     return {"keys": out}
 
 
-def _structure(r, out: dict, omega: float) -> None:
+def _draw_structure(r, out: dict, omega: float) -> None:
     """Draw the structure: modes with one interface, or two masses with an interface each.
 
     There may be a spring in parallel with the interface, linear or nonlinear.
@@ -227,26 +227,26 @@ def _structure(r, out: dict, omega: float) -> None:
         )
 
 
-def _drive(r, out: dict, own: float, reach: float) -> None:
+def _draw_drive(r, out: dict, frequency: float, reach: float) -> None:
     """Draw the details of the drive."""
     kind = out["drive"]
     if out["several"] and kind in ("levels",):
         kind = out["drive"] = "sine"
     if kind == "sweep":
-        low = own * r.uniform(0.6, 0.9)
-        high = own * r.uniform(1.1, 1.5)
+        low = frequency * r.uniform(0.6, 0.9)
+        high = frequency * r.uniform(1.1, 1.5)
         ends = (low, high) if r.random() < 0.5 else (high, low)
         out["sweep"] = {
             "from": float(ends[0]),
             "to": float(ends[1]),
-            "rate": float((high - low) * own / 30),
+            "rate": float((high - low) * frequency / 30),
         }
     elif kind == "levels":
         out["levels"] = [out["size"] * part for part in (0.4, 0.7, 1.0)]
         out["cycles"] = int(r.choice([8, 15]))
     elif kind == "file":
-        time = np.arange(0, 12 / own, 1 / (16 * own))
-        parts = [(r.uniform(0.3, 2) * own, r.uniform(0, 6), r.normal()) for _ in range(4)]
+        time = np.arange(0, 12 / frequency, 1 / (16 * frequency))
+        parts = [(r.uniform(0.3, 2) * frequency, r.uniform(0, 6), r.normal()) for _ in range(4)]
         value = sum(a * np.sin(2 * np.pi * f * time + p) for f, p, a in parts)
         out["record"] = [time.tolist(), (out["size"] * value / np.abs(value).max()).tolist()]
     elif kind == "free":
@@ -257,7 +257,7 @@ def _drive(r, out: dict, own: float, reach: float) -> None:
         ]
 
 
-def _contact(r, out: dict) -> None:
+def _draw_contact(r, out: dict) -> None:
     """Draw the contact: a point with constant or varying load, or a patch.
 
     A patch may be elastic in shear, and tilted.
@@ -281,12 +281,12 @@ def _contact(r, out: dict) -> None:
         }
 
 
-def table(name: str, values: dict) -> str:
+def format_table(name: str, values: dict) -> str:
     """Return a table of a scene as text."""
     return f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
 
 
-def quantity(value: float, unit: str) -> str:
+def format_quantity(value: float, unit: str) -> str:
     """Return a quantity as text of a scene."""
     return f'"{float(value)!r} {unit}"'
 
@@ -311,188 +311,196 @@ NAMES = {
 }
 
 
-def write_law_keys(s: dict) -> dict:
+def format_law_keys(s: dict) -> dict:
     """Return the keys of the law as text values of a scene."""
     name = NAMES.get(s["law"], s["law"])
     out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
     return out | {
-        k: quantity(v, UNITS[k]) if k in UNITS else repr(float(v)) for k, v in s["keys"].items()
+        k: format_quantity(v, UNITS[k]) if k in UNITS else repr(float(v))
+        for k, v in s["keys"].items()
     }
 
 
-def text(s: dict, signal: str = "signal.csv") -> str:
+def format_scene(s: dict, signal: str = "signal.csv") -> str:
     """Return the scene of a spec as text; signal: name of the file of a recorded drive."""
     if s["several"]:
-        return _masses(s) + _driven(s, signal) + _accuracy(s)
+        return _format_masses(s) + _format_drive(s, signal) + _format_accuracy(s)
     parts = []
     if s["patch"] is not None:
         p = s["patch"]
         parts.append(
-            table(
+            format_table(
                 "contact",
                 {
                     "length": '"12.7 mm"',
                     "width": '"12.7 mm"',
                     "height": '"6.35 mm"',
-                    "load": quantity(s["load"], "N"),
+                    "load": format_quantity(s["load"], "N"),
                     "substrate": '"Ti-8Al-1Mo-1V"',
-                    "element_size": quantity(12.7e-3 / p["elements"], "m"),
+                    "element_size": format_quantity(12.7e-3 / p["elements"], "m"),
                 },
             )
         )
         parts += ["[contact.shear]\n"] * p["shear"]
-        parts += [table("contact.tilt", {"angle": quantity(p["tilt"], "rad")})] * (p["tilt"] > 0)
+        parts += [format_table("contact.tilt", {"angle": format_quantity(p["tilt"], "rad")})] * (
+            p["tilt"] > 0
+        )
     else:
         more = (
             {
-                "amplitude": quantity(s["load_amplitude"], "N"),
-                "frequency": quantity(s["load_frequency"], "Hz"),
+                "amplitude": format_quantity(s["load_amplitude"], "N"),
+                "frequency": format_quantity(s["load_frequency"], "Hz"),
             }
             if "load_amplitude" in s
             else {}
         )
-        parts.append(table("normal", {"load": quantity(s["load"], "N")} | more))
+        parts.append(format_table("normal", {"load": format_quantity(s["load"], "N")} | more))
     parts += [
-        table("friction", write_law_keys(s)),
-        table("structure", {"moving_mass": quantity(s["mass"], "kg")}),
+        format_table("friction", format_law_keys(s)),
+        format_table("structure", {"moving_mass": format_quantity(s["mass"], "kg")}),
     ]
     if "bonded" in s:
         parts.append(
-            table(
+            format_table(
                 "structure.bonded",
                 {
-                    "stiffness": quantity(s["bonded"]["stiffness"], "N/m"),
-                    "damping": quantity(s["bonded"]["damping"], "N s/m"),
+                    "stiffness": format_quantity(s["bonded"]["stiffness"], "N/m"),
+                    "damping": format_quantity(s["bonded"]["damping"], "N s/m"),
                 },
             )
         )
     if "cubic" in s:
-        parts.append(table("structure.stiffening", {"cubic": quantity(s["cubic"], "N/m^3")}))
+        parts.append(
+            format_table("structure.stiffening", {"cubic": format_quantity(s["cubic"], "N/m^3")})
+        )
     for k, mode in enumerate(s["modes"]):
         parts.append(
             "["
-            + table(
+            + format_table(
                 "structure.mode",
-                {"name": f'"m{k}"', "frequency": quantity(mode["frequency"], "Hz")}
+                {"name": f'"m{k}"', "frequency": format_quantity(mode["frequency"], "Hz")}
                 | {key: repr(mode[key]) for key in ("damping", "slide", "base", "output")},
             ).replace("]", "]]", 1)
         )
-    return "".join(parts) + _driven(s, signal) + _accuracy(s)
+    return "".join(parts) + _format_drive(s, signal) + _format_accuracy(s)
 
 
-def _masses(s: dict) -> str:
+def _format_masses(s: dict) -> str:
     """Return the structure of two masses as text."""
     m = s["masses"]
     parts = [
-        table(
-            "structure", {"masses": "[" + ", ".join(quantity(one, "kg") for one in m["mass"]) + "]"}
+        format_table(
+            "structure",
+            {"masses": "[" + ", ".join(format_quantity(mass, "kg") for mass in m["mass"]) + "]"},
         )
     ]
     for pair, k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
         parts.append(
             "["
-            + table("structure.spring", {"between": pair, "stiffness": quantity(k, "N/m")}).replace(
-                "]", "]]", 1
-            )
+            + format_table(
+                "structure.spring", {"between": pair, "stiffness": format_quantity(k, "N/m")}
+            ).replace("]", "]]", 1)
         )
         parts.append(
             "["
-            + table(
-                "structure.damper", {"between": pair, "coefficient": quantity(c, "N s/m")}
+            + format_table(
+                "structure.damper", {"between": pair, "coefficient": format_quantity(c, "N s/m")}
             ).replace("]", "]]", 1)
         )
     for pair, load in zip(m["pairs"], m["loads"]):
-        keys = {"between": pair, "load": quantity(load, "N")} | write_law_keys(s)
-        parts.append("[" + table("structure.interface", keys).replace("]", "]]", 1))
+        keys = {"between": pair, "load": format_quantity(load, "N")} | format_law_keys(s)
+        parts.append("[" + format_table("structure.interface", keys).replace("]", "]]", 1))
     return "".join(parts)
 
 
-def _driven(s: dict, signal: str) -> str:
+def _format_drive(s: dict, signal: str) -> str:
     """Return the drive as text."""
     kind = s["drive"]
     size = s["size"]
     out = ""
     force = s["mass"] * size
-    pushed = {"mass": 1} if s["several"] else {}
+    driven_mass = {"mass": 1} if s["several"] else {}
     cycles = {"cycles": s["cycles"]}
     if kind == "free":
-        out = table(
+        out = format_table(
             "structure.start",
-            {"displacement": "[" + ", ".join(quantity(x, "m") for x in s["start"]) + "]"},
+            {"displacement": "[" + ", ".join(format_quantity(x, "m") for x in s["start"]) + "]"},
         )
-        return out + table("drive", {"kind": '"free"'} | cycles)
+        return out + format_table("drive", {"kind": '"free"'} | cycles)
     if kind == "force":
-        return table(
+        return format_table(
             "drive",
             {
                 "kind": '"force"',
-                "frequency": quantity(s["frequency"], "Hz"),
-                "force": quantity(force, "N"),
+                "frequency": format_quantity(s["frequency"], "Hz"),
+                "force": format_quantity(force, "N"),
             }
-            | pushed
+            | driven_mass
             | cycles,
         )
     if kind == "step":
-        return table(
+        return format_table(
             "drive",
-            {"kind": '"base"', "waveform": '"step"', "acceleration": quantity(size, "m/s^2")}
+            {"kind": '"base"', "waveform": '"step"', "acceleration": format_quantity(size, "m/s^2")}
             | cycles,
         )
     if kind == "sweep":
         w = s["sweep"]
-        return table(
+        return format_table(
             "drive",
             {
                 "kind": '"base"',
                 "waveform": '"sweep"',
-                "from": quantity(w["from"], "Hz"),
-                "to": quantity(w["to"], "Hz"),
-                "rate": quantity(w["rate"], "Hz/s"),
-                "acceleration": quantity(size, "m/s^2"),
+                "from": format_quantity(w["from"], "Hz"),
+                "to": format_quantity(w["to"], "Hz"),
+                "rate": format_quantity(w["rate"], "Hz/s"),
+                "acceleration": format_quantity(size, "m/s^2"),
             },
         )
     if kind == "levels":
-        rows = "[" + ", ".join(quantity(one, "m/s^2") for one in s["levels"]) + "]"
-        return table(
+        rows = "[" + ", ".join(format_quantity(level, "m/s^2") for level in s["levels"]) + "]"
+        return format_table(
             "drive",
             {
                 "kind": '"base"',
                 "waveform": '"levels"',
-                "frequency": quantity(s["frequency"], "Hz"),
+                "frequency": format_quantity(s["frequency"], "Hz"),
                 "levels": rows,
             }
             | cycles,
         )
     if kind == "file":
-        return table("drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'})
-    return table(
+        return format_table(
+            "drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'}
+        )
+    return format_table(
         "drive",
         {
             "kind": '"base"',
-            "frequency": quantity(s["frequency"], "Hz"),
-            "acceleration": quantity(size, "m/s^2"),
+            "frequency": format_quantity(s["frequency"], "Hz"),
+            "acceleration": format_quantity(size, "m/s^2"),
         }
         | cycles,
     )
 
 
-def _accuracy(s: dict) -> str:
+def _format_accuracy(s: dict) -> str:
     """Return [accuracy] as text."""
     method = {"method": f'"{s["method"]}"'} if "method" in s else {}
-    return table("accuracy", {"tolerance": s["tolerance"]} | method)
+    return format_table("accuracy", {"tolerance": s["tolerance"]} | method)
 
 
-def record(s: dict) -> str:
+def format_record(s: dict) -> str:
     """Return the table of a recorded drive as text."""
     return "time [s],acceleration [m/s^2]\n" + "".join(
         f"{t!r},{a!r}\n" for t, a in zip(*s["record"])
     )
 
 
-def written(s: dict, folder):
+def write_scene(s: dict, folder):
     """Write the scene of a spec and its recorded drive; return the path of the scene."""
     path = folder / f"scene{s['seed']}.toml"
     if "record" in s:
-        (folder / f"signal{s['seed']}.csv").write_text(record(s), "utf-8")
-    path.write_text(text(s, f"signal{s['seed']}.csv"), "utf-8")
+        (folder / f"signal{s['seed']}.csv").write_text(format_record(s), "utf-8")
+    path.write_text(format_scene(s, f"signal{s['seed']}.csv"), "utf-8")
     return path

@@ -7,14 +7,14 @@ Draw 20 faults in a folder of the package, run the tests on each fault, and comp
     python tests/support/mutations.py run FAULTS.json AFTER --tests tests/contact tests/friction
     python tests/support/mutations.py compare BEFORE AFTER
 
-`draw` chooses lines of code evenly (one fault per line) and leaves out docstrings, messages, type hints, imports and
+`draw_faults` chooses lines of code evenly (one fault per line) and leaves out docstrings, messages, type hints, imports and
 decorators. `run` works on a copy of the checkout, so the checkout may be edited meanwhile and several runs may go on at
 once. It first runs the tests without a fault and records which tests reach which fault. A test that fails or skips
 there is left out. Then it plants one fault at a time and runs the tests that reach it, the quick tests of the folder of
 the same name first, until one fails. A fault that makes the tests hang counts as caught. A second `run` with the same
 folder of results continues an interrupted one; after a change of the tests or the package take a new folder.
 `--root CHECKOUT` tests another checkout of the project, `--jobs 2` runs two processes. Faults whose lines were changed
-since the drawing are reported as gone. `show` lists the outcomes, with the survivors in full.
+since the drawing are reported as gone. `print_outcomes` lists the outcomes, with the survivors in full.
 
 The comparison of whole states of the tests uses 400 faults, drawn once in the package of commit 113e1f10. A fault may
 cost tests that take 60 s without it. The folders `tests/studies` and `tests/torture` are left out. The faults are in
@@ -100,26 +100,26 @@ class Fault(NamedTuple):
 # ---------------------------------------------------------------------------------------------------------------- draw
 
 
-def changed_expressions(node: ast.expr):
+def mutate_expression(node: ast.expr):
     """Yield (kind, changed node) for each fault of one node of an expression."""
     match node:
         case ast.BinOp(left, op, right) if type(op) in SWAPPED_OPERATORS and not (
             is_text(left) or is_text(right)
         ):
-            yield "operator", with_fields(node, op=SWAPPED_OPERATORS[type(op)]())
+            yield "operator", copy_with_fields(node, op=SWAPPED_OPERATORS[type(op)]())
         case ast.UnaryOp(ast.USub() | ast.Not(), operand):
             yield "sign", operand
         case ast.BoolOp(op):
             yield (
                 "boolean",
-                with_fields(node, op=ast.Or() if isinstance(op, ast.And) else ast.And()),
+                copy_with_fields(node, op=ast.Or() if isinstance(op, ast.And) else ast.And()),
             )
         case ast.Compare(ops=ops):
             for place, op in enumerate(ops):
                 for other in SWAPPED_COMPARISONS[type(op)]:
                     yield (
                         "comparison",
-                        with_fields(node, ops=[*ops[:place], other(), *ops[place + 1 :]]),
+                        copy_with_fields(node, ops=[*ops[:place], other(), *ops[place + 1 :]]),
                     )
         case ast.Constant(bool() as value):
             yield "constant", ast.Constant(not value)
@@ -137,7 +137,10 @@ def changed_expressions(node: ast.expr):
             stop = min(1, len(args) - 1)
             for place, step in ((stop, -1), (stop, 1), (0, 1)):
                 shifted = ast.BinOp(args[place], ast.Add(), ast.Constant(step))
-                yield "range", with_fields(node, args=[*args[:place], shifted, *args[place + 1 :]])
+                yield (
+                    "range",
+                    copy_with_fields(node, args=[*args[:place], shifted, *args[place + 1 :]]),
+                )
         case ast.Call(func, args) if len(args) > 1 and not any(
             isinstance(arg, ast.Starred) for arg in args[:2]
         ):
@@ -146,17 +149,23 @@ def changed_expressions(node: ast.expr):
                 "max",
                 "isinstance",
             ):
-                yield "arguments", with_fields(node, args=[args[1], args[0], *args[2:]])
+                yield "arguments", copy_with_fields(node, args=[args[1], args[0], *args[2:]])
         case ast.IfExp(test):
-            yield "condition", with_fields(node, test=ast.UnaryOp(ast.Not(), test))
+            yield "condition", copy_with_fields(node, test=ast.UnaryOp(ast.Not(), test))
     match node:
         case ast.Call(ast.Name(name) as func) if name in SWAPPED_NAMES:
-            yield "minmax", with_fields(node, func=with_fields(func, id=SWAPPED_NAMES[name]))
+            yield (
+                "minmax",
+                copy_with_fields(node, func=copy_with_fields(func, id=SWAPPED_NAMES[name])),
+            )
         case ast.Call(ast.Attribute(_, name) as func) if name in SWAPPED_NAMES:
-            yield "minmax", with_fields(node, func=with_fields(func, attr=SWAPPED_NAMES[name]))
+            yield (
+                "minmax",
+                copy_with_fields(node, func=copy_with_fields(func, attr=SWAPPED_NAMES[name])),
+            )
 
 
-def with_fields(node: ast.AST, **fields):
+def copy_with_fields(node: ast.AST, **fields):
     """Return a copy of a node in which some fields are replaced."""
     other = copy.copy(node)
     for name, value in fields.items():
@@ -171,9 +180,9 @@ def is_text(node: ast.expr) -> bool:
     )
 
 
-def faults_of_statement(node: ast.stmt):
+def mutate_statement(node: ast.stmt):
     """Yield (kind, node, changed node) for each fault of a statement, without the statements inside it."""
-    roots = []
+    expressions = []
     match node:
         case (
             ast.Import()
@@ -189,17 +198,17 @@ def faults_of_statement(node: ast.stmt):
             yield "deletion", node, ast.Pass()
             return
         case ast.FunctionDef(args=args):
-            roots = [*args.defaults, *filter(None, args.kw_defaults)]
+            expressions = [*args.defaults, *filter(None, args.kw_defaults)]
         case ast.If(test) | ast.While(test):
             yield "condition", test, ast.UnaryOp(ast.Not(), test)
-            roots = [test]
+            expressions = [test]
         case ast.AugAssign(target, op, value):
             if type(op) in SWAPPED_OPERATORS and not is_text(value):
-                yield "operator", node, with_fields(node, op=SWAPPED_OPERATORS[type(op)]())
+                yield "operator", node, copy_with_fields(node, op=SWAPPED_OPERATORS[type(op)]())
             yield "deletion", node, ast.Pass()
-            roots = [target, value]
+            expressions = [target, value]
         case ast.AnnAssign(value=value):
-            roots = [value] if value else []
+            expressions = [value] if value else []
         case ast.Break() | ast.Continue():
             yield "deletion", node, ast.Pass()
         case ast.Assign() | ast.Expr() | ast.Return() | ast.Delete() | ast.Assert():
@@ -212,57 +221,59 @@ def faults_of_statement(node: ast.stmt):
                 or (isinstance(node, ast.Return) and node.value)
             ):
                 yield "deletion", node, ast.Pass()
-            roots = [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+            expressions = [
+                child for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)
+            ]
         case ast.For(target, iterable):
-            roots = [target, iterable]
+            expressions = [target, iterable]
         case ast.With(items):
-            roots = [item.context_expr for item in items]
+            expressions = [item.context_expr for item in items]
         case ast.Match(subject):
-            roots = [subject]
-    while roots:
-        expression = roots.pop()
+            expressions = [subject]
+    while expressions:
+        expression = expressions.pop()
         if not isinstance(expression, ast.JoinedStr):
             yield from (
-                (kind, expression, changed) for kind, changed in changed_expressions(expression)
+                (kind, expression, changed) for kind, changed in mutate_expression(expression)
             )
-            roots += operands(expression)
+            expressions += child_expressions(expression)
 
 
-def operands(node: ast.expr):
+def child_expressions(node: ast.expr):
     """Yield the expressions directly inside an expression."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.expr):
             yield child
         elif isinstance(child, (ast.comprehension, ast.keyword)):
-            yield from operands(child)
+            yield from child_expressions(child)
 
 
-def statements(body: list):
+def walk_statements(body: list):
     """Yield the statements of a body and those nested in them, except under `if TYPE_CHECKING`."""
     for node in body:
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             continue
         yield node
         for name in ("body", "orelse", "finalbody"):
-            yield from statements(getattr(node, name, []))
+            yield from walk_statements(getattr(node, name, []))
         for part in [*getattr(node, "handlers", []), *getattr(node, "cases", [])]:
-            yield from statements(part.body)
+            yield from walk_statements(part.body)
 
 
-def faults_of_file(file: str, text: str) -> list[Fault]:
+def list_faults(file: str, text: str) -> list[Fault]:
     """Return all faults of a source file that still compile."""
     lines = text.encode().split(b"\n")
     faults = []
-    for statement in statements(ast.parse(text).body):
-        for kind, node, changed in faults_of_statement(statement):
-            words = ast.unparse(ast.fix_missing_locations(changed))
+    for statement in walk_statements(ast.parse(text).body):
+        for kind, node, changed in mutate_statement(statement):
+            new_text = ast.unparse(ast.fix_missing_locations(changed))
             if isinstance(changed, (ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp)):
-                words = f"({words})"
+                new_text = f"({new_text})"
             first = node.lineno - 1
             last = node.end_lineno
             before = b"\n".join(lines[first:last])
             tail = lines[last - 1][node.end_col_offset :]
-            after = lines[first][: node.col_offset] + words.encode() + tail
+            after = lines[first][: node.col_offset] + new_text.encode() + tail
             faults.append(Fault(file, first + 1, kind, before.decode(), after.decode()))
     return faults
 
@@ -270,12 +281,12 @@ def faults_of_file(file: str, text: str) -> list[Fault]:
 def is_valid(fault: Fault, text: str) -> bool:
     """Return whether the source file with this fault compiles and differs from the original."""
     try:
-        return ast.dump(ast.parse(with_fault(fault, text))) != ast.dump(ast.parse(text))
+        return ast.dump(ast.parse(insert_fault(fault, text))) != ast.dump(ast.parse(text))
     except SyntaxError:
         return False
 
 
-def with_fault(fault: Fault, text: str) -> str | None:
+def insert_fault(fault: Fault, text: str) -> str | None:
     """Return the source text with the fault, at its line or at the nearest equal lines; None if these are gone."""
     lines = text.split("\n")
     before = fault.before.split("\n")
@@ -286,7 +297,7 @@ def with_fault(fault: Fault, text: str) -> str | None:
     return "\n".join([*lines[:place], fault.after, *lines[place + len(before) :]])
 
 
-def draw(root: Path, folders: list[str], seed: int, number: int) -> list[Fault]:
+def draw_faults(root: Path, folders: list[str], seed: int, number: int) -> list[Fault]:
     """Return faults in random order, at most one per line, shared among the folders by their numbers of lines.
 
     Parameters
@@ -307,35 +318,37 @@ def draw(root: Path, folders: list[str], seed: int, number: int) -> list[Fault]:
     ]
     groups = []
     for folder in folders or tops:
-        place = package / folder
+        path_of_folder = package / folder
         by_line = defaultdict(list)
-        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+        for path in (
+            sorted(path_of_folder.rglob("*.py")) if path_of_folder.is_dir() else [path_of_folder]
+        ):
             file = str(path.relative_to(root))
-            for fault in faults_of_file(file, path.read_text("utf-8")):
+            for fault in list_faults(file, path.read_text("utf-8")):
                 by_line[file, fault.line].append(fault)
         groups.append(by_line)
     rng = random.Random(seed)
     chosen = []
-    for by_line, share in zip(
-        groups, shares([len(by_line) for by_line in groups], number), strict=True
+    for by_line, number_in_folder in zip(
+        groups, split_proportionally([len(by_line) for by_line in groups], number), strict=True
     ):
         lines = sorted(by_line)
         rng.shuffle(lines)
-        taken = 0
+        n_chosen = 0
         for line in lines:
-            if taken == share:
+            if n_chosen == number_in_folder:
                 break
             faults = by_line[line]
             kind = rng.choice(sorted({fault.kind for fault in faults}))
             fault = rng.choice([fault for fault in faults if fault.kind == kind])
             if is_valid(fault, (root / fault.file).read_text("utf-8")):
                 chosen.append(fault)
-                taken += 1
+                n_chosen += 1
     rng.shuffle(chosen)
     return chosen
 
 
-def shares(sizes: list[int], number: int) -> list[int]:
+def split_proportionally(sizes: list[int], number: int) -> list[int]:
     """Split a number in proportion to sizes, by the largest remainders."""
     exact = [number * size / max(1, sum(sizes)) for size in sizes]
     parts = [int(share) for share in exact]
@@ -348,7 +361,7 @@ def shares(sizes: list[int], number: int) -> list[int]:
 # --------------------------------------------------------------------------------------------------------------- reach
 
 
-def watched_lines(root: Path, faults: list[Fault]) -> dict:
+def map_lines_to_faults(root: Path, faults: list[Fault]) -> dict:
     """Return {file: {line: [numbers of faults]}}: a test that runs a line may detect these faults.
 
     A fault inside a function has the lines of its statement. A fault outside, which is run at import, has the lines of
@@ -357,28 +370,28 @@ def watched_lines(root: Path, faults: list[Fault]) -> dict:
     """
     watched = defaultdict(lambda: defaultdict(list))
     for number, fault in enumerate(faults):
-        text = text_with_fault(root, fault)
+        text = read_with_fault(root, fault)
         if text is None:
             continue
-        for file, lines in lines_of_fault(root, fault, text).items():
+        for file, lines in find_affected_lines(root, fault, text).items():
             for line in lines:
                 watched[file][line].append(number)
     return watched
 
 
-def text_with_fault(root: Path, fault: Fault) -> str | None:
+def read_with_fault(root: Path, fault: Fault) -> str | None:
     """Return a source file of a checkout with the fault inserted; None if its lines are gone."""
     path = root / fault.file
-    return with_fault(fault, path.read_text("utf-8")) if path.is_file() else None
+    return insert_fault(fault, path.read_text("utf-8")) if path.is_file() else None
 
 
-def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
+def find_affected_lines(root: Path, fault: Fault, text: str) -> dict:
     """Return {file: lines}, the lines whose execution may reveal a fault."""
     old = (root / fault.file).read_text("utf-8")
     line = 1 + next(
         place
-        for place, (one, other) in enumerate(zip(old.split("\n"), text.split("\n")))
-        if one != other
+        for place, (line_before, line_after) in enumerate(zip(old.split("\n"), text.split("\n")))
+        if line_before != line_after
     )
     tree = parse_file(root / fault.file)
     stem = Path(fault.file).stem
@@ -386,16 +399,16 @@ def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
         folder = str(Path(fault.file).parent)
         files = [
             file
-            for file in package_files(root)
+            for file in list_package_files(root)
             if file.startswith(folder) or stem in (root / file).read_text("utf-8")
         ]
         return {file: function_lines(root / file) for file in files}
-    around = [
+    enclosing = [
         node
         for node in ast.walk(tree)
         if isinstance(node, ast.stmt) and node.lineno <= line <= node.end_lineno
     ]
-    statement = max(around, key=lambda node: node.lineno)
+    statement = max(enclosing, key=lambda node: node.lineno)
     end = statement.body[0].lineno - 1 if getattr(statement, "body", None) else statement.end_lineno
     if line in function_lines(root / fault.file):
         return {fault.file: set(range(statement.lineno, max(end, statement.lineno) + 1))}
@@ -405,15 +418,15 @@ def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     }
     reaching = {}
-    for file in package_files(root) if names and statement in tree.body else ():
+    for file in list_package_files(root) if names and statement in tree.body else ():
         if any(name in (root / file).read_text("utf-8") for name in names):
-            reaching[file] = lines_that_mention(root / file, names)
+            reaching[file] = find_mentions(root / file, names)
     reaching[fault.file] = function_lines(root / fault.file)
     return reaching
 
 
 @cache
-def package_files(root: Path) -> list[str]:
+def list_package_files(root: Path) -> list[str]:
     """Return the paths of the package's source files relative to the root."""
     return [str(path.relative_to(root)) for path in sorted((root / PACKAGE).rglob("*.py"))]
 
@@ -431,7 +444,7 @@ def function_lines(path: Path) -> set:
     return {line for node in functions for line in range(node.body[0].lineno, node.end_lineno + 1)}
 
 
-def lines_that_mention(path: Path, names: set) -> set:
+def find_mentions(path: Path, names: set) -> set:
     """Return the numbers of the lines inside functions that contain one of these names."""
     nodes = [
         node for node in ast.walk(parse_file(path)) if isinstance(node, (ast.Name, ast.Attribute))
@@ -445,7 +458,7 @@ def lines_that_mention(path: Path, names: set) -> set:
 # ------------------------------------------------------------------------------------------- plugin of pytest processes
 
 
-class Reached:
+class FaultTracer:
     """Trace function that appends the numbers of faults whose lines are run to a file, each once until `clear`.
 
     All processes that a test starts share the file.
@@ -458,8 +471,8 @@ class Reached:
 
     def start(self) -> None:
         """Trace all functions that are called after this."""
-        threading.settrace(self.call)
-        sys.settrace(self.call)
+        threading.settrace(self.trace_call)
+        sys.settrace(self.trace_call)
 
     def clear(self) -> set:
         """Return the fault numbers appended since the last call, and empty the file."""
@@ -467,35 +480,35 @@ class Reached:
         path = Path(self.log)
         numbers = {int(word) for word in path.read_text().split()} if path.exists() else set()
         path.write_text("")
-        sys.settrace(self.call)
+        sys.settrace(self.trace_call)
         return numbers
 
-    def call(self, frame, event, argument):
+    def trace_call(self, frame, event, argument):
         """Trace the lines of functions in files with faults."""
         lines = self.watched.get(frame.f_code.co_filename)
         if lines is None:
             return None
 
-        def line(frame, event, argument):
+        def trace_line(frame, event, argument):
             """Record the faults of a line when it is run."""
             numbers = lines.get(frame.f_lineno)
             if numbers and event == "line" and not self.seen.issuperset(numbers):
                 self.seen.update(numbers)
                 with open(self.log, "a") as file:
                     file.write("".join(f"{number}\n" for number in numbers))
-            return line
+            return trace_line
 
-        return line
+        return trace_line
 
 
-class Plugin:
+class SelectionPlugin:
     """Pytest plugin of the processes that `run` starts: it selects and orders tests, and records which lines they run."""
 
     def __init__(self, order: dict):
         self.order = order
         self.failed = False
         self.reached = (
-            Reached(read_watched(order["watched"]), order["log"]) if "log" in order else None
+            FaultTracer(read_line_map(order["watched"]), order["log"]) if "log" in order else None
         )
 
     def pytest_collection_modifyitems(self, session, config, items):
@@ -535,10 +548,10 @@ class Plugin:
                 "seconds": seconds,
                 "reached": numbers,
             }
-            append(Path(self.order["record"]), row)
+            append_row(Path(self.order["record"]), row)
 
 
-def read_watched(file: str) -> dict:
+def read_line_map(file: str) -> dict:
     """Read the result of `map_lines_to_faults` from a file; its paths are absolute."""
     return {
         path: {int(line): numbers for line, numbers in lines.items()}
@@ -557,9 +570,9 @@ def pytest_configure(config):
     if "cpu_seconds" in order:
         resource.setrlimit(resource.RLIMIT_CPU, (order["cpu_seconds"], order["cpu_seconds"] + 5))
     pytest.hookimpl(trylast=True)(
-        Plugin.pytest_collection_modifyitems
+        SelectionPlugin.pytest_collection_modifyitems
     )  # after the conftest has sorted the tests
-    plugin = Plugin(order)
+    plugin = SelectionPlugin(order)
     config.pluginmanager.register(plugin)
     if plugin.reached:
         plugin.reached.start()
@@ -568,10 +581,10 @@ def pytest_configure(config):
 def trace_child_process() -> None:
     """Record the lines that run in a child process of a test; called by the `sitecustomize` of the copy."""
     order = json.loads(Path(os.environ["PATCHFEM_FAULT_ORDER"]).read_text())
-    Reached(read_watched(order["watched"]), order["log"]).start()
+    FaultTracer(read_line_map(order["watched"]), order["log"]).start()
 
 
-def append(path: Path, row: dict) -> None:
+def append_row(path: Path, row: dict) -> None:
     """Append a row to a file of JSON lines in a single write."""
     with path.open("a") as file:
         file.write(json.dumps(row) + "\n")
@@ -585,7 +598,7 @@ def read_rows(path: Path) -> list[dict]:
 # ----------------------------------------------------------------------------------------------------------------- run
 
 
-class Copy:
+class CheckoutCopy:
     """Copy of the checkout in which tests run, with its own bytecode and folder of compiled code."""
 
     def __init__(self, root: Path, work: Path, warm: Path):
@@ -607,7 +620,7 @@ class Copy:
         moment = next(CLOCK)
         os.utime(path, (moment, moment))
 
-    def pytest(
+    def run_pytest(
         self, arguments: list[str], order: dict, seconds: float, cache_folder: Path
     ) -> int | None:
         """Run pytest and return its exit status; None if it exceeds the time limit."""
@@ -624,7 +637,7 @@ class Copy:
         }
         environment.pop("PYTHONDONTWRITEBYTECODE", None)
         base = self.work / "tmp"
-        words = [
+        options = [
             "-m",
             "pytest",
             "-p",
@@ -638,7 +651,7 @@ class Copy:
         ]
         with (self.work / "output").open("w") as output:
             process = subprocess.Popen(
-                [sys.executable, "-P", *words, f"--basetemp={base}", *arguments],
+                [sys.executable, "-P", *options, f"--basetemp={base}", *arguments],
                 cwd=self.tree, env=environment, stdout=output, stderr=output, start_new_session=True,
             )  # fmt: skip
             try:
@@ -651,7 +664,7 @@ class Copy:
                     process.wait()
                 shutil.rmtree(base, ignore_errors=True)
 
-    def reach(self, test_path: str, watched: dict, record: Path) -> None:
+    def record_tests(self, test_path: str, watched: dict, record: Path) -> None:
         """Run tests without a fault and record which faults their lines reach."""
         watched_file = self.work / "watched.json"
         watched_file.write_text(
@@ -664,11 +677,11 @@ class Copy:
             "record": str(record),
             "done": done,
         }
-        self.pytest([test_path], order, 1e5, self.warm)
+        self.run_pytest([test_path], order, 1e5, self.warm)
 
-    def outcome(self, fault: Fault, stages: list[list[str]], seconds: dict) -> str:
+    def run_fault(self, fault: Fault, stages: list[list[str]], seconds: dict) -> str:
         """Insert a fault, run tests stage by stage until one fails, and return the outcome."""
-        text = text_with_fault(self.tree, fault)
+        text = read_with_fault(self.tree, fault)
         if text is None:
             return "gone"
         if not stages:
@@ -676,7 +689,7 @@ class Copy:
         old = (self.tree / fault.file).read_text("utf-8")
         cache_folder = self.work / "cache"
         try:
-            shutil.copytree(self.warm, cache_folder, copy_function=link)
+            shutil.copytree(self.warm, cache_folder, copy_function=link_file)
             self.write(fault.file, text)
             for stage in stages:
                 limit = HANG_SECONDS + HANG_FACTOR * sum(seconds[test] for test in stage)
@@ -684,7 +697,7 @@ class Copy:
                     limit += COMPILE_SECONDS
                 order = {"tests": stage, "cpu_seconds": int(limit)}
                 files = list(dict.fromkeys(test.partition("::")[0] for test in stage))
-                status = self.pytest(["-x", *files], order, WAIT_FACTOR * limit, cache_folder)
+                status = self.run_pytest(["-x", *files], order, WAIT_FACTOR * limit, cache_folder)
                 if status in (None, -signal.SIGXCPU):
                     return "hangs"
                 if status != 0:
@@ -694,7 +707,7 @@ class Copy:
             self.write(fault.file, old)
             shutil.rmtree(cache_folder, ignore_errors=True)
 
-    def failed_test(self) -> str:
+    def failure_line(self) -> str:
         """Return the line of the last output that names the failed test."""
         lines = (self.work / "output").read_text(errors="replace").splitlines()
         return next(
@@ -702,7 +715,7 @@ class Copy:
         )
 
 
-def link(source: str, target: str) -> None:
+def link_file(source: str, target: str) -> None:
     """Hard-link a file of compiled code, or copy it if the file system has no links.
 
     Such files are replaced as a whole and never edited.
@@ -725,17 +738,17 @@ def choose_tests(
     own_folder = f"tests/{Path(fault.file).parts[1]}/"
     reaching = [row for row in rows if number in row["reached"]]
     files = {row["test"].partition("::")[0] for row in reaching}
-    beside = [
+    same_file = [
         row
         for row in rows
         if row["test"].partition("::")[0] in files and number not in row["reached"]
     ]
 
-    def rank(row: dict) -> tuple:
+    def sort_key(row: dict) -> tuple:
         """Sort tests of the fault's own folder first, then by duration."""
         return not row["test"].startswith(own_folder), row["seconds"]
 
-    ordered = [*sorted(reaching, key=rank), *sorted(beside, key=rank)]
+    ordered = [*sorted(reaching, key=sort_key), *sorted(same_file, key=sort_key)]
     first = []
     second = []
     spent = 0.0
@@ -745,10 +758,10 @@ def choose_tests(
             first.append(row["test"])
         elif spent <= max_seconds:
             second.append(row["test"])
-    return [by_file(stage) for stage in (first, second) if stage]
+    return [group_by_file(stage) for stage in (first, second) if stage]
 
 
-def by_file(tests: list[str]) -> list[str]:
+def group_by_file(tests: list[str]) -> list[str]:
     """Return the tests with those of the same file together, so that set-ups are shared."""
     places = {
         file: place
@@ -764,27 +777,27 @@ def seed_cache(root: Path, warm: Path) -> None:
     """
     code = "import pathlib; from patchfem.compiled import cache_folder; print(cache_folder())"
     environment = os.environ | {"PYTHONPATH": str(root)}
-    found = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-P", "-c", code],
         env=environment,
         capture_output=True,
         text=True,
         check=True,
     )
-    folder = Path(found.stdout.strip())
+    folder = Path(process.stdout.strip())
     for part in (folder, folder.parent / "operators"):
         target = warm / PACKAGE / part.name
         if part.is_dir():
-            without = shutil.ignore_patterns("bytecode", "*.lock")
+            ignored = shutil.ignore_patterns("bytecode", "*.lock")
             with suppress(
                 shutil.Error
                 # Another process may be replacing files; those that are missing are made again here.
             ):
-                shutil.copytree(part, target, copy_function=link, ignore=without)
+                shutil.copytree(part, target, copy_function=link_file, ignore=ignored)
             target.chmod(0o700)
 
 
-class Run:
+class MutationRun:
     """Run of the tests on faults, with its folder of results."""
 
     def __init__(self, faults: list[Fault], results: Path, options: argparse.Namespace):
@@ -793,7 +806,7 @@ class Run:
         self.options = options
         self.root = options.root.resolve()
         self.copies = SimpleQueue()
-        self.watched = watched_lines(self.root, faults)
+        self.watched = map_lines_to_faults(self.root, faults)
         self.tests = []
 
     def start(self) -> None:
@@ -809,40 +822,40 @@ class Run:
             seed_cache(self.root, work / "warm")
             for job in range(self.options.jobs):
                 (work / str(job)).mkdir()
-                self.copies.put(Copy(self.root, work / str(job), work / "warm"))
+                self.copies.put(CheckoutCopy(self.root, work / str(job), work / "warm"))
             recorded = {row["path"] for row in read_rows(self.results / "recorded.jsonl")}
-            paths = test_paths(self.root, self.options.tests, self.options.without)
-            list(pool.map(self.record, [path for path in paths if path not in recorded]))
+            paths = list_test_paths(self.root, self.options.tests, self.options.without)
+            list(pool.map(self.record_path, [path for path in paths if path not in recorded]))
             self.tests = [row for row in read_rows(self.results / "tests.jsonl") if row["passed"]]
             done = {row["number"] for row in read_rows(self.results / "outcomes.jsonl")}
-            list(pool.map(self.judge, [n for n in range(len(self.faults)) if n not in done]))
+            list(pool.map(self.run_fault, [n for n in range(len(self.faults)) if n not in done]))
 
     @contextmanager
-    def free_copy(self):
+    def borrow_copy(self):
         """Provide a copy of the checkout that no other thread uses."""
-        own = self.copies.get()
+        checkout = self.copies.get()
         try:
-            yield own
+            yield checkout
         finally:
-            self.copies.put(own)
+            self.copies.put(checkout)
 
-    def record(self, path: str) -> None:
+    def record_path(self, path: str) -> None:
         """Record which lines the tests of a path run."""
-        with self.free_copy() as own:
-            own.reach(path, self.watched, self.results / "tests.jsonl")
-        append(self.results / "recorded.jsonl", {"path": path})
+        with self.borrow_copy() as checkout:
+            checkout.record_tests(path, self.watched, self.results / "tests.jsonl")
+        append_row(self.results / "recorded.jsonl", {"path": path})
         print_line(f"{path} is recorded")
 
-    def judge(self, number: int) -> None:
+    def run_fault(self, number: int) -> None:
         """Run the tests on a fault and store its outcome."""
         fault = self.faults[number]
         stages = choose_tests(number, fault, self.tests, self.options.seconds)
         durations = {row["test"]: row["seconds"] for row in self.tests}
-        with self.free_copy() as own:
-            began = time.monotonic()
-            outcome = own.outcome(fault, stages, durations)
-            seconds = round(time.monotonic() - began, 1)
-            failure = own.failed_test() if outcome == "caught" else ""
+        with self.borrow_copy() as checkout:
+            started = time.monotonic()
+            outcome = checkout.run_fault(fault, stages, durations)
+            seconds = round(time.monotonic() - started, 1)
+            failure = checkout.failure_line() if outcome == "caught" else ""
         row = {
             "number": number,
             "outcome": outcome,
@@ -851,21 +864,21 @@ class Run:
             "reached_by": sum(number in row["reached"] for row in self.tests),
             "by": failure,
         }
-        append(self.results / "outcomes.jsonl", row)
-        place = f"{fault.file}:{fault.line}"
-        print_line(f"{outcome:9}{seconds:7.1f} s  {place}  {failure[:90]}")
+        append_row(self.results / "outcomes.jsonl", row)
+        position = f"{fault.file}:{fault.line}"
+        print_line(f"{outcome:9}{seconds:7.1f} s  {position}  {failure[:90]}")
 
 
-def test_paths(root: Path, given: list[str], left_out: list[str]) -> list[str]:
+def list_test_paths(root: Path, places: list[str], excluded: list[str]) -> list[str]:
     """Return the test folders and files to record, each in its own process."""
     paths = []
-    for place in given:
+    for place in places:
         is_all = place.strip("/") == "tests"
         inside = sorted((root / place).iterdir()) if is_all else [root / place]
         paths += [
             str(path.relative_to(root))
             for path in inside
-            if path.name not in left_out
+            if path.name not in excluded
             and (path.name.startswith("test_") or any(path.rglob("test_*.py")))
         ]
     return paths
@@ -895,7 +908,7 @@ def read_outcomes(results: Path) -> dict:
     return {faults[row["number"]]: row["outcome"] for row in read_rows(results / "outcomes.jsonl")}
 
 
-def show(results: Path) -> None:
+def print_outcomes(results: Path) -> None:
     """Print the fraction of caught faults by folder, and each fault that was not caught."""
     outcomes = read_outcomes(results)
     by_folder = defaultdict(Counter)
@@ -912,7 +925,7 @@ def show(results: Path) -> None:
             print_change(fault, outcome)
 
 
-def compare(before: Path, after: Path) -> None:
+def print_comparison(before: Path, after: Path) -> None:
     """Print how often two runs have the same outcome, and each fault that only the first one caught."""
     first = read_outcomes(before)
     second = read_outcomes(after)
@@ -936,41 +949,41 @@ def main() -> None:
         description="plant random faults and find those that no test catches"
     )
     verbs = parser.add_subparsers(dest="verb", required=True)
-    words = verbs.add_parser("draw", help="draw faults")
-    words.add_argument("faults", type=Path)
-    words.add_argument(
+    subparser = verbs.add_parser("draw", help="draw faults")
+    subparser.add_argument("faults", type=Path)
+    subparser.add_argument(
         "--folders", nargs="*", default=[], help="of the package; all if none are given"
     )
-    words.add_argument("--seed", type=int, required=True)
-    words.add_argument("--count", type=int, default=20)
-    words.add_argument("--root", type=Path, default=ROOT)
-    words = verbs.add_parser("run", help="run the tests on each fault")
-    words.add_argument("faults", type=Path)
-    words.add_argument("results", type=Path)
-    words.add_argument("--tests", nargs="+", default=["tests"])
-    words.add_argument("--without", nargs="*", default=[], help="folders of tests to leave out")
-    words.add_argument(
+    subparser.add_argument("--seed", type=int, required=True)
+    subparser.add_argument("--count", type=int, default=20)
+    subparser.add_argument("--root", type=Path, default=ROOT)
+    subparser = verbs.add_parser("run", help="run the tests on each fault")
+    subparser.add_argument("faults", type=Path)
+    subparser.add_argument("results", type=Path)
+    subparser.add_argument("--tests", nargs="+", default=["tests"])
+    subparser.add_argument("--without", nargs="*", default=[], help="folders of tests to leave out")
+    subparser.add_argument(
         "--seconds",
         type=float,
         default=120.0,
         help="CPU time of tests without fault that a fault may cost",
     )
-    words.add_argument("--jobs", type=int, default=1)
-    words.add_argument("--root", type=Path, default=ROOT)
+    subparser.add_argument("--jobs", type=int, default=1)
+    subparser.add_argument("--root", type=Path, default=ROOT)
     verbs.add_parser("show", help="list the outcomes").add_argument("results", type=Path)
-    words = verbs.add_parser("compare", help="compare two runs of the same faults")
-    words.add_argument("before", type=Path)
-    words.add_argument("after", type=Path)
-    given = parser.parse_args()
-    if given.verb == "draw":
-        faults = draw(given.root.resolve(), given.folders, given.seed, given.count)
-        write_faults(given.faults, faults)
-    elif given.verb == "run":
-        Run(read_faults(given.faults), given.results, given).start()
-    elif given.verb == "show":
-        show(given.results)
+    subparser = verbs.add_parser("compare", help="compare two runs of the same faults")
+    subparser.add_argument("before", type=Path)
+    subparser.add_argument("after", type=Path)
+    options = parser.parse_args()
+    if options.verb == "draw":
+        faults = draw_faults(options.root.resolve(), options.folders, options.seed, options.count)
+        write_faults(options.faults, faults)
+    elif options.verb == "run":
+        MutationRun(read_faults(options.faults), options.results, options).start()
+    elif options.verb == "show":
+        print_outcomes(options.results)
     else:
-        compare(given.before, given.after)
+        print_comparison(options.before, options.after)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 from patchfem.mesh.pairs import join_meshes
 
 
-def pair_mesh(grid: TensorGrid) -> dict:
+def make_pair_mesh(grid: TensorGrid) -> dict:
     """Return the mesh of a pair of equal grids: points (2N, 2) [m], quads (t, 4), edges, and their tags.
 
     Node j*ny + i of a piece is column j, row i; the upper piece follows the lower one.

@@ -13,7 +13,7 @@ UM = 1e-6
 LONG, FINE = (4.096e-3, 2**13)
 
 
-class Pair(NamedTuple):
+class SyntheticPair(NamedTuple):
     """Two traces and their true difference.
 
     before, after: Profile; shift [m]: a point at x in `before` lies at x + shift in `after`; worn
@@ -28,7 +28,7 @@ class Pair(NamedTuple):
     offset: float
 
 
-def surface(seed: int, sigma: float = 6 * UM):
+def make_surface(seed: int, sigma: float = 6 * UM):
     """Return the heights of a long trace as a function of x, a cubic spline through its fine samples."""
     from scipy.interpolate import CubicSpline
 
@@ -36,52 +36,54 @@ def surface(seed: int, sigma: float = 6 * UM):
     return CubicSpline(long.x, long.z, bc_type="periodic")
 
 
-def pair(
+def make_worn_pair(
     seed: int,
-    share: float | None = None,
+    worn_fraction: float | None = None,
     noise: float = 0.02 * UM,
     step: float = 1 * UM,
     length: float = 1e-3,
     shift: float | None = None,
-) -> Pair:
+) -> SyntheticPair:
     """Return two traces of the same place; the peaks of the second are worn to a level that varies along it.
 
-    share: worn fraction of the length, random between 0.15 and 0.65 by default. Shift within 25 um,
+    worn_fraction: worn fraction of the length, random between 0.15 and 0.65 by default. Shift within 25 um,
     tilts within 10 mrad and offsets within 5 um are random; noise [m]: standard deviation in each
     trace.
     """
     random = np.random.default_rng([seed, 1985])
-    z = surface(seed)
+    z = make_surface(seed)
     x = np.arange(round(length / step) + 1) * step
-    asked = random.uniform(0.15, 0.65)
-    moved = random.uniform(-25, 25) * UM
-    share = asked if share is None else share
-    moved = moved if shift is None else shift
+    random_share = random.uniform(0.15, 0.65)
+    true_shift = random.uniform(-25, 25) * UM
+    worn_fraction = random_share if worn_fraction is None else worn_fraction
+    true_shift = true_shift if shift is None else shift
     start = -length / 2
-    here = z(x + start - moved)
-    level = np.quantile(here, 1 - share) + random.uniform(0, 1) * UM * np.sin(
+    unworn = z(x + start - true_shift)
+    level = np.quantile(unworn, 1 - worn_fraction) + random.uniform(0, 1) * UM * np.sin(
         2 * np.pi * x / length + random.uniform(0, 2 * np.pi)
     )
-    worn = np.maximum(here - level, 0.0) if share > 0 else np.zeros(x.size)
+    worn = np.maximum(unworn - level, 0.0) if worn_fraction > 0 else np.zeros(x.size)
     tilts = random.uniform(-0.01, 0.01, 2)
     offsets = random.uniform(-5, 5, 2) * UM
     jitter = noise * random.standard_normal((2, x.size))
     before = z(x + start) + tilts[0] * x + offsets[0] + jitter[0]
-    after = here - worn + tilts[1] * x + offsets[1] + jitter[1]
-    return Pair(
+    after = unworn - worn + tilts[1] * x + offsets[1] + jitter[1]
+    return SyntheticPair(
         Profile(frozen_array(x), frozen_array(before), "before"),
         Profile(frozen_array(x), frozen_array(after), "after"),
-        moved,
+        true_shift,
         worn,
         float(tilts[1] - tilts[0]),
-        float(offsets[1] - offsets[0] + tilts[0] * moved),
+        float(offsets[1] - offsets[0] + tilts[0] * true_shift),
     )
 
 
 KINDS = ("band", "parabola", "groove")
 
 
-def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> Pair:
+def make_track_pair(
+    kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM
+) -> SyntheticPair:
     """Return two rough traces (0.3 um, correlated over 10 samples of 1 um), the second with a worn track.
 
     band: a flat floor between walls, 0.1 to 0.4 of the length wide; parabola: of the same width;
@@ -89,20 +91,20 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
     80 um) are random.
     """
     random = np.random.default_rng([seed, KINDS.index(kind), 1986])
-    spare = 100
+    margin = 100
     rough = np.convolve(
-        random.standard_normal(count + 2 * spare + 120),
+        random.standard_normal(count + 2 * margin + 120),
         np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2),
         "valid",
     )
     rough *= 0.3 * UM / rough.std()
     depth = random.uniform(0.4, 2.0) * UM
-    moved = int(random.integers(-80, 81))
+    true_shift = int(random.integers(-80, 81))
     width = random.uniform(30, 120) if kind == "groove" else random.uniform(0.1, 0.4) * count
     middle = random.uniform(0.15 * count + width / 2, 0.85 * count - width / 2)
     x = np.arange(float(count))
-    places = x - moved  # Positions of the samples of `after` in the trace before.
-    t = (places - middle) / (width / 2)
+    positions = x - true_shift  # Positions of the samples of `after` in the trace before.
+    t = (positions - middle) / (width / 2)
     inside = abs(t) <= 1
     shape = {
         "band": np.ones(count),
@@ -111,13 +113,13 @@ def track(kind: str, seed: int, count: int = 4001, noise: float = 0.02 * UM) -> 
     }[kind]
     worn = np.where(inside, depth * shape, 0.0)
     jitter = noise * random.standard_normal((2, count))
-    before = rough[spare : spare + count]
-    after = rough[spare - moved : spare - moved + count] - worn
+    before = rough[margin : margin + count]
+    after = rough[margin - true_shift : margin - true_shift + count] - worn
     x = frozen_array(x * UM)
-    return Pair(
+    return SyntheticPair(
         Profile(x, frozen_array(before + jitter[0]), "before"),
         Profile(x, frozen_array(after + jitter[1]), "after"),
-        moved * UM,
+        true_shift * UM,
         worn,
         0.0,
         0.0,

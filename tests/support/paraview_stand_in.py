@@ -57,7 +57,7 @@ class Proxy:
         return lambda *words: self.called.append((name, *words))
 
 
-class Simple(types.ModuleType):
+class SimpleModule(types.ModuleType):
     """Stand-in for `paraview.simple` that records what is shown and how."""
 
     def __init__(self):
@@ -109,22 +109,24 @@ class Simple(types.ModuleType):
         self.saved.append((path, FrameRate))
 
 
-def times_and_files(reader: Proxy) -> list:
+def read_frames(reader: Proxy) -> list:
     """Return (time, file) of the frames of a .pvd file."""
     path = Path(reader.FileName)
     sets = ElementTree.parse(path).getroot().iter("DataSet")
-    return [(float(one.get("timestep")), path.parent / one.get("file")) for one in sets]
+    return [
+        (float(data_set.get("timestep")), path.parent / data_set.get("file")) for data_set in sets
+    ]
 
 
-def blocks_at(source: Proxy, file: Path) -> list:
+def compute_blocks(source: Proxy, file: Path) -> list:
     """Return (points (n, 3), point data, cell data) of each grid that a source produces if its reader reads `file`."""
-    last = _filter(source, file)
-    last.Update()
-    walk = last.GetOutputDataObject(0).NewIterator()
+    final_filter = _make_filter(source, file)
+    final_filter.Update()
+    iterator = final_filter.GetOutputDataObject(0).NewIterator()
     out = []
-    walk.InitTraversal()
-    while not walk.IsDoneWithTraversal():
-        grid = walk.GetCurrentDataObject()
+    iterator.InitTraversal()
+    while not iterator.IsDoneWithTraversal():
+        grid = iterator.GetCurrentDataObject()
         out.append(
             (
                 vtk_to_numpy(grid.GetPoints().GetData()),
@@ -137,27 +139,27 @@ def blocks_at(source: Proxy, file: Path) -> list:
                 ),
             )
         )
-        walk.GoToNextItem()
+        iterator.GoToNextItem()
     return out
 
 
-def _filter(source: Proxy, file: Path):
+def _make_filter(source: Proxy, file: Path):
     """Return the VTK filter of a source, connected to those before it."""
     if source.kind == "PVDReader":
-        made = vtkXMLMultiBlockDataReader()
-        made.SetFileName(str(file))
-        return made
-    before = _filter(source.Input, file)
+        vtk_filter = vtkXMLMultiBlockDataReader()
+        vtk_filter.SetFileName(str(file))
+        return vtk_filter
+    input_filter = _make_filter(source.Input, file)
     if source.kind == "WarpByVector":
-        made = vtkWarpVector()
-        made.SetInputArrayToProcess(
+        vtk_filter = vtkWarpVector()
+        vtk_filter.SetInputArrayToProcess(
             0, 0, 0, ("POINTS", "CELLS").index(source.Vectors[0]), source.Vectors[1]
         )
-        made.SetScaleFactor(source.ScaleFactor)
+        vtk_filter.SetScaleFactor(source.ScaleFactor)
     else:
-        made = vtkExtractBlockUsingDataAssembly()
-        made.SetAssemblyName("Hierarchy")
-        for one in source.Selectors:
-            made.AddSelector(one)
-    made.SetInputConnection(before.GetOutputPort())
-    return made
+        vtk_filter = vtkExtractBlockUsingDataAssembly()
+        vtk_filter.SetAssemblyName("Hierarchy")
+        for selector in source.Selectors:
+            vtk_filter.AddSelector(selector)
+    vtk_filter.SetInputConnection(input_filter.GetOutputPort())
+    return vtk_filter

@@ -21,12 +21,12 @@ COATED = Layers(CARBIDE, TITANIUM, "strain")
 TILTS = (0.0, 1e-5, 1e-4, 1e-3)
 
 
-def bare(material, plane="strain") -> Layers:
+def make_bare_layers(material, plane="strain") -> Layers:
     """Return layers of a single material."""
     return Layers(material, material, plane)
 
 
-def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
+def make_compliance(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
     """Return the compliance of two mirrored bodies: normal and tangential parts double, the coupling cancels."""
     piece = make_piece(grid.x, grid.depth, grid.coating_rows, layers)
     nn, tt, _ = interface_compliance(piece)
@@ -36,18 +36,20 @@ def pair_of(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Complianc
 
 
 @cache
-def coated_pair(cells: int) -> Compliance:
+def make_coated_pair(cells: int) -> Compliance:
     """Return the compliance of the coated pair of the test specimen with `cells` columns."""
-    return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING), COATED)
+    return make_compliance(graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING), COATED)
 
 
 @cache
-def bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> Compliance:
+def make_bare_pair(cells: int, young: float = TITANIUM[0], plane: str = "strain") -> Compliance:
     """Return the compliance of uncoated blocks of the size of the test specimen."""
-    return pair_of(graded_grid(LENGTH, HEIGHT, LENGTH / cells), bare((young, TITANIUM[1]), plane))
+    return make_compliance(
+        graded_grid(LENGTH, HEIGHT, LENGTH / cells), make_bare_layers((young, TITANIUM[1]), plane)
+    )
 
 
-def refined_middle(
+def make_refined_grid(
     half: float, fine: float, length: float, height: float, growth: float = 1.05
 ) -> TensorGrid:
     """Return a grid with columns of width `fine` in |x| <= half that grow outwards; rows begin with `fine`."""
@@ -58,7 +60,7 @@ def refined_middle(
     return TensorGrid(x, np.concatenate([[0.0], np.cumsum(graded_rows(fine, height, growth))]), 0)
 
 
-def rough(rng, x, size: float, terms: int = 12):
+def draw_gap(rng, x, size: float, terms: int = 12):
     """Return a random smooth gap of a few waves [m]."""
     wave = rng.normal(size=(2, terms)) / np.arange(1, terms + 1)
     phase = np.outer(np.arange(1, terms + 1), np.pi * x / (x[-1] - x[0]))

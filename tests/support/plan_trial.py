@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from torture import grammar
-from torture.toml import text_of
+from torture.toml import to_toml
 from torture.trial import Trial
 
 import patchfem as pf
@@ -28,7 +28,7 @@ print(code, used.ru_utime + used.ru_stime, used.ru_maxrss)
 """
 
 
-class Told(NamedTuple):
+class PlannedRun(NamedTuple):
     """Scene with its seed, kind and engine; seconds and bytes as planned and as measured."""
 
     seed: int
@@ -37,16 +37,16 @@ class Told(NamedTuple):
     planned: tuple
     measured: tuple
 
-    def within(self, time: float = 1.5, memory: float = 1.3) -> tuple:
+    def is_within(self, time: float = 1.5, memory: float = 1.3) -> tuple:
         """Return whether the plan agrees in time and in memory within these factors."""
         ratios = [a / b for a, b in zip(self.planned, self.measured)]
-        return tuple(1 / most <= ratio <= most for ratio, most in zip(ratios, (time, memory)))
+        return tuple(1 / factor <= ratio <= factor for ratio, factor in zip(ratios, (time, memory)))
 
 
-def text(seed: int) -> str:
+def draw_scene(seed: int) -> str:
     """Return the scene of a seed."""
     trial = Trial(np.random.default_rng(seed), None, None, None)
-    out = grammar.scene(trial)
+    out = grammar.draw_scene(trial)
     contact = out.get("contact")
     if contact:
         elements = trial.draw(0, 0, 0, 100, 200, 400)
@@ -55,21 +55,21 @@ def text(seed: int) -> str:
             contact["element_size"] = f"{float(contact['length'].split()[0]) / elements:.4g} m"
     for table in ("slide", "drive"):
         if "cycles" in out.get(table, {}):
-            out[table]["cycles"] = int(out[table]["cycles"] * trial.wide(1, 100))
+            out[table]["cycles"] = int(out[table]["cycles"] * trial.log_uniform(1, 100))
     out["accuracy"]["tolerance"] = trial.draw(1e-2, 3e-3, 1e-3)
-    return text_of(out)
+    return to_toml(out)
 
 
-def planned(seed: int):
+def make_plan(seed: int):
     """Return the plan of a seed; None if it is refused or too long."""
     try:
-        found = pf.plan(text(seed))
+        plan = pf.plan(draw_scene(seed))
     except pf.PatchfemError:
         return None
-    return found if found.seconds <= MOST else None
+    return plan if plan.seconds <= MOST else None
 
 
-def told(first: int, count: int, folder: Path):
+def measure_scenes(first: int, count: int, folder: Path):
     """Yield `count` scenes, from a first seed on, as `PlannedRun`; refused runs are left out.
 
     A scene that disagrees with its plan is run again, and the smaller numbers are taken, because
@@ -78,25 +78,25 @@ def told(first: int, count: int, folder: Path):
     seed = first - 1
     while count:
         seed += 1
-        found = planned(seed)
-        if found is None:
+        plan = make_plan(seed)
+        if plan is None:
             continue
         path = folder / f"{seed}.toml"
-        path.write_text(text(seed), encoding="utf-8")
-        numbers = _measured(path, folder / str(seed))
+        path.write_text(draw_scene(seed), encoding="utf-8")
+        numbers = _measure_run(path, folder / str(seed))
         if numbers is None:
             continue
-        one = Told(seed, found.kind, found.engine, (found.seconds, float(found.bytes)), numbers)
-        if not all(one.within()):
-            again = _measured(path, folder / str(seed))
-            one = one._replace(measured=tuple(map(min, numbers, again)))
+        run = PlannedRun(seed, plan.kind, plan.engine, (plan.seconds, float(plan.bytes)), numbers)
+        if not all(run.is_within()):
+            second_numbers = _measure_run(path, folder / str(seed))
+            run = run._replace(measured=tuple(map(min, numbers, second_numbers)))
         count -= 1
-        yield one
+        yield run
 
 
-def _measured(path: Path, out: Path) -> tuple | None:
+def _measure_run(path: Path, out: Path) -> tuple | None:
     """Return CPU seconds, at most 120, and peak memory [bytes] of `patchfem run`; None if it is refused."""
-    words = [
+    command = [
         sys.executable,
         "-c",
         SMALL,
@@ -109,6 +109,6 @@ def _measured(path: Path, out: Path) -> tuple | None:
         out,
         "-q",
     ]
-    done = subprocess.run(list(map(str, words)), capture_output=True, text=True)
-    code, seconds, size = done.stdout.split()
-    return None if code in ("2", "4") else (float(seconds), 1024.0 * float(size))
+    process = subprocess.run(list(map(str, command)), capture_output=True, text=True)
+    code, seconds, kibibytes = process.stdout.split()
+    return None if code in ("2", "4") else (float(seconds), 1024.0 * float(kibibytes))

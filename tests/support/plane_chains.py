@@ -28,7 +28,7 @@ RUBS = (
 DRIVE = '[drive]\nkind = "{drive}"\nfrequency = "{frequency!r} Hz"\n{size}\ncycles = {cycles}\n'
 
 
-def chain(seed: int) -> dict:
+def draw_chain(seed: int) -> dict:
     """Return the parameters of a random chain of 1 to 3 nodes with two masses each.
 
     Mass 2 k - 1 moves along x, mass 2 k along y.
@@ -40,44 +40,46 @@ def chain(seed: int) -> dict:
     for k in range(nodes):
         x = 2 * k + 1
         y = 2 * k + 2
-        below = max(2 * k - 1, 0)
+        previous = max(2 * k - 1, 0)
         links += [
-            ((x, below), r.uniform(2e4, 8e4)),
-            ((y, below and below + 1), r.uniform(2e4, 8e4)),
+            ((x, previous), r.uniform(2e4, 8e4)),
+            ((y, previous and previous + 1), r.uniform(2e4, 8e4)),
             ((x, y), r.uniform(0, 1e4)),
         ]
     springs = [(pair, float(k)) for pair, k in links]
-    K = matrix(springs, 2 * nodes)
-    C = matrix(dampers_of(springs), 2 * nodes)
+    K = assemble_matrix(springs, 2 * nodes)
+    C = assemble_matrix(make_dampers(springs), 2 * nodes)
     omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(masses, masses))))
     drive = str(r.choice(["base", "force"]))
     frequency = float(r.choice(omega[:2]) * r.uniform(0.7, 1.3))
     push = float(10 ** r.uniform(0, 2))
-    out = []
+    interfaces = []
     limit = push * 10 ** r.uniform(-1.2, 0.1)
-    at = r.choice(nodes, int(r.integers(1, nodes + 1)), replace=False)
-    for k in (int(one) for one in at):
-        to = 2 * k - 1 if k and r.random() < 0.5 else 0
+    nodes_with_friction = r.choice(nodes, int(r.integers(1, nodes + 1)), replace=False)
+    for k in (int(interface) for interface in nodes_with_friction):
+        partner = 2 * k - 1 if k and r.random() < 0.5 else 0
         stiff = float(10 ** r.uniform(4, 5.3))
         load = float(limit / 0.4 * r.uniform(0.5, 1.5))
-        out.append(
+        interfaces.append(
             (
-                [2 * k + 1, to],
-                [2 * k + 2, to and to + 1] if r.random() < 0.8 or not out else None,
+                [2 * k + 1, partner],
+                [2 * k + 2, partner and partner + 1]
+                if r.random() < 0.8 or not interfaces
+                else None,
                 stiff,
                 load,
             )
         )
-    out.sort(key=lambda one: one[1] is None)
+    interfaces.sort(key=lambda one: one[1] is None)
     return {
         "seed": seed,
         "masses": masses,
         "springs": springs,
         "K": K,
         "C": C,
-        "faces": out,
+        "faces": interfaces,
         "drive": drive,
-        "law": f"{sum(one[1] is not None for one in out)} of {len(out)} in planes",
+        "law": f"{sum(interface[1] is not None for interface in interfaces)} of {len(interfaces)} in planes",
         "frequency": frequency / 2 / np.pi,
         "push": push / (1.0 if drive == "force" else float(masses.sum())),
         "pushed": int(r.integers(1, 2 * nodes + 1)),
@@ -86,32 +88,34 @@ def chain(seed: int) -> dict:
     }
 
 
-def row(pair, n: int) -> np.ndarray:
+def difference_row(pair, n: int) -> np.ndarray:
     """Return the row (n,) that gives the relative displacement of two masses, numbered from 1; 0 is the base."""
     unit = np.vstack([np.zeros(n), np.eye(n)])
     return unit[pair[0]] - unit[pair[1]]
 
 
-def matrix(links, n: int) -> np.ndarray:
+def assemble_matrix(links, n: int) -> np.ndarray:
     """Return the matrix (n, n) of links (pair, value)."""
-    return sum(value * np.outer(row(pair, n), row(pair, n)) for pair, value in links)
+    return sum(
+        value * np.outer(difference_row(pair, n), difference_row(pair, n)) for pair, value in links
+    )
 
 
-def dampers_of(springs) -> list:
+def make_dampers(springs) -> list:
     """Return the dampers in parallel with the springs."""
     return [(pair, 2e-4 * k) for pair, k in springs]
 
 
-def text(s: dict) -> str:
+def format_scene(s: dict) -> str:
     """Return the scene of a chain as text."""
     out = HEAD.format(masses=[f"{m!r} kg" for m in s["masses"].tolist()], seen=s["seen"])
     for kind, links, key, unit in (
         ("spring", s["springs"], "stiffness", "N/m"),
-        ("damper", dampers_of(s["springs"]), "coefficient", "N s/m"),
+        ("damper", make_dampers(s["springs"]), "coefficient", "N s/m"),
     ):
         out += "".join(
-            LINK.format(kind=kind, pair=list(pair), key=key, value=one, unit=unit)
-            for pair, one in links
+            LINK.format(kind=kind, pair=list(pair), key=key, value=value, unit=unit)
+            for pair, value in links
         )
     for pair, second, stiff, load in s["faces"]:
         out += RUBS.format(pair, f"lateral = {second}\n" if second else "", stiff, load)
@@ -123,7 +127,7 @@ def text(s: dict) -> str:
     return out + DRIVE.format(**s | {"size": size})
 
 
-class Motion:
+class ChainMotion:
     """Rate equations of a chain.
 
     The state y consists of displacements, velocities, elongations, and the work and loss of every
@@ -136,16 +140,21 @@ class Motion:
         self.n = n
         self.m = s["masses"]
         self.omega = 2 * np.pi * s["frequency"]
-        self.rows = [np.array([row(one, n) for one in pairs if one]) for *pairs, _, _ in s["faces"]]
+        self.rows = [
+            np.array([difference_row(one, n) for one in pairs if one])
+            for *pairs, _, _ in s["faces"]
+        ]
         self.k, self.most = zip(*((stiff, 0.4 * load / stiff) for *_, stiff, load in s["faces"]))
         ends = 2 * n + np.cumsum([0, *map(len, self.rows)])
         self.at = [slice(a, b) for a, b in pairwise(ends)]
         self.size = int(ends[-1]) + 2 * len(self.rows)
         self.push = (
-            -self.m * s["push"] if s["drive"] == "base" else s["push"] * row((s["pushed"], 0), n)
+            -self.m * s["push"]
+            if s["drive"] == "base"
+            else s["push"] * difference_row((s["pushed"], 0), n)
         )
 
-    def rate(self, t, y, slips):
+    def derivative(self, t, y, slips):
         """Return dy/dt; slips: whether each interface slips."""
         n = self.n
         out = np.zeros_like(y)
@@ -156,20 +165,22 @@ class Motion:
         for i, (rows, at, k) in enumerate(zip(self.rows, self.at, self.k)):
             stretch = y[at]
             speed = rows @ y[n : 2 * n]
-            held = speed - stretch * (stretch @ speed) / (stretch @ stretch) if slips[i] else speed
+            elastic_rate = (
+                speed - stretch * (stretch @ speed) / (stretch @ stretch) if slips[i] else speed
+            )
             force -= k * rows.T @ stretch
-            out[at] = held
+            out[at] = elastic_rate
             out[self.size - 2 * len(self.rows) + 2 * i :][:2] = (
                 k * stretch @ speed,
-                k * stretch @ (speed - held),
+                k * stretch @ (speed - elastic_rate),
             )
         out[n : 2 * n] = force / self.m
         return out
 
-    def event(self, i: int, slips: bool):
+    def make_event(self, i: int, slips: bool):
         """Return the event function that ends the present state of interface i."""
 
-        def gap(t, y, *_):
+        def margin(t, y, *_):
             """Return the margin to the end of the state."""
             stretch = y[self.at[i]]
             return (
@@ -178,9 +189,9 @@ class Motion:
                 else stretch @ stretch - self.most[i] ** 2
             )
 
-        gap.terminal = True
-        gap.direction = -1 if slips else 1
-        return gap
+        margin.terminal = True
+        margin.direction = -1 if slips else 1
+        return margin
 
     def run(self, end: float, first: float, rtol: float) -> tuple:
         """Return (times, y) with SAMPLES per cycle from `first` [s] to the end."""
@@ -199,8 +210,8 @@ class Motion:
         )
         atol[-2 * len(self.rows) :] *= max(self.k) * max(self.most)
         while t < end:
-            found = solve_ivp(
-                self.rate,
+            solution = solve_ivp(
+                self.derivative,
                 (t, end),
                 y,
                 "DOP853",
@@ -208,15 +219,15 @@ class Motion:
                 args=(slips,),
                 rtol=rtol,
                 atol=atol,
-                events=[self.event(i, on) for i, on in enumerate(slips)],
+                events=[self.make_event(i, on) for i, on in enumerate(slips)],
                 max_step=period / STEPS,
             )
-            assert found.success, found.message
-            here = (times >= t) & (times <= found.t[-1])
-            out[here] = found.sol(times[here]).T if here.any() else out[here]
-            t = found.t[-1]
-            y = found.y[:, -1].copy()
-            for i, hit in enumerate(found.t_events):
+            assert solution.success, solution.message
+            is_inside = (times >= t) & (times <= solution.t[-1])
+            out[is_inside] = solution.sol(times[is_inside]).T if is_inside.any() else out[is_inside]
+            t = solution.t[-1]
+            y = solution.y[:, -1].copy()
+            for i, hit in enumerate(solution.t_events):
                 if hit.size:
                     slips[i] = not slips[i]
                 if slips[i]:
@@ -229,67 +240,67 @@ class Motion:
         return times, out
 
 
-def widest(places) -> float:
+def max_distance(positions) -> float:
     """Return the largest distance between two positions (k, 1 or 2) [m]."""
-    if places.shape[1] == 1:
-        return float(np.ptp(places))
+    if positions.shape[1] == 1:
+        return float(np.ptp(positions))
     try:
-        places = places[ConvexHull(places).vertices]
+        positions = positions[ConvexHull(positions).vertices]
     except Exception:  # All positions lie on a line.
-        places = places[np.lexsort(places.T)[[0, -1]]]
-    return float(distance.pdist(places).max())
+        positions = positions[np.lexsort(positions.T)[[0, -1]]]
+    return float(distance.pdist(positions).max())
 
 
-def measures(motion: Motion, times, y, cycles: float) -> dict:
+def compute_measures(motion: ChainMotion, times, y, cycles: float) -> dict:
     """Return the measures of the last cycles by name, as MEASURES.md defines them."""
     s = motion.s
     n = motion.n
-    seen = motion.s["seen"] - 1
+    output = motion.s["seen"] - 1
     base = s["push"] * np.sin(motion.omega * times) if s["drive"] == "base" else 0.0
     last = -2 * len(motion.rows)
-    books = y[:, last:]
+    works = y[:, last:]
     force = (
         motion.push[:, None] * np.sin(motion.omega * times)
         - s["K"] @ y[:, :n].T
         - s["C"] @ y[:, n : 2 * n].T
     )
     out = {
-        "relative_displacement_amplitude": np.ptp(y[:, seen]) / 2,
-        "friction_work": books[-1, ::2].sum(),
-        "energy_dissipated": books[-1, 1::2].sum(),
+        "relative_displacement_amplitude": np.ptp(y[:, output]) / 2,
+        "friction_work": works[-1, ::2].sum(),
+        "energy_dissipated": works[-1, 1::2].sum(),
     }
     for i, (rows, at, k) in enumerate(zip(motion.rows, motion.at, motion.k)):
-        tail = f"_{i + 1}" if i else ""
+        suffix = f"_{i + 1}" if i else ""
         stretch = y[:, at]
         force -= k * rows.T @ stretch.T
         slip = y[:, :n] @ rows.T - stretch
         out |= {
-            f"friction_force_peak{tail}": k * np.linalg.norm(stretch, axis=1).max(),
-            f"slip_amplitude{tail}": widest(slip) / 2,
-            f"loop_area{tail}": (books[-1, 2 * i] - books[0, 2 * i]) / cycles,
+            f"friction_force_peak{suffix}": k * np.linalg.norm(stretch, axis=1).max(),
+            f"slip_amplitude{suffix}": max_distance(slip) / 2,
+            f"loop_area{suffix}": (works[-1, 2 * i] - works[0, 2 * i]) / cycles,
         }
-    out["absolute_acceleration_peak"] = np.abs(force[seen] / motion.m[seen] + base).max()
+    out["absolute_acceleration_peak"] = np.abs(force[output] / motion.m[output] + base).max()
     return {name: float(value) for name, value in out.items()}
 
 
-def truth(s: dict, window: int, rtol: float = 1e-10) -> dict:
+def solve_reference(s: dict, window: int, rtol: float = 1e-10) -> dict:
     """Return the measures of the last `window` cycles of a chain."""
-    motion = Motion(s)
+    motion = ChainMotion(s)
     period = 1 / s["frequency"]
-    return measures(
+    return compute_measures(
         motion, *motion.run(s["cycles"] * period, (s["cycles"] - window) * period, rtol), window
     )
 
 
 def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the chain of a seed with its integration; see `campaigns`."""
-    s = chain(seed)
+    s = draw_chain(seed)
     path = folder / "scene.toml"
-    path.write_text(text(s))
+    path.write_text(format_scene(s))
     result = pf.run(path)
     line = {"group": f"{s['law']}, {s['drive']}", "engine": result.extra["engine"], "rows": []}
     if result.outcome == "not_converged":
         return line | {"refused": str(result.outcome)}
-    found = truth(s, int(result.extra["window"]))
-    doubts = {name: 1e-6 * abs(value) for name, value in found.items()}
-    return line | {"rows": measure_rows(result.measures, found, doubts)}
+    reference = solve_reference(s, int(result.extra["window"]))
+    uncertainties = {name: 1e-6 * abs(value) for name, value in reference.items()}
+    return line | {"rows": measure_rows(result.measures, reference, uncertainties)}

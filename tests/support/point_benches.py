@@ -10,7 +10,13 @@ from time import process_time
 import numpy as np
 from campaigns import measure_rows
 from motion_reference import Motion
-from motion_scenes import draw_law_keys, draw_log_uniform, quantity, table, write_law_keys
+from motion_scenes import (
+    draw_law_keys,
+    draw_log_uniform,
+    format_law_keys,
+    format_quantity,
+    format_table,
+)
 
 import patchfem as pf
 
@@ -63,19 +69,19 @@ def draw_bench(seed: int) -> dict:
     return numbers | draw_law_keys(r, law, load, amplitude, amplitude * omega)
 
 
-def write_bench(bench: dict) -> str:
+def format_scene(bench: dict) -> str:
     """Return the scene of a bench as text."""
     slide = {
         "kind": '"sine"',
-        "amplitude": quantity(bench["amplitude"], "m"),
-        "frequency": quantity(bench["frequency"], "Hz"),
+        "amplitude": format_quantity(bench["amplitude"], "m"),
+        "frequency": format_quantity(bench["frequency"], "Hz"),
         "cycles": bench["cycles"],
     }
     return (
-        table("normal", {"load": quantity(bench["load"], "N")})
-        + table("friction", write_law_keys(bench))
-        + table("slide", slide)
-        + table("accuracy", {"tolerance": bench["tolerance"]})
+        format_table("normal", {"load": format_quantity(bench["load"], "N")})
+        + format_table("friction", format_law_keys(bench))
+        + format_table("slide", slide)
+        + format_table("accuracy", {"tolerance": bench["tolerance"]})
     )
 
 
@@ -88,13 +94,13 @@ class PrescribedMotion(Motion):
         y[1] = self.s["amplitude"] * self.s["seeded"]
         return y
 
-    def forces(self, t, y, pull=None):
+    def friction_forces(self, t, y, pull=None):
         """Return the friction force [N]."""
         law = self.laws[0]
         part = self.parts[0]
         return np.array([law.mode * law.kinetic if law.set_valued else law.force(y[part], y[1], t)])
 
-    def slope(self, t, y):
+    def derivative(self, t, y):
         """Return the time derivative of the state."""
         law = self.laws[0]
         part = self.parts[0]
@@ -102,16 +108,16 @@ class PrescribedMotion(Motion):
         out[0] = y[1]
         out[1] = -self.s["size"] * np.sin(self.s["seeded"] * t)
         out[part] = law.rate(y[part], y[1], t)
-        out[-1] = self.forces(t, y)[0] * y[1]
+        out[-1] = self.friction_forces(t, y)[0] * y[1]
         return out
 
-    def turn(self, t, y, k, g):
+    def apply_event(self, t, y, k, g):
         """Apply an event; a set-valued law reverses its direction."""
         law = self.laws[0]
         if law.set_valued:
             law.mode = -law.mode
         else:
-            super().turn(t, y, k, g)
+            super().apply_event(t, y, k, g)
 
 
 def integrate_bench(bench: dict, rtol: float) -> dict:
@@ -125,26 +131,26 @@ def integrate_bench(bench: dict, rtol: float) -> dict:
     displacements = []
     peak = 0.0
     works = {}
-    for stretch in motion.run(end, rtol, start=None if law.set_valued else motion.start()[:-1]):
-        law.mode, law.side = stretch.modes[0]
-        if stretch.turns:
-            law.turns = stretch.turns[0]
-        begin = stretch.times[0]
-        stop = stretch.times[-1]
+    for piece in motion.run(end, rtol, start=None if law.set_valued else motion.start()[:-1]):
+        law.mode, law.side = piece.modes[0]
+        if piece.turns:
+            law.turns = piece.turns[0]
+        begin = piece.times[0]
+        stop = piece.times[-1]
         count = max(int(N_SAMPLES * (stop - begin) / period), 2)
         t = np.linspace(begin, stop, count)
-        y = stretch.solution(t).T
-        f = np.array([motion.forces(*pair)[0] for pair in zip(t, y)])
+        y = piece.solution(t).T
+        f = np.array([motion.friction_forces(*pair)[0] for pair in zip(t, y)])
         peak = max(peak, np.abs(f).max())
         for moment in (end - period, end):
             if begin <= moment <= stop:
-                works[moment] = float(stretch.solution(moment)[-1])
+                works[moment] = float(piece.solution(moment)[-1])
         last = t >= end - period * (1 + 1e-12)
         times.append(t[last])
         forces.append(f[last])
         displacements.append(y[last, 0])
     t, f, q = map(np.concatenate, (times, forces, displacements))
-    turn = np.exp(-1j * bench["seeded"] * t)
+    phase = np.exp(-1j * bench["seeded"] * t)
     high = np.argmax(q)
     low = np.argmin(q)
     measures = {
@@ -153,7 +159,7 @@ def integrate_bench(bench: dict, rtol: float) -> dict:
         "friction_force_peak": peak,
         "friction_ratio_end": f[-1] / bench["load"],
         "secant_stiffness": (f[high] - f[low]) / (q[high] - q[low]),
-        "equivalent_stiffness": (np.trapezoid(f * turn, t) / np.trapezoid(q * turn, t)).real,
+        "equivalent_stiffness": (np.trapezoid(f * phase, t) / np.trapezoid(q * phase, t)).real,
     }
     # At a reversal the force may have any value between the two friction limits.
     if law.set_valued:
@@ -166,7 +172,7 @@ def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     bench = draw_bench(seed)
     begin = process_time()
     try:
-        result = pf.run(write_bench(bench))
+        result = pf.run(format_scene(bench))
     except pf.PatchfemError as error:
         return {"group": bench["law"], "rows": [], "refused": str(error)}
     line = {

@@ -2,7 +2,7 @@
 
 This is the campaign "predicted-wear" of `campaigns.py`.
 
-The measured wear is that of `wear_scenes.integrate`, which uses nothing of the package, with the
+The measured wear is that of `wear_scenes.integrate_depth`, which uses nothing of the package, with the
 true coefficient. It is subtracted from a rough surface of `known_pairs`, and a stylus measures the
 surface before and after: each trace has its own start, tilt, offset and noise; the zero of its x
 differs from that of the patch, and in half of the pairs its direction is reversed. The wear varies
@@ -24,10 +24,10 @@ from typing import NamedTuple
 import numpy as np
 import wear_scenes
 from campaigns import Row
-from known_pairs import surface
+from known_pairs import draw_surface
 from scipy.ndimage import gaussian_filter1d
-from static_reference import PieceInterface, Scene
-from static_scenes import MATERIALS, text_of
+from static_reference import BodySection, PatchScene
+from static_scenes import MATERIALS, format_scene
 from wear_scenes import WearScene
 
 import patchfem as pf
@@ -38,7 +38,7 @@ CELLS = 60  # Cells of the reference along the patch.
 STEPS = 60  # Steps of the reference; twice as many change the depth by less than 1e-3 of its mean.
 
 
-class MadePair(NamedTuple):
+class WearPair(NamedTuple):
     """Scene, coefficient of the run, and two traces with their true properties.
 
     - piece, share: which piece the traces are from, and its part of the wear
@@ -69,7 +69,7 @@ def draw_scene(seed: int) -> WearScene:
     kind = KINDS[seed % len(KINDS)]
     length = draw_number(random, 2.5e-3, 6e-3)
     layers = (MATERIALS[random.integers(len(MATERIALS))],) * 2
-    piece = PieceInterface(length, float(f"{0.7 * length:.5g}"), 0.0, layers)
+    piece = BodySection(length, float(f"{0.7 * length:.5g}"), 0.0, layers)
     tilt = 0.0
     curvature = 0.0
     if "tilt" in kind:
@@ -77,7 +77,7 @@ def draw_scene(seed: int) -> WearScene:
     if "crown" in kind:
         curvature = draw_number(random, 3e-2, 1.0)
     load = draw_number(random, 20, 500)
-    patch = Scene(length, length, "strain", piece, piece, load, tilt, curvature)
+    patch = PatchScene(length, length, "strain", piece, piece, load, tilt, curvature)
     coefficient = draw_number(random, 1e-16, 1e-13)
     amplitude = draw_number(random, 3e-6, 3e-5)
     depth = draw_number(random, 0.3e-6, 8e-6)
@@ -89,12 +89,12 @@ def compute_depth(scene: WearScene, x) -> np.ndarray:
     """Return the depth (n,) [m] of both bodies at positions x (n,) [m] along the patch, without the package."""
     half = scene.patch.length / 2
     model = wear_scenes.discretize(scene.patch, (-half, half), CELLS)
-    depth = wear_scenes.integrate(model, scene, STEPS).depth
-    place = np.clip(x, model.place[0], model.place[-1])
-    return np.where(np.abs(x) <= half, np.interp(place, model.place, depth), 0.0)
+    depth = wear_scenes.integrate_depth(model, scene, STEPS).depth
+    positions = np.clip(x, model.place[0], model.place[-1])
+    return np.where(np.abs(x) <= half, np.interp(positions, model.place, depth), 0.0)
 
 
-def add_pile_up(random, x, ends: tuple, depth: float) -> np.ndarray:
+def draw_pile_up(random, x, ends: tuple, depth: float) -> np.ndarray:
     """Draw ridges (n,) [m] outside both ends of a track."""
     ridge = np.zeros(x.size)
     for end, side in zip(ends, (-1, 1)):
@@ -106,7 +106,7 @@ def add_pile_up(random, x, ends: tuple, depth: float) -> np.ndarray:
     return depth * ridge
 
 
-def draw_pair(seed: int) -> MadePair:
+def draw_pair(seed: int) -> WearPair:
     """Draw the scene, the run and the traces of a seed."""
     scene = draw_scene(seed)
     random = np.random.default_rng([seed, 582])
@@ -115,24 +115,24 @@ def draw_pair(seed: int) -> MadePair:
     if random.random() < 0.15:
         margins[1] = -length * random.uniform(0.05, 0.3)  # The trace ends inside the track.
     trace_length = length + float(margins.sum())
-    edge = 0.06 * trace_length
-    x, new = surface(random, trace_length + 2 * edge, STYLES[random.integers(3)])
-    middle = edge + margins[0] + length / 2
+    margin_length = 0.06 * trace_length
+    x, new = draw_surface(random, trace_length + 2 * margin_length, STYLES[random.integers(3)])
+    middle = margin_length + margins[0] + length / 2
     is_mirrored = bool(random.random() < 0.5)
-    along = (x - middle) * (-1 if is_mirrored else 1)
+    patch_x = (x - middle) * (-1 if is_mirrored else 1)
     piece = str(random.choice(["upper", "lower"]))
     share = 0.5 if random.random() < 0.5 else float(f"{random.uniform(0.2, 0.8):.3g}")
-    part = share if piece == "upper" else 1 - share
+    fraction_of_body = share if piece == "upper" else 1 - share
     correlation = length * random.uniform(1 / 80, 1 / 25)
     process = gaussian_filter1d(random.normal(size=x.size), correlation / (x[1] - x[0]))
     process = 1 + random.uniform(0, 0.12) * process / process.std()
-    wear = part * compute_depth(scene, along) * process
+    wear = fraction_of_body * compute_depth(scene, patch_x) * process
     if random.random() < 0.25:
         worn = x[wear > 0.02 * wear.max()]
-        wear = wear - add_pile_up(random, x, (worn[0], worn[-1]), float(wear.max()))
+        wear = wear - draw_pile_up(random, x, (worn[0], worn[-1]), float(wear.max()))
     noise = random.uniform(1e-9, 15e-9)
     spacing = float(random.choice([0.5e-6, 1e-6, 2e-6]))
-    starts = (edge, edge + random.uniform(-0.04, 0.04) * trace_length)
+    starts = (margin_length, margin_length + random.uniform(-0.04, 0.04) * trace_length)
     traces = []
     for heights, start in zip((new, new - wear), starts):
         points = np.arange(0.0, trace_length, spacing)
@@ -140,7 +140,7 @@ def draw_pair(seed: int) -> MadePair:
         z = np.interp(start + points, x, heights) + noise * random.normal(size=points.size)
         z += random.uniform(-0.8e-3, 0.8e-3) * points + random.uniform(-5e-6, 5e-6)
         traces.append((points, z))
-    return MadePair(
+    return WearPair(
         KINDS[seed % len(KINDS)],
         scene,
         float(f"{scene.coefficient * 10 ** random.uniform(-0.1, 0.8):.4g}"),
@@ -152,13 +152,13 @@ def draw_pair(seed: int) -> MadePair:
     )
 
 
-def write_pair(pair: MadePair, folder: Path) -> None:
+def write_pair(pair: WearPair, folder: Path) -> None:
     """Write before.csv, after.csv and scene.toml of a pair."""
     for name, (x, z) in (("before", pair.before), ("after", pair.after)):
         rows = [f"{a * 1e6:.3f},{b * 1e6:.5f}" for a, b in zip(x, z)]
         (folder / f"{name}.csv").write_text("\n".join(["x [um],z [um]", *rows, ""]), "utf-8")
     scene = pair.scene
-    text = text_of(scene.patch) + (
+    text = format_scene(scene.patch) + (
         '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\nfrequency = "10 Hz"\ncycles = 2\n'
         f'amplitude = "{scene.amplitude!r} m"\n[wear]\ncoefficient = "{pair.run_coefficient!r} m^2/N"\n'
         f"upper_share = {pair.share!r}\ncycles = {scene.cycles!r}\n"
@@ -170,7 +170,7 @@ def compare_pair(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Fit the coefficient of the pair of a seed; see `campaigns`."""
     pair = draw_pair(seed)
     write_pair(pair, folder)
-    begin = process_time()
+    started = process_time()
     pf.run(folder / "scene.toml").save(folder / "wear")
     line = {"group": pair.kind, "engine": "predicted", "run_coefficient": pair.run_coefficient}
     try:
@@ -188,7 +188,7 @@ def compare_pair(seed: int, folder: Path, earlier: dict | None = None) -> dict:
         rows.append(Row(name, value, abs(end - value), 0.0, truth, 0.0))
     return line | {
         "rows": rows,
-        "seconds": process_time() - begin,
+        "seconds": process_time() - started,
         "mirrored": [pair.is_mirrored, data["mirrored"]],
         "sentence": data["sentence"],
     }

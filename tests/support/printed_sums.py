@@ -80,7 +80,7 @@ ROCK = (
 )
 
 
-def scene_of(kind: str, seed: int):
+def draw_scene(kind: str, seed: int):
     """Return a random scene below or above gross slip.
 
     Reading, order, initial bonds, growth, pressure, and amplitude or drive are random.
@@ -105,13 +105,16 @@ def scene_of(kind: str, seed: int):
         sets["contact.tilt.angle"] = f"{10 ** draw.uniform(-5.5, -4):.3g} rad"
     frequency = draw.uniform(80, 200)
     stroke = length * 10 ** draw.uniform(-0.3, 0.9)
-    push = 10 ** draw.uniform(0.3, 1.0)
+    acceleration = 10 ** draw.uniform(0.3, 1.0)
     if kind == "bench":
         sets |= {"slide.frequency": f"{frequency:.1f} Hz", "slide.amplitude": f"{stroke:.4g} um"}
         speed = 2 * pi * frequency * stroke * 1e-6
     else:
-        sets |= {"drive.frequency": f"{frequency:.1f} Hz", "drive.acceleration": f"{push:.3g} g"}
-        speed = push * 9.80665 / (2 * pi * frequency)
+        sets |= {
+            "drive.frequency": f"{frequency:.1f} Hz",
+            "drive.acceleration": f"{acceleration:.3g} g",
+        }
+        speed = acceleration * 9.80665 / (2 * pi * frequency)
     if draw.random() < 0.4:
         floor = 0.05 * speed
         sets |= {
@@ -124,23 +127,23 @@ def scene_of(kind: str, seed: int):
     # The pressure is given by the lower body, or the load varies by heave or by rocking, which
     # lifts the ends.
     if seed >= 8000:
-        what = draw.choice(
+        variant = draw.choice(
             ["upper", "lower", "lower"] if kind == "bench" else ["upper", "lower", "heave", "rock"]
         )
-        if what == "lower" and shape != "flat":
+        if variant == "lower" and shape != "flat":
             sets[f"contact.{shape}.on"] = "lower"
-        if what in ("heave", "rock") and reading == "report":
+        if variant in ("heave", "rock") and reading == "report":
             pitch = 10 ** draw.uniform(0.8, 1.8)
             mode = (
                 HEAVE.format(draw.uniform(150, 400), draw.uniform(0.1, 0.4))
-                if what == "heave"
+                if variant == "heave"
                 else ROCK.format(draw.uniform(150, 400), pitch, draw.uniform(0.1, 0.4))
             )
             motion = motion.replace("slide = 1.0\n", "slide = 1.0\nbase = 0.9\n" + mode)
     return loads(PIECES + motion, "random.toml", [f"{key}={value}" for key, value in sets.items()])
 
 
-class Bonds:
+class NodeBonds:
     """Bonds of m points, each along its own path, by 2.10 and 2.14-2.17.
 
     Parameters
@@ -170,7 +173,7 @@ class Bonds:
         self.first = np.ones(size)
         self.forming = lambda places, part: np.ones_like(places)
 
-    def grown(self, moved, dt):
+    def compute_lengths(self, moved, dt):
         """Return bond lengths by 2.10 for points that move by `moved` (m,) [m] in a step dt [s].
 
         Returns
@@ -184,13 +187,13 @@ class Bonds:
             return self.eps, np.ones_like(moved), self.eps
         out = []
         for part in (1.0, 0.5):
-            rest = f.rest_growth * part * dt / np.maximum(moved / dt, self.floor)
-            slide = part * moved / f.slip_growth
-            target = (rest * f.bond_length + slide * f.bond_length * f.kinetic / f.static) / (
-                rest + slide
-            )
-            left = np.exp(-rest - slide)
-            out += [target + (self.eps - target) * left, left]
+            rest_growth = f.rest_growth * part * dt / np.maximum(moved / dt, self.floor)
+            slip_growth = part * moved / f.slip_growth
+            target = (
+                rest_growth * f.bond_length + slip_growth * f.bond_length * f.kinetic / f.static
+            ) / (rest_growth + slip_growth)
+            decay = np.exp(-rest_growth - slip_growth)
+            out += [target + (self.eps - target) * decay, decay]
         return out[0], out[1], out[2]
 
     def weight(self, s, dt, keep: bool = False):
@@ -203,7 +206,7 @@ class Bonds:
         e0 = self.f.bond_length
         moved = np.abs(s - self.at)
         norm = gamma(self.f.order + 1)
-        eps, left, middle = self.grown(moved, dt)
+        eps, decay, middle = self.compute_lengths(moved, dt)
         path = self.path + moved
         harm = self.harm + moved / middle
         parts = (
@@ -216,21 +219,21 @@ class Bonds:
         low = np.vstack([self.low, ends[:-1]])
         high = np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
-        share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
+        position = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
         # Bonds formed behind the point minus bonds formed ahead of it.
-        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)
-        when = np.vstack([self.when, path - back * moved])
-        hurt = np.vstack([self.hurt, harm - back * moved / middle])
-        born = np.vstack([self.born, np.tile(middle, (parts, 1))])
-        gone = np.zeros_like(moved) + left
+        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(position, 0, 1) - 1)
+        initial_path = np.vstack([self.when, path - back * moved])
+        initial_damage = np.vstack([self.hurt, harm - back * moved / middle])
+        initial_length = np.vstack([self.born, np.tile(middle, (parts, 1))])
+        gone = np.zeros_like(moved) + decay
         # Difference between the mature length and the length of a bond, which grows from 0 by 2.10.
         lag = np.vstack([self.lag * gone, middle * gone**back])
         dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
-        age = path - when
+        age = path - initial_path
         if f.reading == "report":
-            own = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
-            x = age / own
-            each = np.where(size > 0, x**p * np.exp(-x), 0.0) * size / (e0 * norm)
+            bond_length = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
+            x = age / bond_length
+            contributions = np.where(size > 0, x**p * np.exp(-x), 0.0) * size / (e0 * norm)
             first = (
                 f.initial_bonds
                 / norm
@@ -240,7 +243,9 @@ class Bonds:
             first = first * self.first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
         else:
             u = np.abs(s - (low + high) / 2)
-            each = (u / born) ** p * np.exp(-(harm - hurt)) * size / (e0 * norm)
+            contributions = (
+                (u / initial_length) ** p * np.exp(-(harm - initial_damage)) * size / (e0 * norm)
+            )
             first = (
                 f.initial_bonds
                 / norm
@@ -249,25 +254,26 @@ class Bonds:
                 * np.sign(s)
                 * self.first
             )
-        each = each * dense
+        contributions = contributions * dense
         if keep:
-            on = (age / e0 < MOST).any(axis=1)
+            is_kept = (age / e0 < MOST).any(axis=1)
             self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
-                one[on] for one in (low, high, when, hurt, born, lag, dense)
+                column[is_kept]
+                for column in (low, high, initial_path, initial_damage, initial_length, lag, dense)
             )
             self.at = s
             self.path = path
             self.harm = harm
             self.eps = eps
-        return (each * side).sum(axis=0) + first
+        return (contributions * side).sum(axis=0) + first
 
-    def lift(self, off):
+    def break_bonds(self, off):
         """Break the bonds of points without pressure, off (m,) bool."""
         self.dense[:, off] = 0.0
         self.first[off] = 0.0
 
 
-def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
+def solve_displacements(bonds: NodeBonds, limit, c, q: float, dt: float, guess):
     """Solve s = q - c F(s) by Newton's method with step halving.
 
     Parameters
@@ -290,27 +296,31 @@ def settled(bonds: Bonds, limit, c, q: float, dt: float, guess):
         Slides (m,) [m] and forces (m,) [N].
     """
     s = guess.copy()
-    tiny = 1e-7 * bonds.f.bond_length
+    increment = 1e-7 * bonds.f.bond_length
     force = limit * bonds.weight(s, dt)
-    miss = s - q + c @ force
+    residual = s - q + c @ force
     for _ in range(25):
-        if np.abs(miss).max() < 1e-9 * (abs(q) + bonds.f.bond_length):
+        if np.abs(residual).max() < 1e-9 * (abs(q) + bonds.f.bond_length):
             break
-        slope = limit * (bonds.weight(s + tiny, dt) - bonds.weight(s - tiny, dt)) / (2 * tiny)
-        step = np.linalg.solve(np.eye(s.size) + c * slope, miss)
+        slope = (
+            limit
+            * (bonds.weight(s + increment, dt) - bonds.weight(s - increment, dt))
+            / (2 * increment)
+        )
+        step = np.linalg.solve(np.eye(s.size) + c * slope, residual)
         for part in 0.5 ** np.arange(8):
             new = s - part * step
-            there = limit * bonds.weight(new, dt)
-            left = new - q + c @ there
-            if np.linalg.norm(left) < (1 - 0.1 * part) * np.linalg.norm(miss):
+            new_force = limit * bonds.weight(new, dt)
+            new_residual = new - q + c @ new_force
+            if np.linalg.norm(new_residual) < (1 - 0.1 * part) * np.linalg.norm(residual):
                 break
         s = new
-        force = there
-        miss = left
+        force = new_force
+        residual = new_residual
     return s, force
 
 
-class Pressed:
+class PressedPatch:
     """Nodal forces (m,) of a patch whose upper holder heaves and rotates."""
 
     def __init__(self, patch):
@@ -327,27 +337,33 @@ class Pressed:
         The forces and gaps are >= 0. The active set starts from the last one: nodes in tension
         leave it, nodes that would overlap join it.
         """
-        on = self.force > 0
-        open_ = self.opening + heave + turn * self.x
+        is_active = self.force > 0
+        gap_without_force = self.opening + heave + turn * self.x
         for _ in range(200):
             force = np.zeros_like(self.x)
             slopes = np.zeros((self.x.size, 2))
-            if on.any():
-                if on.tobytes() not in self.inverses:
-                    self.inverses[on.tobytes()] = np.linalg.inv(self.c[np.ix_(on, on)])
-                sides = np.stack([open_, np.ones_like(open_), self.x], axis=1)
-                found = self.inverses[on.tobytes()] @ sides[on]
-                force[on] = -found[:, 0]
-                slopes[on] = -found[:, 1:]
-            wanted = np.where(on, force >= 0, open_ + self.c @ force < -1e-16)
-            if (wanted == on).all():
+            if is_active.any():
+                if is_active.tobytes() not in self.inverses:
+                    self.inverses[is_active.tobytes()] = np.linalg.inv(
+                        self.c[np.ix_(is_active, is_active)]
+                    )
+                right_sides = np.stack(
+                    [gap_without_force, np.ones_like(gap_without_force), self.x], axis=1
+                )
+                solution = self.inverses[is_active.tobytes()] @ right_sides[is_active]
+                force[is_active] = -solution[:, 0]
+                slopes[is_active] = -solution[:, 1:]
+            next_active = np.where(
+                is_active, force >= 0, gap_without_force + self.c @ force < -1e-16
+            )
+            if (next_active == is_active).all():
                 break
-            on = wanted
+            is_active = next_active
         self.force = force
         return force, slopes
 
 
-def by_hand(scene, steps: int = 500) -> dict:
+def sum_scene(scene, steps: int = 500) -> dict:
     """Return the measures of a scene by the direct sum with `steps` per cycle."""
     model = build(scene)
     patch = patches.solve_with_coarser(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
@@ -357,15 +373,15 @@ def by_hand(scene, steps: int = 500) -> dict:
     sigma = patch.pressure.sigma_n
     lower = model.side == "lower"
     varies = rig is not None and rig.friction.load_varies
-    on = np.flatnonzero(sigma > 0) if not (lower or varies) else np.arange(sigma.size)
+    nodes = np.flatnonzero(sigma > 0) if not (lower or varies) else np.arange(sigma.size)
     measure = patch.pressure.load / area[sigma > 0].sum()
-    under = np.full(on.size, measure) if lower or varies else sigma[on]
-    limit = f.static * area[on] * under
-    c = patch.giving[np.ix_(on, on)]
-    x = patch.x[on]
-    bonds = Bonds(f, on.size, model.bonds.rest_speed, steps)
-    press = Pressed(patch)
-    bonds.first = sigma[on] / under
+    pressure = np.full(nodes.size, measure) if lower or varies else sigma[nodes]
+    limit = f.static * area[nodes] * pressure
+    c = patch.giving[np.ix_(nodes, nodes)]
+    x = patch.x[nodes]
+    bonds = NodeBonds(f, nodes.size, model.bonds.rest_speed, steps)
+    press = PressedPatch(patch)
+    bonds.first = sigma[nodes] / pressure
     force_now = area * sigma
     if lower:
         bonds.forming = lambda places, part: np.interp(
@@ -378,57 +394,65 @@ def by_hand(scene, steps: int = 500) -> dict:
     )
     dt = 2 * pi / omega / steps
     slide, force, slip = (np.zeros(cycles * steps + 1) for _ in range(3))
-    s = np.zeros(on.size)
-    before = np.zeros(on.size)
+    s = np.zeros(nodes.size)
+    before = np.zeros(nodes.size)
     beta = 0.0
     if rig is not None:
         modes = rig.modes
-        own = modes.omega
+        omega_modes = modes.omega
         zeta = modes.zeta
         mass = modes.mass
         rows = np.stack(
             [
-                np.zeros(own.size) if one is None else np.asarray(one, float)
-                for one in (modes.slide, modes.normal, modes.pitch)
+                np.zeros(omega_modes.size)
+                if participation is None
+                else np.asarray(participation, float)
+                for participation in (modes.slide, modes.normal, modes.pitch)
             ]
         )
-        stiff = own**2 + 4 / dt**2 + 4 * zeta * own / dt
+        stiff = omega_modes**2 + 4 / dt**2 + 4 * zeta * omega_modes / dt
         beta = float((rows[0] ** 2 / stiff).sum() / mass)
-        state = np.zeros((3, own.size))
+        state = np.zeros((3, omega_modes.size))
     for k in range(1, slide.size):
         t = k * dt
         if rig is None:
             free = scene.slide.amplitude * np.sin(omega * t)
         else:  # Newmark's method with average acceleration: z'' = 4 (z - z0)/dt^2 - 4 v0/dt - a0
             z, v, a = state
-            push = -modes.base * scene.drive.acceleration * np.sin(omega * t)
+            drive = -modes.base * scene.drive.acceleration * np.sin(omega * t)
             free_z = (
-                push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)
+                drive + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * omega_modes * (2 * z / dt + v)
             ) / stiff
-            old = force_now
-            pull = np.zeros(own.size)
+            previous_normal_force = force_now
+            contact_displacement = np.zeros(omega_modes.size)
             if varies:
-                force_now, pull = balanced(press, rows, free_z, stiff * mass, z)
-                bonds.forming = lambda places, part, a=old[on], b=force_now[on]: np.broadcast_to(
-                    (a + part * (b - a)) / (measure * area[on]), places.shape
+                force_now, contact_displacement = solve_equilibrium(
+                    press, rows, free_z, stiff * mass, z
                 )
-            free_z = free_z + pull
+                bonds.forming = (
+                    lambda places, part, a=previous_normal_force[nodes], b=force_now[nodes]: (
+                        np.broadcast_to(
+                            (a + part * (b - a)) / (measure * area[nodes]), places.shape
+                        )
+                    )
+                )
+            free_z = free_z + contact_displacement
             free = rows[0] @ free_z
-        new, there = settled(bonds, limit, c + beta, free, dt, 2 * s - before)
+        new, friction = solve_displacements(bonds, limit, c + beta, free, dt, 2 * s - before)
         before = s
         s = new
         bonds.weight(s, dt, keep=True)
-        here = (
-            np.interp(x + s, patch.x, sigma, left=0.0, right=0.0) * area[on]
+        normal_force = (
+            np.interp(x + s, patch.x, sigma, left=0.0, right=0.0) * area[nodes]
             if lower
-            else force_now[on]
+            else force_now[nodes]
         )
-        bonds.lift(here <= 0)
-        force[k] = there.sum()
+        bonds.break_bonds(normal_force <= 0)
+        force[k] = friction.sum()
         slide[k] = free - beta * force[k]
         slip[k] = (
-            (here @ s - f.bond_length / f.static * force[k]) / here.sum()
-            if here.sum() > 0
+            (normal_force @ s - f.bond_length / f.static * force[k]) / normal_force.sum()
+            if normal_force.sum() > 0
             else slide[k]
         )
         if rig is not None:
@@ -437,10 +461,10 @@ def by_hand(scene, steps: int = 500) -> dict:
             state = np.array([z1, v + dt / 2 * (a + a1), a1])
     work = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(slide))])
     last = slice(-steps - 1, None)
-    pulled = np.abs(force[last if beta else slice(None)])
+    force_magnitude = np.abs(force[last if beta else slice(None)])
     return {
         "loop_area": work[-1] - work[-steps - 1],
-        "friction_force_peak": pulled.max(),
+        "friction_force_peak": force_magnitude.max(),
         "friction_work": work[-1],
         "friction_ratio_end": force[-1] / patch.pressure.load,
         "slip_amplitude": np.ptp(slip[last]) / 2,
@@ -448,7 +472,7 @@ def by_hand(scene, steps: int = 500) -> dict:
     }
 
 
-def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
+def solve_equilibrium(press: PressedPatch, rows, free, stiff, guess) -> tuple:
     """Find heave and rotation in equilibrium with the contact forces by Newton's method.
 
     Parameters
@@ -468,18 +492,20 @@ def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
     tuple
         Nodal forces (m,) [N], and the coordinates (n,) by which they push the modes from `free`.
     """
-    up = rows[1:] / stiff  # Change of the coordinates per newton and per newton metre.
-    place = rows[1:] @ guess
-    rest = rows[1:] @ free
+    compliance = rows[1:] / stiff  # Change of the coordinates per newton and per newton metre.
+    motion = rows[1:] @ guess
+    free_motion = rows[1:] @ free
     for _ in range(60):
-        force, slopes = press.at(*place)
-        pull = np.array([force.sum() - press.load, force @ press.x - press.moment])
-        miss = place - rest - rows[1:] @ (up.T @ pull)
-        if np.abs(miss / np.array([1.0, 1 / np.ptp(press.x)])).max() < 1e-15:
+        force, slopes = press.at(*motion)
+        contact_load = np.array([force.sum() - press.load, force @ press.x - press.moment])
+        residual = motion - free_motion - rows[1:] @ (compliance.T @ contact_load)
+        if np.abs(residual / np.array([1.0, 1 / np.ptp(press.x)])).max() < 1e-15:
             break
         arms = np.stack([np.ones_like(press.x), press.x])
-        place = place - np.linalg.solve(np.eye(2) - rows[1:] @ up.T @ (arms @ slopes), miss)
-    return force, up.T @ pull
+        motion = motion - np.linalg.solve(
+            np.eye(2) - rows[1:] @ compliance.T @ (arms @ slopes), residual
+        )
+    return force, compliance.T @ contact_load
 
 
 def compare_sum(kind: str, seed: int) -> dict:
@@ -487,15 +513,18 @@ def compare_sum(kind: str, seed: int) -> dict:
 
     The difference of the two sums is the uncertainty of the reference.
     """
-    scene = scene_of(kind, seed)
+    scene = draw_scene(kind, seed)
     try:
         result = runs.run(pf.plan(scene))
     except pf.PatchfemError as error:
         return {"group": kind, "rows": [], "refused": str(error)}
-    rough = by_hand(scene, 200)
-    fine = by_hand(scene, 400)
-    doubts = {name: abs(fine[name] - rough[name]) for name in fine}
-    return {"group": kind, "rows": measure_rows(result.measures, fine, doubts, COMPARED[kind])}
+    coarse = sum_scene(scene, 200)
+    fine = sum_scene(scene, 400)
+    uncertainties = {name: abs(fine[name] - coarse[name]) for name in fine}
+    return {
+        "group": kind,
+        "rows": measure_rows(result.measures, fine, uncertainties, COMPARED[kind]),
+    }
 
 
 def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:

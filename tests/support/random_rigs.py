@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 from campaigns import Row, measure_rows, strip_number
-from motion_read import measures, works
-from motion_reference import Motion, TooLong
-from motion_scenes import spec, written
-from motion_steady import periodic
+from motion_read import compute_measures, compute_works
+from motion_reference import Motion, TooManySteps
+from motion_scenes import draw_spec, write_scene
+from motion_steady import find_periodic_state
 
 import patchfem as pf
 
@@ -36,7 +36,7 @@ LEFT_OUT = PATCH_MEASURES | {
 }  # fmt: skip
 
 
-class Truth(NamedTuple):
+class ReferenceValues(NamedTuple):
     """Reference values and their uncertainties by name, and the kind of reference."""
 
     values: dict
@@ -51,85 +51,98 @@ def has_reference(s: dict) -> bool:
     return not ((s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"))
 
 
-def compute_truth(s: dict, path: Path, run: dict) -> Truth:
+def compute_reference(s: dict, path: Path, run: dict) -> ReferenceValues:
     """Compute the reference of a rig whose scene is a file; `run` is the result of `run_rig`."""
     if has_reference(s):
         try:
             if s.get("method") == "harmonic":
-                return steady_truth(s, run["period"], run["kept"])
-            return motion_truth(s, run)
-        except TooLong:
+                return solve_steady_reference(s, run["period"], run["kept"])
+            return integrate_reference(s, run)
+        except TooManySteps:
             pass
-    return finer_truth(s, path, run)
+    return run_finer_reference(s, path, run)
 
 
-def motion_truth(s: dict, run: dict) -> Truth:
+def integrate_reference(s: dict, run: dict) -> ReferenceValues:
     """Integrate a rig with the independent program; a second, more accurate integration gives the uncertainty."""
     runs = []
     for step, rtol in (ROUGH,) if run["engine"] == "march" else (ROUGH, FINE):
         motion = Motion(s, step)
-        stretches = motion.run(run["cycles"] * run["period"], rtol, most=MAX_STEPS)
-        runs.append(measures(motion, stretches, run["period"], run["cycles"], run["window"]))
-    return Truth(runs[-1], estimate_doubts(*runs), "reference")
+        stretches = motion.run(run["cycles"] * run["period"], rtol, max_steps=MAX_STEPS)
+        runs.append(
+            compute_measures(motion, stretches, run["period"], run["cycles"], run["window"])
+        )
+    return ReferenceValues(runs[-1], estimate_uncertainties(*runs), "reference")
 
 
-def steady_truth(s: dict, period: float, kept: int) -> Truth:
+def solve_steady_reference(s: dict, period: float, kept: int) -> ReferenceValues:
     """Compute a steady motion with the independent program: its periodic state, or the end of a long run.
 
     `period` in seconds; `kept` is the number of cycles over which works are summed.
     """
     motion = Motion(s)
-    start = periodic(motion, period)
+    start = find_periodic_state(motion, period)
     if start is not None:
         stretches = motion.run(kept * period, 1e-11, start)
-        found = measures(motion, stretches, period, kept, 1) | works(
+        values = compute_measures(motion, stretches, period, kept, 1) | compute_works(
             motion, stretches, 0.0, kept * period
         )
-        return Truth(found, {}, "reference")
+        return ReferenceValues(values, {}, "reference")
     motion = Motion(s)
     steps_per_cycle = 25 * max(1.0, motion.plant.fastest / s["frequency"])
     cycles = next((k for k in (320, 160, 80) if k * steps_per_cycle < MAX_STEPS), 40)
-    stretches = motion.run(cycles * period, 1e-10, most=MAX_STEPS)
+    stretches = motion.run(cycles * period, 1e-10, max_steps=MAX_STEPS)
     runs = []
     for count in (cycles // 4, cycles // 2, cycles - 3, cycles - 2, cycles - 1, cycles):
         end = count * period
         runs.append(
-            measures(motion, stretches, period, count, 1)
-            | works(motion, stretches, end - kept * period, end)
+            compute_measures(motion, stretches, period, count, 1)
+            | compute_works(motion, stretches, end - kept * period, end)
         )
     last = runs[-1]
-    changes = [remaining_decay(*runs[:2], last), *(difference(last, one) for one in runs[2:-1])]
+    changes = [
+        estimate_remaining_transient(*runs[:2], last),
+        *(absolute_differences(last, one) for one in runs[2:-1]),
+    ]
     doubts = {name: max(one.get(name, 0.0) for one in changes) for name in last}
-    return Truth(last, estimate_doubts(last) | doubts, "reference")
+    return ReferenceValues(last, estimate_uncertainties(last) | doubts, "reference")
 
 
-def remaining_decay(quarter: dict, half: dict, whole: dict) -> dict:
+def estimate_remaining_transient(quarter: dict, half: dict, whole: dict) -> dict:
     """Estimate the remaining transient from the values after a quarter, half and all of a run.
 
     If the decay over a quarter is r, the ratio of the two changes is r (1 + r), and r^2/(1 - r^2)
     of the last change remains.
     """
-    out = difference(whole, half)
-    early = difference(half, quarter)
-    for name, last in out.items():
-        rate = min((np.sqrt(1 + 4 * last / max(early.get(name, last), 1e-300)) - 1) / 2, 0.99)
-        out[name] = last * max(1.0, 2 * rate**2 / (1 - rate**2))
+    out = absolute_differences(whole, half)
+    first_changes = absolute_differences(half, quarter)
+    for name, last_change in out.items():
+        rate = min(
+            (np.sqrt(1 + 4 * last_change / max(first_changes.get(name, last_change), 1e-300)) - 1)
+            / 2,
+            0.99,
+        )
+        out[name] = last_change * max(1.0, 2 * rate**2 / (1 - rate**2))
     return out
 
 
-def finer_truth(s: dict, path: Path, run: dict) -> Truth:
+def run_finer_reference(s: dict, path: Path, run: dict) -> ReferenceValues:
     """Compute a rig with patchfem itself: exactly if it was marched, else with many more steps, cells or harmonics."""
     tight = {"accuracy.tolerance": f"{s['tolerance'] / 10:g}"}
     if run["map"] == "yields":
-        return Truth(run_values(path, tight), {}, "cells")
+        return ReferenceValues(run_values(path, tight), {}, "cells")
     if s.get("method") == "harmonic":
         found = pf.run(path, **tight, **{"accuracy.harmonics": "129"}).measures
-        known = {name: one for name, one in found.items() if one.value is not None}
-        values = {name: one.value for name, one in known.items()}
-        return Truth(values, {name: one.error or 0.0 for name, one in known.items()}, "harmonics")
+        known = {name: measure for name, measure in found.items() if measure.value is not None}
+        values = {name: measure.value for name, measure in known.items()}
+        return ReferenceValues(
+            values, {name: measure.error or 0.0 for name, measure in known.items()}, "harmonics"
+        )
     if run["engine"] == "march":
         try:
-            return Truth(run_values(path, tight | {"accuracy.method": "exact"}), {}, "pieces")
+            return ReferenceValues(
+                run_values(path, tight | {"accuracy.method": "exact"}), {}, "pieces"
+            )
         except pf.PatchfemError:  # No exact engine has the equations.
             pass
     steps = run["steps"] or 400
@@ -140,20 +153,23 @@ def finer_truth(s: dict, path: Path, run: dict) -> Truth:
         )
         for factor in (FINER // 2, FINER)
     )
-    return Truth(
+    return ReferenceValues(
         fine,
-        {name: HALVING_FACTOR * gap for name, gap in difference(fine, coarse).items()},
+        {
+            name: HALVING_FACTOR * change
+            for name, change in absolute_differences(fine, coarse).items()
+        },
         "finer",
     )
 
 
-def estimate_doubts(rough: dict, fine: dict | None = None) -> dict:
+def estimate_uncertainties(rough: dict, fine: dict | None = None) -> dict:
     """Estimate the uncertainties of the independent program from one run, or from two of different accuracy.
 
     A drift is a difference of means of the motion, so its uncertainty is a fraction of the
     amplitude.
     """
-    out = {} if fine is None else difference(fine, rough)
+    out = {} if fine is None else absolute_differences(fine, rough)
     relative = 1e-9 if fine is None else 1e-14
     drift = out.get("drift_per_cycle", 0.0) + relative * rough["relative_displacement_amplitude"]
     return out | {"drift_per_cycle": drift}
@@ -162,13 +178,13 @@ def estimate_doubts(rough: dict, fine: dict | None = None) -> dict:
 def run_values(path: Path, sets: dict) -> dict:
     """Run a scene with some keys set and return the values of its measures."""
     return {
-        name: one.value
-        for name, one in pf.run(path, **sets).measures.items()
-        if one.value is not None
+        name: measure.value
+        for name, measure in pf.run(path, **sets).measures.items()
+        if measure.value is not None
     }
 
 
-def difference(fine: dict, coarse: dict) -> dict:
+def absolute_differences(fine: dict, coarse: dict) -> dict:
     """Return the absolute difference of each measure that both runs have."""
     return {
         name: Row(name, fine[name], 0.0, 0.0, coarse[name], 0.0).true_error
@@ -178,12 +194,12 @@ def difference(fine: dict, coarse: dict) -> dict:
 
 def run_rig(path: Path) -> dict:
     """Run a scene with the program; return figures of the run, and its measures under "measures"."""
-    begin = process_time()
+    started = process_time()
     try:
         result = pf.run(path)
     except pf.PatchfemError as error:
         return {"refused": str(error)}
-    seconds = process_time() - begin
+    seconds = process_time() - started
     rig = pf.build(path).rig
     summary = json.loads((result.save(path.with_suffix("")) / "summary.json").read_text("utf-8"))
     numerics = summary["numerics"]
@@ -207,30 +223,30 @@ def run_rig(path: Path) -> dict:
 
 def compare_spec(s: dict, folder: Path, earlier: dict | None = None) -> dict:
     """Compare a rig with its reference; the reference of an earlier line is used if the cycles are the same."""
-    path = written(s, folder)
+    path = write_scene(s, folder)
     line = {"group": f"{s['law']}, {s['drive']}", "rows": []} | run_rig(path)
-    found = line.pop("measures", None)
-    if found is None or line["outcome"] in ("grows", "not_converged"):
+    measures_found = line.pop("measures", None)
+    if measures_found is None or line["outcome"] in ("grows", "not_converged"):
         return line
     if (
         earlier
         and "true" in earlier
         and all(earlier[key] == line[key] for key in ("cycles", "window", "kept"))
     ):
-        truth = Truth(earlier["true"], earlier["doubt"], earlier["truth"])
+        truth = ReferenceValues(earlier["true"], earlier["doubt"], earlier["truth"])
     else:
-        truth = compute_truth(s, path, line)
+        truth = compute_reference(s, path, line)
     names = {name for name in truth.values if strip_number(name) not in LEFT_OUT}
-    rows = measure_rows(found, truth.values, truth.doubts, names)
+    rows = measure_rows(measures_found, truth.values, truth.doubts, names)
     return line | {"true": truth.values, "doubt": truth.doubts, "truth": truth.kind, "rows": rows}
 
 
 def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the rig of a seed with its reference; see `campaigns`."""
-    return compare_spec(spec(seed), folder, earlier)
+    return compare_spec(draw_spec(seed), folder, earlier)
 
 
 def compare_harmonic_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict | None:
     """Compare the rig of a seed if its scene names harmonic balance, else return None; see `campaigns`."""
-    s = spec(seed)
+    s = draw_spec(seed)
     return compare_spec(s, folder, earlier) if s.get("method") == "harmonic" else None

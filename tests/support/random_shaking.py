@@ -19,14 +19,14 @@ NAMES = (
 LEVEL = 1.0  # Spectral density of the acceleration [m^2/s^3].
 
 
-def band_of(frequency: float) -> tuple:
+def excitation_band(frequency: float) -> tuple:
     """Return the frequency band of the excitation [Hz]."""
     return 0.2 * frequency, 3 * frequency
 
 
-def shaken(frequency: float, damping: float, duration: float, seed: int) -> tuple:
+def simulate_random_response(frequency: float, damping: float, duration: float, seed: int) -> tuple:
     """Return (window, drive): the steady motion of an oscillator under a record with the spectral lines of the drive."""
-    low, high = band_of(frequency)
+    low, high = excitation_band(frequency)
     drive = draw_random_record((low, high), (LEVEL, LEVEL), duration, seed, 1 / frequency)
     f = np.arange(drive.time.size // 2 + 1) / drive.duration
     omega = 2 * np.pi * frequency
@@ -36,10 +36,14 @@ def shaken(frequency: float, damping: float, duration: float, seed: int) -> tupl
         * ((f >= low - 1e-9) & (f <= high + 1e-9))
     )
     s = 2j * np.pi * f
-    place = -lines / (omega**2 + s * s + 2 * damping * omega * s)
+    displacement = -lines / (omega**2 + s * s + 2 * damping * omega * s)
     motion = [
-        np.fft.irfft(one, drive.time.size - 1)
-        for one in (place, s * place, -(omega**2 + 2 * damping * omega * s) * place)
+        np.fft.irfft(spectrum, drive.time.size - 1)
+        for spectrum in (
+            displacement,
+            s * displacement,
+            -(omega**2 + 2 * damping * omega * s) * displacement,
+        )
     ]
     return SimpleNamespace(
         extra={},
@@ -47,14 +51,17 @@ def shaken(frequency: float, damping: float, duration: float, seed: int) -> tupl
     ), drive
 
 
-def held(frequency: float, damping: float, duration: float, seed: int) -> list:
+def normalized_measures(frequency: float, damping: float, duration: float, seed: int) -> list:
     """Return for each of NAMES the value and its half-width, divided by the true value."""
-    found = stationary.random_response_measures(*shaken(frequency, damping, duration, seed))
+    found = stationary.random_response_measures(
+        *simulate_random_response(frequency, damping, duration, seed)
+    )
     truth = (
-        *shaken_rms(2 * np.pi * frequency, damping, LEVEL, band_of(frequency)),
+        *shaken_rms(2 * np.pi * frequency, damping, LEVEL, excitation_band(frequency)),
         frequency,
         damping,
     )
     return [
-        (found[name] / true, found[f"{name}_scatter"] / true) for name, true in zip(NAMES, truth)
+        (found[name] / true_value, found[f"{name}_scatter"] / true_value)
+        for name, true_value in zip(NAMES, truth)
     ]

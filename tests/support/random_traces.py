@@ -34,7 +34,7 @@ PIECES = (
 )
 
 
-def drawn(seed: int) -> tuple:
+def draw_trace(seed: int) -> tuple:
     """Return (kind, x (n,) [m], gap z (n,) [m], text of the scene without its profile) of a seed."""
     draw = np.random.default_rng(seed)
     kind = KINDS[seed % len(KINDS)]
@@ -44,36 +44,36 @@ def drawn(seed: int) -> tuple:
         else int(draw.integers(800, 1600))
     )
     x = np.linspace(-LENGTH / 2, LENGTH / 2, count + 1)
-    z, load = _shape(kind, x, draw)
+    z, load = _draw_gap(kind, x, draw)
     text = PIECE + f'load = "{load!r} N"\n' + PIECES[draw.integers(3)]
-    turned = draw.integers(3)
-    if turned == 1:
+    load_case = draw.integers(3)
+    if load_case == 1:
         text += f'[contact.tilt]\nangle = "{draw.uniform(-3e-5, 3e-5)!r} rad"\n'
-    elif turned == 2:
+    elif load_case == 2:
         text += f'[contact.load_line]\noffset = "{draw.uniform(-1, 1)!r} mm"\n'
     return kind, x, z, text
 
 
-def _shape(kind: str, x, draw) -> tuple:
+def _draw_gap(kind: str, x, draw) -> tuple:
     """Draw a gap (n,) [m] of a kind, and a load [N] that closes part of it."""
     area = LENGTH * 12.7e-3
     half = LENGTH / 2
-    place = draw.uniform(-0.4, 0.4) * half
+    position = draw.uniform(-0.4, 0.4) * half
     if kind == "corner":
         left, right = 10 ** draw.uniform(-4, -2.7, 2)
-        return np.where(x < place, left * (place - x), right * (x - place)), 10 ** draw.uniform(
-            1.7, 3
-        )
+        return np.where(
+            x < position, left * (position - x), right * (x - position)
+        ), 10 ** draw.uniform(1.7, 3)
     if kind == "roofs":
-        at = np.sort(draw.uniform(-1, 1, int(draw.integers(4, 9)))) * half
-        heights = draw.uniform(0, 10 ** draw.uniform(-6.5, -5.5), at.size)
-        return np.interp(x, at, heights), 10 ** draw.uniform(1.7, 3)
+        corners = np.sort(draw.uniform(-1, 1, int(draw.integers(4, 9)))) * half
+        heights = draw.uniform(0, 10 ** draw.uniform(-6.5, -5.5), corners.size)
+        return np.interp(x, corners, heights), 10 ** draw.uniform(1.7, 3)
     if kind == "punch":
-        flat = draw.uniform(0.05, 0.3) * half
+        flat_half_width = draw.uniform(0.05, 0.3) * half
         radius = 10 ** draw.uniform(-1.7, 0)
-        return np.maximum(np.abs(x - place) - flat, 0) ** 2 / (2 * radius), 10 ** draw.uniform(
-            2, 3.5
-        )
+        return np.maximum(np.abs(x - position) - flat_half_width, 0) ** 2 / (
+            2 * radius
+        ), 10 ** draw.uniform(2, 3.5)
     if kind in ("rough", "smooth rough"):
         short = 2.05 * LENGTH / (x.size - 1) if kind == "rough" else draw.uniform(150e-6, 400e-6)
         z = self_affine(
@@ -88,31 +88,33 @@ def _shape(kind: str, x, draw) -> tuple:
         slope = np.sqrt(np.mean((np.diff(z) / np.diff(x)) ** 2))
         return z, float(np.clip(10 ** draw.uniform(-2.5, -0.7) * MODULUS * slope * area, 5.0, 2e4))
     wave = LENGTH / draw.uniform(4, 30) if kind != "short wave" else LENGTH / draw.uniform(30, 200)
-    high = 10 ** draw.uniform(-7.5, -6.5)
-    z = high * np.cos(2 * np.pi * (x - place) / wave)
+    amplitude = 10 ** draw.uniform(-7.5, -6.5)
+    z = amplitude * np.cos(2 * np.pi * (x - position) / wave)
     if kind == "crowned wave":
         z = z + x**2 / (2 * 10 ** draw.uniform(0, 1.5))
     return z, float(
-        np.clip(10 ** draw.uniform(-1.7, 0.3) * np.pi * MODULUS * high / wave * area, 5.0, 2e4)
+        np.clip(10 ** draw.uniform(-1.7, 0.3) * np.pi * MODULUS * amplitude / wave * area, 5.0, 2e4)
     )
 
 
 def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the patch under the trace of a seed with cells alone; see `campaigns`."""
-    kind, x, z, text = drawn(seed)
+    kind, x, z, text = draw_trace(seed)
     rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(x.tolist(), z.tolist()))
     (folder / "trace.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
     scene = loads(text + '[contact.profile]\nfile = "trace.csv"\n', folder / "scene.toml")
-    begin = process_time()
+    started = process_time()
     result = pf.run(scene)
-    seconds = process_time() - begin
+    seconds = process_time() - started
     model = build(scene)
-    finer = _beside(kind, model.patch, model.accuracy.tolerance / 10)
+    finer = _solve_on_cells(kind, model.patch, model.accuracy.tolerance / 10)
     known = {
-        name: one for name, one in finer.items() if name != "normal_load" and one.value is not None
+        name: measure
+        for name, measure in finer.items()
+        if name != "normal_load" and measure.value is not None
     }
-    truths = {name: float(one.value) for name, one in known.items()}
-    doubts = {name: float(one.error) for name, one in known.items()}
+    truths = {name: float(measure.value) for name, measure in known.items()}
+    doubts = {name: float(measure.error) for name, measure in known.items()}
     return {
         "group": kind,
         "engine": "points" if result.patch.points else "cells",
@@ -122,16 +124,18 @@ def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     }
 
 
-def _beside(kind: str, asked, tolerance: float) -> dict:
+def _solve_on_cells(kind: str, patch_model, tolerance: float) -> dict:
     """Return the measures of a patch on cells alone, uniform ones for kinds in FINE, else graded ones."""
     if kind in FINE:
         return estimate_measures(
-            *solve_with_coarser(asked.with_mesh(element_size=LENGTH / CELLS), tolerance)
+            *solve_with_coarser(patch_model.with_mesh(element_size=LENGTH / CELLS), tolerance)
         )
     can_use_points = fine.can_use_points
     fine.can_use_points = lambda patch_model: False
     try:
-        patches = [patch for patch in solve_with_coarser(asked, tolerance) if patch is not None]
+        patches = [
+            patch for patch in solve_with_coarser(patch_model, tolerance) if patch is not None
+        ]
         return estimate_measures(*patches, tolerance=tolerance)
     finally:
         fine.can_use_points = can_use_points

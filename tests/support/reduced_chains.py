@@ -45,7 +45,7 @@ cycles = 60
 """
 
 
-def chain(seed: int) -> dict:
+def draw_chain(seed: int) -> dict:
     """Return the matrices and parameters of a random chain of 16 to 60 masses.
 
     One mass has friction, another is the output.
@@ -59,7 +59,9 @@ def chain(seed: int) -> dict:
     omega, shapes = np.linalg.eigh(K / np.sqrt(np.outer(m, m)))
     omega = np.sqrt(omega)
     mode = int(r.integers(0, 2))
-    rubs, seen = (int(one) for one in r.choice(np.arange(n // 4, n), 2, replace=False))
+    rubs, seen = (
+        int(mass_number) for mass_number in r.choice(np.arange(n // 4, n), 2, replace=False)
+    )
     alpha = 2 * r.uniform(0.003, 0.03) * omega[0]
     frequency = omega[mode] * r.uniform(0.85, 1.15)
     force = 10 ** r.uniform(0, 2)
@@ -94,52 +96,52 @@ def chain(seed: int) -> dict:
     }
 
 
-def texts(s: dict) -> tuple:
+def format_scenes(s: dict) -> tuple:
     """Return the scenes of the reduced and the full chain, in this order."""
     out = []
     exact = "" if s["law"] not in SMOOTH else '[accuracy]\nmethod = "harmonic"\n'
-    for whole in (False, True):
-        rubs, seen = (s["rubs"] + 1, s["seen"] + 1) if whole else (1, 2)
+    for is_full in (False, True):
+        friction_mass, output_mass = (s["rubs"] + 1, s["seen"] + 1) if is_full else (1, 2)
         size = (
             f'acceleration = "{s["acceleration"]!r} m/s^2"'
             if s["drive"] == "base"
-            else f'force = "{s["force"]!r} N"\nmass = {seen}'
+            else f'force = "{s["force"]!r} N"\nmass = {output_mass}'
         )
         head = (
             '[structure]\nfile = "whole.npz"\n'
-            if whole
+            if is_full
             else "[structure]\noutput_mass = 2\n"
             + REDUCED.format(
                 boundary=[s["rubs"] + 1, s["seen"] + 1], modes=s["modes"], method=s["method"]
             )
         )
-        out.append(head + REST.format(**s | {"rubs": rubs, "size": size}) + exact)
+        out.append(head + REST.format(**s | {"rubs": friction_mass, "size": size}) + exact)
     return tuple(out)
 
 
 def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the reduced chain of a seed with the full one; see `campaigns`."""
-    s = chain(seed)
+    s = draw_chain(seed)
     line = {"group": f"{s['law']}, {s['drive']}", "engine": s["method"], "rows": []}
     np.savez(
         folder / "whole.npz", M=s["M"], K=s["K"], C=s["C"], output=np.eye(len(s["M"]))[s["seen"]]
     )
     results = []
-    for text in texts(s):
+    for text in format_scenes(s):
         path = folder / "scene.toml"
         path.write_text(text)
         try:
             results.append(pf.run(path))
         except pf.PatchfemError as error:
             return line | {"refused": str(error)}
-    reduced, whole = results
-    if whole.outcome != reduced.outcome or whole.outcome in ("grows", "not_converged"):
-        return line | {"refused": f"reduced {reduced.outcome}, whole {whole.outcome}"}
-    known = {
-        name: one
-        for name, one in whole.measures.items()
-        if None not in (one.value, one.error) and strip_number(name) not in LEFT_OUT
+    reduced, full = results
+    if full.outcome != reduced.outcome or full.outcome in ("grows", "not_converged"):
+        return line | {"refused": f"reduced {reduced.outcome}, whole {full.outcome}"}
+    measures = {
+        name: measure
+        for name, measure in full.measures.items()
+        if None not in (measure.value, measure.error) and strip_number(name) not in LEFT_OUT
     }
-    values = {name: one.value for name, one in known.items()}
-    doubts = {name: one.error for name, one in known.items()}
-    return line | {"rows": measure_rows(reduced.measures, values, doubts)}
+    values = {name: measure.value for name, measure in measures.items()}
+    uncertainties = {name: measure.error for name, measure in measures.items()}
+    return line | {"rows": measure_rows(reduced.measures, values, uncertainties)}

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from torture import grammar
-from torture.toml import text_of
+from torture.toml import to_toml
 from torture.trial import Trial
 
 from patchfem.core import NotConverged, PatchfemError
@@ -40,49 +40,49 @@ class Remedy(NamedTuple):
     vague: tuple = ()
 
 
-def drawn(seed: int) -> dict:
+def draw_scene(seed: int) -> dict:
     """Return the tables of the first scene of a seed that is valid and planned as cheap."""
     trial = Trial(np.random.default_rng([28, seed]), None, None, None)
     while True:
-        tables = _loose(trial, KINDS[seed % len(KINDS)])
+        tables = _draw_coarse_scene(trial, KINDS[seed % len(KINDS)])
         try:
-            asked = plan(loads(text_of(tables)))
+            planned = plan(loads(to_toml(tables)))
         except (PatchfemError, SceneError):
             continue
-        if asked.seconds < DEAR:
+        if planned.seconds < DEAR:
             return tables
 
 
-def _loose(trial: Trial, word: str) -> dict:
+def _draw_coarse_scene(trial: Trial, name: str) -> dict:
     """Draw a scene with fixed settings: few steps, harmonics, elements or strips, or a tight tolerance."""
     kind = {
         "wear": trial.draw("bench", "rig"),
         "harmonic": trial.draw("rig", "masses"),
         "soft": "rig",
-    }.get(word, word)
-    out = grammar.scene(trial, kind)
-    if word == "soft":
+    }.get(name, name)
+    out = grammar.draw_scene(trial, kind)
+    if name == "soft":
         out.pop("normal", None)
-        out["contact"] = grammar.patch(trial) | {"shear": {}}
-    if word == "wear":
+        out["contact"] = grammar.draw_patch(trial) | {"shear": {}}
+    if name == "wear":
         out["wear"] = {
-            "coefficient": grammar.quantity(trial, 1e-16, 1e-13, "m^2/N"),
-            "cycles": trial.wide(10, 1e5),
+            "coefficient": grammar.draw_quantity(trial, 1e-16, 1e-13, "m^2/N"),
+            "cycles": trial.log_uniform(10, 1e5),
         }
-    pins = out["accuracy"] = {"tolerance": trial.draw(1e-2, 1e-3, 1e-4, 1e-5)}
+    settings = out["accuracy"] = {"tolerance": trial.draw(1e-2, 1e-3, 1e-4, 1e-5)}
     if kind != "patch" and trial.chance(0.5):
-        pins["steps_per_cycle"] = int(trial.r.integers(8, 80))
+        settings["steps_per_cycle"] = int(trial.r.integers(8, 80))
     if kind in ("rig", "masses", "linear"):
-        pins["method"] = trial.draw("auto", "auto", "march", "exact")
-    if word == "harmonic":
-        pins["method"] = "harmonic"
-        pins |= {"harmonics": int(trial.r.integers(1, 12))} if trial.chance(0.6) else {}
+        settings["method"] = trial.draw("auto", "auto", "march", "exact")
+    if name == "harmonic":
+        settings["method"] = "harmonic"
+        settings |= {"harmonics": int(trial.r.integers(1, 12))} if trial.chance(0.6) else {}
     if "contact" in out and trial.chance(0.6):
         out["contact"].pop("element_size", None)
     if "contact" in out and trial.chance(0.2):
         out["contact"]["strips"] = {
             "count": int(trial.r.integers(2, 5)),
-            "roll": grammar.quantity(trial, 1e-7, 1e-4, "rad"),
+            "roll": grammar.draw_quantity(trial, 1e-7, 1e-4, "rad"),
         }
     return out
 
@@ -96,129 +96,143 @@ INSTEAD = re.compile(rf'leave out ({KEY}), or set it to ("[^"]*")')
 VAGUE = re.compile(rf"(?:raise|lower|loosen|name|make|compare with) ({KEY})(?! below)")
 
 
-def remedies_of(sentence: str) -> list:
+def parse_remedies(sentence: str) -> list:
     """Return the remedies that a warning or note names; keys joined by `and` belong to one remedy."""
     tail = sentence.rpartition("; ")[2] if "; " in sentence else sentence
     out = []
-    if found := INSTEAD.search(tail):
-        return [Remedy(sentence, {found[1]: None}), Remedy(sentence, {found[1]: _value(found[2])})]
+    if match := INSTEAD.search(tail):
+        return [
+            Remedy(sentence, {match[1]: None}),
+            Remedy(sentence, {match[1]: _parse_value(match[2])}),
+        ]
     for part in re.split(r",? or ", tail):
-        sets = {_whole(key): _value(value) for key, value in SETS.findall(part)}
-        sets |= dict.fromkeys(map(_whole, WITHOUT.findall(part)))
-        vague = tuple(map(_whole, VAGUE.findall(part)))
+        sets = {_complete_key(key): _parse_value(value) for key, value in SETS.findall(part)}
+        sets |= dict.fromkeys(map(_complete_key, WITHOUT.findall(part)))
+        vague = tuple(map(_complete_key, VAGUE.findall(part)))
         if sets or vague:
             out.append(Remedy(sentence, sets, vague if not sets else ()))
     return out
 
 
-def _whole(key: str) -> str:
+def _complete_key(key: str) -> str:
     """Return a key with its table; keys without one belong to [friction]."""
     return key if "." in key else f"friction.{key}"
 
 
-def _value(text: str):
+def _parse_value(text: str):
     """Return the value of a printed number or string."""
     if text.startswith('"'):
         return text[1:-1]
     return int(text) if text.isdigit() else float(text)
 
 
-def changed(tables: dict, sets: dict) -> dict:
+def set_keys(tables: dict, sets: dict) -> dict:
     """Return the tables with these keys set, or left out if their value is None."""
     out = copy.deepcopy(tables)
     for key, value in sets.items():
         *path, last = key.split(".")
-        at = out
+        table = out
         for name in path:
-            at = at.setdefault(name, {})
+            table = table.setdefault(name, {})
         if value is None:
-            at.pop(last, None)
+            table.pop(last, None)
         else:
-            at[last] = value
+            table[last] = value
     return out
 
 
-def ran(tables: dict):
+def run_tables(tables: dict):
     """Return the Result of a scene; None if it is refused, does not converge or is too expensive."""
     try:
-        asked = plan(loads(text_of(tables)))
-        return run(asked) if asked.seconds < LONG else None
+        planned = plan(loads(to_toml(tables)))
+        return run(planned) if planned.seconds < LONG else None
     except (NotConverged, PatchfemError, SceneError):
         return None
 
 
-def verdict(tables: dict, found, remedy: Remedy) -> str:
+def try_remedy(tables: dict, found, remedy: Remedy) -> str:
     """Return the effect of a remedy: `gone`, `better`, `failed`, `refused`, or `dear` if it was too expensive to try.
 
     found: Result of the tables.
     """
     sets = remedy.sets or {
-        key: _turned(tables, found, key, remedy.sentence) for key in remedy.vague
+        key: _scale_number(tables, found, key, remedy.sentence) for key in remedy.vague
     }
     if not sets or any(value is None and key in remedy.vague for key, value in sets.items()):
         return "refused"
-    asked = changed(tables, sets)
+    changed_tables = set_keys(tables, sets)
     try:
-        what = plan(loads(text_of(asked)))
-        if what.seconds > LONG:
+        planned = plan(loads(to_toml(changed_tables)))
+        if planned.seconds > LONG:
             return "dear"
-        again = run(what)
+        new_result = run(planned)
     except (NotConverged, PatchfemError, SceneError):
         return "refused"
-    return _judged(found, again, remedy, sets)
+    return _judge_effect(found, new_result, remedy, sets)
 
 
-def _turned(tables: dict, found, key: str, sentence: str):
+def _scale_number(tables: dict, result, key: str, sentence: str):
     """Return a number of the scene or of the run times or over FACTOR; None if there is no number."""
     table, _, last = key.rpartition(".")
-    number = tables.get(table, {}).get(last, found.extra.get(last))
+    number = tables.get(table, {}).get(last, result.extra.get(last))
     if not isinstance(number, int | float):
         return None
     return number * FACTOR if "raise" in sentence else number / FACTOR
 
 
-def _judged(before, after, remedy: Remedy, sets: dict) -> str:
+def _judge_effect(before, after, remedy: Remedy, sets: dict) -> str:
     """Return the effect of a remedy from the results before and after it."""
     sentence = remedy.sentence
-    if not (names := _named(before, sentence)):
-        said = [*after.warnings, *after.extra.get("notes", [])]
-        old = sentence
-        new = next((one for one in said if _gist(one) == _gist(sentence)), None)
-        if new is None:
+    if not (names := _find_measures(before, sentence)):
+        messages = [*after.warnings, *after.extra.get("notes", [])]
+        old_sentence = sentence
+        new_sentence = next(
+            (
+                measure
+                for measure in messages
+                if _strip_numbers(measure) == _strip_numbers(sentence)
+            ),
+            None,
+        )
+        if new_sentence is None:
             return "gone"
-        share = re.compile(r"^work_check is (\S+) ")
-        pair = [share.search(one) for one in (new, old)]
+        pattern = re.compile(r"^work_check is (\S+) ")
+        pair = [pattern.search(measure) for measure in (new_sentence, old_sentence)]
         return (
             "better" if all(pair) and float(pair[0][1]) <= BETTER * float(pair[1][1]) else "failed"
         )
-    asked = before.plan.model.accuracy.tolerance
+    tolerance = before.plan.model.accuracy.tolerance
     if "would meet" in sentence and "accuracy.tolerance" in sets:
-        misses = [one for one in after.warnings if set(_named(after, one)) & set(names)]
-        return "failed" if misses else "gone"
-    worst = max(names, key=lambda name: _over(before.measures[name], asked))
-    one = after.measures.get(worst)
-    if one is None or one.value is None or one.error is None:
-        return "failed" if one is None or one.value is not None else "gone"
-    if _over(one, asked) <= 1:
+        remaining = [
+            measure
+            for measure in after.warnings
+            if set(_find_measures(after, measure)) & set(names)
+        ]
+        return "failed" if remaining else "gone"
+    worst_name = max(names, key=lambda name: _relative_error(before.measures[name], tolerance))
+    measure = after.measures.get(worst_name)
+    if measure is None or measure.value is None or measure.error is None:
+        return "failed" if measure is None or measure.value is not None else "gone"
+    if _relative_error(measure, tolerance) <= 1:
         return "gone"
-    share = REFINED if "to refine" in sentence else BETTER
-    return "better" if one.error <= share * before.measures[worst].error else "failed"
+    pattern = REFINED if "to refine" in sentence else BETTER
+    return "better" if measure.error <= pattern * before.measures[worst_name].error else "failed"
 
 
-def _named(found, sentence: str) -> list:
+def _find_measures(result, sentence: str) -> list:
     """Return the measures that a sentence about errors names, in its order; [] for another sentence."""
     if "; the tolerance is " not in sentence:
         return []
-    said = sentence.partition("; the tolerance is ")[0]
-    words = re.findall(r"(?:^|, )(\w+) (?:has an estimated error )?of ", said)
-    return [one for one in words if one in found.measures]
+    list_of_errors = sentence.partition("; the tolerance is ")[0]
+    words = re.findall(r"(?:^|, )(\w+) (?:has an estimated error )?of ", list_of_errors)
+    return [word for word in words if word in result.measures]
 
 
-def _over(one, tolerance: float) -> float:
+def _relative_error(measure, tolerance: float) -> float:
     """Return the error relative to the permitted error."""
-    return one.error / max(tolerance * abs(one.value) + one.floor, 1e-300)
+    return measure.error / max(tolerance * abs(measure.value) + measure.floor, 1e-300)
 
 
-def _gist(sentence: str) -> str:
+def _strip_numbers(sentence: str) -> str:
     """Return a sentence without its numbers."""
     return re.sub(r"[-+]?\d[\d.e+-]*", "#", sentence.partition("; ")[0])

@@ -38,22 +38,22 @@ def draw_finish(random) -> Finish:
 def draw_surface(random, shape: tuple, finish: Finish) -> np.ndarray:
     """Draw heights (n, m) of zero mean and unit deviation; two calls give two places of similar surfaces."""
     if finish.name == "ground":
-        heights = _spectral(random, shape, finish, finish.angle)
+        heights = _draw_spectral(random, shape, finish, finish.angle)
     elif finish.name == "honed":
-        heights = _cross_lay(random, shape, finish)
+        heights = _draw_cross_lay(random, shape, finish)
     elif finish.name == "turned":
-        heights = _turned(random, shape, finish)
+        heights = _draw_turned(random, shape, finish)
     elif finish.name == "plateau-honed":
-        heights = _plateau(random, shape, finish)
+        heights = _draw_plateau(random, shape, finish)
     elif finish.name == "peened":
-        heights = _peened(random, shape, finish)
+        heights = _draw_peened(random, shape, finish)
     else:
-        heights = _spectral(random, shape, finish)
+        heights = _draw_spectral(random, shape, finish)
     heights = heights - heights.mean()
     return heights / heights.std()
 
 
-def _spectral(random, shape: tuple, finish: Finish, angle: float | None = None) -> np.ndarray:
+def _draw_spectral(random, shape: tuple, finish: Finish, angle: float | None = None) -> np.ndarray:
     """Draw Gaussian heights with a self-affine spectrum, elongated along a lay at `angle` if given."""
     ky = fftfreq(shape[0])[:, None]
     kx = rfftfreq(shape[1])[None, :]
@@ -69,47 +69,50 @@ def _spectral(random, shape: tuple, finish: Finish, angle: float | None = None) 
     return heights / heights.std()
 
 
-def _cross_lay(random, shape: tuple, finish: Finish) -> np.ndarray:
+def _draw_cross_lay(random, shape: tuple, finish: Finish) -> np.ndarray:
     """Draw two crossing lays."""
     lays = [
-        _spectral(random, shape, finish, finish.angle + side * finish.crossing) for side in (-1, 1)
+        _draw_spectral(random, shape, finish, finish.angle + side * finish.crossing)
+        for side in (-1, 1)
     ]
     return lays[0] + lays[1]
 
 
-def _turned(random, shape: tuple, finish: Finish) -> np.ndarray:
+def _draw_turned(random, shape: tuple, finish: Finish) -> np.ndarray:
     """Draw cusped feed marks on circles about a distant centre, over a fine random surface."""
     distance = random.uniform(2, 10) * max(shape)
     y, x = np.indices(shape)
     r = np.hypot(x - distance * np.cos(finish.angle), y - distance * np.sin(finish.angle))
-    first = np.floor(r.min() / finish.period)
-    turn = r / finish.period - first
+    first_revolution = np.floor(r.min() / finish.period)
+    revolution = r / finish.period - first_revolution
     # Each revolution of the tool is a little higher or lower.
-    depths = random.normal(size=int(turn.max()) + 2)
-    cusps = 4 * (np.mod(turn, 1.0) - 0.5) ** 2 + 0.08 * depths[turn.astype(int)]
-    return cusps / cusps.std() + random.uniform(0.15, 0.4) * _spectral(random, shape, finish)
+    depths = random.normal(size=int(revolution.max()) + 2)
+    cusps = 4 * (np.mod(revolution, 1.0) - 0.5) ** 2 + 0.08 * depths[revolution.astype(int)]
+    return cusps / cusps.std() + random.uniform(0.15, 0.4) * _draw_spectral(random, shape, finish)
 
 
-def _plateau(random, shape: tuple, finish: Finish) -> np.ndarray:
+def _draw_plateau(random, shape: tuple, finish: Finish) -> np.ndarray:
     """Draw a fine plateau with deep crossing grooves (negative skewness)."""
     y, x = np.indices(shape)
     grooves = np.zeros(shape)
     for side in (-1, 1):
         angle = finish.angle + side * finish.crossing
         across = np.cos(angle) * y - np.sin(angle) * x
-        places = np.arange(across.min() - 20, across.max() + 20)
-        profile = np.zeros(places.size)
-        for place in random.uniform(
-            places[0], places[-1], int(places.size / (2 * finish.period)) + 1
+        positions = np.arange(across.min() - 20, across.max() + 20)
+        profile = np.zeros(positions.size)
+        for groove_position in random.uniform(
+            positions[0], positions[-1], int(positions.size / (2 * finish.period)) + 1
         ):
             depth = random.exponential(1.0) + 0.3
             half = random.uniform(3, 8)
-            profile = np.maximum(profile, depth * np.maximum(1 - np.abs(places - place) / half, 0))
-        grooves = np.maximum(grooves, np.interp(across, places, profile))
-    return -grooves + random.uniform(0.08, 0.2) * _spectral(random, shape, finish)
+            profile = np.maximum(
+                profile, depth * np.maximum(1 - np.abs(positions - groove_position) / half, 0)
+            )
+        grooves = np.maximum(grooves, np.interp(across, positions, profile))
+    return -grooves + random.uniform(0.08, 0.2) * _draw_spectral(random, shape, finish)
 
 
-def _peened(random, shape: tuple, finish: Finish) -> np.ndarray:
+def _draw_peened(random, shape: tuple, finish: Finish) -> np.ndarray:
     """Draw overlapping round dimples."""
     heights = np.zeros(shape)
     count = int(3.0 * heights.size / (np.pi * finish.period**2))
@@ -127,4 +130,6 @@ def _peened(random, shape: tuple, finish: Finish) -> np.ndarray:
         np.minimum(
             block, dimple * (radius / finish.period) ** 2 * random.uniform(0.6, 1.0), out=block
         )
-    return heights / heights.std() + random.uniform(0.05, 0.2) * _spectral(random, shape, finish)
+    return heights / heights.std() + random.uniform(0.05, 0.2) * _draw_spectral(
+        random, shape, finish
+    )

@@ -128,7 +128,7 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Pair:
+class ScanPair:
     """Heights (ny, nx) [m] of two scans (NaN if missing), their spacing [m] and the truth."""
 
     kind: str
@@ -140,7 +140,7 @@ class Pair:
     truth: Truth
 
 
-class Field(NamedTuple):
+class SurfaceGrid(NamedTuple):
     """Surface grid: positions x, y (n, m) [m], pitch [m], and a box that lies inside both scans."""
 
     x: np.ndarray
@@ -150,7 +150,7 @@ class Field(NamedTuple):
     high: np.ndarray
 
 
-def make(seed: int, kind: str | None = None) -> Pair:
+def draw_pair(seed: int, kind: str | None = None) -> ScanPair:
     """Draw the pair of scans of a seed; without `kind`, consecutive seeds have consecutive kinds."""
     kind = KINDS[(seed - 1) % len(KINDS)] if kind is None else kind
     random = np.random.default_rng([seed, 311, KINDS.index(kind)])
@@ -158,29 +158,29 @@ def make(seed: int, kind: str | None = None) -> Pair:
     spacing = float(np.exp(random.uniform(np.log(0.4e-6), np.log(5e-6))))
     size = (shape[::-1] - 1) * spacing
     pose = draw_pose(random, size)
-    grid = make_field(size, spacing, pose)
+    grid = make_grid(size, spacing, pose)
     finish = draw_finish(random)
     rms = spacing * np.exp(random.uniform(np.log(0.04), np.log(0.3)))
     new = rms * draw_surface(random, grid.x.shape, finish)
     old, track = apply_wear(kind, random, grid, new, rms)
-    other = rms * draw_surface(random, new.shape, finish) if kind == "elsewhere" else old
+    second_place = rms * draw_surface(random, new.shape, finish) if kind == "elsewhere" else old
     blur = OVERSAMPLING * random.uniform(0.35, 0.6)  # Resolution of the instrument [points].
-    first, second, worn = (gaussian_filter(heights, blur) for heights in (new, other, old))
+    first, second, worn = (gaussian_filter(heights, blur) for heights in (new, second_place, old))
     if kind == "exchanged":
         first, second, new, worn = second, first, old, first
     points = scan_points(shape, spacing, Pose((0.0, 0.0), 0.0, pose.centre))
-    moved = scan_points(shape, spacing, pose)
-    true_before = sample(first, grid, points)
-    true_after = sample(second, grid, moved)
+    moved_points = scan_points(shape, spacing, pose)
+    true_before = interpolate_surface(first, grid, points)
+    true_after = interpolate_surface(second, grid, moved_points)
     instrument = random.choice(["stylus", "camera"])
     noise = rms * random.uniform(0.01, 0.06)
     scans = [
-        measure(random, heights, spacing, rms, noise, instrument)
+        make_scan(random, heights, spacing, rms, noise, instrument)
         for heights in (true_before, true_after)
     ]
-    depth = sample(first - worn, grid, moved)
-    truth = find_truth(kind, depth, moved, pose, spacing, size, track)
-    return Pair(kind, seed, finish.name, *scans, spacing, truth)
+    depth = interpolate_surface(first - worn, grid, moved_points)
+    truth = compute_truth(kind, depth, moved_points, pose, spacing, size, track)
+    return ScanPair(kind, seed, finish.name, *scans, spacing, truth)
 
 
 def draw_pose(random, size) -> Pose:
@@ -194,7 +194,7 @@ def draw_pose(random, size) -> Pose:
     return Pose(tuple(shift.tolist()), float(rotation), tuple((size / 2).tolist()))
 
 
-def make_field(size, spacing: float, pose: Pose) -> Field:
+def make_grid(size, spacing: float, pose: Pose) -> SurfaceGrid:
     """Return the grid of the surface over both scans, and the box inside both of them."""
     pitch = spacing / OVERSAMPLING
     margin = MARGIN * size.max()
@@ -203,7 +203,7 @@ def make_field(size, spacing: float, pose: Pose) -> Field:
     skew = abs(np.tan(pose.rotation)) * size[::-1] / 2 + 4 * spacing
     low = np.maximum(0, pose.shift) + skew
     high = np.minimum(size, size + pose.shift) - skew
-    return Field(*np.meshgrid(x, y), pitch, low, high)
+    return SurfaceGrid(*np.meshgrid(x, y), pitch, low, high)
 
 
 def scan_points(shape, spacing: float, pose: Pose) -> np.ndarray:
@@ -221,13 +221,13 @@ def scan_points(shape, spacing: float, pose: Pose) -> np.ndarray:
     )
 
 
-def sample(heights, grid: Field, points) -> np.ndarray:
+def interpolate_surface(heights, grid: SurfaceGrid, points) -> np.ndarray:
     """Interpolate the surface at positions (2, ny, nx) [m] by cubic splines."""
     index = [(points[1] - grid.y[0, 0]) / grid.pitch, (points[0] - grid.x[0, 0]) / grid.pitch]
     return map_coordinates(spline_filter(heights), index, prefilter=False, mode="nearest")
 
 
-def measure(
+def make_scan(
     random, heights, spacing: float, rms: float, noise: float, instrument: str
 ) -> np.ndarray:
     """Return a scan: heights with noise, tilt, offset, digitization, dust and missing points."""
@@ -282,7 +282,7 @@ def draw_noise(random, shape, instrument: str) -> np.ndarray:
     return fast + lines[:, None]
 
 
-def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
+def apply_wear(kind: str, random, grid: SurfaceGrid, new, rms: float) -> tuple:
     """Return the worn surface (n, m) [m], and the track or None."""
     if kind == "exchanged":
         kind = random.choice(["smooth track", "crater", "shallow wear"])
@@ -295,7 +295,7 @@ def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
     if kind == "crater":
         radius = random.uniform(0.15, 0.32) * span.min()
         depth = random.uniform(2, 12) * rms
-        return cut(random, grid, new, depth * (1 - (dx**2 + dy**2) / radius**2)), None
+        return cut_surface(random, grid, new, depth * (1 - (dx**2 + dy**2) / radius**2)), None
     if kind == "shallow wear":
         half = random.uniform(0.27, 0.4, 2) * span
         r = (np.abs(dx) / half[0]) ** 4 + (np.abs(dy) / half[1]) ** 4
@@ -316,7 +316,7 @@ def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
         reach = (
             np.cos(angle) * dx / span[0] + np.sin(angle) * dy / span[1] - random.uniform(-0.1, 0.25)
         )
-        return cut(random, grid, new, random.uniform(4, 25) * rms * reach), None
+        return cut_surface(random, grid, new, random.uniform(4, 25) * rms * reach), None
     if kind == "ring":
         outer = random.uniform(0.28, 0.42) * span.min()
         r = np.hypot(dx, dy) / outer
@@ -331,7 +331,7 @@ def apply_wear(kind: str, random, grid: Field, new, rms: float) -> tuple:
     return new.copy(), None  # The kinds "remounted" and "elsewhere" have no wear here.
 
 
-def cut(random, grid: Field, new, depth) -> np.ndarray:
+def cut_surface(random, grid: SurfaceGrid, new, depth) -> np.ndarray:
     """Cut to `depth` [m] below the smoothed surface where depth > 0.
 
     The floor is smooth or keeps the roughness.
@@ -343,7 +343,7 @@ def cut(random, grid: Field, new, depth) -> np.ndarray:
     return np.where(depth > 0, np.minimum(new, floor), new)
 
 
-def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
+def wear_track(kind: str, random, grid: SurfaceGrid, new, rms: float) -> tuple:
     """Wear a straight track: through both scans, or with round ends inside them."""
     span = grid.high - grid.low
     middle = grid.low + random.uniform(0.45, 0.55, 2) * span
@@ -352,19 +352,19 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
     depth = random.uniform(2, 10) * rms
     axis = np.array([np.cos(direction), np.sin(direction)])
     across = -(grid.x - middle[0]) * axis[1] + (grid.y - middle[1]) * axis[0]
-    along = (grid.x - middle[0]) * axis[0] + (grid.y - middle[1]) * axis[1]
+    along_axis = (grid.x - middle[0]) * axis[0] + (grid.y - middle[1]) * axis[1]
     length = None
     ends = None
     distance = np.abs(across)
     if random.random() < 0.5:
         # Half the distance between the centres of the round ends.
         straight = random.uniform(0.15, 0.22) * span.min()
-        distance = np.hypot(across, np.maximum(np.abs(along) - straight, 0))
+        distance = np.hypot(across, np.maximum(np.abs(along_axis) - straight, 0))
         length = float(2 * (straight + half))
         ends = tuple(tuple((middle + sign * axis * length / 2).tolist()) for sign in (-1, 1))
     r = distance / half
     profile = random.choice(["parabola", "vee", "cosine", "flat"])
-    worn = depth * cross_profile(random, profile, r)
+    worn = depth * evaluate_profile(random, profile, r)
     if kind == "smooth track":
         smooth = gaussian_filter(new, random.uniform(20, 40) * OVERSAMPLING)
         grooves = np.interp(across, *draw_grooves(random, half, grid.pitch))
@@ -378,11 +378,11 @@ def wear_track(kind: str, random, grid: Field, new, rms: float) -> tuple:
         heights = random.uniform(0.05, 0.4, 2) * depth
         shape = np.sin(np.pi * np.clip((r - 1) / ridge, 0, 1)) ** 2
         old = old + np.where(across > 0, heights[0], heights[1]) * shape
-    flat = profile == "cosine" and kind != "smooth track"
-    return old, Track(tuple(middle.tolist()), direction, 2 * half, length, ends, flat)
+    is_flat_flanked = profile == "cosine" and kind != "smooth track"
+    return old, Track(tuple(middle.tolist()), direction, 2 * half, length, ends, is_flat_flanked)
 
 
-def cross_profile(random, profile: str, r) -> np.ndarray:
+def evaluate_profile(random, profile: str, r) -> np.ndarray:
     """Return the depth relative to the largest depth at r = distance from the axis / half-width."""
     if profile == "parabola":
         return np.maximum(1 - r**2, 0)
@@ -395,12 +395,12 @@ def cross_profile(random, profile: str, r) -> np.ndarray:
 
 def draw_grooves(random, half: float, pitch: float) -> tuple:
     """Draw the fine grooves of a worn floor: positions across the track [m] and heights of unit deviation."""
-    places = np.arange(-half - 2 * pitch, half + 2 * pitch, pitch)
-    heights = gaussian_filter(random.normal(size=places.size), random.uniform(2, 6))
-    return places, heights / heights.std()
+    positions = np.arange(-half - 2 * pitch, half + 2 * pitch, pitch)
+    heights = gaussian_filter(random.normal(size=positions.size), random.uniform(2, 6))
+    return positions, heights / heights.std()
 
 
-def draw_scratches(random, grid: Field, rms: float) -> np.ndarray:
+def draw_scratches(random, grid: SurfaceGrid, rms: float) -> np.ndarray:
     """Return the depth [m] of three to eight straight scratches of limited length with round ends."""
     span = grid.high - grid.low
     depth = np.zeros(grid.x.shape)
@@ -418,7 +418,7 @@ def draw_scratches(random, grid: Field, rms: float) -> np.ndarray:
     return depth
 
 
-def draw_lumps(random, grid: Field, rms: float) -> np.ndarray:
+def draw_lumps(random, grid: SurfaceGrid, rms: float) -> np.ndarray:
     """Return the height [m] of deposits: one to six lumps of elliptic outline."""
     span = grid.high - grid.low
     height = np.zeros(grid.x.shape)
@@ -432,7 +432,7 @@ def draw_lumps(random, grid: Field, rms: float) -> np.ndarray:
     return height
 
 
-def find_truth(
+def compute_truth(
     kind: str, depth, points, pose: Pose, spacing: float, size, track: Track | None
 ) -> Truth:
     """Integrate the noise-free depth (ny, nx) [m] over the region that both scans cover."""
@@ -442,17 +442,19 @@ def find_truth(
     inner[[0, -1], :] = inner[:, [0, -1]] = False
     if kind == "elsewhere":
         depth = np.zeros(depth.shape)
-    lost = np.maximum(depth, 0)
-    gained = np.maximum(-depth, 0)
-    sums = [spacing**2 * part[mask].sum() for mask in (common, inner) for part in (lost, gained)]
-    volumes = Volumes(*sums, common.sum() * spacing**2, inner.sum() * spacing**2)
+    worn = np.maximum(depth, 0)
+    grown = np.maximum(-depth, 0)
+    volumes_of_parts = [
+        spacing**2 * part[mask].sum() for mask in (common, inner) for part in (worn, grown)
+    ]
+    volumes = Volumes(*volumes_of_parts, common.sum() * spacing**2, inner.sum() * spacing**2)
     medians = median_filter(depth, 3)
     depths = Depths(
-        lost[common].mean(), depth[common].mean(), depth[common].max(), medians[common].max()
+        worn[common].mean(), depth[common].mean(), depth[common].max(), medians[common].max()
     )
     if kind == "exchanged":
         track = None
-    section = None if track is None else find_section(track, depth, points, common, spacing)
+    section = None if track is None else measure_section(track, depth, points, common, spacing)
     return Truth(
         is_knowable=kind not in UNKNOWABLE,
         sentence=FALSE_CLAIMS.get(kind, ("grew", "no wear")),
@@ -465,7 +467,7 @@ def find_truth(
     )
 
 
-def find_section(track: Track, depth, points, common, spacing: float) -> Section:
+def measure_section(track: Track, depth, points, common, spacing: float) -> Section:
     """Average the depth along the track and measure the mean cross-section.
 
     The average is over nine tenths of the straight part.

@@ -19,7 +19,7 @@ KEYS = {
 }
 
 
-def friction_of(law: str) -> str:
+def make_friction_table(law: str) -> str:
     """Return the table of a friction law with a limit of 0.3 times the load."""
     return f'[friction]\nlaw = "{law}"\nstatic = 0.3\n' + (KEYS[law] + "\n" if KEYS[law] else "")
 
@@ -31,7 +31,7 @@ BLOCK = PIECE.replace("6.35 mm", "6 mm") + 'load = "115 N"\nsubstrate = "Ti-8Al-
 COATING = '[contact.coating]\nmaterial = "WC-Co"\nthickness = "6 mil"\n'
 COATED = PIECE + 'load = "26 lbf"\nelement_size = "0.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 SHEAR = "[contact.shear]\n"
-COULOMB, PLASTIC, NONLOCAL = map(friction_of, ("coulomb", "elastic-plastic", "nonlocal"))
+COULOMB, PLASTIC, NONLOCAL = map(make_friction_table, ("coulomb", "elastic-plastic", "nonlocal"))
 GROWING = """\
 [friction]
 law = "nonlocal"
@@ -59,7 +59,7 @@ DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncyc
 IWAN = 'law = "iwan"\nchi = -0.5\nbeta = 0.5\nstiffness = "20 kN/m"'
 
 
-def shaken(law: str, acceleration: str = "1 g", cycles: int = 20) -> str:
+def make_shaken_block(law: str, acceleration: str = "1 g", cycles: int = 20) -> str:
     """Return a scene of a block of 0.5 kg and 100 Hz under 100 N, driven at its resonance.
 
     law: lines with the keys of its friction.
@@ -186,12 +186,12 @@ LINEAR = RIG[RIG.index("[structure]") :]
 PATCH = RIG[RIG.index("[contact]") : RIG.index("[friction]")]
 
 
-def line_of(text: str, start: str) -> int:
+def find_line(text: str, start: str) -> int:
     """Return the number of the first line that begins with a text."""
     return next(n for n, line in enumerate(text.splitlines(), 1) if line.startswith(start))
 
 
-def mistakes(text: str, *sets: str) -> list[str]:
+def list_mistakes(text: str, *sets: str) -> list[str]:
     """Return the mistakes of a scene, which must be refused."""
     with pytest.raises(SceneError) as caught:
         loads(text, "a.toml", sets)
@@ -199,11 +199,11 @@ def mistakes(text: str, *sets: str) -> list[str]:
     return caught.value.mistakes
 
 
-def only(text: str, *sets: str) -> str:
+def get_only_mistake(text: str, *sets: str) -> str:
     """Return the only mistake of a scene."""
-    found = mistakes(text, *sets)
-    assert len(found) == 1, found
-    return found[0]
+    messages = list_mistakes(text, *sets)
+    assert len(messages) == 1, messages
+    return messages[0]
 
 
 FULL = [

@@ -65,7 +65,7 @@ tolerance = 1e-2
 """
 
 
-def _shaped(draw, crowns: tuple, tilts: tuple) -> dict:
+def _draw_shape(draw, crowns: tuple, tilts: tuple) -> dict:
     """Draw the keys of a crown, a tilt or neither; the ranges are powers of ten of metres and of radians."""
     kind = draw.choice(["crown", "flat", "tilt"])
     if kind == "crown":
@@ -73,12 +73,12 @@ def _shaped(draw, crowns: tuple, tilts: tuple) -> dict:
     return {"contact.tilt.angle": f"{10 ** draw.uniform(*tilts):.3g} rad"} if kind == "tilt" else {}
 
 
-def _scene(text: str, sets: dict) -> Scene:
+def _load_scene(text: str, sets: dict) -> Scene:
     """Return the scene of a text with keys set."""
     return loads(text, "random.toml", [f"{key}={value}" for key, value in sets.items()])
 
 
-def joint(seed: int) -> tuple:
+def draw_joint(seed: int) -> tuple:
     """Return (text, keys) of a bolted joint with an amplitude of 0.02 to 2.5 times the gross slip of a rigid joint."""
     draw = np.random.default_rng(seed)
     mu = f"{draw.uniform(0.1, 0.6):.3f}"
@@ -87,19 +87,23 @@ def joint(seed: int) -> tuple:
         "contact.load": f"{10 ** draw.uniform(1.5, 4):.3g} N",
         "friction.static": mu,
         "friction.kinetic": mu,
-    } | _shaped(draw, (1, 3.5), (-6, -4.3))
+    } | _draw_shape(draw, (1, 3.5), (-6, -4.3))
     if draw.random() < 0.3:
         sets |= {
             "contact.coating.material": "WC-Co",
             "contact.coating.thickness": f"{draw.uniform(50, 400):.0f} um",
         }
     text = re.sub(r"\[contact.crown\]\nradius.*\n(\s+#.*\n)*", "", pf.new("joint"))
-    first = pf.run(_scene(text, sets | {"slide.amplitude": "0.01 um"})).measures
-    yields = float(mu) * first["normal_load"].value / first["tangential_stiffness"].value
-    return text, sets | {"slide.amplitude": f"{10 ** draw.uniform(-1.7, 0.4) * yields!r} m"}
+    measures = pf.run(_load_scene(text, sets | {"slide.amplitude": "0.01 um"})).measures
+    slip_displacement = (
+        float(mu) * measures["normal_load"].value / measures["tangential_stiffness"].value
+    )
+    return text, sets | {
+        "slide.amplitude": f"{10 ** draw.uniform(-1.7, 0.4) * slip_displacement!r} m"
+    }
 
 
-def rig(seed: int) -> tuple:
+def draw_rig(seed: int) -> tuple:
     """Return (text, keys) of the coated bodies on one mode, below and far above its frequency, at 0.1 to 30 g."""
     draw = np.random.default_rng(seed)
     mu = f"{draw.uniform(0.1, 0.6):.3f}"
@@ -108,7 +112,7 @@ def rig(seed: int) -> tuple:
         "friction.static": mu,
         "friction.kinetic": mu,
     }
-    sets |= _shaped(draw, (0.5, 3), (-5.5, -3.5))
+    sets |= _draw_shape(draw, (0.5, 3), (-5.5, -3.5))
     return RIG, sets | {
         "drive.frequency": f"{draw.uniform(100, 600):.1f} Hz",
         "drive.acceleration": f"{10 ** draw.uniform(-1, 1.5):.3g} g",
@@ -139,23 +143,23 @@ coefficient = "5 N s/m"
 """
 
 
-def chain(seed: int) -> tuple:
+def draw_chain(seed: int) -> tuple:
     """Return (text, keys) of two masses in a row, each on its own patch, at frequencies near their resonances."""
     draw = np.random.default_rng(seed)
     one, two = 10 ** draw.uniform(5, 7, 2)
-    pieces, rest = RIG.split("[friction]")
+    pieces, other_tables = RIG.split("[friction]")
     text = CHAIN.format(one=one, two=two)
     sets = {}
     for k, pair in enumerate(("1, 0", "2, 1")):
         text += FACE.format(pair=pair, static=draw.uniform(0.1, 0.6)) + pieces.replace(
             "[contact", "[structure.interface.contact"
         )
-        own = {"contact.load": f"{10 ** draw.uniform(1, 3):.3g} N"} | _shaped(
+        interface_keys = {"contact.load": f"{10 ** draw.uniform(1, 3):.3g} N"} | _draw_shape(
             draw, (0.5, 3), (-5.5, -3.5)
         )
-        sets |= {f"structure.interface.{k}.{key}": value for key, value in own.items()}
+        sets |= {f"structure.interface.{k}.{key}": value for key, value in interface_keys.items()}
     frequency = 10 ** draw.uniform(1.8, 3)
-    return text + "[drive]" + rest.partition("[drive]")[2], sets | {
+    return text + "[drive]" + other_tables.partition("[drive]")[2], sets | {
         "drive.frequency": f"{frequency:.1f} Hz",
         "drive.acceleration": f"{10 ** draw.uniform(-1, 1.5):.3g} g",
     }
@@ -163,10 +167,10 @@ def chain(seed: int) -> tuple:
 
 def compare_scene(text: str, sets: dict, tolerance: float, names) -> dict:
     """Compare a scene with the same scene at a smaller tolerance; see `campaigns`."""
-    begin = process_time()
-    result = pf.run(_scene(text, sets))
-    line = {"seconds": process_time() - begin, "warnings": list(result.warnings)}
-    finer = pf.run(_scene(text, sets | {"accuracy.tolerance": tolerance})).measures
+    started = process_time()
+    result = pf.run(_load_scene(text, sets))
+    line = {"seconds": process_time() - started, "warnings": list(result.warnings)}
+    finer = pf.run(_load_scene(text, sets | {"accuracy.tolerance": tolerance})).measures
     truths = {
         name: finer[name].value for name in names if name in finer and finer[name].value is not None
     }
@@ -175,16 +179,16 @@ def compare_scene(text: str, sets: dict, tolerance: float, names) -> dict:
 
 def compare_joint(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the joint of a seed; see `campaigns`."""
-    return compare_scene(*joint(seed), JOINT_TOLERANCE, BENCH)
+    return compare_scene(*draw_joint(seed), JOINT_TOLERANCE, BENCH)
 
 
 def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the rig of a seed; see `campaigns`."""
-    return compare_scene(*rig(seed), RIG_TOLERANCE, MOTION)
+    return compare_scene(*draw_rig(seed), RIG_TOLERANCE, MOTION)
 
 
 def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the chain of a seed; see `campaigns`."""
     return compare_scene(
-        *chain(seed), RIG_TOLERANCE, (*MOTION, *(f"{name}_2" for name in INTERFACE_MEASURES))
+        *draw_chain(seed), RIG_TOLERANCE, (*MOTION, *(f"{name}_2" for name in INTERFACE_MEASURES))
     )

@@ -17,7 +17,7 @@ from patchfem.contact import (
 from patchfem.core import Compliance, Interface, Outcome
 
 
-class State(NamedTuple):
+class LayerState(NamedTuple):
     """Pressed asperity layer: arrays (m,) and scalars as in `strips.StripsState`; `separation` is its gap."""
 
     force: np.ndarray
@@ -33,7 +33,7 @@ class State(NamedTuple):
     residuals: dict
 
 
-def strips_of(c, x, weight, offsets, asperities=None):
+def make_strips(c, x, weight, offsets, asperities=None):
     """Return strips with a compliance given as an array, or as a compliance with separate diagonals."""
     compliance = c if isinstance(c, StripCompliance) else StripCompliance(c)
     layout = strips.StripLayout(x, weight, offsets)
@@ -47,14 +47,16 @@ def press_strips(
     moments = {key: control.pop(key) for key in ("roll_moment", "spring") if key in control}
     loads = strips.HolderLoads(load, moment, **moments)
     return strips.press_strips(
-        strips_of(c, x, weight, offsets, asperities), gap, loads, roll=roll, **control
+        make_strips(c, x, weight, offsets, asperities), gap, loads, roll=roll, **control
     )
 
 
-def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0):
+def press_layer(
+    law, c, x, weight, gap, load=None, moment=None, approach=None, rotation=0.0, spring=0.0
+):
     """Return the LayerState of two bodies pressed through an asperity layer of any law."""
-    if not isinstance(skin, LinearAsperities):
-        one = press_strips(
+    if not isinstance(law, LinearAsperities):
+        state = press_strips(
             c,
             x,
             weight,
@@ -65,58 +67,58 @@ def solve(skin, c, x, weight, gap, load=None, moment=None, approach=None, rotati
             approach=approach,
             rotation=rotation,
             spring=spring,
-            asperities=skin,
+            asperities=law,
         )
-        return State(
-            one.force[0],
-            one.pressure[0],
-            one.gap[0],
-            one.stiffness[0],
-            one.delta,
-            one.theta,
-            one.load,
-            one.moment,
-            one.iterations,
-            one.outcome,
-            one.residuals,
+        return LayerState(
+            state.force[0],
+            state.pressure[0],
+            state.gap[0],
+            state.stiffness[0],
+            state.delta,
+            state.theta,
+            state.load,
+            state.moment,
+            state.iterations,
+            state.outcome,
+            state.residuals,
         )
-    soft = Compliance(Interface(x, weight, 1.0), c + np.diag(1 / (skin.k * weight)), c)
-    found = (
+    soft = Compliance(Interface(x, weight, 1.0), c + np.diag(1 / (law.k * weight)), c)
+    solution = (
         press(soft, gap, load, moment, rotation, spring=spring)
         if approach is None
         else press_to_approach(soft, gap, approach, rotation)
     )
-    force = found.sigma_n * weight
-    free = gap + (found.rotation - rotation) * x - found.approach + c @ force
-    return State(
+    force = solution.sigma_n * weight
+    free = gap + (solution.rotation - rotation) * x - solution.approach + c @ force
+    return LayerState(
         force,
-        found.sigma_n,
-        np.where(force > 0, -found.sigma_n / skin.k, free),
-        np.where(force > 0, skin.k, 0.0),
-        found.approach,
-        found.rotation,
-        found.load,
-        found.moment,
-        found.iterations,
-        found.outcome,
-        found.residuals,
+        solution.sigma_n,
+        np.where(force > 0, -solution.sigma_n / law.k, free),
+        np.where(force > 0, law.k, 0.0),
+        solution.approach,
+        solution.rotation,
+        solution.load,
+        solution.moment,
+        solution.iterations,
+        solution.outcome,
+        solution.residuals,
     )
 
 
-def longer(skin, factor: float):
+def stretch_law(law, factor: float):
     """Return the law P(s/factor), which belongs to fewer peaks with wider height distribution."""
-    if isinstance(skin, ExponentialAsperities):
-        return replace(skin, u0=skin.u0 * factor)
-    return replace(skin, deviation=skin.deviation * factor, density=skin.density * factor**-1.5)
+    if isinstance(law, ExponentialAsperities):
+        return replace(law, u0=law.u0 * factor)
+    return replace(law, deviation=law.deviation * factor, density=law.density * factor**-1.5)
 
 
-def tangent(c, weight, stiffness) -> float:
+def layer_stiffness(c, weight, stiffness) -> float:
     """Return the stiffness [N/m] of the whole patch, layer and bodies in series, for a common rigid motion.
 
     stiffness (m,) [Pa/m] of the layer; nodes without stiffness carry no load.
     """
     d = weight * stiffness
-    live = np.flatnonzero(d > 1e-18 * d.max())
-    root = np.sqrt(d[live])
-    system = np.eye(live.size) + root[:, None] * c[np.ix_(live, live)] * root
+    loaded = np.flatnonzero(d > 1e-18 * d.max())
+    root = np.sqrt(d[loaded])
+    system = np.eye(loaded.size) + root[:, None] * c[np.ix_(loaded, loaded)] * root
     return float(root @ cho_solve(cho_factor(system, lower=True), root))

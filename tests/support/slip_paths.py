@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 
-def elements(group, path):
+def jenkins_forces(group, path):
     """Return the total force [N] of parallel elements, each a spring in series with a slider, at every reversal."""
-    settled = np.zeros(group.stiffness.size)
+    slider_positions = np.zeros(group.stiffness.size)
     out = []
     for q in path:
-        stretch = np.clip(q - settled, -group.yield_displacement, group.yield_displacement)
-        settled = q - stretch
+        stretch = np.clip(q - slider_positions, -group.yield_displacement, group.yield_displacement)
+        slider_positions = q - stretch
         out.append(group.stiffness @ stretch)
     return np.array(out)
 
 
-def histories(count, reach, seed=7):
+def draw_paths(count, reach, seed=7):
     """Yield random paths of 40 reversals, from micro-slip to gross sliding."""
     rng = np.random.default_rng(seed)
     for _ in range(count):

@@ -16,78 +16,78 @@ class RateForm(NamedTuple):
     force: Callable
 
 
-def rate_form(law: motion_laws.Law, start=(0.0,)) -> RateForm:
+def make_rate_form(law: motion_laws.Law, start=(0.0,)) -> RateForm:
     """Return the rate equations of a law without a set-valued force."""
 
     def rates(y, v, way):
         """Return the rates of the states."""
-        law.take_branch(y, v, way)
+        law.choose_branch(y, v, way)
         return law.rate(y, v, 0.0)
 
     def force(y, v, way):
         """Return the friction force."""
-        law.take_branch(y, v, way)
+        law.choose_branch(y, v, way)
         return law.force(y, v, 0.0)
 
     return RateForm(list(start), rates, force)
 
 
-def bonds(law, load) -> RateForm:
+def bonds_form(law, load) -> RateForm:
     """Return the rate form of `Bonds` in the stretch reading, p = 1."""
     keys = {"bond_length": law.length, "static": law.static, "kinetic": law.ratio * law.static}
     if law.has_growth:
         names = ("rest_growth", "slip_growth", "rest_speed")
         keys |= {name: getattr(law, name) for name in names}
     if law.initial < 1.0:
-        reference = motion_laws.Maturing(law.static * load, initial=law.initial, **keys)
+        reference = motion_laws.MaturingLaw(law.static * load, initial=law.initial, **keys)
     else:
-        reference = motion_laws.Stretch(law.static * load, **keys)
-    return rate_form(reference, reference.start())
+        reference = motion_laws.StretchLaw(law.static * load, **keys)
+    return make_rate_form(reference, reference.start())
 
 
-def lugre(law, load) -> RateForm:
+def lugre_form(law, load) -> RateForm:
     """Return the rate form of `LuGre`."""
     per_newton = {
         name: load * getattr(law, name) for name in ("stiffness", "micro_damping", "viscous")
     }
     keys = {"static": law.static, "kinetic": law.kinetic, "stribeck_speed": law.speed}
-    return rate_form(motion_laws.LuGre(law.static * load, **keys, **per_newton))
+    return make_rate_form(motion_laws.LuGreLaw(law.static * load, **keys, **per_newton))
 
 
-def bouc_wen(law, load) -> RateForm:
+def bouc_wen_form(law, load) -> RateForm:
     """Return the rate form of `BoucWen`."""
     limit = law.static * load
     keys = {"stiffness": limit / law.length, "exponent": law.exponent, "shape": law.shape}
-    return rate_form(motion_laws.BoucWen(limit, **keys))
+    return make_rate_form(motion_laws.BoucWenLaw(limit, **keys))
 
 
-def tanh(law, load) -> RateForm:
+def tanh_form(law, load) -> RateForm:
     """Return the rate form of `Rate`."""
-    return rate_form(motion_laws.Tanh(law.static * load, reference_speed=law.speed), ())
+    return make_rate_form(motion_laws.TanhLaw(law.static * load, reference_speed=law.speed), ())
 
 
-def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12):
+def integrate_modes(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12):
     """Return (coordinates (n, k), forces (k,)) at times (k,) [s].
 
     The integration is restarted at reversals, at zeros of kink(y, v), and at the limits of the
     drive's segments.
     """
-    begin, rates, force = form
+    initial_states, rates, force = form
     n = modes.omega.size
     period = drive.period
-    borders = (
+    limits = (
         [s.start for s in drive.segments[1:]]
         if drive.segments
         else list(getattr(drive, "time", []))
     )
-    y = np.concatenate([np.zeros(2 * n) if start is None else [*start.z, *start.v], begin])
+    y = np.concatenate([np.zeros(2 * n) if start is None else [*start.z, *start.v], initial_states])
     damping = modes.damping_matrix
     t = 0.0
-    way = 0.0
+    direction = 0.0
     out = np.zeros((n, len(times)))
     forces = np.zeros(len(times))
 
-    def slope(t, y, way, edge):
+    def derivatives(t, y, way, edge):
         """Return the time derivative of the state."""
         z = y[:n]
         v = y[n : 2 * n]
@@ -106,52 +106,54 @@ def integrate(modes, drive, form, end, times, start=None, kink=None, rtol=1e-12)
         ]
 
     while t < end:
-        edge = min([b for b in borders if b > t + 1e-15] + [end])
-        if way == 0:
-            look = solve_ivp(
-                slope, (t, t + 1e-6 * period), y, args=(1.0, edge), rtol=1e-10, atol=1e-18
+        edge = min([b for b in limits if b > t + 1e-15] + [end])
+        if direction == 0:
+            trial = solve_ivp(
+                derivatives, (t, t + 1e-6 * period), y, args=(1.0, edge), rtol=1e-10, atol=1e-18
             )
-            way = np.sign(modes.slide @ look.y[n : 2 * n, -1]) or 1.0
+            direction = np.sign(modes.slide @ trial.y[n : 2 * n, -1]) or 1.0
 
-        def stops(t, y, way, edge):
+        def velocity(t, y, way, edge):
             """Return the velocity at the interface, whose zero is a reversal."""
             return modes.slide @ y[n : 2 * n]
 
-        def bends(t, y, way, edge):
+        def kink_value(t, y, way, edge):
             """Return the value of kink, whose zero is a discontinuity of the law."""
             return kink(y[2 * n :], modes.slide @ y[n : 2 * n]) if kink is not None else 1.0
 
-        stops.terminal = True
-        stops.direction = -way
-        bends.terminal = True
+        velocity.terminal = True
+        velocity.direction = -direction
+        kink_value.terminal = True
         first = min(1e-6 * period, edge - t)
-        done = solve_ivp(
-            slope,
+        solution = solve_ivp(
+            derivatives,
             (t, edge),
             y,
             "DOP853",
-            args=(way, edge),
-            events=[stops, bends],
+            args=(direction, edge),
+            events=[velocity, kink_value],
             dense_output=True,
             rtol=rtol,
             atol=np.maximum(1e-16, 1e-14 * np.abs(y)),
             first_step=first,
             max_step=period / 20,
         )
-        here = (times >= t) & (times <= done.t[-1])
-        states = done.sol(times[here]) if here.any() else np.zeros((y.size, 0))
-        out[:, here] = states[:n]
-        forces[here] = [force(s[2 * n :], modes.slide @ s[n : 2 * n], way) for s in states.T]
-        turned = done.t_events[0].size > 0
-        t = done.t[-1]
-        y = done.y[:, -1].copy()
-        if turned:
-            way = -way
+        is_inside = (times >= t) & (times <= solution.t[-1])
+        states = solution.sol(times[is_inside]) if is_inside.any() else np.zeros((y.size, 0))
+        out[:, is_inside] = states[:n]
+        forces[is_inside] = [
+            force(s[2 * n :], modes.slide @ s[n : 2 * n], direction) for s in states.T
+        ]
+        is_reversal = solution.t_events[0].size > 0
+        t = solution.t[-1]
+        y = solution.y[:, -1].copy()
+        if is_reversal:
+            direction = -direction
             if n == 1:
                 y[1] = 0.0
         # A small step past the kink, which would otherwise end the next piece at once.
-        elif done.t_events[1].size:
+        elif solution.t_events[1].size:
             step = 1e-9 * period
-            y = y + step * np.array(slope(t, y, way, edge))
+            y = y + step * np.array(derivatives(t, y, direction, edge))
             t = t + step
     return out, forces

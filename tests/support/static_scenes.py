@@ -12,7 +12,7 @@ from time import process_time
 
 import numpy as np
 from campaigns import measure_rows
-from static_reference import PieceInterface, Scene, answer
+from static_reference import BodySection, PatchScene, solve_scene
 
 import patchfem as pf
 
@@ -34,48 +34,48 @@ JUDGED = (
 )
 
 
-def drawn(seed: int) -> Scene:
+def draw_scene(seed: int) -> PatchScene:
     """Return the scene of a seed; its kind is KINDS[seed % 6]."""
     r = np.random.default_rng([seed, 28])
     kind = KINDS[seed % len(KINDS)]
 
-    def wide(low, high):
+    def log_uniform(low, high):
         """Draw a number with five digits from a log-uniform distribution."""
         return float(f"{10 ** r.uniform(np.log10(low), np.log10(high)):.5g}")
 
-    length = wide(5e-3, 5e-2)
-    load = wide(10, 5e3)
+    length = log_uniform(5e-3, 5e-2)
+    load = log_uniform(10, 5e3)
     height = float(f"{length * r.uniform(0.3, 1.2):.5g}")
     kinds = r.choice(len(MATERIALS), 3)
-    thick = float(f"{height * r.uniform(0.01, 0.2):.5g}") if r.random() < 0.5 else 0.0
-    base = tuple(MATERIALS[k] for k in kinds[:2]) if thick else (MATERIALS[kinds[1]],) * 2
-    lower = upper = PieceInterface(length, height, thick, base)
+    thickness = float(f"{height * r.uniform(0.01, 0.2):.5g}") if r.random() < 0.5 else 0.0
+    layers = tuple(MATERIALS[k] for k in kinds[:2]) if thickness else (MATERIALS[kinds[1]],) * 2
+    lower = upper = BodySection(length, height, thickness, layers)
     if r.random() < 0.3:
-        upper = PieceInterface(length, height, 0.0, (MATERIALS[kinds[2]],) * 2)
+        upper = BodySection(length, height, 0.0, (MATERIALS[kinds[2]],) * 2)
     tilt = float(f"{10 ** r.uniform(-6.5, -3.5) * r.choice([-1, 1]):.5g}")
     curvature = step = skin = None
     if kind in ("crown", "h1") or (kind in ("step", "skin") and r.random() < 0.5):
         curvature = float(f"{10 ** r.uniform(-1.5, 1):.5g}")
     if kind == "h1":  # A narrow contact of long bodies, outside their middle.
-        length = wide(2e-2, 6e-2)
-        lower = upper = PieceInterface(length, length / 2, 0.0, (MATERIALS[kinds[0]],) * 2)
+        length = log_uniform(2e-2, 6e-2)
+        lower = upper = BodySection(length, length / 2, 0.0, (MATERIALS[kinds[0]],) * 2)
         tilt = float(f"{length * curvature * r.uniform(-0.2, 0.2):.5g}")
-        load = wide(1, 100)
+        load = log_uniform(1, 100)
     if kind == "step" or (kind == "skin" and r.random() < 0.5):
         step = (
-            wide(2e-8, 2e-6) * float(r.choice([-1, 1])),
+            log_uniform(2e-8, 2e-6) * float(r.choice([-1, 1])),
             float(f"{length * r.uniform(-0.35, 0.35):.5g}"),
         )
         tilt = float(f"{tilt / 3:.5g}")
     if kind == "skin":
-        skin = wide(1e12, 1e15)
+        skin = log_uniform(1e12, 1e15)
     if kind == "ends":
-        lower = PieceInterface(
+        lower = BodySection(
             float(f"{length * r.uniform(1.2, 2):.5g}"), height, lower.thickness, lower.layers
         )
-    return Scene(
+    return PatchScene(
         length,
-        wide(2e-3, 5e-2),
+        log_uniform(2e-3, 5e-2),
         str(r.choice(["strain", "stress"])),
         lower,
         upper,
@@ -87,10 +87,10 @@ def drawn(seed: int) -> Scene:
     )
 
 
-def text_of(scene: Scene) -> str:
+def format_scene(scene: PatchScene) -> str:
     """Return the scene as text."""
 
-    def material(young, nu):
+    def format_material(young, nu):
         """Return a material as a table of a scene."""
         return f'{{young = "{young:.9g} Pa", poisson = {nu:.9g}, density = "5000 kg/m^3"}}'
 
@@ -101,16 +101,16 @@ def text_of(scene: Scene) -> str:
         f'height = "{scene.lower.height!r} m"',
         f'load = "{scene.load!r} N"',
         f'plane = "{scene.plane}"',
-        f"substrate = {material(*scene.lower.layers[1])}",
+        f"substrate = {format_material(*scene.lower.layers[1])}",
     ]
     for name, body in (("lower", scene.lower), ("upper", scene.upper)):
         rows += [
             f"[contact.{name}]",
             f'length = "{body.length!r} m"',
-            f"substrate = {material(*body.layers[1])}",
+            f"substrate = {format_material(*body.layers[1])}",
         ]
         rows.append(
-            f'coating = {{material = {material(*body.layers[0])}, thickness = "{body.thickness!r} m"}}'
+            f'coating = {{material = {format_material(*body.layers[0])}, thickness = "{body.thickness!r} m"}}'
             if body.thickness
             else 'coating = "none"'
         )
@@ -128,9 +128,9 @@ def text_of(scene: Scene) -> str:
     return "\n".join(rows) + "\n"
 
 
-def solve_reference(scene: Scene, tolerance: float = FINE) -> tuple:
+def solve_reference(scene: PatchScene, tolerance: float = FINE) -> tuple:
     """Return the measures of the reference, and their uncertainties, by name."""
-    true, doubt = answer(scene, tolerance)
+    true, doubt = solve_scene(scene, tolerance)
     doubt = {name: float(doubt[name]) for name in JUDGED}
     # The value is zero by symmetry; its uncertainty is a fraction of the terms of its difference.
     doubt["pressure_centre"] = max(doubt["pressure_centre"], 1e-6 * true["contact_half_width"])
@@ -141,27 +141,27 @@ def compare_patch(
     seed: int, folder: Path, earlier: dict | None = None, *, tolerance: float
 ) -> dict:
     """Compare the patch of a seed with its reference; see `campaigns`."""
-    scene = drawn(seed)
-    begin = process_time()
-    run = pf.run(text_of(scene), **{"accuracy.tolerance": tolerance})
+    scene = draw_scene(seed)
+    started = process_time()
+    run = pf.run(format_scene(scene), **{"accuracy.tolerance": tolerance})
     line = {
         "group": KINDS[seed % len(KINDS)],
         "engine": "patch",
-        "seconds": process_time() - begin,
+        "seconds": process_time() - started,
         "warnings": list(run.warnings),
     }
     if earlier and "true" in earlier:
         line |= {key: earlier[key] for key in ("true", "doubt")}
     else:
         line["true"], line["doubt"] = solve_reference(scene)
-    return line | {"rows": judged_rows(run.measures, line["true"], line["doubt"])}
+    return line | {"rows": reliable_rows(run.measures, line["true"], line["doubt"])}
 
 
 compare_fine_patch = partial(compare_patch, tolerance=1e-3)
 compare_coarse_patch = partial(compare_patch, tolerance=1e-2)
 
 
-def judged_rows(measures, true: dict, doubt: dict) -> list:
+def reliable_rows(measures, true: dict, doubt: dict) -> list:
     """Return the rows of measures whose reference is accurate enough to judge the error."""
     rows = measure_rows(measures, true, doubt)
     return [

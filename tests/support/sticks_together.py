@@ -45,7 +45,7 @@ STEPS, NEAR = 3000, 2e-3  # Steps of the time stepping for dependent interfaces,
 LONGEST = 20  # Time limit of a reference [CPU s].
 
 
-def spec(seed: int) -> dict:
+def draw_spec(seed: int) -> dict:
     """Return the parameters of a rig in SI units.
 
     `links` are (pair, stiffness [N/m], damping [N s/m]); bodies are numbered from 1, and 0 is the
@@ -56,27 +56,32 @@ def spec(seed: int) -> dict:
     faces = int(r.integers(2, 4))
     ratio = RATIOS[int(r.integers(len(RATIOS)))]
     n = int(r.integers(2 if kind == "twins" or (ratio == 1 and kind != "mirror") else faces, 5))
-    alike = kind == "mirror"
+    is_symmetric = kind == "mirror"
     omega = 2 * np.pi * r.uniform(50, 200)
-    mass = np.full(n, r.uniform(0.3, 2)) if alike else r.uniform(0.3, 2, n)
+    mass = np.full(n, r.uniform(0.3, 2)) if is_symmetric else r.uniform(0.3, 2, n)
     ground = mass * omega**2 * r.uniform(0.5, 1.5, n)
     between = r.uniform(0.1, 0.8, (n, n)) * mass[0] * omega**2
-    if alike:
+    if is_symmetric:
         ground[:] = ground[0]
         between[:] = between[0, 0]
     links = [((k + 1, 0), ground[k]) for k in range(n)]
     links += [
-        ((k + 1, j + 1), between[k, j]) for k in range(n) for j in range(k) if alike or j == k - 1
+        ((k + 1, j + 1), between[k, j])
+        for k in range(n)
+        for j in range(k)
+        if is_symmetric or j == k - 1
     ]
     zeta = r.uniform(0.002, 0.05)
     size = r.uniform(10, 80)
     pairs = [[1, 0]] * faces if kind == "twins" else [[k + 1, 0] for k in range(min(faces, n))]
     if len(pairs) < faces:
         pairs.append([2, 1])
-    share = np.full(faces, r.uniform(0.15, 0.6)) if alike else r.uniform(0.15, 0.6, faces)
+    limit_ratio = (
+        np.full(faces, r.uniform(0.15, 0.6)) if is_symmetric else r.uniform(0.15, 0.6, faces)
+    )
     if kind == "twins":
-        share[:] = share[0] / faces
-    limit = share * size * (mass[0] if kind in ("mirror", "twins") else mass.mean())
+        limit_ratio[:] = limit_ratio[0] / faces
+    limit = limit_ratio * size * (mass[0] if kind in ("mirror", "twins") else mass.mean())
     start = size / omega**2 * r.uniform(-4, 4, n) if kind == "release" else np.zeros(n)
     return {
         "seed": seed,
@@ -94,10 +99,10 @@ def spec(seed: int) -> dict:
     }
 
 
-def text(s: dict) -> str:
+def format_scene(s: dict) -> str:
     """Return the scene of a spec as text."""
-    each = ", ".join(f'"{one!r} kg"' for one in s["mass"])
-    out = f"[structure]\nmasses = [{each}]\n"
+    masses = ", ".join(f'"{mass!r} kg"' for mass in s["mass"])
+    out = f"[structure]\nmasses = [{masses}]\n"
     for pair, k, c in s["links"]:
         out += f'[[structure.spring]]\nbetween = {pair}\nstiffness = "{k!r} N/m"\n'
         out += f'[[structure.damper]]\nbetween = {pair}\ncoefficient = "{c!r} N s/m"\n'
@@ -105,10 +110,10 @@ def text(s: dict) -> str:
         out += f'[[structure.interface]]\nbetween = {pair}\nlaw = "coulomb"\nload = "{load!r} N"\n'
         out += f"static = 0.3\nkinetic = {0.3 * s['ratio']!r}\n"
     if s["kind"] == "release":
-        places = ", ".join(f'"{x!r} m"' for x in s["start"])
+        displacements = ", ".join(f'"{x!r} m"' for x in s["start"])
         return (
             out
-            + f'[structure.start]\ndisplacement = [{places}]\n[drive]\nkind = "free"\ncycles = {CYCLES}\n'
+            + f'[structure.start]\ndisplacement = [{displacements}]\n[drive]\nkind = "free"\ncycles = {CYCLES}\n'
         )
     wave = (
         'waveform = "step"\n' if s["kind"] == "step" else f'frequency = "{s["frequency"]!r} Hz"\n'
@@ -119,7 +124,7 @@ def text(s: dict) -> str:
     )
 
 
-def row(pair, n: int) -> np.ndarray:
+def difference_row(pair, n: int) -> np.ndarray:
     """Return the row of x_i - x_j for a pair (i, j)."""
     out = np.zeros(n + 1)
     out[pair[0]] += 1
@@ -127,22 +132,30 @@ def row(pair, n: int) -> np.ndarray:
     return out[1:]
 
 
-def matrices(s: dict) -> tuple:
+def make_matrices(s: dict) -> tuple:
     """Return mass, stiffness and damping (n, n), and the rows of the interfaces (i, n) of a rig."""
     n = len(s["mass"])
     stiff, damp = (
-        sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
+        sum(
+            link[which] * np.outer(difference_row(link[0], n), difference_row(link[0], n))
+            for link in s["links"]
+        )
         for which in (1, 2)
     )
-    return np.diag(s["mass"]), stiff, damp, np.array([row(pair, n) for pair in s["pairs"]])
+    return (
+        np.diag(s["mass"]),
+        stiff,
+        damp,
+        np.array([difference_row(pair, n) for pair in s["pairs"]]),
+    )
 
 
-def marched(s: dict, time, slide) -> float:
+def difference_from_march(s: dict, time, slide) -> float:
     """Return the largest difference of displacements (i, t) [m] from Moreau's time stepping.
 
     It is relative to the largest displacement; the last of the times (t,) [s] is the end.
     """
-    mass, stiff, damp, faces = matrices(s)
+    mass, stiff, damp, faces = make_matrices(s)
     square, shapes = eigh(stiff, mass)
     modes = SimpleNamespace(
         interfaces=faces @ shapes,
@@ -156,7 +169,7 @@ def marched(s: dict, time, slide) -> float:
     drive = SimpleNamespace(
         values=lambda t: np.full_like(t, size) if s["kind"] == "step" else size * np.sin(omega * t)
     )
-    when, z = march_reference(
+    times, z = march_reference(
         modes,
         drive,
         0.3 * np.array(s["load"]),
@@ -165,29 +178,32 @@ def marched(s: dict, time, slide) -> float:
         np.zeros(len(mass)),
         STEPS,
     )
-    found = z @ shapes.T @ faces.T
-    gap = max(np.abs(np.interp(time, when, one) - own).max() for one, own in zip(found.T, slide))
-    return float(gap / np.abs(found).max())
+    displacements = z @ shapes.T @ faces.T
+    difference = max(
+        np.abs(np.interp(time, times, reference) - values).max()
+        for reference, values in zip(displacements.T, slide)
+    )
+    return float(difference / np.abs(displacements).max())
 
 
-def truth(s: dict, end: float, order: str) -> tuple:
+def solve_reference(s: dict, end: float, order: str) -> tuple:
     """Return times (t,) [s] of events and the end, displacements (t, i) [m] and directions (t, i).
 
     They are those of the reference, in modes of unit mass. order: as in ORDERS; with `together`,
     equal interfaces are one that carries the total load, and equal bodies are one.
     """
-    (mass, stiff, damp, faces), n = matrices(s), len(s["mass"])
-    same = np.arange(len(faces))
+    (mass, stiff, damp, faces), n = make_matrices(s), len(s["mass"])
+    group = np.arange(len(faces))
     bodies = np.eye(n)
     if order == "together":
-        same[:] = 0
+        group[:] = 0
     if order == "together" and s["kind"] == "mirror":
         with_face = np.arange(n) < len(faces)
         bodies = np.array([one for one in (with_face, ~with_face) if one.any()], float).T
     square, shapes = eigh(bodies.T @ stiff @ bodies, bodies.T @ mass @ bodies)
     shapes = bodies @ shapes
     modes = SimpleNamespace(
-        interfaces=(faces @ shapes)[np.unique(same)],
+        interfaces=(faces @ shapes)[np.unique(group)],
         mass=1.0,
         omega=np.sqrt(square),
         damping_matrix=shapes.T @ damp @ shapes,
@@ -203,9 +219,9 @@ def truth(s: dict, end: float, order: str) -> tuple:
         phase=0.0,
         omega=0.0 if s["kind"] == "step" else omega,
     )
-    static = 0.3 * np.bincount(same, s["load"])
+    static = 0.3 * np.bincount(group, s["load"])
     start = shapes.T @ mass @ np.array(s["start"])
-    found = run_reference(
+    states = run_reference(
         modes,
         [drive],
         static,
@@ -215,8 +231,8 @@ def truth(s: dict, end: float, order: str) -> tuple:
         np.zeros(len(square)),
         most_sliding=order == "most",
     )
-    time, signs, z, _ = zip(*found)
-    return np.array(time), np.array(z) @ shapes.T @ faces.T, np.array(signs)[:, same]
+    time, signs, z, _ = zip(*states)
+    return np.array(time), np.array(z) @ shapes.T @ faces.T, np.array(signs)[:, group]
 
 
 def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = None) -> dict:
@@ -224,41 +240,41 @@ def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = No
 
     Each order of combinations is tried until one agrees.
     """
-    s = spec(seed)
+    s = draw_spec(seed)
     line = {"group": f"{s['kind']}, {s['ratio']}", "engine": "events"}
     try:
-        result = pf.run(text(s), say=lambda _: None)
+        result = pf.run(format_scene(s), say=lambda _: None)
     except pf.PatchfemError as error:
         return line | {"rows": [], "refused": str(error)}
     data = result.to_xarray()
     time, slide, speed = (
         data[name].values for name in ("time", "relative_displacement", "relative_velocity")
     )
-    last = np.append(np.diff(time) > 0, True)
-    curve = CubicHermiteSpline(time[last], slide[:, last], speed[:, last], axis=1)
+    is_last = np.append(np.diff(time) > 0, True)
+    curve = CubicHermiteSpline(time[is_last], slide[:, is_last], speed[:, is_last], axis=1)
     gaps = {}
     failed = {}
     for order in ORDERS[s["kind"]]:
         signal.setitimer(signal.ITIMER_PROF, LONGEST)
         try:
-            when, where, _ = truth(s, float(time[-1]), order)
+            event_times, reference, _ = solve_reference(s, float(time[-1]), order)
         except (AssertionError, TimeoutError) as error:
             failed[order] = repr(error)
             continue
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
-        scale = max(np.abs(where).max(), np.abs(slide).max(), 1e-300)
-        gaps[order] = float(np.abs(curve(when).T - where).max() / scale)
+        scale = max(np.abs(reference).max(), np.abs(slide).max(), 1e-300)
+        gaps[order] = float(np.abs(curve(event_times).T - reference).max() / scale)
         if gaps[order] <= SAME:
             break
     gap = min(gaps.values(), default=np.inf)
-    allowed = SAME
+    tolerance = SAME
     if gap > SAME and len(s["pairs"]) > len(s["mass"]):
-        gap = marched(s, time, slide)
-        allowed = NEAR
+        gap = difference_from_march(s, time, slide)
+        tolerance = NEAR
     balance = result.measures["energy_balance"].value
     rows = [
-        Row("slides", gap, allowed, 0.0, 0.0, 0.0),
+        Row("slides", gap, tolerance, 0.0, 0.0, 0.0),
         Row("energy_balance", balance, BALANCED, 0.0, 0.0, 0.0),
     ]
     return line | {"gaps": gaps, "failed": failed, "rows": rows}

@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2] / "studies"
 
 
-def study(name):
+def load_study(name):
     """Return the module of a study, given its path below studies/."""
     path = ROOT / name
     spec = importlib.util.spec_from_file_location(path.stem, path)
@@ -17,13 +17,13 @@ def study(name):
     return module
 
 
-def study_fixture(name):
+def make_study_fixture(name):
     """Return a fixture that loads a study once for a file of tests."""
 
     @pytest.fixture(scope="module")
     def module():
         """Return the module of the study."""
-        return study(name)
+        return load_study(name)
 
     return module
 

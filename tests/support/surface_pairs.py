@@ -46,14 +46,16 @@ def find_false_claims(answer: dict, worn: WearTruth) -> list:
     verdict = answer["verdict"].lower()
     text = " ".join((verdict, *answer["sentences"])).lower()
 
-    def number(name, key):
+    def get_number(name, key):
         """Return an entry of a quantity of the answer, or None."""
         return (answer.get(name) or {}).get(key)
 
     limit = LIMIT.search(text)
-    hidden = number("hidden_wear", "high")
-    shows_place = {number(name, "value") for name in ("worn_depth_mean", "worn_volume")} != {None}
-    has_grown = re.search(r"\bgrew|\bgrown|deposit", verdict) or number("grown_volume", "low")
+    hidden = get_number("hidden_wear", "high")
+    shows_place = {get_number(name, "value") for name in ("worn_depth_mean", "worn_volume")} != {
+        None
+    }
+    has_grown = re.search(r"\bgrew|\bgrown|deposit", verdict) or get_number("grown_volume", "low")
     claims = {
         "worn": not worn.can_show and verdict.startswith("worn"),
         "grew": not worn.grew and has_grown,
@@ -100,7 +102,7 @@ def make_line(kind: str, files: tuple, units: tuple | None, worn: WearTruth, tru
 def compare_traces(seed: int, folder: Path, _) -> dict:
     """Compare the pair of traces of a seed; consecutive seeds have different kinds."""
     kind = known_pairs.KINDS[seed % len(known_pairs.KINDS)]
-    pair = known_pairs.pair(kind, seed)
+    pair = known_pairs.draw_pair(kind, seed)
     files = (folder / "before.csv", folder / "after.csv")
     for file, (x, z) in zip(files, (pair.before, pair.after), strict=True):
         columns = np.column_stack([x * 1e3, z * 1e6])
@@ -129,7 +131,7 @@ def compare_traces(seed: int, folder: Path, _) -> dict:
 
 def compare_scans(seed: int, folder: Path, _) -> dict:
     """Compare the pair of areal scans of a seed."""
-    pair = scan_pairs.make(seed)
+    pair = scan_pairs.draw_pair(seed)
     truth = pair.truth
     files = (folder / "before.npy", folder / "after.npy")
     for file, heights in zip(files, (pair.before, pair.after), strict=True):
@@ -145,15 +147,15 @@ def compare_scans(seed: int, folder: Path, _) -> dict:
         largest=truth.depths.maximum,
     )
     units = (f"{pair.spacing * 1e6:.12g} um", "um")
-    truths = scan_truths(truth) if truth.is_knowable else {}
+    truths = list_scan_truths(truth) if truth.is_knowable else {}
     return make_line(pair.kind, files, units, worn, truths)
 
 
-def scan_truths(truth) -> dict:
+def list_scan_truths(truth) -> dict:
     """Return the true values of a pair of scans by name, several if definitions differ."""
     volumes = truth.volumes
     depths = truth.depths
-    turn = truth.pose.rotation
+    rotation = truth.pose.rotation
     # Ripples of the interpolation do not count as growth.
     has_grown = volumes.grown > 1e-4 * (volumes.worn + volumes.grown)
     truths = {
@@ -164,7 +166,7 @@ def scan_truths(truth) -> dict:
         "worn_depth_max": (depths.maximum,),
         "worn_depth_max_median": (depths.maximum_median,),
         "worn_depth_max_either": (depths.maximum, depths.maximum_median),
-        "rotation": (turn, -turn),
+        "rotation": (rotation, -rotation),
     }
     if truth.track is None:
         return truths
@@ -179,7 +181,7 @@ def scan_truths(truth) -> dict:
         "track_depth_floor": (section.floor_depth,),
         "track_step": (section.step_depth,),
         "track_area_gross": (section.gross_area,),
-        "track_direction": (*directions, *(one - turn for one in directions)),
+        "track_direction": (*directions, *(direction - rotation for direction in directions)),
     }
     if track.length is not None:
         truths |= {

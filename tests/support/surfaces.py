@@ -12,12 +12,12 @@ SPACE = "http://www.opengps.eu/2008/ISO5436_2"
 TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 
 
-def scan(rows=4, count=6, seed=2) -> np.ndarray:
+def draw_scan(rows=4, count=6, seed=2) -> np.ndarray:
     """Return heights (rows, count) [m] with a deviation of 0.2 um."""
     return np.random.default_rng(seed).normal(0.0, 2e-7, (rows, count))
 
 
-def zipped(members: dict) -> bytes:
+def make_zip(members: dict) -> bytes:
     """Return a zip file of {name: bytes}."""
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w") as archive:
@@ -26,14 +26,14 @@ def zipped(members: dict) -> bytes:
     return out.getvalue()
 
 
-def axis(name: str, kind="I", data="D", increment=None, offset=None) -> str:
+def format_axis(name: str, kind="I", data="D", increment=None, offset=None) -> str:
     """Return an axis of main.xml."""
     parts = {"AxisType": kind, "DataType": data, "Increment": increment, "Offset": offset}
     inside = "".join(f"<{key}>{value}</{key}>" for key, value in parts.items() if value is not None)
     return f"<{name}>{inside}</{name}>"
 
 
-def main_xml(
+def make_main_xml(
     axes: str, record3: str, feature="SUR", revision="ISO5436 - 2000", prefix="p:"
 ) -> bytes:
     """Return main.xml with the given axes and third record."""
@@ -46,14 +46,14 @@ def main_xml(
     ).encode()
 
 
-def matrix(count: int, rows: int, layers=1) -> str:
+def format_matrix(count: int, rows: int, layers=1) -> str:
     """Return the dimensions of a matrix for the third record."""
     return f"<MatrixDimension><SizeX>{count}</SizeX><SizeY>{rows}</SizeY><SizeZ>{layers}</SizeZ></MatrixDimension>"
 
 
-def link(data: bytes, valid: bytes | None = None, md5=None, name="bindata/data.bin") -> str:
+def format_link(data: bytes, valid: bytes | None = None, md5=None, name="bindata/data.bin") -> str:
     """Return the link to the binary data for the third record."""
-    more = (
+    valid_points = (
         ""
         if valid is None
         else (
@@ -63,11 +63,11 @@ def link(data: bytes, valid: bytes | None = None, md5=None, name="bindata/data.b
     )
     return (
         f"<DataLink><PointDataLink>{name}</PointDataLink><MD5ChecksumPointData>"
-        f"{md5 or hashlib.md5(data).hexdigest().upper()}</MD5ChecksumPointData>{more}</DataLink>"
+        f"{md5 or hashlib.md5(data).hexdigest().upper()}</MD5ChecksumPointData>{valid_points}</DataLink>"
     )
 
 
-def x3p(
+def make_x3p(
     xml: bytes, data: bytes | None = None, valid: bytes | None = None, folder="", checksum=None
 ) -> bytes:
     """Return an X3P file made of its parts."""
@@ -79,10 +79,10 @@ def x3p(
         members[f"{folder}bindata/data.bin"] = data
     if valid is not None:
         members[f"{folder}bindata/valid.bin"] = valid
-    return zipped(members)
+    return make_zip(members)
 
 
-def x3p_of(z, data="D", increment=1.0, offset=0.0, **more) -> bytes:
+def heights_to_x3p(z, data="D", increment=1.0, offset=0.0, **more) -> bytes:
     """Return heights (m, n) [m] as a binary X3P file, stored as (z - offset)/increment."""
     raw = (z - offset) / increment
     raw = (np.rint(np.nan_to_num(raw)) if data in "IL" else raw).astype(TYPES[data]).tobytes()
@@ -90,15 +90,17 @@ def x3p_of(z, data="D", increment=1.0, offset=0.0, **more) -> bytes:
     if data in "IL" and np.isnan(z).any():
         valid = np.packbits(np.isfinite(z).ravel(), bitorder="little").tobytes()
     axes = (
-        axis("CX", increment=0.5e-6)
-        + axis("CY", increment=0.75e-6)
-        + axis("CZ", "A", data, increment if increment != 1 else None, offset or None)
+        format_axis("CX", increment=0.5e-6)
+        + format_axis("CY", increment=0.75e-6)
+        + format_axis("CZ", "A", data, increment if increment != 1 else None, offset or None)
     )
-    xml = main_xml(axes, matrix(z.shape[1], z.shape[0]) + link(raw, valid), **more)
-    return x3p(xml, raw, valid)
+    xml = make_main_xml(
+        axes, format_matrix(z.shape[1], z.shape[0]) + format_link(raw, valid), **more
+    )
+    return make_x3p(xml, raw, valid)
 
 
-def sdf_binary(z) -> bytes:
+def make_binary_sdf(z) -> bytes:
     """Return heights (m, n) [m] as a binary SDF file of 8-byte numbers in nanometres."""
     names = b"bISO-1.0", b"tests", b"010120260000", b"010120260000"
     scales = 0.5e-6, 0.75e-6, 1e-9, 0.0
@@ -106,7 +108,7 @@ def sdf_binary(z) -> bytes:
     return head + (z / 1e-9).astype("<f8").tobytes()
 
 
-def sdf_ascii(z) -> bytes:
+def make_ascii_sdf(z) -> bytes:
     """Return heights (m, n) [m] as an ASCII SDF file in micrometres."""
     head = (
         f"aISO-1.0\nManufacID = tests\nNumPoints = {z.shape[1]}\nNumProfiles = {z.shape[0]}\nXscale = 5e-07\n"
@@ -119,29 +121,29 @@ def sdf_ascii(z) -> bytes:
     return f"{head}{rows}\n*\n< PartName > test < /PartName >\n*".encode()
 
 
-def npy(array) -> bytes:
+def make_npy(array) -> bytes:
     """Return an array as an .npy file."""
     out = io.BytesIO()
     np.save(out, array)
     return out.getvalue()
 
 
-def mat(packed=True, **arrays) -> bytes:
+def make_mat(packed=True, **arrays) -> bytes:
     """Return variables as a MATLAB file of version 5."""
     out = io.BytesIO()
     savemat(out, arrays, do_compression=packed)
     return out.getvalue()
 
 
-def dektak(z, length=50.0, results=True) -> bytes:
+def make_dektak(z, length=50.0, results=True) -> bytes:
     """Return heights (n,) [um] over a length [um] as an export of Dektak, with x printed to 0.1 um."""
     x = np.arange(z.size) * length / z.size
-    found = (
+    analysis = (
         "\nAnalytical Results\nFunction,R.Cur Pos,R.Cur Width,M.Cur Pos,M.Cur Width,Result\n"
         "Ra,1.0 um,0.5 um,9.0 um,0.0 um,0.00525 um\nSkew,1.0 um,0.0 um,9.0 um,0.0 um,6.96\n"
     )
     head = (
         f"Scan Parameters\nScan Type,Standard Scan\nStylus,Radius: 2.5 µm\nLength,{length} um\nDuration,32 sec\n"
-        f"{found if results else ''}\nScan Data\nLateral um,Raw Micrometer,\n"
+        f"{analysis if results else ''}\nScan Data\nLateral um,Raw Micrometer,\n"
     )
     return (head + "".join(f"{a:.1f},{b:.5f},,\n" for a, b in zip(x, z))).encode("latin-1")

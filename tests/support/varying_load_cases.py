@@ -26,7 +26,7 @@ LAWS = {
 }
 
 
-def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
+def make_modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
     """Return a modal basis with displacement, heave and pitch at the interface."""
     size = len(frequencies)
     numbers = (np.array(v, float) for v in (slide, slide if base is None else base, slide))
@@ -42,10 +42,10 @@ def modes(frequencies, slide, normal, pitch, zeta=0.0, base=None) -> ModalBasis:
 
 
 # Displacement, heave and pitch in every mode.
-MIXED = modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
+MIXED = make_modes([143.0, 700.0], [1.0, 0.3], [0.05, 1.0], [30.0, -80.0], 0.02)
 
 
-def elastic(m: int = 21, crown: float = 0.0) -> ContactSets:
+def make_contact(m: int = 21, crown: float = 0.0) -> ContactSets:
     """Return springs of 5e7 N/m coupled as in a half space and pressed by LOAD, flat or crowned."""
     x = np.linspace(-5e-3, 5e-3, m)
     c = 2e-8 * (np.exp(-np.abs(x[:, None] - x) / 2e-3) * 0.3 + np.eye(m))
@@ -58,12 +58,12 @@ def elastic(m: int = 21, crown: float = 0.0) -> ContactSets:
 
 
 @cache
-def crowned() -> ContactSets:
+def crowned_contact() -> ContactSets:
     """Return the crowned contact."""
-    return elastic(21, 4e-7)
+    return make_contact(21, 4e-7)
 
 
-def mechanical(response, basis) -> np.ndarray:
+def total_energy(response, basis) -> np.ndarray:
     """Return kinetic and elastic energy of the motion, the contact and the friction (t,) [J]."""
     motion = (
         0.5
@@ -73,20 +73,20 @@ def mechanical(response, basis) -> np.ndarray:
     return motion + response.extra["normal_energy"] + response.extra["ledger"][1]
 
 
-def balance(done, basis) -> float:
+def check_balance(result, basis) -> float:
     """Check the stored energy of a march and return its energy balance."""
-    book = done.ledger
-    assert book["stored"] == pytest.approx(
-        mechanical(done.response, basis)[-1], rel=1e-9, abs=1e-18
+    energies = result.ledger
+    assert energies["stored"] == pytest.approx(
+        total_energy(result.response, basis)[-1], rel=1e-9, abs=1e-18
     )
-    return energy_balance(book)
+    return energy_balance(energies)
 
 
 def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -> None:
     """Assert that a random march only loses energy, that its energy balances and that no force exceeds mu N."""
     rng = np.random.default_rng(seed)
     n = rng.integers(1, 5)
-    basis = modes(
+    basis = make_modes(
         rng.uniform(50, 900, n),
         rng.normal(size=n),
         rng.normal(size=n) * rng.choice([0, 0.3, 1.0]),
@@ -95,50 +95,52 @@ def check_energy_of_random_march(name: str, seed: int, steps: int, shear=None) -
     )
     drive = SineDrive(float(rng.choice([0, 30.0, 150.0])), 2 * np.pi * 143)
     start = InitialState(1e-6 * rng.normal(size=n), 3e-4 * rng.normal(size=n))
-    done = varying_load.march(
-        basis, drive, crowned(), LAWS[name], 3, steps, 3, start=start, shear=shear
+    result = varying_load.march(
+        basis, drive, crowned_contact(), LAWS[name], 3, steps, 3, start=start, shear=shear
     )
-    response = done.response
-    peak = done.ledger["peak_stored"]
-    assert done.outcome is None, done.message
-    assert balance(done, basis) <= 1e-11
+    response = result.response
+    peak = result.ledger["peak_stored"]
+    assert result.outcome is None, result.message
+    assert check_balance(result, basis) <= 1e-11
     work, stored, lost, created = response.extra["ledger"]
     assert created[-1] == 0 and (np.diff(lost) >= -1e-12 * peak).all()
     if shear is not None:  # The displacement of the holder does work in this case.
         assert work[-1] == pytest.approx(stored[-1] + lost[-1], rel=1e-9, abs=1e-12 * peak)
-    within = 1e-9 * (lost[-1] + stored[-1]) + 1e-18
-    assert done.ledger["friction"] == pytest.approx(lost[-1], abs=within)
+    tolerance = 1e-9 * (lost[-1] + stored[-1]) + 1e-18
+    assert result.ledger["friction"] == pytest.approx(lost[-1], abs=tolerance)
     limit = 0.3 * response.extra["normal_load"]
     assert (np.abs(response.force) <= limit + 1e-9 * LOAD).all()
 
 
 def march_with_lift_off(name: str, shear=None) -> tuple:
     """Return a march that lifts off and lands again, without force while apart, and its energy balance."""
-    basis = modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
+    basis = make_modes([100.0, 150.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.0, [1.0, 0.0])
     drive = SineDrive(30.0, 2 * np.pi * 143)
     start = InitialState([0, 5e-7], [0, 0.0])
-    done = varying_load.march(
-        basis, drive, crowned(), LAWS[name], 6, 400, 6, start=start, shear=shear
+    result = varying_load.march(
+        basis, drive, crowned_contact(), LAWS[name], 6, 400, 6, start=start, shear=shear
     )
-    force = done.response.force
-    apart = done.response.extra["normal_load"] == 0
-    assert 0.02 < apart.mean() < 0.95 and not force[apart].any()
+    force = result.response.force
+    is_apart = result.response.extra["normal_load"] == 0
+    assert 0.02 < is_apart.mean() < 0.95 and not force[is_apart].any()
     assert np.abs(force).max() > 0.1 * 0.3 * LOAD
-    assert np.count_nonzero(np.diff(apart.astype(int)) == -1) >= 3
-    return done, balance(done, basis)
+    assert np.count_nonzero(np.diff(is_apart.astype(int)) == -1) >= 3
+    return result, check_balance(result, basis)
 
 
-def check_order_two(name: str, steps: int, within: float, shear=None) -> None:
+def check_order_two(name: str, steps: int, tolerance: float, shear=None) -> None:
     """Assert that halving the step divides the error of `MIXED` by nearly four, from `steps` per cycle on."""
     drive = SineDrive(40.0, 2 * np.pi * 143)
-    ends = []
+    final_states = []
     for factor in (1, 2, 4, 8):
-        done = varying_load.march(
-            MIXED, drive, crowned(), LAWS[name], 1, factor * steps, 1, shear=shear
+        result = varying_load.march(
+            MIXED, drive, crowned_contact(), LAWS[name], 1, factor * steps, 1, shear=shear
         )
-        response = done.response
-        ends.append(np.concatenate([response.modal[-1], response.modal_rate[-1] / MIXED.omega]))
-        assert done.outcome is None
-    change = np.abs(np.diff(ends, axis=0)).max(axis=1)
-    assert change[-1] <= 2e-3 * np.abs(ends[-1]).max()
-    assert np.log2(change[0] / change[2]) / 2 == pytest.approx(2, abs=within)
+        response = result.response
+        final_states.append(
+            np.concatenate([response.modal[-1], response.modal_rate[-1] / MIXED.omega])
+        )
+        assert result.outcome is None
+    change = np.abs(np.diff(final_states, axis=0)).max(axis=1)
+    assert change[-1] <= 2e-3 * np.abs(final_states[-1]).max()
+    assert np.log2(change[0] / change[2]) / 2 == pytest.approx(2, abs=tolerance)

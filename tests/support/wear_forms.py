@@ -39,7 +39,7 @@ def worn_pad_fraction(coefficient, line_load, path, angle, length, stiffness):
     )
 
 
-def even_wear_pressure(line_load, path, weight):
+def uniform_wear_pressure(line_load, path, weight):
     """Return the pressure (m,) [Pa] of a worn-in pad whose points have different sliding distances (m,) [m].
 
     It is proportional to 1/path. weight (m,) [m]: length of each node. All points wear at the same

@@ -33,7 +33,7 @@ FIRST_STEP = 1e-4
 class WearScene(NamedTuple):
     """Patch that slides back and forth without partial slip, in SI units."""
 
-    patch: reference.Scene
+    patch: reference.PatchScene
     coefficient: float  # [m^2/N]
     amplitude: float  # [m]
     cycles: float
@@ -44,7 +44,7 @@ class WearScene(NamedTuple):
         return 4 * self.amplitude * self.cycles
 
 
-class Model(NamedTuple):
+class WearModel(NamedTuple):
     """Discrete patch: compliances (m, m) [m/N] per unit width, positions, weights and gap (m,) [m]."""
 
     normal: np.ndarray
@@ -54,9 +54,9 @@ class Model(NamedTuple):
     gap: np.ndarray
 
 
-def draw(seed: int) -> WearScene:
+def draw_scene(seed: int) -> WearScene:
     """Draw the patch of `static_scenes` for a seed, and a wear of 0.03 to 10 times its elastic approach."""
-    patch = static_scenes.drawn(seed)
+    patch = static_scenes.draw_scene(seed)
     random = np.random.default_rng([seed, 52])
     pressure = patch.load / patch.width / patch.length
     elastic = pressure * (patch.lower.height + patch.upper.height) / patch.lower.layers[1][0]
@@ -69,16 +69,16 @@ def draw(seed: int) -> WearScene:
     return WearScene(patch, coefficient, amplitude, cycles)
 
 
-def text_of(scene: WearScene) -> str:
+def format_scene(scene: WearScene) -> str:
     """Return the scene as text."""
-    return static_scenes.text_of(scene.patch) + (
+    return static_scenes.format_scene(scene.patch) + (
         '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\nfrequency = "10 Hz"\ncycles = 2\n'
         f'amplitude = "{scene.amplitude!r} m"\n[wear]\ncoefficient = "{scene.coefficient!r} m^2/N"\n'
         f"cycles = {scene.cycles!r}\n"
     )
 
 
-def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
+def discretize(patch: reference.PatchScene, span: tuple, cells: int) -> WearModel:
     """Condense both bodies to an interface with uniform cells over `span` and larger ones outside it."""
     half = patch.length / 2
     size = (span[1] - span[0]) / cells
@@ -93,17 +93,17 @@ def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
     if patch.step:
         points = [*points, patch.step[1]]
         sizes = [*sizes, size / 4]
-    x = reference.spread(points, sizes, -half, half, 0.5, patch.length / 10)
+    x = reference.grade_points(points, sizes, -half, half, 0.5, patch.length / 10)
     place, weight = reference.cells_of.face_nodes(x, reference.ORDER)
     bodies = [patch.lower] + [patch.upper] * (patch.upper != patch.lower)
-    parts = [reference.face(body, patch.plane, x, 0.5, corner) for body in bodies]
+    parts = [reference.condense_face(body, patch.plane, x, 0.5, corner) for body in bodies]
     low = parts[0]
     high = parts[-1]
     normal = low[0] + high[0]
     if patch.skin:
         normal = normal + np.diag(1 / (patch.skin * weight))
     gap = reference.unloaded_gap(patch, place)
-    return Model(
+    return WearModel(
         normal, low[1] + high[1] if patch.upper == patch.lower else np.empty(0), place, weight, gap
     )
 
@@ -117,7 +117,7 @@ class WornPatch(NamedTuple):
     active: np.ndarray
 
 
-def integrate(model: Model, scene: WearScene, steps: int) -> WornPatch:
+def integrate_depth(model: WearModel, scene: WearScene, steps: int) -> WornPatch:
     """Integrate the depth along the sliding distance in `steps` steps that grow geometrically."""
     load = scene.patch.load / scene.patch.width
     edges = (
@@ -127,68 +127,68 @@ def integrate(model: Model, scene: WearScene, steps: int) -> WornPatch:
     depth = np.zeros(model.gap.size)
     for begin, end in pairwise(edges):
         rate = scene.coefficient * (end - begin) / model.weight
-        force, approach, active = reference.contact(
+        force, approach, active = reference.solve_contact(
             model.normal + np.diag(rate), model.gap + depth, load, active
         )
         depth = depth + rate * force
     return WornPatch(depth, force, approach, active)
 
 
-def wear(model: Model, scene: WearScene, steps: int) -> dict:
+def compute_measures(model: WearModel, scene: WearScene, steps: int) -> dict:
     """Return the measures after wear that is integrated in `steps` steps."""
-    depth, force, approach, active = integrate(model, scene, steps)
+    depth, force, approach, active = integrate_depth(model, scene, steps)
     pressure = force / model.weight
     index = np.flatnonzero(active)
     patch = scene.patch
     place = model.place
-    ends = [
-        reference.edge_of(place, pressure, int(index[0]), -1, patch),
-        reference.edge_of(place, pressure, int(index[-1]), 1, patch),
+    edges = [
+        reference.locate_edge(place, pressure, int(index[0]), -1, patch),
+        reference.locate_edge(place, pressure, int(index[-1]), 1, patch),
     ]
     inverse = np.linalg.inv(model.normal[np.ix_(index, index)])
     values = {
         "worn_depth_max": float(depth.max()),
-        "contact_half_width": (ends[1] - ends[0]) / 2,
-        "pressure_peak": reference.peak(place, pressure),
+        "contact_half_width": (edges[1] - edges[0]) / 2,
+        "pressure_peak": reference.interpolate_peak(place, pressure),
         "approach": approach,
         "normal_stiffness": inverse.sum() * patch.width,
         "rotational_stiffness": place[index] @ inverse @ place[index] * patch.width,
     }
     if index.size == index[-1] - index[0] + 1:  # The contact has no gap inside.
-        values["contact_fraction"] = (ends[1] - ends[0]) / patch.length
+        values["contact_fraction"] = (edges[1] - edges[0]) / patch.length
     if model.tangential.size:
-        soft = model.tangential[np.ix_(index, index)]
+        compliance = model.tangential[np.ix_(index, index)]
         values["tangential_stiffness"] = (
-            np.linalg.solve(soft, np.ones(index.size)).sum() * patch.width
+            np.linalg.solve(compliance, np.ones(index.size)).sum() * patch.width
         )
     return values
 
 
-def contact_span(model: Model, scene: WearScene) -> tuple:
+def find_contact_span(model: WearModel, scene: WearScene) -> tuple:
     """Return the smallest and largest position in contact before and after wear."""
     load = scene.patch.load / scene.patch.width
     rate = scene.coefficient * scene.path / model.weight
-    new = reference.contact(model.normal, model.gap, load)[2]
-    worn = reference.contact(model.normal + np.diag(rate), model.gap, load)[2]
-    places = model.place[new | worn]
-    return float(places.min()), float(places.max())
+    new = reference.solve_contact(model.normal, model.gap, load)[2]
+    worn = reference.solve_contact(model.normal + np.diag(rate), model.gap, load)[2]
+    positions = model.place[new | worn]
+    return float(positions.min()), float(positions.max())
 
 
-def answer(scene: WearScene) -> dict:
+def solve_scene(scene: WearScene) -> dict:
     """Return the measures after wear: name -> (value, uncertainty)."""
     patch = scene.patch
     half = scene.patch.length / 2
     span = (-half, half)
     for _ in range(3):
-        low, high = contact_span(discretize(patch, span, CELLS[0]), scene)
+        low, high = find_contact_span(discretize(patch, span, CELLS[0]), scene)
         margin = 0.05 * (high - low) + 1e-6 * patch.length
         span = (max(low - margin, -half), min(high + margin, half))
-    found = []
+    extrapolated = []
     for cells in CELLS:
         model = discretize(patch, span, cells)
-        coarse, middle, fine = (wear(model, scene, steps) for steps in STEPS)
+        coarse, middle, fine = (compute_measures(model, scene, steps) for steps in STEPS)
         shared = coarse.keys() & middle.keys() & fine.keys()
-        found.append(
+        extrapolated.append(
             {
                 name: (
                     2 * fine[name] - middle[name],
@@ -198,9 +198,9 @@ def answer(scene: WearScene) -> dict:
             }
         )
     truth = {
-        name: (value, own + abs(value - found[0][name][0]))
-        for name, (value, own) in found[1].items()
-        if name in found[0]
+        name: (value, error + abs(value - extrapolated[0][name][0]))
+        for name, (value, error) in extrapolated[1].items()
+        if name in extrapolated[0]
     }
     truth["worn_volume"] = (worn_volume(scene.coefficient, patch.load, scene.path), 0.0)
     return truth
@@ -208,18 +208,18 @@ def answer(scene: WearScene) -> dict:
 
 def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     """Compare the bench of a seed with its reference; see `campaigns`."""
-    scene = draw(seed)
+    scene = draw_scene(seed)
     line = {"group": static_scenes.KINDS[seed % len(static_scenes.KINDS)], "engine": "wear"}
-    begin = process_time()
+    started = process_time()
     try:
-        run = pf.run(text_of(scene))
+        run = pf.run(format_scene(scene))
     except pf.PatchfemError as error:
         return line | {"rows": [], "refused": str(error)}
-    line |= {"seconds": process_time() - begin, "warnings": list(run.warnings)}
+    line |= {"seconds": process_time() - started, "warnings": list(run.warnings)}
     if earlier and "true" in earlier:
         line |= {key: earlier[key] for key in ("true", "doubt")}
     else:
-        found = answer(scene)
-        line["true"] = {name: value for name, (value, _) in found.items()}
-        line["doubt"] = {name: doubt for name, (_, doubt) in found.items()}
-    return line | {"rows": static_scenes.judged_rows(run.measures, line["true"], line["doubt"])}
+        reference_values = solve_scene(scene)
+        line["true"] = {name: value for name, (value, _) in reference_values.items()}
+        line["doubt"] = {name: doubt for name, (_, doubt) in reference_values.items()}
+    return line | {"rows": static_scenes.reliable_rows(run.measures, line["true"], line["doubt"])}

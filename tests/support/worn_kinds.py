@@ -37,7 +37,7 @@ KINDS = (
 )
 
 
-class Kind(NamedTuple):
+class WornPair(NamedTuple):
     """Two traces and their true difference.
 
     before, after: Profile; shift [m]; worn, piled (n,) [m]: lost and added material at the samples
@@ -52,7 +52,7 @@ class Kind(NamedTuple):
     factor: float
 
 
-def surface(random, rms: float, longest: float, shortest: float):
+def make_surface(random, rms: float, longest: float, shortest: float):
     """Return a rough surface as a function of x [m]: rms [m], waves from longest to shortest [m]."""
     count = 700
     wave = np.exp(random.uniform(np.log(1 / (4 * longest)), np.log(1 / shortest), count))
@@ -65,17 +65,17 @@ def surface(random, rms: float, longest: float, shortest: float):
     size *= rms / np.sqrt((size**2).sum() / 2)
     phase = random.uniform(0, 2 * np.pi, count)
 
-    def height(x):
+    def evaluate_height(x):
         """Return the heights [m] at positions x (n,) [m]."""
         out = np.zeros(x.size)
         for a, k, p in zip(size, 2 * np.pi * wave, phase):
             out += a * np.cos(k * x + p)
         return out
 
-    return height
+    return evaluate_height
 
 
-def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
+def _draw_wear(kind: str, random, x, z, rms: float) -> np.ndarray:
     """Return the worn depth [m] at the samples."""
     t = x / x[-1]
     depth = random.uniform(1.0, 6.0) * max(rms, 0.3 * UM)
@@ -107,8 +107,8 @@ def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
         "worn elsewhere",
     ):
         half = random.uniform(0.05, 0.18)
-        at = random.uniform(0.3, 0.7)
-        u = np.abs(t - at) / half
+        centre = random.uniform(0.3, 0.7)
+        u = np.abs(t - centre) / half
         if kind == "trough":
             return depth * np.clip((1 - u) / random.uniform(0.1, 0.5), 0, 1)
         return depth * np.maximum(1 - u**2, 0.0)
@@ -123,7 +123,7 @@ def _lost(kind: str, random, x, z, rms: float) -> np.ndarray:
     return np.zeros(x.size)
 
 
-def made(kind: str, seed: int) -> Kind:
+def make_trace_pair(kind: str, seed: int) -> WornPair:
     """Return a pair of a kind: 1 to 4 mm long, 0.2 um to 6 um rough, noise of 5 nm to 40 nm, tilted and shifted."""
     random = np.random.default_rng([KINDS.index(kind), seed, 51])
     step = random.choice([0.5, 1.0, 2.0]) * UM if kind != "coarse" else 4 * UM
@@ -131,45 +131,49 @@ def made(kind: str, seed: int) -> Kind:
     x = np.arange(round(length / step) + 1) * step
     rms = np.exp(random.uniform(np.log(0.3), np.log(6.0))) * UM
     noise = random.uniform(5, 40) * 1e-9
-    height = surface(random, rms, random.uniform(80, 250) * UM, 12 * UM)
+    height = make_surface(random, rms, random.uniform(80, 250) * UM, 12 * UM)
     shift = random.uniform(-40, 40) * UM
     factor = 1 + (random.choice([-1, 1]) * random.uniform(0.002, 0.02) if kind == "scale" else 0.0)
-    here = height(x / factor - shift) if "elsewhere" not in kind else height(x + 20e-3)
-    worn = _lost(kind, random, x, here, rms)
+    heights_after = height(x / factor - shift) if "elsewhere" not in kind else height(x + 20e-3)
+    worn = _draw_wear(kind, random, x, heights_after, rms)
     piled = np.zeros(x.size)
     if kind == "deposits":
-        for at in random.uniform(0.1, 0.9, random.integers(1, 4)) * length:
+        for position in random.uniform(0.1, 0.9, random.integers(1, 4)) * length:
             piled += (
                 random.uniform(0.5, 4)
                 * rms
-                * np.exp(-0.5 * ((x - at) / random.uniform(20e-6, 60e-6)) ** 2)
+                * np.exp(-0.5 * ((x - position) / random.uniform(20e-6, 60e-6)) ** 2)
             )
-    sides = [height(x), here - worn + piled]
+    traces = [height(x), heights_after - worn + piled]
     if kind.startswith("bent"):
-        sides[1] += random.choice([-1, 1]) * random.uniform(0.3, 3) * UM * (2 * x / length - 1) ** 2
-    sides = [
+        traces[1] += (
+            random.choice([-1, 1]) * random.uniform(0.3, 3) * UM * (2 * x / length - 1) ** 2
+        )
+    traces = [
         z
         + random.uniform(-0.01, 0.01) * x
         + random.uniform(-5, 5) * UM
         + noise * random.standard_normal(x.size)
-        for z in sides
+        for z in traces
     ]
     if "dust" in kind or kind == "dropouts":
         for _ in range(random.integers(1, 5)):
-            z = sides[random.integers(2)]
-            at = random.integers(5, x.size - 8)
-            wide = random.integers(1, 4)
-            z[at : at + wide] += (
+            z = traces[random.integers(2)]
+            position = random.integers(5, x.size - 8)
+            width = random.integers(1, 4)
+            z[position : position + width] += (
                 (1 if "dust" in kind else -1) * random.uniform(5, 30) * max(UM, rms)
             )
-    after = {"mirrored": sides[1][::-1], "turned": -sides[1]}.get(kind, sides[1])
+    after = {"mirrored": traces[1][::-1], "turned": -traces[1]}.get(kind, traces[1])
     worn = worn[::-1] if kind == "mirrored" else worn
-    one, other = (
+    first, second = (
         Profile(frozen_array(x), frozen_array(z), name)
-        for z, name in ((sides[0], "before"), (after, "after"))
+        for z, name in ((traces[0], "before"), (after, "after"))
     )
     return (
-        Kind(one, other, shift, worn, piled, factor)
+        WornPair(first, second, shift, worn, piled, factor)
         if kind != "exchanged"
-        else Kind(other, one, -shift, np.zeros(x.size), np.interp(x, x - shift, worn), factor)
+        else WornPair(
+            second, first, -shift, np.zeros(x.size), np.interp(x, x - shift, worn), factor
+        )
     )

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from synthetic import peaks, self_affine, sine
-from traces import UM, bumpy
+from traces import UM, draw_uneven_trace
 
 from patchfem.core import PatchfemError
 from patchfem.formatting import format_length
@@ -25,7 +25,7 @@ def make_rough_trace(count=4000, seed=0) -> Profile:
 @given(st.floats(-0.5, 0.5), st.floats(-1e-3, 1e-3), st.integers(0, 99))
 def test_exact_levelling_removes_only_the_line(slope, offset, seed):
     """Levelling removes the least-squares line and nothing else, also with missing heights."""
-    x, z = (values * UM for values in bumpy(seed=seed))
+    x, z = (values * UM for values in draw_uneven_trace(seed=seed))
     z = np.where(np.arange(x.size) % 7 == 3, np.nan, z)
     present = ~np.isnan(z)
     levelled = level(Profile(x, z + slope * x + offset, "a"))

@@ -7,7 +7,7 @@ import os
 
 import pytest
 from torture import driver
-from torture.driver import CAMPAIGNS, torture
+from torture.driver import CAMPAIGNS, run_campaigns
 
 from patchfem.__main__ import run_command
 
@@ -33,7 +33,7 @@ def run_trials(names, fraction, seed):
     """Run a fraction of the trials of campaigns and return their rows; fail if any message is
     reported."""
     messages = []
-    rows = torture(run_command, fraction, names, seed, None, messages.append)
+    rows = run_campaigns(run_command, fraction, names, seed, None, messages.append)
     assert not messages, "\n".join(messages)
     return rows
 
@@ -41,11 +41,11 @@ def run_trials(names, fraction, seed):
 @pytest.fixture(scope="module", autouse=True)
 def warm_up(tmp_path_factory):
     """Run the warm-up of the driver once for all campaigns."""
-    driver.warm(run_command, tmp_path_factory.mktemp("warm"))
-    original_warm = driver.warm
-    driver.warm = lambda command, folder: None
+    driver.preload(run_command, tmp_path_factory.mktemp("warm"))
+    original_warm = driver.preload
+    driver.preload = lambda command, folder: None
     yield
-    driver.warm = original_warm
+    driver.preload = original_warm
 
 
 @pytest.mark.parametrize("name", ALWAYS)

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from torture import driver, results
-from torture.trial import Trial, Wrong, alone, captured
+from torture.trial import Trial, TrialFailure, capture, run_in_fork
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a fo
 def run_trial(tmp_path, command, work=lambda trial: trial.run("run", "x.toml"), patience=0.02):
     """Return the message of the driver about a command under one trial, or an empty string if there
     is no fault."""
-    return alone(
+    return run_in_fork(
         work,
         lambda report: Trial(np.random.default_rng(0), tmp_path, command, report, patience),
         20.0,
@@ -103,7 +103,7 @@ def test_always_stdout_and_stderr_are_captured(tmp_path):
         print("from Python")
         return 3
 
-    assert captured(command, []) == (3, "from Python\n", "from C\n")
+    assert capture(command, []) == (3, "from Python\n", "from C\n")
 
 
 def write_summary(folder, **changes):
@@ -129,9 +129,9 @@ def write_summary(folder, **changes):
 )
 def test_refuses_inconsistent_summary(tmp_path, changes, expected):
     """A summary that contradicts itself or contains NaN is refused with a message that says why."""
-    assert results.whole(write_summary(tmp_path / "good"))["outcome"] == "steady"
-    with pytest.raises(Wrong, match=expected):
-        results.whole(write_summary(tmp_path / "bad", **changes))
+    assert results.check_results(write_summary(tmp_path / "good"))["outcome"] == "steady"
+    with pytest.raises(TrialFailure, match=expected):
+        results.check_results(write_summary(tmp_path / "bad", **changes))
 
 
 def test_refuses_nan_in_result_file(tmp_path):
@@ -139,22 +139,22 @@ def test_refuses_nan_in_result_file(tmp_path):
     for name, values in (("good", [1.0, 2.0]), ("bad", [1.0, np.nan])):
         with h5py.File(write_summary(tmp_path / name) / "result.nc", "w") as file:
             file.create_group("deep")["x"] = values
-    results.whole(tmp_path / "good")
-    with pytest.raises(Wrong, match="deep/x holds 1 of 2 values"):
-        results.whole(tmp_path / "bad")
+    results.check_results(tmp_path / "good")
+    with pytest.raises(TrialFailure, match="deep/x holds 1 of 2 values"):
+        results.check_results(tmp_path / "bad")
 
 
 def test_refuses_leftover_files(tmp_path):
     """A partial results folder that remains after a run is refused."""
     (tmp_path / "out.partial").mkdir()
-    with pytest.raises(Wrong, match=r"out\.partial"):
-        results.left_over(tmp_path)
+    with pytest.raises(TrialFailure, match=r"out\.partial"):
+        results.check_no_remnants(tmp_path)
 
 
 def test_always_random_numbers_of_trial_are_reproducible():
     """The random numbers of a trial depend only on its campaign, seed and index, not on earlier
     trials."""
     trials = [("grammar", 5, 0), ("grammar", 5, 1), ("grammar", 6, 0), ("scenes", 5, 0)]
-    first = [driver.random_numbers(*trial).random() for trial in trials]
+    first = [driver.make_generator(*trial).random() for trial in trials]
     assert len(set(first)) == 4
-    assert [driver.random_numbers(*trial).random() for trial in reversed(trials)] == first[::-1]
+    assert [driver.make_generator(*trial).random() for trial in reversed(trials)] == first[::-1]

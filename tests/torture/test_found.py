@@ -1,7 +1,7 @@
 """Faults that the torture campaigns found, each with the shortest scene that showed it."""
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH
 
 WORN = BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 10\n'
@@ -11,7 +11,7 @@ def refusal_message(tmp_path, text, *options):
     """Return stderr of `check` for a scene, which must be refused without an internal fault."""
     path = tmp_path / "scene.toml"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    answer = cli("check", path, *options)
+    answer = run_cli("check", path, *options)
     assert answer.code == 2 and "internal fault" not in answer.err, answer.err
     return answer.err
 
@@ -34,12 +34,12 @@ def test_refuses_folder_as_output_file(tmp_path, monkeypatch, place):
     """`schema -o` refuses the path of a folder, because it writes a file."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there").mkdir()
-    answer = cli("schema", "-o", place)
+    answer = run_cli("schema", "-o", place)
     assert answer.code == 4 and "this is a folder; name a file" in answer.err
 
 
 def test_always_long_arguments_are_shortened_in_messages():
     """A message about an argument of 3000 letters has fewer than 500 characters and states the
     length."""
-    answer = cli("export", "out", "-o", "x.vtu", "--frame", "x" * 3000)
+    answer = run_cli("export", "out", "-o", "x.vtu", "--frame", "x" * 3000)
     assert answer.code == 2 and len(answer.err) < 500 and "3002 letters" in answer.err

@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-from command_line import cli
-from import_graph import sources, syntax_nodes
+from command_line import run_cli
+from import_graph import read_sources, syntax_nodes
 from scene_texts import BENCH, MODE
-from torture.hostile import Planted
+from torture.hostile import MaliciousPickle
 
 import patchfem
 
@@ -91,7 +91,7 @@ def test_always_sources_contain_no_unsafe_code():
     """No module of the package executes data as code or imports a network library."""
     assert not {
         name: findings
-        for name, text in sources(HOUSE).items()
+        for name, text in read_sources(HOUSE).items()
         if (findings := find_unsafe_code(name, text))
     }
 
@@ -124,12 +124,12 @@ def test_always_commands_write_only_into_output_folder(tmp_path):
     scene.write_text('title = "../../escaped"\n' + BENCH, "utf-8")
     old_paths = {path for path in tmp_path.rglob("*")}
     out = tmp_path / "work" / "out"
-    sweep = cli(
+    sweep = run_cli(
         "sweep", scene, "--over", "title=../../escaped,/escaped", "-o", out / "swept", "-j", "1"
     )
     assert sweep.code in (0, 2), sweep.err
-    assert cli("run", scene, "-o", out / "run", "--no-page").code == 0
-    assert cli("export", out / "run", "-o", out / "histories.csv").code == 0
+    assert run_cli("run", scene, "-o", out / "run", "--no-page").code == 0
+    assert run_cli("export", out / "run", "-o", out / "histories.csv").code == 0
     new_paths = {path for path in tmp_path.rglob("*")} - old_paths
     assert new_paths and all(path.is_relative_to(out) for path in new_paths)
     assert not Path("/escaped").exists()
@@ -144,7 +144,7 @@ def test_always_pages_escape_text_of_scenes(tmp_path):
     scene.write_text(
         f'title = "{markup}"\n' + MODE.replace('"axial"', f'"{markup}"') + drive, "utf-8"
     )
-    assert cli("run", scene, "-o", tmp_path / "out").code == 0
+    assert run_cli("run", scene, "-o", tmp_path / "out").code == 0
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert "&lt;img src=x" in page
     page_without_scripts = re.sub(r"<script.*?</script>", "", page, flags=re.S)
@@ -158,13 +158,13 @@ def test_always_pickles_are_never_loaded(tmp_path, monkeypatch):
 
     monkeypatch.chdir(tmp_path)
     for suffix in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml"):
-        Path(f"x.{suffix}").write_bytes(pickle.dumps(Planted()))
+        Path(f"x.{suffix}").write_bytes(pickle.dumps(MaliciousPickle()))
         arguments = (
             ["check", f"x.{suffix}"]
             if suffix == "toml"
             else ["profile", f"x.{suffix}", "--units", "um,um"]
         )
-        answer = cli(*arguments)
+        answer = run_cli(*arguments)
         assert answer.code in (2, 4) and answer.err.strip(), (suffix, answer)
     assert sorted(path.suffix for path in tmp_path.iterdir()) == sorted(
         f".{suffix}" for suffix in ("npy", "npz", "mat", "csv", "sdf", "x3p", "toml")

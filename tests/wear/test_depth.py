@@ -5,9 +5,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pieces import bare, bare_pair, coated_pair, refined_middle
+from pieces import make_bare_layers, make_bare_pair, make_coated_pair, make_refined_grid
 from scipy.linalg import expm
-from wear_forms import even_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
+from wear_forms import uniform_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
 
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact.unilateral import solve_forces
@@ -55,7 +55,7 @@ def make_contact_solver(compliance, x, gap, load=LOAD):
 def flat_contact():
     """Return contact solver, compliance, areas, wear rates and critical step of two flat uncoated
     blocks."""
-    pair = bare_pair(32)
+    pair = make_bare_pair(32)
     area = pair.interface.weight
     c = np.array(pair.normal)
     rate = wear_rates(KAPPA, np.full(area.size, PATH), area)
@@ -145,7 +145,7 @@ def test_order_step_size_follows_true_error():
 def test_exact_steady_pressure_is_inverse_to_sliding_distance():
     """Under a non-uniform sliding distance s the pressure of a yawing pad tends to the classical p
     ~ 1/s, within 1e-11."""
-    pair = bare_pair(32)
+    pair = make_bare_pair(32)
     x = pair.interface.x
     area = pair.interface.weight
     width = pair.interface.width
@@ -156,7 +156,7 @@ def test_exact_steady_pressure_is_inverse_to_sliding_distance():
     for _ in range(60):
         depth, force = solve_jump(press, depth, rate, 1e7)
     assert force / area == pytest.approx(
-        even_wear_pressure(LOAD / width, path, area / width), rel=1e-11
+        uniform_wear_pressure(LOAD / width, path, area / width), rel=1e-11
     )
 
 
@@ -184,7 +184,7 @@ def test_exact_contact_fraction_of_tilted_pad_on_springs():
 
 def crowned_problem(cells=100, radius=0.05):
     """Return a wear problem of coated bodies with a crown, in gross slip for 135 723 cycles."""
-    pair = coated_pair(cells)
+    pair = make_coated_pair(cells)
     x = pair.interface.x
     area = pair.interface.weight
     path = np.full(x.size, PATH)
@@ -224,11 +224,11 @@ def test_exact_worn_hertz_contact_agrees_with_half_space_program():
     line_load = 1e5
     young = 121e9
     hertz_width = hertz_half_width(line_load, radius, young / (1 - 0.32**2) / 2)
-    mesh = refined_middle(
+    mesh = make_refined_grid(
         5 * hertz_width, hertz_width / 10, 40 * hertz_width, 20 * hertz_width, 1.2
     )
     nn, _, _ = interface_compliance(
-        make_piece(mesh.x, mesh.depth, mesh.coating_rows, bare((young, 0.32)))
+        make_piece(mesh.x, mesh.depth, mesh.coating_rows, make_bare_layers((young, 0.32)))
     )
     x = mesh.x
     area = mesh.tributary_lengths() * width

@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem import SceneError, build, run
@@ -327,7 +327,7 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
         "-o",
         str(out),
     ]
-    code, text, said = cli(*given)
+    code, text, said = run_cli(*given)
     assert code == 0, said
     answer = json.loads((out / "fit.json").read_text())
     one = answer["values"]["structure.mode.axial.frequency"]
@@ -437,7 +437,7 @@ def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
         str(tmp_path / "out"),
         *words,
     ]
-    code, _, err = cli(*given)
+    code, _, err = run_cli(*given)
     assert code == 2 and said in err
     assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
 

@@ -8,7 +8,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH
 
 from patchfem.campaigns import Cases, SweepScene, Work, environment_versions
@@ -124,7 +124,7 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
 
 def test_refuses_tls_without_certificates_and_names_the_variables(tmp_path):
     (tmp_path / "bench.toml").write_text(BENCH)
-    answer = cli(
+    answer = run_cli(
         "sweep",
         tmp_path / "bench.toml",
         "--over",

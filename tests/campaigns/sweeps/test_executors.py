@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cli
-from deadly_cases import Deadly
+from command_line import run_cli
+from deadly_cases import KillingMeasure
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 from patchfem.campaigns import (
@@ -77,7 +77,7 @@ def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, onc
 def one_case_only(tmp_path: Path, once: bool, executor) -> None:
     """Of cases that kill their worker, once or always, all others are as if nothing had died."""
     deadly = (3, 5) if once else (3,)
-    asked = work(tell=Deadly(deadly, tmp_path, once))
+    asked = work(tell=KillingMeasure(deadly, tmp_path, once))
     found, told = all_of(asked, executor)
     want, _ = all_of(work(), LocalExecutor())
     lost = [] if once else [3]
@@ -232,7 +232,7 @@ def whole(tmp_path_factory):
     place = tmp_path_factory.mktemp("whole")
     (place / "rig.toml").write_text(RIG, encoding="utf-8")
     over = "friction.static=0.05..0.6:20lin"
-    assert cli("sweep", place / "rig.toml", "--over", over, "-o", place / "whole").code == 0
+    assert run_cli("sweep", place / "rig.toml", "--over", over, "-o", place / "whole").code == 0
     return place / "rig.toml", over, place / "whole"
 
 
@@ -242,7 +242,7 @@ def resumed(whole: tuple, out: Path) -> None:
     there = [one for one in (out / "cases").iterdir() if not one.name.startswith(".")]
     assert 0 < len(there) < len(names(want / "cases")) and not (out / "sweep.csv").exists()
     assert all((one / "summary.json").read_text().endswith("}\n") for one in there)
-    assert cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
+    assert run_cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (want / name).read_bytes()
     assert names(out / "cases") == names(want / "cases") and names(out) == names(want)

@@ -6,7 +6,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, SECOND, SHEAR, friction_of
+from scene_texts import (
+    COATED,
+    COULOMB,
+    DRIVE,
+    MODE,
+    NONLOCAL,
+    POINT,
+    SECOND,
+    SHEAR,
+    make_friction_table,
+)
 
 from patchfem.campaigns import SweepScene
 from patchfem.core import PatchfemError
@@ -167,7 +177,10 @@ LUMPED = {
     "coulomb": ONE.format(COULOMB),
     "elastic-plastic": ONE.format(PLASTIC),
     "springs": ONE.format(SPRINGS),
-    **{law: ONE.format(friction_of(law)) for law in ("tanh", "nonlocal", "bouc-wen", "lugre")},
+    **{
+        law: ONE.format(make_friction_table(law))
+        for law in ("tanh", "nonlocal", "bouc-wen", "lugre")
+    },
     "start": ONE.format(COULOMB) + '[structure.start]\nvelocity = ["0.1 m/s"]\n',
 }
 

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import BENCH
 from study_module import ROOT
 
@@ -57,7 +57,7 @@ def asked(tmp_path) -> tuple:
     scene = tmp_path / "a scene.toml"  # a path to be quoted
     scene.write_text(BENCH, encoding="utf-8")
     words = [word for one in OVER for word in ("--over", one)]
-    assert cli("sweep", scene, *words, "-o", tmp_path / "whole").code == 0
+    assert run_cli("sweep", scene, *words, "-o", tmp_path / "whole").code == 0
     return scene, words, tmp_path / "whole"
 
 

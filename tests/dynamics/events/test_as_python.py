@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from modal_bases import random_basis
+from modal_bases import make_random_modal_basis
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import make_coulomb_elements, make_elements
@@ -51,7 +51,7 @@ def make_interface(rng, kind: str):
 def compute_motion(seed: int, n_modes: int, n_interfaces: int, kind: str, drive) -> dict:
     """Run 6 cycles and return the histories, the events and the measures of the last cycles."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n_modes, n_interfaces)
+    modes = make_random_modal_basis(rng, n_modes, n_interfaces)
     groups = [make_interface(rng, kind) for _ in range(n_interfaces)]
     run = histories.simulate(modes, drive, groups, 6.0, window=3)
     names = ("time", "modal", "modal_rate", "force", "slip")
@@ -92,8 +92,8 @@ def test_always_estimated_time_rises_with_problem_size():
     """The estimated time of a cycle in Python rises with the events, elements, modes and
     interfaces."""
     rng = np.random.default_rng(4)
-    small = random_basis(rng, 1, 1)
-    large = random_basis(rng, 6, 3)
+    small = make_random_modal_basis(rng, 1, 1)
+    large = make_random_modal_basis(rng, 6, 3)
     assert (
         0
         < cost.estimate_cycle_time(small, SINE, 0.0, 0)

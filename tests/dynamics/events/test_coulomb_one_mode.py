@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import vibration_forms
 from event_reference import run_reference
-from event_run import combine, groups_of, run, simulate
-from modal_bases import basis_of
+from event_run import combine_signals, make_groups, run_phases, simulate
+from modal_bases import make_modal_basis
 from vibration_forms import sliding_amplitude
 
 from patchfem.core import DriveSegment, InitialState, Outcome, PatchfemError, SineDrive
@@ -22,7 +22,7 @@ from patchfem.structure.drives import PiecewiseDrive, make_levels
 
 def make_mode(omega=1.0, zeta=0.003):
     """Return the basis of a single mode."""
-    return basis_of(omega, zeta)
+    return make_modal_basis(omega, zeta)
 
 
 def run_case(
@@ -116,8 +116,8 @@ def test_figure_16_stops_of_two_masses():
     """Stops of two unit masses joined by a unit spring agree with figure 16 within 1e-11; sin(1.14
     t) drives the first mass, and friction acts on the second."""
     h = sqrt(0.5)
-    modes = basis_of([0.0, sqrt(2)], 0.0, [h, -h], (-h, -h))
-    phases = run(modes, SineDrive(1.0, 1.14), 3.0, 3.0, 400.0)
+    modes = make_modal_basis([0.0, sqrt(2)], 0.0, [h, -h], (-h, -h))
+    phases = run_phases(modes, SineDrive(1.0, 1.14), 3.0, 3.0, 400.0)
     assert len(phases) == 286
     assert phases[0].span == pytest.approx(8.079711463905416, abs=1e-12)
     exact = [
@@ -127,8 +127,8 @@ def test_figure_16_stops_of_two_masses():
     ]
     for phase, (time, place) in zip([p for p in phases[1:] if p.direction == 0], exact):
         assert phase.time == pytest.approx(time, abs=1e-11)
-        assert combine(phase.modal, modes.slide)(0.0) == pytest.approx(place, abs=1e-11)
-    assert combine(phases[-1].modal, modes.slide)(phases[-1].span) == pytest.approx(
+        assert combine_signals(phase.modal, modes.slide)(0.0) == pytest.approx(place, abs=1e-11)
+    assert combine_signals(phases[-1].modal, modes.slide)(phases[-1].span) == pytest.approx(
         -0.37952939486, abs=1e-10
     )
 
@@ -136,7 +136,7 @@ def test_figure_16_stops_of_two_masses():
 def test_refuses_interface_that_no_mode_moves():
     """An interface that no mode moves is refused."""
     with pytest.raises(PatchfemError, match="no mode moves the interface"):
-        simulate(basis_of(1.0, faces=[0.0]), SineDrive(1.0, 1.0), 1.0, 1.0, 2)
+        simulate(make_modal_basis(1.0, faces=[0.0]), SineDrive(1.0, 1.0), 1.0, 1.0, 2)
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_exact_motion_agrees_with_40_digit_arithmetic(omega, decay, drive_omega)
     motion = evaluate_motion(
         modes,
         drive,
-        groups_of(modes, 0.0, 0.0),
+        make_groups(modes, 0.0, 0.0),
         2,
         times,
         InitialState(np.zeros(1), np.array([v0])),
@@ -309,7 +309,7 @@ def test_exact_segmented_drives_agree_with_dop853(drive, zeta, static, kinetic):
     expected = [
         phase for k, phase in enumerate(expected[:-1]) if k == 0 or phase[1] != expected[k - 1][1]
     ]
-    phases = run(modes, drive, static, kinetic, end)
+    phases = run_phases(modes, drive, static, kinetic, end)
     phases = [
         phase
         for k, phase in enumerate(phases)

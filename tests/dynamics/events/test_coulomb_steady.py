@@ -5,8 +5,8 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from event_run import period_map, simulate, steady
-from modal_bases import basis_of, random_basis
+from event_run import map_period, simulate, solve_steady
+from modal_bases import make_modal_basis, make_random_modal_basis
 from vibration_forms import sliding_amplitude, two_stop_amplitude
 
 from patchfem.core import InitialState, PatchfemError, SineDrive
@@ -40,7 +40,7 @@ def run_amplitude(modes, drive, static, kinetic, cycles, start=None):
 def test_exact_resonance_amplitudes_agree_with_published_values(friction, zeta, expected, regime):
     """Amplitudes at resonance agree within 2e-12 with published values, or with the closed form of
     two stops, which is ill-conditioned near pi/4. Below pi/4 the undamped motion is unbounded."""
-    motion = steady(basis_of(1.0, zeta), SineDrive(1.0, 1.0), friction, friction)
+    motion = solve_steady(make_modal_basis(1.0, zeta), SineDrive(1.0, 1.0), friction, friction)
     assert motion.regime == regime
     if regime == "unbounded":
         return
@@ -58,7 +58,7 @@ def test_exact_resonance_amplitudes_agree_with_published_values(friction, zeta, 
 )
 def test_table_check_7_amplitudes_without_damping(hertz, level, amplitude):
     """Amplitudes without damping agree with table check 7 of the report within 2e-6."""
-    motion = steady(basis_of(1.0), SineDrive(level / 4, hertz / 143), 1.0, 1.0)
+    motion = solve_steady(make_modal_basis(1.0), SineDrive(level / 4, hertz / 143), 1.0, 1.0)
     assert (
         motion.amplitude / (level / 4) == pytest.approx(amplitude, rel=2e-6)
         and motion.regime == "sliding"
@@ -72,7 +72,9 @@ def test_table_check_8_transition_to_sliding(hertz, knee):
     """The last stop vanishes at the ratio of drive to friction in table check 8 of the report,
     within 1e-3."""
     regimes = [
-        steady(basis_of(1.0, 0.003), SineDrive(knee + offset, hertz / 143), 1.0, 1.0).regime
+        solve_steady(
+            make_modal_basis(1.0, 0.003), SineDrive(knee + offset, hertz / 143), 1.0, 1.0
+        ).regime
         for offset in (-1e-3, 1e-3)
     ]
     assert regimes == ["2 stops", "sliding"]
@@ -95,9 +97,9 @@ POINTS = [
 def test_exact_steady_amplitudes_agree_with_runs():
     """Steady amplitudes at ten frequencies and levels agree with runs of 60 cycles within 1e-9."""
     for ratio, level in POINTS:
-        modes = basis_of(1.0, 0.08)
+        modes = make_modal_basis(1.0, 0.08)
         drive = SineDrive(level, ratio)
-        motion = steady(modes, drive, 1.0, 1.0)
+        motion = solve_steady(modes, drive, 1.0, 1.0)
         expected = run_amplitude(modes, drive, 1.0, 1.0, 60)
         assert motion.amplitude == pytest.approx(expected, rel=1e-9), (ratio, level)
 
@@ -107,9 +109,9 @@ def test_exact_steady_amplitudes_agree_with_runs():
 def test_exact_number_of_stops_below_resonance(level, ratio, n_stops):
     """The steady motion under a slow drive has the same number of stops per cycle and the same
     amplitude as a long run."""
-    modes = basis_of(1.0, 0.0005)
+    modes = make_modal_basis(1.0, 0.0005)
     drive = SineDrive(level, ratio)
-    motion = steady(modes, drive, 1.0, 1.0)
+    motion = solve_steady(modes, drive, 1.0, 1.0)
     result = simulate(modes, drive, 1.0, 1.0, 80, 10)
     stops = np.count_nonzero((result.log.kind == 0) & (result.log.time > 70 * drive.period)) / 10
     assert motion.stops == (stops,) == (n_stops,) and motion.regime == f"{n_stops} stops"
@@ -120,10 +122,10 @@ def test_exact_number_of_stops_below_resonance(level, ratio, n_stops):
 def test_exact_stuck_and_sliding_motion_coexist():
     """With kinetic below static friction the rig stays at rest, or slides steadily after an initial
     impulse, at the same drive level."""
-    modes = basis_of(1.0, 0.05)
+    modes = make_modal_basis(1.0, 0.05)
     drive = SineDrive(0.9, 1.0)
-    rest = steady(modes, drive, 1.0, 0.3)
-    moving = steady(modes, drive, 1.0, 0.3, InitialState(np.zeros(1), np.array([8.0])))
+    rest = solve_steady(modes, drive, 1.0, 0.3)
+    moving = solve_steady(modes, drive, 1.0, 0.3, InitialState(np.zeros(1), np.array([8.0])))
     assert (rest.regime, moving.regime) == ("stuck", "sliding") and rest.amplitude == 0
     expected = 0.9 * sliding_amplitude(1.0, 0.3 / 0.9, 0.05)
     assert moving.amplitude == pytest.approx(expected, rel=1e-11)
@@ -133,13 +135,13 @@ def test_exact_stuck_and_sliding_motion_coexist():
 def test_refuses_drive_that_is_not_periodic():
     """A drive of several levels has no steady motion and is refused."""
     with pytest.raises(PatchfemError, match="a single sine without end"):
-        steady(basis_of(1.0), drives.make_levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
+        solve_steady(make_modal_basis(1.0), drives.make_levels([1.0, 2.0], 1.0, 5), 1.0, 1.0)
 
 
 def make_two_interface_rig(seed=2, ratio=1.0):
     """Return modes, drive and friction limits of a random rig with two interfaces."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, 3, 2)
+    modes = make_random_modal_basis(rng, 3, 2)
     static = rng.uniform(0.1, 0.3, 2)
     return modes, SineDrive(1.0, 1.2), static, ratio * static
 
@@ -150,7 +152,7 @@ def test_exact_two_interfaces_agree_with_run(seed, ratio):
     """The steady motion of two interfaces has the amplitude of a run of 400 cycles and repeats
     after one cycle."""
     modes, drive, static, kinetic = make_two_interface_rig(seed, ratio)
-    motion = steady(modes, drive, static, kinetic)
+    motion = solve_steady(modes, drive, static, kinetic)
     assert motion.amplitude == pytest.approx(
         run_amplitude(modes, drive, static, kinetic, 400), rel=1e-8
     )
@@ -172,17 +174,17 @@ def test_exact_derivative_of_map_agrees_with_differences(seed, n_modes, n_interf
     """The derivative of the event map, with its saltation matrices, agrees with central differences
     within 3e-8."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n_modes, n_interfaces)
+    modes = make_random_modal_basis(rng, n_modes, n_interfaces)
     static = rng.uniform(0.2, 1.0, n_interfaces)
     x = rng.normal(size=2 * n_modes)
     drive = SineDrive(1.0, 1.2)
     step = 1e-6
-    mapped = period_map(modes, drive, static, ratio * static, x)
+    mapped = map_period(modes, drive, static, ratio * static, x)
     for j in range(2 * n_modes):
         direction = np.zeros(2 * n_modes)
         direction[j] = step
         ends = [
-            period_map(modes, drive, static, ratio * static, x + s * direction).end for s in (1, -1)
+            map_period(modes, drive, static, ratio * static, x + s * direction).end for s in (1, -1)
         ]
         np.testing.assert_allclose(mapped.slope[:, j], (ends[0] - ends[1]) / (2 * step), atol=3e-8)
 
@@ -191,9 +193,9 @@ def test_exact_steady_motion_of_figure_16():
     """The steady motion of figure 16 of the report has two stops, and its amplitude agrees with the
     report within 2e-8."""
     h = sqrt(0.5)
-    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
+    modes = make_modal_basis([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
     drive = SineDrive(1.0, 1.14)
-    motion = steady(modes, drive, 3.0, 3.0, cycles=120)
+    motion = solve_steady(modes, drive, 3.0, 3.0, cycles=120)
     assert motion.amplitude == pytest.approx((0.69867878 + 0.39299347) / 2, abs=2e-8)
     assert motion.regime == "2 stops"
 
@@ -201,6 +203,6 @@ def test_exact_steady_motion_of_figure_16():
 def test_exact_simultaneous_events_are_reported():
     """A steady motion reports whether events of two interfaces coincide, which makes the derivative
     of its map invalid."""
-    modes = basis_of([1.0, 1.0], 0.05, np.eye(2), (1, 1), (1, 0))
-    assert not steady(modes, SineDrive(1.5, 0.9), 0.5, 0.5).alone
-    assert steady(modes, SineDrive(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone
+    modes = make_modal_basis([1.0, 1.0], 0.05, np.eye(2), (1, 1), (1, 0))
+    assert not solve_steady(modes, SineDrive(1.5, 0.9), 0.5, 0.5).alone
+    assert solve_steady(modes, SineDrive(1.5, 0.9), [0.5, 0.4], [0.5, 0.4]).alone

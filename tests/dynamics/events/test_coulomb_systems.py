@@ -6,10 +6,10 @@ from math import atan, cos, pi, sin, sqrt
 import numpy as np
 import pytest
 from event_reference import march_reference, run_reference
-from event_run import rows_of, run, simulate, starts
+from event_run import collect_rows, release_phases, run_phases, simulate
 from hypothesis import given
 from hypothesis import strategies as st
-from modal_bases import basis_of, random_basis
+from modal_bases import make_modal_basis, make_random_modal_basis
 
 from patchfem.core import (
     DriveSegment,
@@ -49,14 +49,14 @@ def test_exact_coupled_systems_agree_with_dop853(seed, n_modes, n_interfaces, ra
     """Directions, times and states at all events of coupled systems agree with DOP853 within
     1e-10."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n_modes, n_interfaces, True, rigid)
+    modes = make_random_modal_basis(rng, n_modes, n_interfaces, True, rigid)
     static = rng.uniform(0.2, 1.0, n_interfaces)
     drive = SineDrive(1.0, 1.2)
     start = random_start(rng, n_modes)
     expected = run_reference(
         modes, drive.segments, static, ratio * static, 6 * drive.period, start.z, start.v
     )
-    phases = list(run(modes, drive, static, ratio * static, 6 * drive.period, start))
+    phases = list(run_phases(modes, drive, static, ratio * static, 6 * drive.period, start))
     assert [p.directions for p in phases] == [w[1] for w in expected[:-1]] and len(phases) > 10
     np.testing.assert_allclose(
         [p.time for p in phases], [w[0] for w in expected[:-1]], rtol=0, atol=1e-10
@@ -71,7 +71,7 @@ def test_exact_steps_and_sines_agree_with_dop853():
     """Events under alternating steps and sines agree with DOP853 within 1e-9, and the changes of
     the drive are listed."""
     rng = np.random.default_rng(11)
-    modes = random_basis(rng, 3, 2)
+    modes = make_random_modal_basis(rng, 3, 2)
     static = np.array([0.3, 0.5])
     drive = drives.PiecewiseDrive(
         (
@@ -83,7 +83,7 @@ def test_exact_steps_and_sines_agree_with_dop853():
         5.0,
     )
     expected = run_reference(modes, drive.segments, static, static, 25.0, np.zeros(3), np.zeros(3))
-    phases = list(run(modes, drive, static, static, 25.0))
+    phases = list(run_phases(modes, drive, static, static, 25.0))
     times = [w[0] for w in expected]
     states = np.array([w[2] for w in expected])
     assert len(phases) > 12 and set(np.array([4.1, 9.3, 14.0])) <= {
@@ -102,7 +102,7 @@ def test_order_dependent_interfaces_agree_with_moreau_scheme():
     """A Moreau time-stepping scheme converges to the motion of three interfaces between two
     coordinates, which are linearly dependent when all stick."""
     rng = np.random.default_rng(9)
-    modes = random_basis(rng, 2, 3)
+    modes = make_random_modal_basis(rng, 2, 3)
     static = rng.uniform(0.3, 1.0, 3)
     drive = SineDrive(1.0, 1.2)
     start = random_start(rng, 2)
@@ -136,19 +136,19 @@ def test_always_friction_law_and_energy_balance_hold(
     """For random systems the energy is balanced, friction forces keep their limits, sliding forces
     oppose the slide, and stuck interfaces do not move."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n_modes, n_interfaces, coupled, rigid)
+    modes = make_random_modal_basis(rng, n_modes, n_interfaces, coupled, rigid)
     static = rng.uniform(0.05, 1.5, n_interfaces)
     drive = SineDrive(rng.uniform(0.2, 2.0), rng.uniform(0.5, 2.0))
     start = random_start(rng, n_modes)
     result = simulate(modes, drive, static, ratio * static, 4, 4, start=start)
     assert energy_balance(result.ledger) < 1e-10 and result.ledger["friction"] > 0
     speed = max(1.0, np.abs(result.response.modal_rate).max())
-    for phase in run(modes, drive, static, ratio * static, 4 * drive.period, start):
+    for phase in run_phases(modes, drive, static, ratio * static, 4 * drive.period, start):
         tau = np.linspace(0, phase.span, 12)
-        z = np.array([s.rate().many(tau) for s in phase.modal])
+        z = np.array([s.rate().evaluate(tau) for s in phase.modal])
         rates = np.asarray(modes.interfaces) @ z
         for c, sign in enumerate(phase.directions):
-            force = phase.forces[c].many(tau)
+            force = phase.forces[c].evaluate(tau)
             assert np.all(np.abs(force) <= static[c] * (1 + 1e-9))
             if sign:
                 np.testing.assert_allclose(force, sign * ratio * static[c], rtol=1e-12)
@@ -161,7 +161,7 @@ def test_exact_stuck_slides_are_constant():
     """The slide of a stuck interface is constant to the last bit, also across events of other
     interfaces."""
     rng = np.random.default_rng(5)
-    modes = random_basis(rng, 4, 3)
+    modes = make_random_modal_basis(rng, 4, 3)
     static = np.array([0.9, 1.1, 0.5])
     result = simulate(
         modes, SineDrive(1.0, 1.2), static, static, 30, 30, start=random_start(rng, 4)
@@ -198,9 +198,9 @@ def test_exact_two_interfaces_stop_simultaneously(joined):
     """Two equal blocks, each on its own spring, move as one block alone does, also with a third
     interface between them."""
     faces = [[1, 0], [0, 1], [1, -1]] if joined else [[1, 0], [0, 1]]
-    modes = basis_of([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
+    modes = make_modal_basis([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
     drive = SineDrive(1.0, 1.1)
-    single_mode = basis_of(1.0, 0.01)
+    single_mode = make_modal_basis(1.0, 0.01)
     result = simulate(modes, drive, 0.6, 0.6, 20, 20)
     expected = simulate(single_mode, drive, 0.6, 0.6, 20, 20)
     np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-13)
@@ -219,7 +219,7 @@ def test_exact_two_interfaces_stop_simultaneously(joined):
 def test_exact_three_dependent_interfaces_with_weak_or_strong_friction(middle):
     """Two blocks touch the ground and each other. With strong friction between them they move as
     one block of both masses; with weak friction they slide relative to each other."""
-    modes = basis_of([1.0, 1.0], 0.0, [[1, 0], [0, 1], [1, -1]], (1.0, 0.4), (1, 0))
+    modes = make_modal_basis([1.0, 1.0], 0.0, [[1, 0], [0, 1], [1, -1]], (1.0, 0.4), (1, 0))
     drive = SineDrive(1.5, 0.9)
     result = simulate(modes, drive, [0.4, 0.6, middle], [0.4, 0.6, middle], 30, 30)
     assert energy_balance(result.ledger) < 1e-10
@@ -229,7 +229,7 @@ def test_exact_three_dependent_interfaces_with_weak_or_strong_friction(middle):
             np.array_equal(extra["slides"][:, 0], extra["slides"][:, 1])
             or np.abs(extra["slides"][:, 0] - extra["slides"][:, 1]).max() < 1e-14
         )
-        expected = simulate(basis_of(1.0, 0.0, ((1.0,),), (0.7,)), drive, 0.5, 0.5, 30, 30)
+        expected = simulate(make_modal_basis(1.0, 0.0, ((1.0,),), (0.7,)), drive, 0.5, 0.5, 30, 30)
         np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-12)
         np.testing.assert_allclose(
             result.ledger["friction"], 2 * expected.ledger["friction"], rtol=1e-11
@@ -241,11 +241,11 @@ def test_exact_three_dependent_interfaces_with_weak_or_strong_friction(middle):
 def test_exact_dependent_interfaces_slip_at_sum_of_limits():
     """One coordinate with three interfaces of limits 1, 2 and 3 sticks below a force of 6; above,
     all interfaces slip simultaneously."""
-    modes = basis_of(1.0, 0.0, [[1.0], [1.0], [1.0]])
+    modes = make_modal_basis(1.0, 0.0, [[1.0], [1.0], [1.0]])
     limit = np.array([1.0, 2.0, 3.0])
     assert not simulate(modes, SineDrive(5.999999, 0.7), limit, limit, 3).response.slide.any()
     result = simulate(modes, SineDrive(6.5, 0.7), limit, limit, 8, 8)
-    expected = simulate(basis_of(1.0), SineDrive(6.5, 0.7), 6.0, 6.0, 8, 8)
+    expected = simulate(make_modal_basis(1.0), SineDrive(6.5, 0.7), 6.0, 6.0, 8, 8)
     np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-13)
     np.testing.assert_allclose(
         result.window.extra["forces"].sum(axis=1)[::50],
@@ -260,10 +260,10 @@ def test_exact_dependent_interfaces_slip_at_sum_of_limits():
 def test_exact_many_interfaces_stop_and_slip_simultaneously(count):
     """Seven or sixteen equal blocks move as one block does. These numbers exceed the limits up to
     which interfaces are tried one by one, and in all combinations."""
-    modes = basis_of(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
+    modes = make_modal_basis(np.ones(count), 0.02, np.eye(count), np.ones(count), np.eye(count)[0])
     drive = SineDrive(1.0, 1.1)
     result = simulate(modes, drive, 0.5, 0.5, 6, 6)
-    expected = simulate(basis_of(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
+    expected = simulate(make_modal_basis(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
     np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-13)
     assert np.ptp(result.window.extra["slides"], axis=1).max() < 1e-13
     assert energy_balance(result.ledger) < 1e-10
@@ -273,13 +273,13 @@ def check_directions_at_rest(seed, n_modes, n_interfaces, ratio):
     """Assert that accelerations agree with the slip directions and forces with their limits, for
     interfaces at rest."""
     rng = np.random.default_rng(seed)
-    modes = random_basis(rng, n_modes, n_interfaces)
+    modes = make_random_modal_basis(rng, n_modes, n_interfaces)
     static = rng.uniform(0.1, 1.0, n_interfaces)
     z = rng.normal(size=n_modes)
     v = np.zeros(n_modes)
     rows = np.asarray(modes.interfaces)
     drive = drives.PiecewiseDrive((DriveSegment(0.0, 0.7, 0.5, 1.0, 0.64),), 2 * pi)
-    event_run, row = rows_of(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
+    event_run, row = collect_rows(modes, drive, static, ratio * static, 1e-3, InitialState(z, v))
     values = event_run.evaluate_rows(row, np.zeros(1, np.int64), np.zeros(1))[0]
     forces = values[2 * n_modes + 3 :: 6]
     acceleration = (
@@ -332,7 +332,7 @@ def test_exact_mass_on_belt_agrees_with_closed_form():
     coordinate of nearly infinite mass."""
     tiny = 1e-8
     speed = 0.1
-    modes = basis_of([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
+    modes = make_modal_basis([1.0, 0.0], 0.0, [[1.0, -tiny]], (0, 0), (1, 0))
     start = InitialState(np.zeros(2), np.array([speed, speed / tiny]))
     result = simulate(modes, drives.make_release(2 * pi), 1.0, 0.6, 30.0, 10, start=start)
     releases = result.log.time[np.abs(result.log.kind) == RELEASE]
@@ -347,7 +347,7 @@ def test_exact_mass_on_belt_agrees_with_closed_form():
 )
 def test_exact_amplitude_near_onset_of_slip(friction, peak):
     """Amplitudes near the onset of slip agree with known values within 1e-11."""
-    result = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), friction, friction, 30, 30)
+    result = simulate(make_modal_basis(1.0, 0.003), SineDrive(1.0, 1.0), friction, friction, 30, 30)
     assert np.abs(result.amplitudes[-1]).max() == pytest.approx(peak, rel=1e-11)
 
 
@@ -355,7 +355,11 @@ def test_exact_amplitude_near_onset_of_slip(friction, peak):
 def test_exact_first_slip_tends_to_asymptotic_form(distance):
     """At a distance 1 - D from the onset the first slip tends to 9/2 (1 - D)^2. The tolerance
     includes the condition number of the release, eps/(1 - D)."""
-    phases = list(run(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 1 - distance, 1 - distance, pi))
+    phases = list(
+        run_phases(
+            make_modal_basis(1.0, 0.003), SineDrive(1.0, 1.0), 1 - distance, 1 - distance, pi
+        )
+    )
     stop = next(p for p in phases[1:] if p.direction == 0)
     slip = abs(stop.modal[0](0.0))
     assert slip == pytest.approx(4.5 * distance**2, rel=3 * sqrt(distance) + 1e-15 / distance)
@@ -368,9 +372,9 @@ def test_exact_phases_after_a_million_cycles():
     as one that begins at time zero, within 1e-14."""
     rate = 2 * pi * 0.37
     drive = drives.make_levels([0.5, 1.25], rate, 10**6)
-    modes = basis_of(rate, 0.003)
-    _, late = rows_of(modes, drive, 1.0, 1.0, 10**6 + 4, begin=10**6 - 1)
-    _, early = rows_of(modes, SineDrive(1.25, rate), 1.0, 1.0, 4)
+    modes = make_modal_basis(rate, 0.003)
+    _, late = collect_rows(modes, drive, 1.0, 1.0, 10**6 + 4, begin=10**6 - 1)
+    _, early = collect_rows(modes, SineDrive(1.25, rate), 1.0, 1.0, 4)
     late = late[late[:, 5] >= 10**6]
     assert len(late) == len(early)
     np.testing.assert_allclose(late[:, 6], early[:, 6], rtol=0, atol=1e-14)
@@ -380,7 +384,7 @@ def test_exact_phases_after_a_million_cycles():
 
 def test_exact_force_drive_has_no_base_acceleration():
     """A force gives the same slide as a base acceleration, but no acceleration of the base."""
-    modes = basis_of(1.0, 0.05)
+    modes = make_modal_basis(1.0, 0.05)
     base, force = (
         simulate(modes, SineDrive(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False)
     )
@@ -398,9 +402,9 @@ def test_exact_force_drive_has_no_base_acceleration():
 def test_table_check_9_waveform_agrees_with_report():
     """Phases, speeds, forces and jumps of the waveform agree with table check 9 of the report
     within 1e-3."""
-    result = simulate(basis_of(1.0, 0.003), SineDrive(1.0, 1.0), 0.82802, 0.82802, 200)
+    result = simulate(make_modal_basis(1.0, 0.003), SineDrive(1.0, 1.0), 0.82802, 0.82802, 200)
     stops = result.log.phase[-9:][result.log.kind[-9:] == STOP] % pi
-    np.testing.assert_allclose(np.degrees(starts(result)), 42.69, atol=0.03)
+    np.testing.assert_allclose(np.degrees(release_phases(result)), 42.69, atol=0.03)
     np.testing.assert_allclose(np.degrees(stops), 164.09, atol=0.03)
     window = result.window
     assert np.abs(window.slide_rate).max() == pytest.approx(0.2529, abs=1e-3)
@@ -420,7 +424,7 @@ def test_refuses_start_beyond_travel():
     the closed form reaches the travel."""
     with pytest.raises(PatchfemError, match=r"structure\.travel"):
         simulate(
-            basis_of(1.0),
+            make_modal_basis(1.0),
             FREE,
             1.0,
             1.0,
@@ -429,7 +433,7 @@ def test_refuses_start_beyond_travel():
             start=InitialState(np.array([-3.0]), np.zeros(1)),
         )
     result = simulate(
-        basis_of(1.0),
+        make_modal_basis(1.0),
         FREE,
         0.1,
         0.1,
@@ -449,15 +453,15 @@ def test_refuses_start_beyond_travel():
 def test_refuses_kinetic_friction_out_of_range(kinetic):
     """Negative kinetic friction or kinetic friction above static friction is refused."""
     with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
-        simulate(basis_of(1.0), SineDrive(1.0, 1.0), 1.0, kinetic, 3)
+        simulate(make_modal_basis(1.0), SineDrive(1.0, 1.0), 1.0, kinetic, 3)
 
 
 def test_exact_coordinates_preserve_stuck_slide():
     """The modal coordinates of a stuck interface move so that its slide keeps its value over 300
     cycles."""
     h = sqrt(0.5)
-    modes = basis_of([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
-    event_run, rows = rows_of(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
+    modes = make_modal_basis([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
+    event_run, rows = collect_rows(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
     rows = rows[rows[:, Row.CYCLE] >= 20]
     stuck_slide = rows[0, event_run._column_index(0, Column.SLIDE)]
     z = rows[:, Row.MOTION : Row.MOTION + 2]
@@ -471,8 +475,8 @@ def test_exact_coordinates_preserve_stuck_slide():
 
 def test_exact_frictionless_interface_has_no_effect():
     """An additional interface without friction does not change amplitudes, events and losses."""
-    modes = basis_of([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
-    single_interface = basis_of([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
+    modes = make_modal_basis([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
+    single_interface = make_modal_basis([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
     drive = SineDrive(1.0, 1.2)
     result = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5)
     expected = simulate(single_interface, drive, 0.4, 0.4, 20, 5)

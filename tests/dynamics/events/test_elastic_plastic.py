@@ -3,8 +3,8 @@ balances."""
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
-from support.jenkins_reference import Reference
+from modal_bases import make_modal_basis
+from support.jenkins_reference import JenkinsReference
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import make_elements
@@ -15,7 +15,9 @@ from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 def make_basis(omega, zeta, slide, base, output, damping=None, faces=None):
     """Return a modal basis with one or more interfaces."""
-    return basis_of(omega, zeta, slide if faces is None else faces, base, output, damping=damping)
+    return make_modal_basis(
+        omega, zeta, slide if faces is None else faces, base, output, damping=damping
+    )
 
 
 ONE = make_basis([1.0], [0.003], [1.0], [1.0], [1.0])
@@ -55,7 +57,7 @@ def test_exact_random_rigs_agree_with_dop853(seed, max_elements):
     yield."""
     modes, drive, k, y = random_rig(seed, max_elements)
     result = simulate(modes, drive, [make_elements(k, y)], 2, window=1)
-    expected = Reference(modes, drive, [(k, y)]).go(2 * drive.period)
+    expected = JenkinsReference(modes, drive, [(k, y)]).march_to(2 * drive.period)
     state = np.concatenate([result.response.modal[-1], result.response.modal_rate[-1]])
     assert np.abs(state - expected).max() <= 1e-9 * np.abs(expected).max()
     assert energy_balance(result.ledger) <= 1e-10
@@ -68,7 +70,7 @@ def test_exact_two_interfaces_agree_with_dop853():
     drive = SineDrive(1.0, 1.4)
     elements = [([2.0, 1.0], [0.1, 0.3]), ([1.5], [0.12])]
     result = simulate(modes, drive, [make_elements(*group) for group in elements], 4, window=2)
-    expected = Reference(modes, drive, elements).go(4 * drive.period)
+    expected = JenkinsReference(modes, drive, elements).march_to(4 * drive.period)
     state = np.concatenate([result.response.modal[-1], result.response.modal_rate[-1]])
     assert np.abs(state - expected).max() <= 1e-10 * np.abs(expected).max()
     assert energy_balance(result.ledger) <= 1e-13
@@ -177,10 +179,10 @@ def test_exact_sweeps_and_records_agree_with_dop853(drive):
     y = [0.1, 0.3]
     end = 1.1 * drive.duration
     result = simulate(modes, drive, [make_elements(k, y)], end / drive.period, window=2)
-    reference = Reference(modes, drive, [(k, y)])
+    reference = JenkinsReference(modes, drive, [(k, y)])
     breaks = drive.breaks if isinstance(drive, RecordedDrive) else [drive.duration]
     for stop in (*breaks, end):  # DOP853 is restarted where the drive changes its formula
-        expected = reference.go(stop)
+        expected = reference.march_to(stop)
     state = np.concatenate([result.response.modal[-1], result.response.modal_rate[-1]])
     assert np.abs(state - expected).max() <= 1e-9 * np.abs(expected).max()
     assert energy_balance(result.ledger) <= 1e-12
@@ -196,8 +198,8 @@ def test_exact_simultaneous_yields_of_two_equal_masses(mirrored):
     h = np.sqrt(0.5)
     sign = -1.0 if mirrored else 1.0
     rows = np.array([[h, h], [sign * h, -sign * h]])
-    two_masses = basis_of([1.0, 2.3], [0.02, 0.03], rows, [1.0, 0.0], [h, h])
-    one_mass = basis_of(1.0, 0.02, [h], [1.0])
+    two_masses = make_modal_basis([1.0, 2.3], [0.02, 0.03], rows, [1.0, 0.0], [h, h])
+    one_mass = make_modal_basis(1.0, 0.02, [h], [1.0])
     k = np.array([0.4, 1.0, 0.3])
     y = np.array([0.1, 0.3, 0.8])
     expected = simulate(one_mass, SineDrive(1.5, 1.1), [make_elements(2 * k, y)], 40, 5)

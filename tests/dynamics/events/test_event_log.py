@@ -4,7 +4,7 @@ stored events."""
 import event_run
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 from scene_texts import COULOMB, MODE, POINT
 
 from patchfem import plan
@@ -31,7 +31,7 @@ cycles = 25
 
 def make_mode(zeta=0.003):
     """Return a mode with natural frequency 1."""
-    return basis_of(1.0, zeta)
+    return make_modal_basis(1.0, zeta)
 
 
 def test_exact_level_changes_are_listed():

@@ -3,11 +3,11 @@ energy balances."""
 
 import numpy as np
 import pytest
-from event_reference import run_reference, stretches
-from event_run import run, simulate
+from event_reference import run_reference, split_drive
+from event_run import run_phases, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from modal_bases import basis_of, random_basis
+from modal_bases import make_modal_basis, make_random_modal_basis
 
 from patchfem.dynamics import DRIVE_CHANGE
 from patchfem.response import energy_balance
@@ -30,9 +30,9 @@ def assert_agrees_with_dop853(modes, drive, static, ratio, end, count):
     segments of the drive."""
     n = modes.omega.size
     expected = run_reference(
-        modes, stretches(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n)
+        modes, split_drive(drive, count), static, ratio * static, end, np.zeros(n), np.zeros(n)
     )
-    phases = [p for p in run(modes, drive, static, ratio * static, end) if p.span > 1e-9]
+    phases = [p for p in run_phases(modes, drive, static, ratio * static, end) if p.span > 1e-9]
     assert len(phases) > 4
     times = [w[0] for w in expected]
     states = np.array([w[2] for w in expected])
@@ -55,13 +55,13 @@ def assert_agrees_with_dop853(modes, drive, static, ratio, end, count):
 )
 def test_exact_sweeps_agree_with_dop853(seed, drive, limits, ratio, end):
     """Events and states under sweeps agree with DOP853 within 1e-9."""
-    modes = random_basis(np.random.default_rng(seed), 2, len(limits))
+    modes = make_random_modal_basis(np.random.default_rng(seed), 2, len(limits))
     assert_agrees_with_dop853(modes, drive, np.array(limits), ratio, end, 2)
 
 
 def test_exact_records_agree_with_dop853():
     """Events and states under a recorded signal agree with DOP853 within 1e-9."""
-    modes = random_basis(np.random.default_rng(8), 2, 1)
+    modes = make_random_modal_basis(np.random.default_rng(8), 2, 1)
     assert_agrees_with_dop853(modes, random_record(2, 20, 20.0), np.array([0.25]), 0.6, 24.0, 99)
 
 
@@ -72,7 +72,7 @@ def test_exact_rigid_block_under_ramp_agrees_with_closed_form():
     # v = t^2 - t/2 for 0.5 < t < 1, 0.5 + 1.5 (t - 1) for 1 < t < 2, 2 - 0.5 (t - 2) for t > 2
     expected = {0.5: 0.0, 1.0: 5 / 48, 2.0: 5 / 48 + 1.25, 6.0: 5 / 48 + 5.25, 9.0: 5 / 48 + 5.25}
     for time, slide in expected.items():
-        result = simulate(basis_of([0.0]), drive, 1.0, 0.5, time, 1)
+        result = simulate(make_modal_basis([0.0]), drive, 1.0, 0.5, time, 1)
         assert result.response.slide[-1] == pytest.approx(slide, rel=1e-13)
     # release, end of the record, stop
     np.testing.assert_allclose(result.log.time, [0.5, 2.0, 6.0], rtol=1e-13)
@@ -80,14 +80,14 @@ def test_exact_rigid_block_under_ramp_agrees_with_closed_form():
 
 def test_exact_end_of_record_is_a_drive_change():
     """The end of a record with a nonzero last value is listed as a change of the drive."""
-    result = simulate(basis_of([1.0]), random_record(4), 5.0, 5.0, 8.0, 2)
+    result = simulate(make_modal_basis([1.0]), random_record(4), 5.0, 5.0, 8.0, 2)
     assert list(result.log.kind) == [DRIVE_CHANGE] and result.log.time[0] == pytest.approx(30.0)
 
 
 def test_always_energy_is_balanced_under_sweep_and_record():
     """Under a sweep and a recorded signal the energy is balanced within 1e-12."""
     for drive in (FALLING_SWEEP, random_record(7)):
-        modes = random_basis(np.random.default_rng(1), 3, 2)
+        modes = make_random_modal_basis(np.random.default_rng(1), 3, 2)
         result = simulate(
             modes, drive, np.array([0.3, 0.2]), np.array([0.2, 0.2]), 40.0 / drive.period
         )
@@ -101,5 +101,5 @@ def test_always_record_below_limit_causes_no_slip(fraction, kinetic, seed):
     rng = np.random.default_rng(seed)
     value = fraction * rng.uniform(-1, 1, 12)
     drive = RecordedDrive(np.linspace(0, 9, 12), value, 1.0)
-    result = simulate(basis_of([1.0]), drive, 1.0, kinetic, 10.0)
+    result = simulate(make_modal_basis([1.0]), drive, 1.0, kinetic, 10.0)
     assert not result.response.slide.any() and result.log.count <= 1

@@ -3,7 +3,7 @@ forms and fits to samples."""
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import SineDrive
@@ -22,13 +22,15 @@ GAUSS_POINT, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 def make_mode(omega, zeta, mass=1.0):
     """Return the basis of a single mode."""
-    return basis_of(omega, zeta, mass=mass)
+    return make_modal_basis(omega, zeta, mass=mass)
 
 
 def make_three_modes() -> tuple:
     """Return modes and elements of three modes with two interfaces."""
     faces = np.array([[1.0, -0.8, 0.5], [0.4, 0.9, -0.6]])
-    modes = basis_of([1.0, 2.3, 3.1], 0.05, faces, [0.8, 0.3, -0.5], [1.0, -0.6, 0.3], mass=1.3)
+    modes = make_modal_basis(
+        [1.0, 2.3, 3.1], 0.05, faces, [0.8, 0.3, -0.5], [1.0, -0.6, 0.3], mass=1.3
+    )
     return modes, [make_elements([0.5, 1.0, 0.4], [0.1, 0.4, 0.2]), make_elements([2.0], [0.15])]
 
 

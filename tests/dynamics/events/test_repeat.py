@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import make_elements
@@ -15,7 +15,7 @@ def make_case(n_modes: int, n_interfaces: int, n_elements: int) -> tuple:
     """Return modes, drive and elements of a damped rig that becomes periodic within 250 cycles."""
     rows = np.linspace(0.6, 1.0, n_interfaces * n_modes).reshape(n_interfaces, n_modes)
     rows[:, 1::2] *= -1
-    basis = basis_of(
+    basis = make_modal_basis(
         np.linspace(1.0, 2.7, n_modes),
         0.05,
         rows,

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import InitialState, Outcome, SineDrive
 from patchfem.dynamics import element_model, make_bonds_law, make_elastic_plastic_law, points_model
@@ -18,7 +18,7 @@ from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.response import energy_balance
 
 LOAD, MU = 115.65, 0.4
-BASIS = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
+BASIS = make_modal_basis(2 * np.pi * 143, 0.003, mass=1.194)
 DRIVE = SineDrive(49.0, 2 * np.pi * 143)
 LAWS = {
     "elastic-plastic": (

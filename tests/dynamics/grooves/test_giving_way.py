@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 import patchfem as pf
 from patchfem import load
@@ -206,7 +206,7 @@ def test_exact_energy_balance_of_coulomb_points():
     assert work - energies[:-1, 0].sum() == pytest.approx(
         energies[-1, 1] - energies[0, 1], rel=1e-9
     )
-    basis = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
+    basis = make_modal_basis(2 * np.pi * 143, 0.003, mass=1.194)
     result = march(
         basis,
         SineDrive(49.0, 2 * np.pi * 143),
@@ -230,7 +230,7 @@ def test_exact_energy_balance_with_shear_modes(law):
         energies[-1, 1] - energies[0, 1], rel=1e-10
     )
     assert energies[:-1, 0].min() >= -1e-15 * work
-    basis = basis_of(2 * np.pi * 143, 0.003, mass=1.194)
+    basis = make_modal_basis(2 * np.pi * 143, 0.003, mass=1.194)
     model = make_compliant_model(LAWS[law], Grooves(80e-6, 7.5e-6, 0.3, 0.4), COMPLIANCE)
     result = march(basis, SineDrive(49.0, 2 * np.pi * 143), model, 4, 200, window=3)
     assert result.outcome is None and energy_balance(result.ledger) < 1e-11

@@ -4,8 +4,8 @@ friction law, energy."""
 import numpy as np
 import pytest
 from event_run import simulate
-from grooves_reference import case_of, flank, forces, run
-from modal_bases import basis_of
+from grooves_reference import draw_case, flank_slope, integrate_case, sliding_forces
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
@@ -20,7 +20,7 @@ from patchfem.structure.drives import make_levels, make_step
 
 def make_mode(omega, zeta=0.0, mass=1.0):
     """Return the basis of a single mode."""
-    return basis_of(omega, zeta, mass=mass)
+    return make_modal_basis(omega, zeta, mass=mass)
 
 
 def march_case(case, cycles: int, steps: int):
@@ -62,10 +62,10 @@ def test_exact_random_rigs_agree_with_dop853(seed):
     """Slide, speed, force, friction loss and work of the drive of random rigs agree within 1e-7
     with an independent derivation, integrated by DOP853. The rig with seed 10 slides over more than
     five waves."""
-    case = case_of(seed)
+    case = draw_case(seed)
     result = march_case(case, 4, 50)
     response = result.response
-    expected, lift_off_time = run(case, response.time[-1], response.time)
+    expected, lift_off_time = integrate_case(case, response.time[-1], response.time)
     assert (
         lift_off_time == np.inf
         and result.outcome is None
@@ -77,7 +77,7 @@ def test_exact_random_rigs_agree_with_dop853(seed):
         )
     is_moving = np.abs(expected[:, 1]) > 1e-3 * np.abs(expected[:, 1]).max()
     force = [
-        forces(case, t, q, v, np.sign(v), case.kinetic)[2]
+        sliding_forces(case, t, q, v, np.sign(v), case.kinetic)[2]
         for t, (q, v) in zip(response.time, expected[:, :2])
     ]
     np.testing.assert_allclose(
@@ -97,20 +97,22 @@ def test_exact_random_rigs_agree_with_dop853(seed):
 def test_exact_normal_load_and_stored_energy_agree_with_dop853(seed):
     """The vertical force and the stored energy, which includes the work against the load, agree
     within 1e-6 with the independent solution by DOP853."""
-    case = case_of(seed)
+    case = draw_case(seed)
     result = march_case(case, 4, 50)
     response = result.response
-    expected, _ = run(case, response.time[-1], response.time)
+    expected, _ = integrate_case(case, response.time[-1], response.time)
     is_moving = np.abs(expected[:, 1]) > 1e-3 * np.abs(expected[:, 1]).max()
     assert case.lifted > 0
     normal_force = [
-        forces(case, t, q, v, np.sign(v), case.kinetic)[1]
+        sliding_forces(case, t, q, v, np.sign(v), case.kinetic)[1]
         for t, (q, v) in zip(response.time, expected[:, :2])
     ]
     # vertical fraction of the normal force
     vertical_fraction = [
         np.cos(a) - np.sign(v) * case.kinetic * np.sin(a)
-        for a, v in zip(np.arctan([flank(case, q)[0] for q in expected[:, 0]]), expected[:, 1])
+        for a, v in zip(
+            np.arctan([flank_slope(case, q)[0] for q in expected[:, 0]]), expected[:, 1]
+        )
     ]
     np.testing.assert_allclose(
         response.extra["normal_load"][is_moving],
@@ -119,7 +121,7 @@ def test_exact_normal_load_and_stored_energy_agree_with_dop853(seed):
     )
     start_energy = case.load * case.amplitude * (1 - np.cos(case.phase))
     modal = 0.5 * case.mass * (expected[-1, 1] ** 2 + case.omega**2 * expected[-1, 0] ** 2)
-    lift_energy = 0.5 * case.lifted * (flank(case, expected[-1, 0])[0] * expected[-1, 1]) ** 2
+    lift_energy = 0.5 * case.lifted * (flank_slope(case, expected[-1, 0])[0] * expected[-1, 1]) ** 2
     assert result.ledger["stored"] == pytest.approx(
         start_energy + expected[-1, 4] + modal + lift_energy, rel=1e-6
     )
@@ -134,7 +136,7 @@ def test_exact_breakaway_at_force_limits_of_flank(position):
     load = 100.0
     mu = 0.3
     q = position * 80e-6
-    t = flank(case_of(0)._replace(wavelength=80e-6, amplitude=5e-6, phase=0.0), q)[0]
+    t = flank_slope(draw_case(0)._replace(wavelength=80e-6, amplitude=5e-6, phase=0.0), q)[0]
     for direction, limit in (
         (1, load * (t + mu) / (1 - mu * t)),
         (-1, load * (t - mu) / (1 + mu * t)),
@@ -165,12 +167,12 @@ def test_refuses_too_large_lifted_mass():
 def test_exact_time_of_lift_off_agrees_with_dop853(seed):
     """The run ends at the first sample after the vertical force vanishes in the independent
     solution by DOP853."""
-    case = case_of(seed)
+    case = draw_case(seed)
     result = march_case(case, 4, 50)
     assert result.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in result.message
     time = result.response.time
     step = 2 * np.pi / case.drive / 50
-    lift_off_time = run(case, time[-1] + step, time)[1]
+    lift_off_time = integrate_case(case, time[-1] + step, time)[1]
     assert -1e-6 * step < time[-1] - lift_off_time < step
 
 
@@ -184,7 +186,7 @@ def test_always_rig_on_grooves_exceeds_travel_near_8_g(frequency, stable_level, 
     load = 115.65
     g = 9.80665
     mass = 0.4 * load / (4.2 * g)
-    basis = basis_of(
+    basis = make_modal_basis(
         2 * np.pi * np.array([143.0, 129.0]),
         0.003,
         [1.0, 0.0932],
@@ -207,7 +209,7 @@ def test_always_rig_on_grooves_exceeds_travel_near_8_g(frequency, stable_level, 
 def test_exact_tanh_law_on_grooves_agrees_with_dop853(lifted):
     """With the friction coefficient mu tanh(sqrt(1 + t^2) v/v_0) slide and speed agree with DOP853
     within 1e-6."""
-    case = case_of(3)._replace(lifted=lifted)
+    case = draw_case(3)._replace(lifted=lifted)
     speed = 5e-3
     basis = make_mode(case.omega, case.zeta, case.mass)
     duration = 3 * 2 * np.pi / case.drive
@@ -221,8 +223,8 @@ def test_exact_tanh_law_on_grooves_agrees_with_dop853(lifted):
     )
 
     def state_derivative(t, x):
-        friction = case.static * np.tanh(np.hypot(1, flank(case, x[0])[0]) * x[1] / speed)
-        return [x[1], forces(case, t, x[0], x[1], 1.0, friction)[0]]
+        friction = case.static * np.tanh(np.hypot(1, flank_slope(case, x[0])[0]) * x[1] / speed)
+        return [x[1], sliding_forces(case, t, x[0], x[1], 1.0, friction)[0]]
 
     expected = solve_ivp(
         state_derivative, (0, duration), [0.0, 0.0], "DOP853", rtol=1e-11, atol=[1e-16, 1e-13]
@@ -234,7 +236,7 @@ def test_exact_tanh_law_on_grooves_agrees_with_dop853(lifted):
 
 def test_always_forked_march_equals_original_march():
     """A copy of a march continues bit-identically, also across a change of the drive level."""
-    case = case_of(3)
+    case = draw_case(3)
     basis = make_mode(case.omega, case.zeta, case.mass)
     drive = make_levels([case.acceleration, 0.0], case.drive, 2)
     model = make_model(
@@ -257,7 +259,7 @@ def test_always_forked_march_equals_original_march():
 def test_exact_flat_grooves_agree_with_event_engine(kinetic):
     """Two modes on grooves with a slope of 1e-12 agree within 1e-7 with the event engine for
     Coulomb friction."""
-    basis = basis_of(
+    basis = make_modal_basis(
         2 * np.pi * np.array([143.0, 129.0]), 0.003, [1.0, 0.4], [1.0, 0.0], [1.0, 0.0], mass=1.2
     )
     drive = SineDrive(48.0, 2 * np.pi * 143)

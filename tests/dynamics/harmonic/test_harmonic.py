@@ -3,10 +3,18 @@ balances."""
 
 import numpy as np
 import pytest
-from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
+from harmonic_cases import (
+    jenkins_forces,
+    make_bond_law,
+    make_elements,
+    make_five_modes,
+    make_sdof,
+    make_speed_law,
+    march_exactly,
+)
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import NotConverged, PatchfemError, SineDrive
 from patchfem.dynamics import (
@@ -55,14 +63,14 @@ def random_harmonics(seed, count, scale=1.0):
 def test_always_elements_agree_with_sequential_loop(seed, count, scale):
     """Sampled forces of parallel elements agree within 1e-12 with a loop over samples and reversals
     in order, one element at a time."""
-    k, w = many(17, 3.0, 1.0)
+    k, w = make_elements(17, 3.0, 1.0)
     slide = SampledSlide(random_harmonics(seed, count, scale), 1.0, 64)
     angles, turning_slides, cells, _ = slide.turning_points
     order = np.argsort(
         np.concatenate([np.arange(64), cells + 0.5 + 1e-9 * np.arange(cells.size)]), kind="stable"
     )
     cycle = np.concatenate([slide.q, turning_slides])[order]
-    forces = plain_jenkins(np.tile(cycle, 2), k, w)[0][cycle.size :]
+    forces = jenkins_forces(np.tile(cycle, 2), k, w)[0][cycle.size :]
     sampled = Jenkins(k, w).sample(slide)
     assert sampled.force == pytest.approx(forces[order < 64], abs=1e-12)
     fine = evaluate_series(slide.x, 65536)
@@ -91,7 +99,7 @@ def test_always_bonds_agree_with_recursion(seed, count, scale):
             state = advance_bonds(state, np.array([q - previous]), np.ones(1), law.length)[0]
             previous = q
             forces.append(law.static / law.length * state[1, 0])
-    sampled = bonds(0.3, 0.4).sample(slide)
+    sampled = make_bond_law(0.3, 0.4).sample(slide)
     assert sampled.force == pytest.approx(np.array(forces)[order < 32], abs=1e-10)
 
 
@@ -99,17 +107,17 @@ def test_always_bonds_agree_with_recursion(seed, count, scale):
     "law",
     [
         Jenkins([10.0, 3.0], [0.08, 0.2]),
-        bonds(0.8, 0.1),
+        make_bond_law(0.8, 0.1),
         Spring(2.0, 5.0),
         Interlock(3.0, 0.5),
-        of_speed(0.8, 0.3),
+        make_speed_law(0.8, 0.3),
     ],
     ids=lambda law: type(law).__name__,
 )
 def test_exact_derivatives_of_forces_agree_with_differences(law):
     """The derivatives of the forces with respect to the slide and the frequency agree with central
     differences within 1e-7."""
-    group = LawGroup(sdof(), law, 4096)
+    group = LawGroup(make_sdof(), law, 4096)
     q = random_harmonics(3, 5)[None]
     result = group(q, 1.3)
     v = pack_harmonics(random_harmonics(3, 5)[None])
@@ -148,7 +156,7 @@ def test_exact_limiting_cases_agree_with_linear_response(omega):
     with coupled damping."""
     c = np.diag(0.04 * np.arange(1, 6)) + 0.02
     for damping in (None, c):
-        modes = five(damping)
+        modes = make_five_modes(damping)
         point = find_point(
             modes, SineDrive(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3
         )
@@ -164,7 +172,7 @@ def test_exact_rigid_and_undamped_modes_agree_with_linear_response():
     """Rigid modes and undamped modes at their natural frequency have no receptance. The balance
     agrees with the linear response within 1e-10, and with a march if friction acts."""
     ones = np.ones(2)
-    modes = basis_of([0.0, 1.0], 0.0, [1.0, 0.6], ones, ones, mass=1.5)
+    modes = make_modal_basis([0.0, 1.0], 0.0, [1.0, 0.6], ones, ones, mass=1.5)
     for omega in (0.8, 1.0):
         point = find_point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
         assert point.modal[1] == pytest.approx(
@@ -186,9 +194,13 @@ def test_exact_jacobian_of_balance_agrees_with_differences():
     c = 0.1 * np.eye(3) + 0.05
     interfaces = np.array([[1.0, 0.5, -0.3], [0.2, -1.0, 0.4]])
     for damping in (None, c):
-        modes = basis_of([0.0, 1.0, 3.0], 0.02, interfaces, ones, ones, mass=1.3, damping=damping)
+        modes = make_modal_basis(
+            [0.0, 1.0, 3.0], 0.02, interfaces, ones, ones, mass=1.3, damping=damping
+        )
         group = LawGroup(
-            modes, [(0, of_speed(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, bonds(0.5, 0.4))], 1024
+            modes,
+            [(0, make_speed_law(0.4, 0.3)), (1, Spring(0.3, 0.8)), (0, make_bond_law(0.5, 0.4))],
+            1024,
         )
         balance = HarmonicBalance(modes, group.rows, group)
         x = np.random.default_rng(4).normal(size=balance.count_unknowns(1.1, 3)) * 0.5
@@ -218,9 +230,9 @@ def check_cycle(modes, drive, point, k, w, tolerance, steps=4000):
     periodic."""
     response = make_cycle_response(point, modes, drive, steps)
     path = np.tile(response.slide[:-1], 2)
-    stretch = plain_jenkins(np.append(path, path[0]), k, w)[1]
+    stretch = jenkins_forces(np.append(path, path[0]), k, w)[1]
     start = np.concatenate([response.modal[0], response.modal_rate[0]])
-    states, forces = march(modes, drive, k, w, start, stretch, steps)
+    states, forces = march_exactly(modes, drive, k, w, start, stretch, steps)
     n = modes.omega.size
     scale = np.abs(response.modal).max()
     assert np.abs(states[:, :n] - response.modal).max() < tolerance * scale
@@ -235,7 +247,7 @@ def check_cycle(modes, drive, point, k, w, tolerance, steps=4000):
 @pytest.mark.parametrize("omega", [0.7, 1.2, 2.45])
 def test_exact_five_modes_with_many_elements_agree_with_march(omega):
     """The balance of five modes with many elements agrees with a march of one cycle within 2e-4."""
-    modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
+    modes, (k, w), drive = make_five_modes(), make_elements(), SineDrive(1.5, omega)
     point = find_point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
     assert point.error < 1e-4 and np.ptp(evaluate_series(point.coefficients, 512)) > 4 * w.min()
     check_cycle(modes, drive, point, k, w, 2e-4)
@@ -249,7 +261,9 @@ def test_exact_five_modes_with_many_elements_agree_with_march(omega):
 def test_exact_peaks_at_resonance_agree_with_dop853(stiffness, tolerance, max_error):
     """Peaks at resonance agree with values by DOP853 within the tolerance, and the stated error
     covers the difference."""
-    point = find_point(sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance)
+    point = find_point(
+        make_sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance
+    )
     error = abs(point.amplitude([1.0]) / PEAKS[stiffness] - 1)
     assert error < max_error and error < point.error < tolerance
 
@@ -258,7 +272,7 @@ def test_exact_peaks_at_resonance_agree_with_dop853(stiffness, tolerance, max_er
 def test_always_work_of_drive_equals_losses(omega):
     """The work of the base per cycle equals the viscous loss plus the area of the loop, within
     2e-4, from three independent sums."""
-    modes, (k, w), drive = five(), many(), SineDrive(1.5, omega)
+    modes, (k, w), drive = make_five_modes(), make_elements(), SineDrive(1.5, omega)
     point = find_point(modes, drive, Jenkins(k, w), harmonics=15)
     response = make_cycle_response(point, modes, drive, 2000)
     dt = drive.period / 2000
@@ -286,7 +300,7 @@ def test_always_work_of_drive_equals_losses(omega):
 def test_order_of_truncation_error():
     """The truncation error falls exponentially for a smooth law. For elements, where the harmonics
     of the slide fall like k^-4, it falls like H^-3 or faster."""
-    modes = sdof(0.05)
+    modes = make_sdof(0.05)
     drive = SineDrive(1.0, 0.5)
     reference = find_point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
     errors = [
@@ -310,7 +324,7 @@ def test_order_of_truncation_error():
 def test_exact_laws_on_two_interfaces_agree_with_linear_response():
     """Springs at the slide and at the output agree with the linear response within 1e-10, and the
     receptance is symmetric."""
-    modes = five()
+    modes = make_five_modes()
     laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
     point = find_point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
     a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.damping_matrix
@@ -324,13 +338,13 @@ def test_exact_laws_on_two_interfaces_agree_with_linear_response():
 
 @pytest.mark.parametrize(
     "law",
-    [bonds(0.8, 0.05), of_speed(0.4, 0.05), Interlock(1.0, 0.5)],
+    [make_bond_law(0.8, 0.05), make_speed_law(0.4, 0.05), Interlock(1.0, 0.5)],
     ids=lambda law: type(law).__name__,
 )
 def test_exact_balance_satisfies_equation_of_motion(law):
     """The accelerations of the harmonics agree with the equation of motion for the force of the
     law, within 2e-3."""
-    modes = sdof(0.05)
+    modes = make_sdof(0.05)
     drive = SineDrive(1.0, 1.2)
     point = find_point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
     response = make_cycle_response(point, modes, drive, 512)
@@ -347,7 +361,7 @@ def test_exact_balance_satisfies_equation_of_motion(law):
 def test_refuses_laws_that_cannot_be_balanced():
     """Rigid friction, breakaway friction, missing interfaces and invalid elements are refused with
     a message."""
-    modes = sdof()
+    modes = make_sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
         find_point(modes, DRIVE, coulomb_model(1.0, 1.0))
     with pytest.raises(PatchfemError, match="breakaway"):
@@ -367,14 +381,14 @@ def test_exact_dependent_interfaces_are_removed_at_any_scale(scale):
     """If one of three interfaces depends on the others, two remain, and all three are reconstructed
     from them within 1e-14, at any scale."""
     rows = scale * np.array([[1.0, 0.5, 0, 0, 0.2], [0, 1.0, 0.1, 0, 0], [2.0, 2.0, 0.1, 0, 0.4]])
-    balance = HarmonicBalance(five(), rows, None)
+    balance = HarmonicBalance(make_five_modes(), rows, None)
     assert balance.lift.shape == (3, 2) and balance.faces.shape == (2, 5)
     np.testing.assert_allclose(balance.lift @ balance.faces, rows, rtol=0, atol=1e-14 * scale)
 
 
 def test_refuses_motion_that_does_not_converge():
     """Newton's method raises an error if it does not converge in the given number of steps."""
-    modes = sdof()
+    modes = make_sdof()
     group = LawGroup(modes, Jenkins([10.0], [0.08]), 256)
     balance = make_balance(modes, group, 256)
     with pytest.raises(NotConverged, match="did not converge in"):

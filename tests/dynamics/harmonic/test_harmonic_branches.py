@@ -3,8 +3,16 @@ integration."""
 
 import numpy as np
 import pytest
-from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
-from modal_bases import basis_of
+from harmonic_cases import (
+    jenkins_forces,
+    make_bond_law,
+    make_elements,
+    make_five_modes,
+    make_sdof,
+    make_speed_law,
+    march_exactly,
+)
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
@@ -31,7 +39,7 @@ from patchfem.dynamics.periodic import find_multipliers
 
 W = 2 * np.pi * 143
 MASS = 0.884
-RIG = basis_of(W, 0.003, mass=MASS)
+RIG = make_modal_basis(W, 0.003, mass=MASS)
 CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the stiffness of the flexure at 1 mm [N/m^3]
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
@@ -173,7 +181,7 @@ def test_refuses_invalid_sweep_values():
 
 def test_exact_multipliers_of_linear_modes_agree_with_closed_form():
     """The Floquet multipliers of linear modes agree with their closed form within 1e-12."""
-    modes = five()
+    modes = make_five_modes()
     multipliers = add_stability(
         find_point(modes, SineDrive(1.0, 1.2), Spring(0.0), harmonics=1), modes
     ).multipliers
@@ -187,17 +195,17 @@ def test_exact_multipliers_of_linear_modes_agree_with_closed_form():
 def test_exact_monodromy_agrees_with_perturbed_march(omega):
     """For five modes and 40 elements the modal part of the monodromy matrix agrees with central
     differences of a march within 0.15 %."""
-    modes, (k, w), drive = five(), many(40), SineDrive(1.5, omega)
+    modes, (k, w), drive = make_five_modes(), make_elements(40), SineDrive(1.5, omega)
     p = find_point(modes, drive, Jenkins(k, w), tolerance=1e-5)
     response = make_cycle_response(p, modes, drive, 2000)
-    stretch = plain_jenkins(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
+    stretch = jenkins_forces(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
     start = np.concatenate([response.modal[0], response.modal_rate[0]])
     columns = []
     for j in (0, 1, 4, 5, 6):
         perturbation = np.zeros(10)
         perturbation[j] = 1e-4
         ends = [
-            march(modes, drive, k, w, start + s * perturbation, stretch, 2000)[0][-1]
+            march_exactly(modes, drive, k, w, start + s * perturbation, stretch, 2000)[0][-1]
             for s in (1, -1)
         ]
         columns.append((ends[0] - ends[1]) / 2e-4)
@@ -211,11 +219,11 @@ def test_exact_monodromy_agrees_with_perturbed_march(omega):
 def test_exact_monodromy_of_bonds_agrees_with_dop853():
     """For one mode with bonds the whole monodromy matrix, including the bond state u with u' = (q'
     - |q'| u)/length, agrees with differences of DOP853 solutions."""
-    modes = sdof(0.05)
+    modes = make_sdof(0.05)
     drive = SineDrive(1.0, 1.2)
     limit = 0.4
     length = 0.3
-    p = find_point(modes, drive, bonds(limit, length), tolerance=1e-6)
+    p = find_point(modes, drive, make_bond_law(limit, length), tolerance=1e-6)
     response = make_cycle_response(p, modes, drive, 4096)
 
     def state_derivative(t, y):
@@ -249,8 +257,10 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
 def test_exact_jacobian_of_free_balance_agrees_with_differences():
     """The Jacobian of the free balance agrees with central differences within 1e-7, for a rate law
     and coupled modes."""
-    modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = LawGroup(modes, [of_speed(0.4, 0.3), Spring(0.3, 0.8), bonds(0.5, 0.4)], 1024)
+    modes = make_five_modes(np.diag(0.04 * np.arange(1, 6)) + 0.02)
+    group = LawGroup(
+        modes, [make_speed_law(0.4, 0.3), Spring(0.3, 0.8), make_bond_law(0.5, 0.4)], 1024
+    )
     equations = FreeBalance(HarmonicBalance(modes, group.rows, group), 1, 3, 2.0)
     x = np.append(np.random.default_rng(4).normal(size=7) * 0.5, [1.1, 0.07])
     expected = np.stack(
@@ -267,8 +277,8 @@ def test_exact_jacobian_of_free_balance_agrees_with_differences():
 def test_exact_free_motion_satisfies_modal_equations():
     """With coupled damping every harmonic of the free motion satisfies the modal equations,
     including the balancing negative damping."""
-    modes = five(np.diag(0.04 * np.arange(1, 6)) + 0.02)
-    group = LawGroup(modes, Jenkins(*many(20)), 512)
+    modes = make_five_modes(np.diag(0.04 * np.arange(1, 6)) + 0.02)
+    group = LawGroup(modes, Jenkins(*make_elements(20)), 512)
     omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), 1)
     for motion in trace_free_motions(
         FreeBalance(HarmonicBalance(modes, group.rows, group), 1, 5, omega),
@@ -290,7 +300,9 @@ def test_exact_free_motion_satisfies_modal_equations():
 def test_exact_backbone_of_duffing_oscillator_agrees_with_closed_form():
     """The backbone of the undamped Duffing oscillator has the period 4 K(m)/sqrt(1 + c a^2) with m
     = c a^2/(2 (1 + c a^2)), within 1e-4."""
-    backbone = find_backbone(sdof(0.0), Spring(0.0, 0.5), np.array([0.3, 1.0, 2.0]), harmonics=15)
+    backbone = find_backbone(
+        make_sdof(0.0), Spring(0.0, 0.5), np.array([0.3, 1.0, 2.0]), harmonics=15
+    )
     for a, f, z in zip(backbone.slide, backbone.frequency, backbone.damping):
         c = 0.5 * a * a
         assert f == pytest.approx(np.sqrt(1 + c) / (4 * ellipk(c / (2 * (1 + c)))), rel=1e-4)
@@ -319,7 +331,7 @@ steps_per_cycle = 600
             'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "2 um"',
             Jenkins([30 / 2e-6], [2e-6]),
         ),
-        ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', bonds(30.0, 2e-6)),
+        ('law = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"', make_bond_law(30.0, 2e-6)),
     ],
     ids=["elastic-plastic", "bonds"],
 )
@@ -343,7 +355,7 @@ def test_exact_backbone_agrees_with_bench_loops(text, law):
 def test_exact_backbone_tends_to_stuck_and_free_modes():
     """The backbone of five modes tends to the stuck frequency at small amplitudes and to the free
     one at large amplitudes, with the largest damping between."""
-    modes, (k, w) = five(), many(50)
+    modes, (k, w) = make_five_modes(), make_elements(50)
     backbone = find_backbone(modes, Jenkins(k, w), np.array([1e-3, 0.2, 1.0, 300.0]), harmonics=9)
     stuck_omega = np.sqrt(
         np.linalg.eigvalsh(
@@ -360,7 +372,7 @@ def test_order_of_microslip_loss_of_iwan_joint():
     chi = -0.4
     w = ((np.arange(4000) + 0.5) / 4000) ** (1 / (1 + chi))
     backbone = find_backbone(
-        sdof(0.0), Jenkins(np.full(4000, 1e-6), w), np.array([0.1, 0.2, 0.4]), harmonics=1
+        make_sdof(0.0), Jenkins(np.full(4000, 1e-6), w), np.array([0.1, 0.2, 0.4]), harmonics=1
     )
     slope = np.diff(np.log(backbone.loss)) / np.log(2)
     assert slope == pytest.approx([3 + chi] * 2, abs=0.01)
@@ -371,7 +383,7 @@ def test_exact_forced_response_on_backbone_is_in_quadrature():
     """With one harmonic the forced response at the balancing level has the amplitude of the
     backbone and lags by 90 degrees."""
     law = Jenkins([0.2], [0.5])
-    modes = sdof(0.01)
+    modes = make_sdof(0.01)
     free = find_backbone(modes, law, np.array([2.0]), harmonics=1)
     omega = 2 * np.pi * free.frequency[0]
     level = 2 * free.damping[0] * omega**2 * 2.0

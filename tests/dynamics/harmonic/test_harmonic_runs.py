@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from harmonic_cases import bonds, five, march, plain_jenkins, sdof
-from modal_bases import basis_of
+from harmonic_cases import jenkins_forces, make_bond_law, make_five_modes, make_sdof, march_exactly
+from modal_bases import make_modal_basis
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem import plan
@@ -46,7 +46,9 @@ def test_exact_measures_agree_with_marched_scene(law):
     p = find_point(
         modes,
         drive,
-        Jenkins([limit / 20e-6], [20e-6]) if law == "elastic-plastic" else bonds(limit, 20e-6),
+        Jenkins([limit / 20e-6], [20e-6])
+        if law == "elastic-plastic"
+        else make_bond_law(limit, 20e-6),
         tolerance=1e-5,
     )
     response = make_cycle_response(p, modes, drive, 1000)
@@ -81,8 +83,8 @@ def test_exact_thirty_interfaces_on_five_modes():
     the equation of motion within 2 %."""
     rng = np.random.default_rng(2)
     faces = rng.normal(size=(30, 5)) * np.array([1.0, 0.5, 0.4, 0.3, 0.2])
-    base = five()
-    modes = basis_of(base.omega, base.zeta, faces, base.base, base.output, mass=base.mass)
+    base = make_five_modes()
+    modes = make_modal_basis(base.omega, base.zeta, faces, base.base, base.output, mass=base.mass)
     laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
     drive = SineDrive(1.0, 0.9)
     p = find_point(modes, drive, laws, tolerance=1e-4)
@@ -119,7 +121,7 @@ def test_exact_thirty_interfaces_on_five_modes():
 def test_always_sweep_agrees_with_single_points():
     """The amplitudes of a sweep agree within 3e-4 with points that are computed without a start
     value."""
-    modes = sdof(0.01)
+    modes = make_sdof(0.01)
     law = Jenkins([4.0, 1.0], [0.05, 0.5])
     values = np.linspace(0.12, 0.4, 15)
     sweep = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
@@ -132,7 +134,7 @@ def test_always_sweep_agrees_with_single_points():
 def test_exact_regimes_of_slide_amplitudes():
     """Slides of three amplitudes through elements that yield at 0.1 and 0.5 have the regimes stuck,
     partial slip and slides."""
-    modes = sdof(0.0)
+    modes = make_sdof(0.0)
     law = Jenkins([1.0, 1.0], [0.1, 0.5])
     for amplitude, expected in (
         (0.05, ("stuck", 0.0)),
@@ -145,11 +147,13 @@ def test_exact_regimes_of_slide_amplitudes():
         assert (name, fraction) == (expected[0], pytest.approx(expected[1]))
     assert find_regime(find_point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
     assert (
-        find_regime(find_point(modes, SineDrive(1e-4, 0.5), bonds(1.0, 1.0), harmonics=3))[0]
+        find_regime(find_point(modes, SineDrive(1e-4, 0.5), make_bond_law(1.0, 1.0), harmonics=3))[
+            0
+        ]
         == "stuck"
     )
     assert (
-        find_regime(find_point(modes, SineDrive(1.0, 0.5), bonds(0.1, 0.1), harmonics=7))[0]
+        find_regime(find_point(modes, SineDrive(1.0, 0.5), make_bond_law(0.1, 0.1), harmonics=7))[0]
         == "slides"
     )
 
@@ -158,7 +162,7 @@ def test_exact_regimes_of_slide_amplitudes():
 def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bounded):
     """An undamped mode at resonance has a bounded motion if the friction limit exceeds pi/4 of the
     drive. Below this threshold there is no periodic motion, and the message names the reason."""
-    modes = sdof(0.0)
+    modes = make_sdof(0.0)
     law = Jenkins([20.0], [limit / 20.0])
     if not bounded:
         with pytest.raises(
@@ -171,8 +175,8 @@ def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bou
     response = make_cycle_response(p, modes, DRIVE, 4000)
     k = np.array([20.0])
     w = np.array([limit / 20.0])
-    stretch = plain_jenkins(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
-    states, _ = march(
+    stretch = jenkins_forces(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
+    states, _ = march_exactly(
         modes,
         DRIVE,
         k,
@@ -189,5 +193,8 @@ def test_refuses_tolerance_beyond_maximum_harmonics():
     states the remaining error."""
     with pytest.raises(NotConverged, match="the motion still has an error"):
         find_point(
-            sdof(0.05), SineDrive(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12
+            make_sdof(0.05),
+            SineDrive(1.0, 0.7),
+            [Spring(0.1), Jenkins([1.0], [0.1])],
+            tolerance=1e-12,
         )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import G_N, SineDrive
 from patchfem.dynamics import Spring, find_branches
@@ -16,7 +16,7 @@ def test_exact_all_three_motions_near_fold_are_found():
     w = 2 * np.pi * 143
     mass = 0.884
     limit = 0.3 * 26 * 4.4482216152605
-    modes = basis_of(w, 0.003, mass=mass)
+    modes = make_modal_basis(w, 0.003, mass=mass)
     laws = [(0, Jenkins([limit / 1e-6], [1e-6])), (modes.output, Spring(0.0, 2e10))]
     for hertz in np.linspace(147.2, 147.6, 5):
         points = find_branches(modes, SineDrive(6 * G_N, 2 * np.pi * hertz), laws)

@@ -3,8 +3,8 @@ event engine."""
 
 import numpy as np
 import pytest
-from event_run import steady
-from modal_bases import basis_of
+from event_run import solve_steady
+from modal_bases import make_modal_basis
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import element_model, start_run
@@ -14,7 +14,7 @@ from patchfem.friction import Grooves, parallel_element
 from patchfem.response import energy_balance
 
 OMEGA, ZETA = 2 * np.pi * 143, 0.003
-BASIS = basis_of(OMEGA, ZETA, mass=1.194)
+BASIS = make_modal_basis(OMEGA, ZETA, mass=1.194)
 
 
 def test_exact_orbit_of_linear_oscillator_agrees_with_closed_form():
@@ -48,7 +48,7 @@ def test_exact_orbit_with_coulomb_friction_agrees_with_event_map(level):
     event engine, for a motion with stops and for one that slides all the time."""
     drive = SineDrive(level, OMEGA * 1.03)
     limit = 0.35 * 115.65
-    expected = steady(BASIS, drive, np.array([limit]), np.array([limit]))
+    expected = solve_steady(BASIS, drive, np.array([limit]), np.array([limit]))
     run = start_run(
         BASIS, drive, make_model(Grooves(80e-6, 1e-17), 115.65, 0.35, 0.35, None, BASIS), 64
     )

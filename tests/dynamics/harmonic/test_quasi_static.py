@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import PatchfemError
 from patchfem.dynamics import LawGroup, Spring
@@ -15,7 +15,7 @@ from patchfem.friction.laws import tanh
 
 def make_modes(omega, zeta, slide, output):
     """Return a modal basis with modal mass 0.5."""
-    return basis_of(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
+    return make_modal_basis(omega, zeta, slide, np.ones(len(omega)), output, 0.5)
 
 
 ONE = make_modes([700.0], [0.002], [1.0], [1.0])

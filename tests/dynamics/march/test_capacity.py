@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, one_mode
+from march_paths import OMEGA, make_one_mode
 
 from patchfem import build
 from patchfem.core import Missing, SineDrive
@@ -35,7 +35,7 @@ def make_model(law, entries):
 def march_model(model, frames=0):
     """Return a march of three cycles at 5 g."""
     return march(
-        one_mode(OMEGA, 0.01, 1.0),
+        make_one_mode(OMEGA, 0.01, 1.0),
         SineDrive(5 * 9.80665, OMEGA),
         model,
         3,

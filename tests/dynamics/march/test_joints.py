@@ -6,8 +6,8 @@ import pytest
 from event_run import simulate
 from hypothesis import given
 from hypothesis import strategies as st
-from march_paths import ALL, rate_model
-from modal_bases import basis_of
+from march_paths import ALL, make_tanh_model
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
@@ -86,7 +86,7 @@ def tanh_joint(port, limit, speed):
 
 def single_mode(omega=OMEGA, zeta=0.003):
     """Return the basis of a single mode."""
-    return basis_of(omega, zeta)
+    return make_modal_basis(omega, zeta)
 
 
 LAW = Bonds(
@@ -99,7 +99,7 @@ PAIRS = {
         lambda: elastic_plastic_joint(0, 39.0, 2e-6),
     ),
     "bonds": (points_model(LAW, [1.0], [98.0]), lambda: bonds_joint(0, LAW, 98.0)),
-    "tanh": (rate_model(39.0, 1e-3), lambda: tanh_joint(0, 39.0, 1e-3)),
+    "tanh": (make_tanh_model(39.0, 1e-3), lambda: tanh_joint(0, 39.0, 1e-3)),
     "list": (
         bond_list_model(Bonds(0.4, 2e-6, 1.0, "report"), 39.0, np.inf, 0.0),
         None,
@@ -328,7 +328,7 @@ def test_order_two_for_coupled_stops_with_kinetic_below_static(
     rows = rng.uniform(-1, 1, (n_interfaces, n_modes))
     root = rng.normal(size=(n_modes, n_modes))
     limit = rng.uniform(0.1, 0.5, n_interfaces)
-    basis = basis_of(
+    basis = make_modal_basis(
         np.sort(rng.uniform(0.5, 4.0, n_modes)),
         0.02,
         rows,

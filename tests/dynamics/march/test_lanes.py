@@ -4,7 +4,7 @@ runs."""
 import numpy as np
 import pytest
 from march_paths import OMEGA
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 from test_march_loop import half_plane_compliance
 
 from patchfem.core import Response, SineDrive
@@ -16,8 +16,8 @@ from patchfem.response import loops, measures, spectrum
 from patchfem.runs.batch.samples import Samples
 from patchfem.slip.shear_modes import shear_modes
 
-ONE = basis_of(OMEGA, 0.05)
-TWO = basis_of(OMEGA * np.array([1.0, 0.9]), 0.05, [1.0, 0.2], np.ones(2), [1.0, -0.5])
+ONE = make_modal_basis(OMEGA, 0.05)
+TWO = make_modal_basis(OMEGA * np.array([1.0, 0.9]), 0.05, [1.0, 0.2], np.ones(2), [1.0, -0.5])
 ACCELERATIONS, CYCLES, STEPS, WINDOW = (5.0, 20.0, 49.0, 300.0), 12, 80, 3
 LAW, DRIVE = Bonds(0.4, 1e-6), SineDrive(1.0, OMEGA)
 LEDGER_NAMES = {

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from friction_paths import random_walk, upper_pressure, walk
-from march_paths import OMEGA, follow, one_mode
-from modal_bases import basis_of
+from friction_paths import march_path, random_walk, upper_pressure
+from march_paths import OMEGA, follow_path, make_one_mode
+from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 
 from patchfem.core import InitialState, Outcome, SineDrive
@@ -37,8 +37,8 @@ def test_exact_points_on_path_agree_with_recursion(growth):
     area = np.array([0.5, 1.0, 0.25])
     sigma = np.array([2.0, 1.0, 3.0])
     path = random_walk(2, 80, 0.6)
-    forces, energies, failed, _ = follow(points_model(law, area, sigma), path)
-    run = walk(FirstOrderBonds(law), path, upper_pressure(sigma), 0.3)
+    forces, energies, failed, _ = follow_path(points_model(law, area, sigma), path)
+    run = march_path(FirstOrderBonds(law), path, upper_pressure(sigma), 0.3)
     assert failed == 0
     assert forces[1:, 0] == pytest.approx(run.traction @ area, abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean @ area, abs=1e-12)
@@ -53,12 +53,12 @@ def test_exact_list_on_path_agrees_with_quadrature(order):
     1e-10, and its mean over a step within 1e-2."""
     law = Bonds(0.4, 1.0, order, "report", initial=0.0)
     path = random_walk(2, 40, 0.6)
-    forces, _, _, _ = follow(bond_list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
-    run = walk(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
+    forces, _, _, _ = follow_path(bond_list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
+    run = march_path(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
     fine = np.interp(np.linspace(0, 40, 321), np.arange(41), path)
     means = (
-        walk(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 8)
+        march_path(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 8)
         .mean.reshape(40, 8)
         .mean(axis=1)
     )
@@ -113,7 +113,7 @@ def test_exact_shear_modes_agree_with_nodal_deflections(stiffness, step):
     sigma = 1 + 0.8 * x
     modes = shear_modes(compliance, law.static * area * sigma, law.length, 24)
     path = random_walk(11, 60, step)
-    forces, energies, failed, contact = follow(points_model(law, area, sigma, modes), path)
+    forces, energies, failed, contact = follow_path(points_model(law, area, sigma, modes), path)
     expected, deflection = march_nodal_deflections(law, compliance, area, sigma, path)
     assert failed == 0
     assert forces[:-1, 1] == pytest.approx(expected[:, 0], abs=1e-10)
@@ -134,7 +134,7 @@ def test_exact_gross_slip_in_closed_form_agrees_with_iteration(level):
     model = points_model(
         law, area, sigma, shear_modes(compliance, law.static * area * sigma, law.length, 8)
     )
-    modes = one_mode(OMEGA, 0.05, 1.0)
+    modes = make_one_mode(OMEGA, 0.05, 1.0)
     drive = SineDrive(level * 9.80665, OMEGA)
     fast, general = (start_run(modes, drive, model, 200) for _ in range(2))
     rows = fast.march_cycle(600, 0, [])[1]
@@ -197,7 +197,7 @@ def test_order_two_against_integrated_rate_equations(growth):
     errors = []
     for steps in (100, 800, 6400):
         result = march(
-            one_mode(OMEGA, 0.003, 1.0),
+            make_one_mode(OMEGA, 0.003, 1.0),
             SineDrive(drive, OMEGA),
             points_model(law, [1e-4], [98.0665e4]),
             2,
@@ -229,7 +229,7 @@ def test_order_two_for_steady_amplitude_of_jenkins_oscillator(stiffness, expecte
     amplitudes = []
     for steps in (400, 3200, 6400):
         result = march(
-            one_mode(1.0, 0.003, 1.0),
+            make_one_mode(1.0, 0.003, 1.0),
             SineDrive(1.0, 1.0),
             jenkins_model([stiffness], [0.8 / stiffness]),
             80,
@@ -247,7 +247,7 @@ def test_always_stiff_element_needs_one_evaluation_per_step():
     """An element that is much stiffer than the structure needs a single evaluation per step;
     Newton's method across its kinks needed up to 30."""
     model = jenkins_model([1e6 * OMEGA**2], [40.0 / (1e6 * OMEGA**2)])
-    result = march(one_mode(OMEGA, 0.003, 1.0), SineDrive(50.0, OMEGA), model, 4, 200)
+    result = march(make_one_mode(OMEGA, 0.003, 1.0), SineDrive(50.0, OMEGA), model, 4, 200)
     assert (
         result.ledger["iterations"] == 800
         and result.ledger["worst_iterations"] == 1
@@ -265,7 +265,7 @@ def test_exact_march_under_moving_pressure_agrees_with_numpy_law():
     area = np.full(61, 1e-4 / 61)
     limit = 0.4 * area @ sigma
     result = march(
-        one_mode(OMEGA, 0.01, 1.0),
+        make_one_mode(OMEGA, 0.01, 1.0),
         SineDrive(1.5 * limit, OMEGA),
         points_model(law, area, sigma, pattern=(x, sigma)),
         2,
@@ -273,7 +273,7 @@ def test_exact_march_under_moving_pressure_agrees_with_numpy_law():
         window=2,
     )
     path = result.window.slide
-    run = walk(
+    run = march_path(
         FirstOrderBonds(law), path, lambda q: np.interp(x + q, x, sigma, left=0.0, right=0.0)
     )
     assert np.ptp(path) > 5e-6 and (run.traction == 0).any()
@@ -289,7 +289,7 @@ def test_always_unresolved_pressure_waves_are_reported():
     drive = SineDrive(1.5 * 0.4 * area @ sigma, OMEGA)
     coarse, fine = (
         march(
-            one_mode(OMEGA, 0.01, 1.0),
+            make_one_mode(OMEGA, 0.01, 1.0),
             drive,
             points_model(Bonds(0.4, 2e-6), area, sigma, pattern=(x, sigma)),
             2,
@@ -312,9 +312,20 @@ def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     model = jenkins_model([2e5, 1e5], [1e-6, 2e-6])
     drive = SineDrive(49.0, OMEGA)
     if np.isfinite(travel):  # the travel is given as a fraction of the amplitude
-        travel *= march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2).amplitudes.max()
+        travel *= march(
+            make_one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2
+        ).amplitudes.max()
     complete, condensed = (
-        march(one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2, travel, keeps_samples=keep)
+        march(
+            make_one_mode(OMEGA, 0.003, 1.0),
+            drive,
+            model,
+            cycles,
+            40,
+            2,
+            travel,
+            keeps_samples=keep,
+        )
         for keep in (True, False)
     )
     assert (
@@ -349,7 +360,7 @@ def test_always_energy_falls_in_free_decay(shear, steps_per_cycle):
     modes = shear_modes(compliance, law.static * area * sigma, law.length, 10) if shear else None
     omega = OMEGA * np.array([1.0, 1.7, 3.1, 5.3, 8.9, 14.2])
     slide = np.array([1.0, -0.6, 0.5, 0.4, -0.3, 0.2])
-    basis = basis_of(omega, 0.0, slide)
+    basis = make_modal_basis(omega, 0.0, slide)
     start = InitialState(1e-4 * np.array([1.0, -0.3, 0.1, 0.02, -0.01, 0.005]), np.zeros(6))
     result = march(
         basis,

@@ -4,12 +4,12 @@ from time import process_time
 
 import numpy as np
 import pytest
-from march_paths import ALL, OMEGA, one_mode, rate_model
-from modal_bases import basis_of
+from march_paths import ALL, OMEGA, make_one_mode, make_tanh_model
+from modal_bases import make_modal_basis
 from test_joints import coulomb_joint, elastic_plastic_joint, make_chain
 from test_march_loop import half_plane_compliance
 from test_varying_shear import reduce_to_shear_modes
-from varying_load_cases import LAWS, crowned, modes
+from varying_load_cases import LAWS, crowned_contact, make_modes
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import JointsModel, coulomb_model, jenkins_model, points_model
@@ -20,8 +20,8 @@ from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds
 from patchfem.slip.shear_modes import shear_modes
 
-PITCHES = modes([143.0], [1.0], [0.0], [20.0], 0.05)
-DRIVE, BASIS, CYCLES, STEPS = SineDrive(49.0, OMEGA), one_mode(OMEGA, 0.05, 1.0), 400, 80
+PITCHES = make_modes([143.0], [1.0], [0.0], [20.0], 0.05)
+DRIVE, BASIS, CYCLES, STEPS = SineDrive(49.0, OMEGA), make_one_mode(OMEGA, 0.05, 1.0), 400, 80
 
 
 def compliant_points_model():
@@ -41,7 +41,7 @@ def two_mass_joints(*joints):
 
 
 CASES = {
-    "tanh": lambda: (BASIS, rate_model(20.0, 5e-3)),
+    "tanh": lambda: (BASIS, make_tanh_model(20.0, 5e-3)),
     "coulomb": lambda: (BASIS, coulomb_model(20.0, 16.0)),
     "elements": lambda: (BASIS, jenkins_model([2e7, 1e7, 4e6], [3e-7, 1e-6, 2e-6])),
     "bonds": lambda: (BASIS, points_model(Bonds(0.4, 1e-6), [1e-4], [50e4])),
@@ -54,9 +54,9 @@ CASES = {
         varying_load.make_model(
             PITCHES,
             LAWS["plastic"],
-            crowned(),
+            crowned_contact(),
             None,
-            reduce_to_shear_modes(crowned(), LAWS["plastic"], 4),
+            reduce_to_shear_modes(crowned_contact(), LAWS["plastic"], 4),
         ),
     ),
 }
@@ -151,12 +151,14 @@ def test_exact_beats_and_slow_growth_are_not_extrapolated(monkeypatch):
     """All steps are computed if an undamped mode beats, or if bonds grow over a time much longer
     than the run."""
     ones = np.ones(2)
-    beating_modes = basis_of(OMEGA * np.array([1.0, 1.37]), [0.05, 0.0], [1.0, 0.0], ones, ones)
+    beating_modes = make_modal_basis(
+        OMEGA * np.array([1.0, 1.37]), [0.05, 0.0], [1.0, 0.0], ones, ones
+    )
     growing_bonds = points_model(
         Bonds(0.4, 1e-6, ratio=2.0, rest_growth=1e-12, slip_growth=1e3), [1e-4], [50e4]
     )
     for name, case in (
-        ("beat", (beating_modes, rate_model(20.0, 5e-3))),
+        ("beat", (beating_modes, make_tanh_model(20.0, 5e-3))),
         ("growth", (BASIS, growing_bonds)),
     ):
         monkeypatch.setitem(CASES, name, lambda case=case: case)
@@ -189,7 +191,7 @@ def test_exact_beats_and_slow_growth_are_not_extrapolated(monkeypatch):
 def test_always_only_decaying_motion_counts_as_periodic(motion, periodic, monkeypatch):
     """A state that decays or stays counts as periodic; a state that creeps, beats, decays slowly or
     has another period does not. The states follow formulas over 1024 cycles."""
-    run = marching.start_run(BASIS, DRIVE, rate_model(20.0, 5e-3), STEPS)
+    run = marching.start_run(BASIS, DRIVE, make_tanh_model(20.0, 5e-3), STEPS)
     monkeypatch.setattr(
         run, "_carried_state", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])]
     )

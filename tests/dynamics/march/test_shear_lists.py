@@ -8,11 +8,11 @@ import march_paths
 import numpy as np
 import pytest
 from list_paths import STATUS
-from printed_sums import Bonds as BondsByHand
-from printed_sums import settled
+from printed_sums import NodeBonds as BondsByHand
+from printed_sums import solve_displacements
 from scipy.optimize import brentq
 from scipy.special import gammainc
-from varying_load_cases import modes
+from varying_load_cases import make_modes
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import (
@@ -40,7 +40,7 @@ DEFINITIONS = [
 def follow_path(model, path, dt=1e-3):
     """Return forces (k, 3), energies (k, 2), number of failed steps, and contact of a model along a
     path."""
-    return march_paths.follow(model, path, dt)
+    return march_paths.follow_path(model, path, dt)
 
 
 def assert_energy_balance(forces, energies, path) -> None:
@@ -189,7 +189,7 @@ def test_always_points_agree_with_explicit_bond_sums(reading, order, grows):
     previous = np.zeros(5)
     expected = [0.0]
     for q in path[1:]:
-        next_slip, force = settled(bonds, limit, compliance, q, dt, 2 * slip - previous)
+        next_slip, force = solve_displacements(bonds, limit, compliance, q, dt, 2 * slip - previous)
         previous = slip
         slip = next_slip
         bonds.weight(slip, dt, keep=True)
@@ -269,7 +269,7 @@ def test_order_two_under_prescribed_load(order, grows):
     def load(t):
         return np.maximum(60 + 70 * np.cos(2 * np.pi * 90 * np.asarray(t)), 0.0)
 
-    basis = modes([143.0], [1.0], [0.0], [0.0], 0.02)
+    basis = make_modes([143.0], [1.0], [0.0], [0.0], 0.02)
     differences = []
     for steps in (400, 800):
         result = varying_load.march(

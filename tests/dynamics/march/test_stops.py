@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from event_run import simulate
-from modal_bases import basis_of
+from modal_bases import make_modal_basis
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import coulomb_model
@@ -13,7 +13,7 @@ from patchfem.response import energy_balance
 
 def single_mode(zeta=0.02):
     """Return a mode with natural frequency 1."""
-    return basis_of(1.0, zeta, [1.0], [-1.0])
+    return make_modal_basis(1.0, zeta, [1.0], [-1.0])
 
 
 def random_modes(seed, damping=False):
@@ -22,7 +22,7 @@ def random_modes(seed, damping=False):
     n = int(rng.integers(3, 5))
     root = rng.normal(size=(n, n))
     slide = np.append(1.0, rng.uniform(0.3, 1.0, n - 1) * rng.choice([-1, 1], n - 1))
-    return basis_of(
+    return make_modal_basis(
         np.sort(rng.uniform(0.5, 6.0, n)),
         0.02,
         slide,

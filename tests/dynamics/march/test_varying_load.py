@@ -15,11 +15,11 @@ from varying_load_cases import (
     STILL,
     check_energy_of_random_march,
     check_order_two,
-    crowned,
-    elastic,
+    crowned_contact,
+    make_contact,
+    make_modes,
     march_with_lift_off,
-    mechanical,
-    modes,
+    total_energy,
 )
 
 from patchfem.contact.unilateral import solve_forces
@@ -40,9 +40,9 @@ POINT_LAWS = [
 def test_order_two_for_small_heave_and_pitch(row):
     """On a flat full contact small heave and pitch are A cos(sqrt(omega^2 + K r^2/m) t) with the
     normal or rotational stiffness K, and the error falls with the square of the step."""
-    sets = elastic()
+    sets = make_contact()
     mode_component = [1.0, 300.0][row]
-    basis = modes(
+    basis = make_modes(
         [200.0], [0.0], [mode_component * (row == 0)], [mode_component * (row == 1)], base=[0.0]
     )
     stiffness = np.linalg.inv(sets.c)
@@ -82,18 +82,18 @@ def test_order_two_for_small_heave_and_pitch(row):
 def test_exact_energy_of_bouncing_block_is_conserved():
     """In 5000 steps of heave and pitch with repeated lift-off the energy is constant within
     1e-12."""
-    basis = modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
+    basis = make_modes([150.0, 400.0, 300.0], [0, 0, 0], [1.0, 0.2, 0.0], [20.0, 0.0, 250.0])
     result = varying_load.march(
         basis,
         STILL,
-        crowned(),
+        crowned_contact(),
         LAWS["plastic"],
         10,
         500,
         10,
         start=InitialState([12e-7, 0, 9e-7], [0.0, 15e-3, 6e-3]),
     )
-    total = mechanical(result.response, basis)
+    total = total_energy(result.response, basis)
     force = result.response.extra["normal_load"]
     assert np.ptp(total) <= 1e-12 * total[0] and result.outcome is None
     assert (force == 0).sum() > 500 and force.max() > 2 * LOAD
@@ -106,9 +106,9 @@ def test_exact_energy_of_bouncing_block_is_conserved():
 def test_exact_nodal_forces_agree_with_unilateral_solution():
     """At every snapshot of a slowly varying tilt the nodal forces agree within 1e-12 with a new
     solution of the contact."""
-    sets = crowned()
+    sets = crowned_contact()
     drive = SineDrive(200.0, 2 * np.pi * 2)
-    basis = modes([40.0], [1.0], [0.0], [400.0], 0.5)
+    basis = make_modes([40.0], [1.0], [0.0], [400.0], 0.5)
     result = varying_load.march(basis, drive, sets, LAWS["plastic"], 1, 200, 1, frames=40)
     contact_sets = set()
     for snapshot in result.snapshots:
@@ -148,9 +148,9 @@ def integrate_coulomb_block(basis, drive, stiffness, mu, start, cycles, steps):
 def test_exact_coulomb_block_under_oscillating_load():
     """A block that sticks and slips while its heave nearly unloads the contact agrees within 1e-3
     with small steps of another method."""
-    sets = elastic()
+    sets = make_contact()
     stiffness = float(np.linalg.inv(sets.c).sum())
-    basis = modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
+    basis = make_modes([143.0, 20.0], [1.0, 0.0], [0.0, 1.0], [0.0, 0.0], 0.02, [1.0, 0.0])
     basis = replace(basis, zeta=np.array([0.02, 0.0]))
     drive = SineDrive(8 * 9.80665 * 0.5, 2 * np.pi * 143)
     start = 0.9 * LOAD / stiffness
@@ -188,7 +188,7 @@ def test_order_output_acceleration_agrees_with_differences():
     errors = []
     for steps in (6400, 12800):
         response = varying_load.march(
-            MIXED, drive, crowned(), LAWS["plastic"], 1, steps, 1
+            MIXED, drive, crowned_contact(), LAWS["plastic"], 1, steps, 1
         ).response
         expected = np.gradient(response.output_rate, response.time) + drive.values(response.time)
         errors.append(
@@ -235,7 +235,7 @@ def test_always_stops_under_varying_load_are_solved(law, seed, steps):
 def test_exact_strip_slides_under_yaw():
     """A rotation +yaw about z moves a strip at +y backwards by y yaw, and the sum of friction times
     y is the yaw moment."""
-    basis = modes([100.0], [1.0], [0.0], [0.0])
+    basis = make_modes([100.0], [1.0], [0.0], [0.0])
     yawing = replace(basis, normal=None, pitch=None, yaw=np.array([2.0]))
     offsets = np.array([-1e-3, 0.0, 1e-3])
     rows = compute_strip_slides(yawing, offsets)
@@ -249,7 +249,7 @@ def test_refuses_heave_of_rigid_point_contact():
     """Heave with a rigid point contact is refused; the message names the table to use."""
     with pytest.raises(PatchfemError, match=r"\[contact\] in place of \[normal\]"):
         varying_load.march(
-            modes([100.0], [1.0], [1.0], [0.0]),
+            make_modes([100.0], [1.0], [1.0], [0.0]),
             STILL,
             None,
             LAWS["coulomb"],

@@ -11,12 +11,12 @@ from varying_load_cases import (
     LOAD,
     MASS,
     MIXED,
-    balance,
+    check_balance,
     check_energy_of_random_march,
     check_order_two,
-    crowned,
+    crowned_contact,
+    make_modes,
     march_with_lift_off,
-    modes,
 )
 
 from patchfem.contact.unilateral import solve_forces
@@ -125,9 +125,11 @@ def test_exact_all_shear_modes_agree_with_march_of_nodes(name):
     """With all shear modes the slide and the force agree with a march of all nodes, while the
     contact opens and closes. The differences are below 1e-8 of the slide and 1e-7 of the friction
     limit."""
-    basis = modes([143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0])
+    basis = make_modes(
+        [143.0, 300.0, 410.0], [1.0, 0, 0], [0, 1.0, 0], [0, 0, 250.0], 0.01, [1.0, 0, 0]
+    )
     drive = SineDrive(120.0, 2 * np.pi * 143)
-    sets = crowned()
+    sets = crowned_contact()
     law = LAWS[name]
     steps = 60
     result = varying_load.march(
@@ -141,7 +143,7 @@ def test_exact_all_shear_modes_agree_with_march_of_nodes(name):
         start=InitialState([0, 5e-7, 5e-7], [0, 0, 0]),
         shear=reduce_to_shear_modes(sets, law),
     )
-    single = modes([143.0], [1.0], [0.0], [0.0], 0.01)
+    single = make_modes([143.0], [1.0], [0.0], [0.0], 0.01)
     slides, forces, loads = march_all_nodes(single, drive, SOFT[name], sets, result.response, steps)
     response = result.response
     n_contact = (loads > 0).sum(axis=1)
@@ -152,7 +154,7 @@ def test_exact_all_shear_modes_agree_with_march_of_nodes(name):
     )
     assert response.slide == pytest.approx(slides, abs=1e-8 * np.abs(slides).max())
     assert response.force == pytest.approx(forces, abs=1e-7 * 0.3 * LOAD)
-    assert result.outcome is None and balance(result, basis) <= 1e-11
+    assert result.outcome is None and check_balance(result, basis) <= 1e-11
 
 
 @pytest.mark.share(1)
@@ -161,12 +163,12 @@ def test_exact_nearly_constant_load_agrees_with_preloaded_march(name):
     """Under a nearly constant load the slide agrees within 1e-6 with a march under the preload,
     with shear modes or exact parallel elements. The difference comes from the spring-back at the
     end of each step and falls with the square of the step."""
-    basis = modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
+    basis = make_modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
     drive = SineDrive(40.0, 2 * np.pi * 300)
-    sets = crowned()
+    sets = crowned_contact()
     law = LAWS[name]
     force = sets.reference.forces(0.0, 0.0)
-    compliance = exponential_compliance(crowned().x)
+    compliance = exponential_compliance(crowned_contact().x)
     if name == "plastic":
         group = jenkins_set(compliance, 0.3 * force, 1e-6)
         model = models.jenkins_model(group.stiffness, group.yield_displacement)
@@ -194,7 +196,9 @@ def test_exact_separated_bodies_store_no_energy():
     """During lift-off the bodies store no energy; the energy that they stored is counted as
     loss."""
     for name in ("plastic", "bonds"):
-        result, imbalance = march_with_lift_off(name, reduce_to_shear_modes(crowned(), LAWS[name]))
+        result, imbalance = march_with_lift_off(
+            name, reduce_to_shear_modes(crowned_contact(), LAWS[name])
+        )
         stored, _, created = result.response.extra["ledger"][1:]
         is_separated = result.response.extra["normal_load"] == 0
         assert stored[is_separated].max() <= 1e-20 * stored.max()
@@ -211,7 +215,7 @@ def test_exact_separated_bodies_store_no_energy():
 def test_always_shear_compliance_creates_no_energy(name, seed, steps, count, depth):
     """No energy is created for random modes, initial states, drives and numbers of shear modes,
     with coarse steps and lift-off."""
-    shear = reduce_to_shear_modes(crowned(), LAWS[name], count, depth)
+    shear = reduce_to_shear_modes(crowned_contact(), LAWS[name], count, depth)
     check_energy_of_random_march(name, seed, steps, shear)
 
 
@@ -221,9 +225,9 @@ def test_exact_forked_march_equals_original_march(count):
     continued."""
     law = LAWS["bonds"]
     drive = SineDrive(60.0, 2 * np.pi * 143)
-    shear = reduce_to_shear_modes(crowned(), law, count) if count else None
+    shear = reduce_to_shear_modes(crowned_contact(), law, count) if count else None
     run = plain.start_run(
-        MIXED, drive, varying_load.make_model(MIXED, law, crowned(), None, shear), 200
+        MIXED, drive, varying_load.make_model(MIXED, law, crowned_contact(), None, shear), 200
     )
     run.march_cycle(200, 0, [])
     copy = run.fork(drive)
@@ -239,17 +243,20 @@ def test_refuses_shear_modes_with_unsuitable_laws():
     for other_law in ("coulomb", "tanh"):
         with pytest.raises(PatchfemError, match="elastic-plastic"):
             varying_load.make_model(
-                modes([100.0], [1.0], [1.0], [0.0]),
+                make_modes([100.0], [1.0], [1.0], [0.0]),
                 LAWS[other_law],
-                crowned(),
-                shear=reduce_to_shear_modes(crowned(), law, 4),
+                crowned_contact(),
+                shear=reduce_to_shear_modes(crowned_contact(), law, 4),
             )
     few_modes = shear_modes(
-        exponential_compliance(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4
+        exponential_compliance(crowned_contact().x),
+        0.3 * crowned_contact().reference.forces(0.0, 0.0),
+        1e-6,
+        4,
     )
     with pytest.raises(PatchfemError, match="include every node"):
         varying_load.make_model(
-            modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few_modes
+            make_modes([100.0], [1.0], [1.0], [0.0]), law, crowned_contact(), shear=few_modes
         )
 
 
@@ -257,4 +264,4 @@ def test_refuses_shear_modes_with_unsuitable_laws():
 def test_order_two_with_shear_modes(name):
     """With modes that combine slide, heave and pitch and a varying contact the march converges with
     order two; the spring-back at the end of a step does not reduce the order."""
-    check_order_two(name, 800, 0.45, reduce_to_shear_modes(crowned(), LAWS[name], 8))
+    check_order_two(name, 800, 0.45, reduce_to_shear_modes(crowned_contact(), LAWS[name], 8))

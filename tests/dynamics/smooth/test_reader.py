@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, one_mode
+from march_paths import OMEGA, make_one_mode
 from scipy.optimize import brentq
 from test_smooth import MASS
 
@@ -124,7 +124,7 @@ def test_exact_peaks_agree_with_finely_sampled_motion(name):
     law, load, zeta, ratio, acceleration, moving = CASES[name]
     drive = SineDrive(acceleration, ratio * OMEGA, moving)
     start = None if name == "tanh" else InitialState(np.full(1, 2e-5), np.zeros(1))
-    modes = one_mode(OMEGA, zeta, MASS)
+    modes = make_one_mode(OMEGA, zeta, MASS)
     run, reference = (
         Motion(modes, drive, make_element(law, load), 40, 1e-9, start=start) for _ in range(2)
     )

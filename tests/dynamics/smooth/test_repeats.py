@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, one_mode
+from march_paths import OMEGA, make_one_mode
 from test_smooth import MASS, make_element
 
 from patchfem.core import SineDrive
@@ -12,7 +12,7 @@ from patchfem.friction import Bonds, TanhLaw
 from patchfem.friction.laws.bouc_wen import BoucWen
 
 LAWS = {"tanh": TanhLaw(0.3, 5e-3), "bonds": Bonds(0.3, 5e-6), "bouc-wen": BoucWen(0.3, 5e-6)}
-MODES, SINE = one_mode(OMEGA, 0.02, MASS), SineDrive(49.0, OMEGA * 0.9)
+MODES, SINE = make_one_mode(OMEGA, 0.02, MASS), SineDrive(49.0, OMEGA * 0.9)
 
 
 def element_of_law(name):
@@ -78,7 +78,7 @@ def test_exact_measures_after_a_million_cycles():
 def test_always_growing_motion_is_not_extrapolated():
     """A motion that has not become periodic is integrated to its end."""
     run = Motion(
-        one_mode(OMEGA, 1e-5, MASS), SineDrive(49.0, OMEGA), element_of_law("tanh"), 300, 1e-9
+        make_one_mode(OMEGA, 1e-5, MASS), SineDrive(49.0, OMEGA), element_of_law("tanh"), 300, 1e-9
     )
     run.run_ahead_to(300 * 2 * np.pi / OMEGA)
     assert run.repeat_change == 0 and run.time == 300 * 2 * np.pi / OMEGA

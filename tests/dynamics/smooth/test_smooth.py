@@ -4,8 +4,8 @@ runs."""
 import numpy as np
 import pytest
 import smooth_reference as ref
-from march_paths import OMEGA, one_mode
-from modal_bases import basis_of
+from march_paths import OMEGA, make_one_mode
+from modal_bases import make_modal_basis
 from scipy.integrate import simpson
 
 from patchfem.core import InitialState, Outcome, SineDrive
@@ -19,9 +19,9 @@ from patchfem.response import energy_balance
 from patchfem.structure import drives
 
 LOAD, MASS = 115.65, 0.884
-ONE = one_mode(OMEGA, 0.003, MASS)
+ONE = make_one_mode(OMEGA, 0.003, MASS)
 SINE = SineDrive(49.0, OMEGA)
-THREE = basis_of(
+THREE = make_modal_basis(
     OMEGA * np.array([1, 3.3, 8.0]),
     [0.003, 0.01, 0.02],
     [1, 0.6, -0.4],
@@ -49,7 +49,7 @@ def relative_errors(
     times = np.linspace(0, end, 50 * cycles + 1)
     n = modes.omega.size
     samples = run.run_to(end, times)
-    z, force = ref.integrate(modes, drive, form(law, LOAD), end, times, start, event)
+    z, force = ref.integrate_modes(modes, drive, form(law, LOAD), end, times, start, event)
     return (
         abs(samples[:, 1 : 1 + n].T - z).max() / abs(z).max(),
         abs(samples[:, 2 * n + 3] - force).max() / abs(force).max(),
@@ -70,14 +70,14 @@ def stretch_event(y, v):
 @pytest.mark.parametrize(
     "law, modes, form, event, force_tolerance",
     [
-        (SHORT, ONE, ref.bonds, None, 1e-8),
-        (LONG, ONE, ref.bonds, None, 1e-8),
-        (SHORT, THREE, ref.bonds, None, 1e-8),
-        (GROWING, ONE, ref.bonds, bond_rest_event, 1e-6),
-        (LUGRE, ONE, ref.lugre, None, 1e-5),
-        (BoucWen(0.3, 5e-6), ONE, ref.bouc_wen, stretch_event, 1e-7),
-        (BoucWen(0.3, 5e-6, 1.5, 0.8), ONE, ref.bouc_wen, stretch_event, 1e-7),
-        (TanhLaw(0.3, 1e-2), ONE, ref.tanh, None, 1e-7),
+        (SHORT, ONE, ref.bonds_form, None, 1e-8),
+        (LONG, ONE, ref.bonds_form, None, 1e-8),
+        (SHORT, THREE, ref.bonds_form, None, 1e-8),
+        (GROWING, ONE, ref.bonds_form, bond_rest_event, 1e-6),
+        (LUGRE, ONE, ref.lugre_form, None, 1e-5),
+        (BoucWen(0.3, 5e-6), ONE, ref.bouc_wen_form, stretch_event, 1e-7),
+        (BoucWen(0.3, 5e-6, 1.5, 0.8), ONE, ref.bouc_wen_form, stretch_event, 1e-7),
+        (TanhLaw(0.3, 1e-2), ONE, ref.tanh_form, None, 1e-7),
     ],
 )
 def test_exact_rate_laws_agree_with_scipy(law, modes, form, event, force_tolerance):
@@ -102,7 +102,7 @@ def test_exact_rate_laws_agree_with_scipy(law, modes, form, event, force_toleran
 def test_exact_response_to_every_waveform_agrees_with_scipy(drive):
     """The response to sweeps, drive levels and recorded signals agrees with SciPy's integrator, the
     motion within 1e-9 and the force within 1e-8."""
-    motion, force = relative_errors(ONE, SHORT, ref.bonds, 3, drive)
+    motion, force = relative_errors(ONE, SHORT, ref.bonds_form, 3, drive)
     assert motion < 1e-9 and force < 1e-8
 
 
@@ -290,7 +290,7 @@ def test_exact_tiny_slides_need_no_small_steps(drive):
 def test_exact_grazing_speed_agrees_with_scipy(second_slide):
     """Motions whose speed comes close to zero, with or without a reversal, agree with SciPy's
     integrator within 1e-9."""
-    modes = basis_of(
+    modes = make_modal_basis(
         OMEGA * np.array([1, 3.0]),
         [0.01, 0.003],
         [1.0, second_slide],
@@ -298,7 +298,7 @@ def test_exact_grazing_speed_agrees_with_scipy(second_slide):
         [1, 0.0],
         mass=MASS,
     )
-    motion, force = relative_errors(modes, SHORT, ref.bonds, 3, SineDrive(60.0, OMEGA))
+    motion, force = relative_errors(modes, SHORT, ref.bonds_form, 3, SineDrive(60.0, OMEGA))
     assert motion < 1e-9 and force < 1e-8
 
 

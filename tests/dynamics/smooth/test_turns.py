@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from march_paths import OMEGA, one_mode
+from march_paths import OMEGA, make_one_mode
 from test_smooth import ONE, make_element
 
 from patchfem.core import InitialState, Outcome, SineDrive
@@ -59,7 +59,7 @@ def test_always_strongly_damped_release_reaches_its_end():
     drive = drives.make_release(1 / 162.4)
     law = TanhLaw(0.671, 1.569e-3).element(15.46)
     run = Motion(
-        one_mode(omega, 0.05, 0.7626),
+        make_one_mode(omega, 0.05, 0.7626),
         drive,
         law,
         104,
@@ -92,7 +92,7 @@ def test_always_round_off_of_stiff_bonds_does_not_reduce_steps(
     law = points_element(Bonds(0.588, length), [1.0], [load])
     start = InitialState(np.array([1.023e-5]), np.zeros(1))
     run = Motion(
-        one_mode(omega, 0.05, 0.4143),
+        make_one_mode(omega, 0.05, 0.4143),
         drives.make_release(1 / 62.86),
         law,
         108,

@@ -6,8 +6,8 @@ import h5netcdf
 import numpy as np
 import pytest
 import pyuff
-from command_line import cli
-from lab_files import BOND, MU, SCENE, SI, loop, record, written
+from command_line import run_cli
+from lab_files import BOND, MU, SCENE, SI, elastic_plastic_loop, make_record, write_universal
 from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
@@ -56,11 +56,13 @@ def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
 
     The exported file has the same numbers as the imported one, to the last bit.
     """
-    time, slide, force = loop()
-    written(tmp_path / "lab.uff", [SI, record(time, slide, 8), record(time, force, 13)])
+    time, slide, force = elastic_plastic_loop()
+    write_universal(
+        tmp_path / "lab.uff", [SI, make_record(time, slide, 8), make_record(time, force, 13)]
+    )
     (tmp_path / "scene.toml").write_text(SCENE)
-    assert cli("import", tmp_path / "lab.uff", "-o", tmp_path / "loop.csv").code == 0
-    answer = cli(
+    assert run_cli("import", tmp_path / "lab.uff", "-o", tmp_path / "loop.csv").code == 0
+    answer = run_cli(
         "fit",
         tmp_path / "scene.toml",
         "--to",
@@ -77,7 +79,7 @@ def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
     assert values["friction.static"]["value"] == pytest.approx(MU, rel=1e-6)
     assert values["friction.bond_length"]["value"] == pytest.approx(BOND, rel=1e-6)
     assert "measured" in (tmp_path / "fit/fit.svg").read_text()
-    assert cli("export", tmp_path / "fit", "-o", tmp_path / "back.uff").code == 0
+    assert run_cli("export", tmp_path / "fit", "-o", tmp_path / "back.uff").code == 0
     exported = read_uff_functions(tmp_path / "back.uff")
     for name, expected, kind in (("displacement", slide, 8), ("force", force, 13)):
         assert exported[name]["data"].tobytes() == expected.tobytes()
@@ -90,7 +92,7 @@ def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
     assert measured["x"].tobytes() == slide.tobytes()
     assert measured["data"].tobytes() == force.tobytes()
     assert fitted["data"] == pytest.approx(force, abs=1e-4)
-    second_import = cli(
+    second_import = run_cli(
         "import",
         tmp_path / "back.uff",
         "-o",
@@ -114,7 +116,7 @@ def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
         }
         stress = np.asarray(file["normal_stress"][...])
     for name in ("a.uff", "a.mat", "a.csv"):
-        answer = cli("export", bench_folder, "-o", tmp_path / name, "--histories")
+        answer = run_cli("export", bench_folder, "-o", tmp_path / name, "--histories")
         assert (
             answer.code == 0
             and f"{histories['time'].size} rows of relative_displacement" in answer.out
@@ -148,7 +150,9 @@ def test_exact_loop_over_slide_encloses_loop_area(method, tmp_path):
     The loop over the output displacement does not, because the second mode moves the output.
     """
     (tmp_path / "rig.toml").write_text(TWO_MODES + f'[accuracy]\nmethod = "{method}"\n')
-    answer = cli("run", tmp_path / "rig.toml", "-o", tmp_path / "out", "-q", "--json", "--no-page")
+    answer = run_cli(
+        "run", tmp_path / "rig.toml", "-o", tmp_path / "out", "-q", "--json", "--no-page"
+    )
     assert answer.code == 0, answer.err
     area = json.loads(answer.out)["measures"]["loop_area"]
     with h5netcdf.File(tmp_path / "out/result.nc", "r") as file:
@@ -161,7 +165,7 @@ def test_exact_loop_over_slide_encloses_loop_area(method, tmp_path):
     enclosed, output_area = (np.trapezoid(force[last], x[last]) for x in (slide, output))
     assert abs(enclosed - area["value"]) <= area["error"] + area["floor"]
     assert abs(output_area - area["value"]) > 10 * (area["error"] + area["floor"])
-    assert cli("export", tmp_path / "out", "-o", tmp_path / "a.uff", "--histories").code == 0
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.uff", "--histories").code == 0
     loops = [
         dataset
         for name, dataset in read_uff_functions(tmp_path / "a.uff").items()
@@ -176,7 +180,7 @@ def test_exact_uff_header_states_number_of_bytes(tmp_path):
     """The header of a universal file states the bytes of real and complex data, with and without abscissae."""
     x = np.arange(5.0)
     for k, (data, spacing, numbers) in enumerate(((x, 1, 5), (x + 1j, 1, 10), (x + 1j, 0, 15))):
-        write_sets(tmp_path / f"{k}.uff", [record(x, data, 12, abscissa_spacing=spacing)])
+        write_sets(tmp_path / f"{k}.uff", [make_record(x, data, 12, abscissa_spacing=spacing)])
         head = (tmp_path / f"{k}.uff").read_bytes().split(b"\n")[1]
         assert int(head[31:43]) == 8 * numbers
         assert np.array_equal(pyuff.UFF(str(tmp_path / f"{k}.uff")).read_sets()["data"], data)
@@ -196,7 +200,7 @@ def test_refuses_history_export_with_wrong_options(
 ):
     """Histories are not exported with options of fields or as an unsupported file type, and no file is written."""
     monkeypatch.chdir(tmp_path)
-    answer = cli("export", bench_folder, *arguments)
+    answer = run_cli("export", bench_folder, *arguments)
     assert answer.code == code and message in answer.err and "internal fault" not in answer.err
     assert not list(tmp_path.iterdir())
 
@@ -207,10 +211,10 @@ def test_refuses_folder_without_histories(tmp_path):
         ("none", "a.uff", 4, "no such results folder"),
         (".", "a.mat", 4, "neither"),
     ):
-        answer = cli("export", tmp_path / folder, "-o", tmp_path / out)
+        answer = run_cli("export", tmp_path / folder, "-o", tmp_path / out)
         assert answer.code == code and message in answer.err, answer.err
     (tmp_path / "result.nc").write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
-    assert "cannot be read as netCDF" in cli("export", tmp_path, "-o", tmp_path / "a.uff").err
+    assert "cannot be read as netCDF" in run_cli("export", tmp_path, "-o", tmp_path / "a.uff").err
 
 
 def test_refuses_non_finite_values_in_universal_file(tmp_path):
@@ -223,7 +227,7 @@ def test_refuses_non_finite_values_in_universal_file(tmp_path):
     )
     with pytest.raises(PatchfemError, match="force has values that are not finite"):
         write_histories(tmp_path / "a.uff", histories)
-    assert cli("export", tmp_path, "-o", tmp_path / "a.uff").code == 0
+    assert run_cli("export", tmp_path, "-o", tmp_path / "a.uff").code == 0
 
 
 def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path):
@@ -231,7 +235,7 @@ def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path)
 
     This holds after an import and with a column in millimetres.
     """
-    assert cli("export", bench_folder, "-o", tmp_path / "loop.csv", "--histories").code == 0
+    assert run_cli("export", bench_folder, "-o", tmp_path / "loop.csv", "--histories").code == 0
     text = (tmp_path / "loop.csv").read_text()
     measured = read_loop(tmp_path / "loop.csv")
     with h5netcdf.File(bench_folder / "result.nc", "r") as file:
@@ -242,7 +246,7 @@ def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path)
         measured.reading, force
     )
     assert measured.quantity == "force" and "normal_load" in measured.labels
-    assert cli("import", tmp_path / "loop.csv", "-o", tmp_path / "lab.csv").code == 0
+    assert run_cli("import", tmp_path / "loop.csv", "-o", tmp_path / "lab.csv").code == 0
     imported = read_loop(tmp_path / "lab.csv")
     assert np.array_equal(imported.displacement, measured.displacement) and np.array_equal(
         imported.reading, force

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.response import DecayCurve
@@ -71,7 +71,9 @@ def decay_folders(tmp_path_factory):
             (folder / f"{name}.toml").write_text(text + drive, "utf-8")
             folders[name] = folder / name
             assert (
-                cli("run", folder / f"{name}.toml", "-o", folders[name], "--no-page", *words).code
+                run_cli(
+                    "run", folder / f"{name}.toml", "-o", folders[name], "--no-page", *words
+                ).code
                 == 0
             )
         return folders[name]
@@ -102,8 +104,8 @@ def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, end
     sum.
     """
     folder = decay_folders(name)
-    assert cli("export", folder, "-o", tmp_path / f"run.{ending}", "--histories").code == 0
-    answer = cli("import", tmp_path / f"run.{ending}", "--decay", "-o", tmp_path / "decay.csv")
+    assert run_cli("export", folder, "-o", tmp_path / f"run.{ending}", "--histories").code == 0
+    answer = run_cli("import", tmp_path / f"run.{ending}", "--decay", "-o", tmp_path / "decay.csv")
     assert answer.code == 0, answer.err
     _, amplitude, frequency, frequency_error, damping, damping_error = read_decay_columns(
         tmp_path / "decay.csv"
@@ -144,13 +146,13 @@ def test_exact_decay_of_march_agrees_with_exact_method(tmp_path):
 
 def test_always_export_states_time_of_reduced_rows(decay_folders, tmp_path):
     """The export states up to which time the rows of a long run are only turning points."""
-    answer = cli("export", decay_folders("exact"), "-o", tmp_path / "whole.csv", "--histories")
+    answer = run_cli("export", decay_folders("exact"), "-o", tmp_path / "whole.csv", "--histories")
     assert "turning points" not in answer.out
     (tmp_path / "long.toml").write_text(
         (IWAN + RELEASED).replace("cycles = 40", "cycles = 1100"), "utf-8"
     )
-    assert cli("run", tmp_path / "long.toml", "-o", tmp_path / "long", "--no-page").code == 0
-    answer = cli("export", tmp_path / "long", "-o", tmp_path / "long.csv", "--histories")
+    assert run_cli("run", tmp_path / "long.toml", "-o", tmp_path / "long", "--no-page").code == 0
+    answer = run_cli("export", tmp_path / "long", "-o", tmp_path / "long.csv", "--histories")
     assert "before 10.9 s the rows are turning points" in answer.out
     assert "1000 cycles (drive.cycles)" in answer.out
 
@@ -172,7 +174,7 @@ def test_always_decay_import_reports_sparse_samples(tmp_path):
             comments="",
             header="time [s],output_displacement [m]",
         )
-        return cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
+        return run_cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
 
     answer = import_decay(time, value)
     assert answer.code == 0
@@ -197,7 +199,7 @@ def test_refuses_record_without_response(tmp_path):
     (tmp_path / "a.csv").write_text(
         "time [s],tip [mm],base_acceleration [g]\n0,0,1\n1,1,0\n", "utf-8"
     )
-    answer = cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
+    answer = run_cli("import", tmp_path / "a.csv", "--decay", "-o", tmp_path / "decay.csv")
     assert answer.code == 2
     assert "--map displacement=CHANNEL among 1 'time' [s], 2 'tip' [mm], 3 'base_" in answer.err
 
@@ -207,7 +209,7 @@ def test_exact_export_of_scene_ignores_its_sweep(tmp_path):
     text = read_template("damper")
     assert "[sweep]" in text
     (tmp_path / "damper.toml").write_text(text, "utf-8")
-    answer = cli("export", tmp_path / "damper.toml", "-o", tmp_path / "damper.npz")
+    answer = run_cli("export", tmp_path / "damper.toml", "-o", tmp_path / "damper.npz")
     assert answer.code == 0
     assert "[sweep] is left out: structure.interface[1].load as the scene gives it" in answer.err
     assert "in these coordinates x the output is output·x" in answer.out

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from chromium import Chromium, program
-from page_data import swept_key, swept_measure, swept_table
+from chromium import Chromium, find_chromium
+from page_data import make_sweep_key, make_sweep_measure, make_sweep_table
 
 
 @pytest.fixture
@@ -16,17 +16,17 @@ def sweep_table() -> dict:
     amplitude = 1e-5 * (1 + load / 10) * np.log10(tilt / 1e-7)
     amplitude[7] = np.nan
     texts = [f"{value * 1e3:g} mrad" for value in tilt]
-    return swept_table(
+    return make_sweep_table(
         [
-            swept_key("contact.tilt.angle", tilt, "rad", texts, log=True),
-            swept_key("normal.load", load, "N"),
+            make_sweep_key("contact.tilt.angle", tilt, "rad", texts, log=True),
+            make_sweep_key("normal.load", load, "N"),
         ],
         {
-            "relative_displacement_amplitude": swept_measure(
+            "relative_displacement_amplitude": make_sweep_measure(
                 amplitude, amplitude * 0.01, "m", means="half <i>peak-to-peak</i>"
             ),
-            "contact_fraction": swept_measure(np.full(12, 0.5)),
-            "loop_area": swept_measure(np.full(12, np.nan), unit="J"),
+            "contact_fraction": make_sweep_measure(np.full(12, 0.5)),
+            "loop_area": make_sweep_measure(np.full(12, np.nan), unit="J"),
         },
         title="Tilt </script><b>&amp;",
         version="1.2.3",
@@ -42,7 +42,7 @@ def sweep_table() -> dict:
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory):
     """Return the browser that all tests of a process share; without a browser they are skipped."""
-    if program() is None:
+    if find_chromium() is None:
         pytest.skip("no Chromium here")
     browser = Chromium(tmp_path_factory.mktemp("chromium"))
     yield browser
@@ -52,4 +52,4 @@ def chromium(tmp_path_factory):
 @pytest.fixture
 def load_page(chromium):
     """Return a function from a page to its document after 6 s of the page's clock."""
-    return lambda page: chromium.after(page, 6000)
+    return lambda page: chromium.html_after(page, 6000)

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from command_line import cli
-from page_data import swept_key, swept_measure, swept_table
+from command_line import run_cli
+from page_data import make_sweep_key, make_sweep_measure, make_sweep_table
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps.ranking import SobolIndex
@@ -23,7 +23,7 @@ AMPLITUDE = "relative_displacement_amplitude"
 
 def make_key(name, values, texts=None):
     """Return a swept key with its values in hertz."""
-    return swept_key(name, values, "Hz", texts or [f"{value:.12g} Hz" for value in values])
+    return make_sweep_key(name, values, "Hz", texts or [f"{value:.12g} Hz" for value in values])
 
 
 def resonance_amplitude(x, centre, damping):
@@ -109,7 +109,7 @@ def random_sweep(tmp_path_factory):
     """Return the results folder of a sweep of 64 random cases and the answer of the command."""
     folder = tmp_path_factory.mktemp("drawn")
     (folder / "rig.toml").write_text(RIG, encoding="utf-8")
-    answer = cli(
+    answer = run_cli(
         "sweep",
         folder / "rig.toml",
         "--over",
@@ -170,7 +170,7 @@ def test_exact_quantiles_include_cases_that_miss_tolerance():
     Without the 12 smallest of 40 values the 5 % quantile was 2.3 times as large.
     """
     values = np.append(np.arange(1.0, 41), np.nan)
-    loop = swept_measure(values, np.where(values < 13, 0.5 * values, 0.0), "J")
+    loop = make_sweep_measure(values, np.where(values < 13, 0.5 * values, 0.0), "J")
     outcome = ["steady"] * 40 + ["failed"]
     table = random_table([make_key("normal.load", values)], {"loop_area": loop}, outcome=outcome)
     quantiles = ranked.measure_quantiles(table, {"loop_area": np.append(values[:-1] > 12, True)})
@@ -228,7 +228,7 @@ def find_amplitude_peaks(keys: list, values):
 
 def random_table(keys, measures, **more):
     """Return the table of a sweep of random cases."""
-    return swept_table(keys, measures, grid=False, drawn=True, **more)
+    return make_sweep_table(keys, measures, grid=False, drawn=True, **more)
 
 
 def test_exact_answer_of_random_sweep_names_requested_maximum():
@@ -239,8 +239,8 @@ def test_exact_answer_of_random_sweep_names_requested_maximum():
     mu = np.random.default_rng(1).permutation(np.append(np.linspace(0.1, 0.6, 60), 0.475))
     damping = 30 - 400 * (mu - 0.475) ** 2
     columns = {
-        "equivalent_damping": swept_measure(damping),
-        AMPLITUDE: swept_measure(1 - mu / 4, unit="m"),
+        "equivalent_damping": make_sweep_measure(damping),
+        AMPLITUDE: make_sweep_measure(1 - mu / 4, unit="m"),
     }
     table = random_table(
         [make_key("friction.static", mu, [f"{value:.6g}" for value in mu])],
@@ -257,13 +257,13 @@ def test_exact_answer_of_random_sweep_names_requested_maximum():
         f"equivalent damping ratio from {low:.3g} to {high:.3g}, "
     )
     for slope, trend in ((1, "grows with"), (-1, "falls with growing")):
-        columns["equivalent_damping"] = swept_measure(2 + slope * mu)
+        columns["equivalent_damping"] = make_sweep_measure(2 + slope * mu)
         assert (
             summarise_sweep(table)
             .answer()
             .startswith(f"Equivalent damping ratio {trend} friction.static; 90 % of")
         )
-    columns["equivalent_damping"] = swept_measure(np.abs(mu - 0.3) + 1)
+    columns["equivalent_damping"] = make_sweep_measure(np.abs(mu - 0.3) + 1)
     assert "is least, 1" in summarise_sweep(table).answer()
 
 
@@ -284,9 +284,9 @@ def test_exact_trend_of_strongest_key():
         (b - 4 * a, "Loop area falls with growing a.a."),
         (noise, ""),
     ):
-        table = random_table(keys, {"loop_area": swept_measure(values, unit="J")})
+        table = random_table(keys, {"loop_area": make_sweep_measure(values, unit="J")})
         assert ranked.describe_trend(table, indices, settled) == sentence
-    table = random_table(keys, {"loop_area": swept_measure(b - 9 * (a - 0.5) ** 2, unit="J")})
+    table = random_table(keys, {"loop_area": make_sweep_measure(b - 9 * (a - 0.5) ** 2, unit="J")})
     low, high = map(
         float,
         ranked.describe_trend(table, indices, settled)
@@ -307,7 +307,7 @@ def test_exact_too_few_steady_cases_give_no_ranking():
     values = np.append(np.full(32, np.nan), rng.random(32))
     table = random_table(
         keys,
-        {AMPLITUDE: swept_measure(values, unit="m")},
+        {AMPLITUDE: make_sweep_measure(values, unit="m")},
         outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"],
     )
     summary = summarise_sweep(table)
@@ -339,10 +339,10 @@ def test_exact_maxima_at_range_ends_are_counted():
     frequency = np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
     columns = ((AMPLITUDE, "m", height), ("peak_frequency", "Hz", frequency))
     measures = {
-        name: swept_measure(values, 1e-9 * values, unit, floors=np.zeros(5))
+        name: make_sweep_measure(values, 1e-9 * values, unit, floors=np.zeros(5))
         for name, unit, values in columns
     }
-    table = swept_table([swept_key("normal.load", [1, 2, 3, 4, 5], "N")], measures)
+    table = make_sweep_table([make_sweep_key("normal.load", [1, 2, 3, 4, 5], "N")], measures)
     sentence = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
     for ends in ((300.0, 372.0), (np.full(5, 372.0), np.full(5, 300.0))):
         assert sentence in summarise_sweep(table | {"ends": ends}).answer()
@@ -354,7 +354,7 @@ def test_exact_swept_frequency_range_is_stored(tmp_path):
     """The answer counts a maximum at 372 Hz, the end of the sweep, also after the results are read again."""
     scene = tmp_path / "damper.toml"
     scene.write_text(read_template("damper"), "utf-8")
-    answer = cli(
+    answer = run_cli(
         "sweep",
         scene,
         "--set",
@@ -375,7 +375,7 @@ def test_exact_warning_states_drive_limit_of_friction(tmp_path):
     scene.write_text(read_template("rig"), "utf-8")
     arguments = ("--set", "drive.acceleration=6 g", "--no-page", "-o", tmp_path / "run")
     warning = "6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude"
-    assert warning in cli("run", scene, *arguments).out
+    assert warning in run_cli("run", scene, *arguments).out
 
 
 @pytest.mark.parametrize(
@@ -383,9 +383,11 @@ def test_exact_warning_states_drive_limit_of_friction(tmp_path):
 )
 def test_exact_transient_cases_are_counted_in_answer(values, is_counted):
     """The answer counts cases that are not steady if their amplitudes exceed those of the steady cases."""
-    measures = {AMPLITUDE: swept_measure(values, unit="m")}
+    measures = {AMPLITUDE: make_sweep_measure(values, unit="m")}
     outcome = ["transient", "steady"] * 2
-    table = swept_table([swept_key("normal.load", [1, 2, 3, 4], "N")], measures, outcome=outcome)
+    table = make_sweep_table(
+        [make_sweep_key("normal.load", [1, 2, 3, 4], "N")], measures, outcome=outcome
+    )
     start = "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; "
     answer = summarise_sweep(table).answer()
     assert answer.startswith(start) == ("did not settle" in answer) == is_counted
@@ -416,7 +418,7 @@ def test_exact_scatter_is_unknown_with_many_transient_cases():
     keys = [make_key(name, rng.random(100)) for name in ("a.a", "b.b")]
     transient = np.arange(100) % 3 == 0
     values = 1e-6 * (1 + rng.random(100)) * np.where(transient, 1e3, 1)
-    table = random_table(keys, {AMPLITUDE: swept_measure(values, unit="m")})
+    table = random_table(keys, {AMPLITUDE: make_sweep_measure(values, unit="m")})
 
     def scatter_section(table) -> str:
         """Return the section of the page about the scatter."""
@@ -485,7 +487,7 @@ def test_always_stuck_case_has_no_peak_frequency(tmp_path):
         "drive.rate=1 Hz/s",
         "accuracy.method=harmonic",
     ]
-    cli(
+    run_cli(
         "sweep",
         scene,
         *(word for setting in settings for word in ("--set", setting)),
@@ -499,7 +501,7 @@ def test_always_stuck_case_has_no_peak_frequency(tmp_path):
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
     cases = text[text.index("id=cases") :] if "id=cases" in text else text[text.index(">Cases<") :]
     assert "peak frequency [Hz]" in cases[: cases.index("</table>")].replace("</a>", "")
-    output = cli(
+    output = run_cli(
         "run",
         scene,
         *(word for setting in settings for word in ("--set", setting)),

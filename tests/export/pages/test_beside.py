@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from page_data import charts_of, data_of
+from page_data import read_charts, read_page_data
 
 import patchfem as pf
 from patchfem.core import Measure, PatchfemError
@@ -84,7 +84,7 @@ def test_exact_page_compares_two_runs(tmp_path):
     rows = re.search(r'<section id="scenes">.*?<tbody>(.*?)</tbody>', text, re.S)[1]
     assert re.findall(r"<tr><td>(.*?)</td>", rows) == ["normal.load"]
     assert "<b class=v>1.0000 ± 0.0010 um</b> <span class=v>(-50.00%)</span>" in text
-    history = charts_of(text)["Displacement", "displacement"]
+    history = read_charts(text)["Displacement", "displacement"]
     assert history["x"]["unit"] == "ms" and history["y"]["unit"] == "um"
     assert [mark["name"] for mark in history["marks"]] == ["light", "<b>heavy"]
     for mark, size in zip(history["marks"], (2.0, 1.0)):
@@ -157,7 +157,7 @@ def test_always_levels_of_different_units_have_separate_charts(tmp_path):
         pf.run(scene).save(tmp_path / f"run{number}")
         runs.append(read_run(tmp_path / f"run{number}"))
     html = page_html(runs)
-    charts = data_of(html)["charts"]
+    charts = read_page_data(html)["charts"]
     assert len({chart["anchor"] for chart in charts}) == len(charts)
     onset = re.search(r"<tr>(?:(?!</tr>).)*onset level.*?</tr>", html, re.S)[0]
     assert onset.count(" N</span>") == 2 and "%" not in onset and "&times;" not in onset

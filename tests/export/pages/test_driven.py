@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from page_data import charts_of
+from page_data import read_charts
 
 import patchfem as pf
 from patchfem.export.pages.driven import describe_drive, run_command
@@ -118,7 +118,7 @@ def test_exact_page_shows_measured_force_of_recorded_slide(tmp_path, column, fac
     (tmp_path / "a.toml").write_text(BENCH + '[slide]\nkind = "file"\nfile = "loop.csv"', "utf-8")
     pf.run(tmp_path / "a.toml").save(tmp_path / "out")
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    chart_marks = {name: one["marks"] for (name, _), one in charts_of(text).items()}
+    chart_marks = {name: one["marks"] for (name, _), one in read_charts(text).items()}
     title = next(
         name for name in chart_marks if name.startswith("Friction loop") or "against" in name
     )

@@ -6,7 +6,7 @@ from math import log
 
 import numpy as np
 import pytest
-from page_data import own_part, swept_key, swept_measure, swept_table
+from page_data import make_sweep_key, make_sweep_measure, make_sweep_table, strip_scripts
 from scipy.optimize import brentq
 
 from patchfem.export import summarise_sweep
@@ -21,7 +21,7 @@ LINE = 1 + 0.25 * (TILT - 0.05)
 def make_key(values=TILT, name="contact.tilt.angle", unit="mrad", **more) -> dict:
     """Return a key whose values are written in mrad, or in another unit of 1/1000 of its own."""
     texts = [f"{value:g} {unit}" for value in values]
-    return swept_key(name, np.array(values) * 1e-3, "rad", texts, **more)
+    return make_sweep_key(name, np.array(values) * 1e-3, "rad", texts, **more)
 
 
 def tilt_limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, **more):
@@ -243,7 +243,7 @@ def test_exact_limit_is_smallest_over_lines():
     The measure 1 + s (t - 0.05) has limits of 0.25 and 0.15 mrad for slopes s of 0.25 and 0.5.
     """
     tilt, slope = (grid.ravel() for grid in np.meshgrid(TILT, [0.25, 0.5], indexing="ij"))
-    keys = [make_key(tilt), swept_key("normal.load", slope, "N")]
+    keys = [make_key(tilt), make_sweep_key("normal.load", slope, "N")]
     values = 1 + slope * (tilt - 0.05)
     trusted = {"loop_area": np.ones(10, bool)}
     (limit,) = find_limits(keys, {"loop_area": (values, 0 * values)}, trusted).found
@@ -262,15 +262,15 @@ def make_tilt_sweep() -> dict:
         "contact_fraction": ("1", np.ones(5), 0.0),
     }
     measures = {
-        name: swept_measure(values, errors, unit)
+        name: make_sweep_measure(values, errors, unit)
         for name, (unit, values, errors) in columns.items()
     }
-    return swept_table([make_key()], measures, patch={"length": 12.7e-3})
+    return make_sweep_table([make_key()], measures, patch={"length": 12.7e-3})
 
 
 def test_exact_page_and_summary_state_limits():
     """The page and sweep.json state the same limits, which agree with the closed forms: 0.46, 0.15 and 0.5475 mrad."""
-    text = own_part(page_html(make_tilt_sweep()))
+    text = strip_scripts(page_html(make_tilt_sweep()))
     summary = sweep_summary(summarise_sweep(make_tilt_sweep()), make_tilt_sweep()["outcome"])
     expected = (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) "
@@ -314,7 +314,7 @@ def test_exact_page_and_summary_state_limits():
 def test_always_sweep_over_words_has_no_limit():
     """A key with words as values, such as the friction law, has no limit."""
     table = make_tilt_sweep() | {
-        "keys": [swept_key("friction.law", TILT, texts=list("abcde"), words=True)]
+        "keys": [make_sweep_key("friction.law", TILT, texts=list("abcde"), words=True)]
     }
     summary = sweep_summary(summarise_sweep(table), table["outcome"])
     assert summary["limits"] == []
@@ -381,11 +381,11 @@ def test_exact_sentence_has_single_unit():
     tilt = np.geomspace(1e-3, 1, 7)
     texts = [f"{1e3 * value!r} urad" for value in tilt.tolist()]
     measures = {
-        "loop_area": swept_measure(1 - 0.1 * tilt**0.4),
-        "normal_stiffness": swept_measure(1 - np.minimum(1e3 * tilt / 300, 0.9)),
-        "moment": swept_measure(np.ones(7), np.array([0, 0, 0, 0, 0, 0.4, 0.2])),
+        "loop_area": make_sweep_measure(1 - 0.1 * tilt**0.4),
+        "normal_stiffness": make_sweep_measure(1 - np.minimum(1e3 * tilt / 300, 0.9)),
+        "moment": make_sweep_measure(np.ones(7), np.array([0, 0, 0, 0, 0, 0.4, 0.2])),
     }
-    table = swept_table([make_key(tilt, log=True) | {"texts": texts}], measures)
+    table = make_sweep_table([make_key(tilt, log=True) | {"texts": texts}], measures)
     sentences = summarise_sweep(table | {"patch": {"length": 12.7e-3}}).sentences()
     assert "0.316228 mrad, is 40 %" in sentences[0]
     assert all(("mrad" in text) + ("urad" in text) < 2 for text in sentences)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from page_data import swept_key, swept_table
+from page_data import make_sweep_key, make_sweep_table
 from scene_texts import PIECE
 
 import patchfem as pf
@@ -152,8 +152,8 @@ def test_exact_sentence_states_floor_if_decisive():
         "All 2 cases meet the tolerance of 0.1 % or the floor of their "
         "measure, such as 0.1 nJ of loop area."
     )
-    keys = [swept_key("slide.amplitude", [1e-7, 1e-6], "m", ["0.1 um", "1 um"], log=True)]
-    table = swept_table(keys, {"loop_area": loop | {"means": ""}}, outcome=["done"] * 2)
+    keys = [make_sweep_key("slide.amplitude", [1e-7, 1e-6], "m", ["0.1 um", "1 um"], log=True)]
+    table = make_sweep_table(keys, {"loop_area": loop | {"means": ""}}, outcome=["done"] * 2)
     table["tolerance"] = 1e-3
     assert summarise_sweep(table).said.span == (
         "Loop area ranges from 0.16 nJ (slide.amplitude 0.1 um) to 1 mJ (slide.amplitude 1 um), with errors of at most "

@@ -13,6 +13,6 @@ def test_always_narrow_page_breaks_no_word(chromium, tmp_path, width):
     """
     pf.run(pf.new("patch")).save(tmp_path)
     page = chromium.visit(tmp_path / "report.html", width)
-    page.settled()
+    page.wait_for_charts()
     assert page.broken_words() == [] and page.faults == []
-    assert page.js("document.documentElement.scrollWidth") <= width
+    assert page.evaluate("document.documentElement.scrollWidth") <= width

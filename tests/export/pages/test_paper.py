@@ -56,22 +56,22 @@ def printed_chart_pixels(chromium: Chromium, text: str, dark: bool) -> np.ndarra
     """Return the pixels of the first chart in the print style, after the page was drawn in one theme."""
     import matplotlib.image
 
-    page = chromium.opened(text, dark=dark)
+    page = chromium.open_html(text, dark=dark)
     assert not page.faults, page.faults
-    assert page.js("document.documentElement.dataset.drawn") == ("dark" if dark else "light")
-    page.themed(dark, "print")
-    page.js("new Promise(done => setTimeout(done, 200))")
-    page.js(
+    assert page.evaluate("document.documentElement.dataset.drawn") == ("dark" if dark else "light")
+    page.set_theme(dark, "print")
+    page.evaluate("new Promise(done => setTimeout(done, 200))")
+    page.evaluate(
         "[...document.querySelectorAll('.chart')].find(one => one.offsetWidth).scrollIntoView()"
     )
     left, top, width, height = (
         round(number)
-        for number in page.js(
+        for number in page.evaluate(
             "(({x, y, width, height}) => [x, y, width, height])([...document.querySelectorAll('.chart')]"
             ".find(one => one.offsetWidth).getBoundingClientRect())"
         )
     )
-    image = matplotlib.image.imread(io.BytesIO(page.picture()))[..., :3]
+    image = matplotlib.image.imread(io.BytesIO(page.take_screenshot()))[..., :3]
     return image[max(top, 0) : top + height, left : left + width]
 
 
@@ -107,28 +107,32 @@ def test_exact_static_figure_follows_page_theme(chromium, dark, ink):
     assert not re.search("|".join(PAGE_COLOURS), text[text.index("<svg") :]) and set(
         pictures.COLOURS.values()
     ) < set(PAGE_COLOURS)
-    page = chromium.opened(text, dark=dark)
-    assert page.js("getComputedStyle(document.querySelector('figure text')).fill") == ink
-    assert page.js("getComputedStyle(document.body).color") == ink
+    page = chromium.open_html(text, dark=dark)
+    assert page.evaluate("getComputedStyle(document.querySelector('figure text')).fill") == ink
+    assert page.evaluate("getComputedStyle(document.body).color") == ink
 
 
 def test_always_dark_page_is_printed_light(chromium):
     """A page in the dark theme is printed in dark on white, and the screen stays dark afterwards."""
-    page = chromium.opened(stress_page(), dark=True)
+    page = chromium.open_html(stress_page(), dark=True)
     styles = (
         "[...document.querySelectorAll('.chart')].map(one => getComputedStyle(one).display + ' ' + "
         "getComputedStyle(one).visibility + ' ' + getComputedStyle(one).filter)"
     )
-    assert page.js(styles) == ["block visible none", "block hidden none", "block visible none"]
-    assert page.js("document.documentElement.scrollWidth") <= 1200
-    page.themed(True, "print")
-    assert page.js(styles) == [
+    assert page.evaluate(styles) == [
+        "block visible none",
+        "block hidden none",
+        "block visible none",
+    ]
+    assert page.evaluate("document.documentElement.scrollWidth") <= 1200
+    page.set_theme(True, "print")
+    assert page.evaluate(styles) == [
         "none visible invert(1) hue-rotate(180deg)",
         "block visible none",
         "block visible invert(1) hue-rotate(180deg)",
     ]
-    assert page.js("getComputedStyle(document.body).color") == "rgb(28, 36, 48)"
-    page.themed(False)
-    page.js("new Promise(done => setTimeout(done, 300))")
-    assert page.js("document.querySelectorAll('.onpaper').length") == 0
-    assert page.printed().startswith(b"%PDF")
+    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(28, 36, 48)"
+    page.set_theme(False)
+    page.evaluate("new Promise(done => setTimeout(done, 300))")
+    assert page.evaluate("document.querySelectorAll('.onpaper').length") == 0
+    assert page.print_pdf().startswith(b"%PDF")

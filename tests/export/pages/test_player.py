@@ -7,9 +7,9 @@ from time import monotonic
 import h5netcdf
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from exported import CROWNED
-from page_data import data_of
+from page_data import read_page_data
 
 from patchfem.export import report
 from patchfem.export.drawing.panels import make_panels, quadrilateral_areas
@@ -109,7 +109,7 @@ def coarse_folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("coarse")
     (folder / "bench.toml").write_text(CROWNED, "utf-8")
     size = "contact.element_size=0.8 mm"
-    answer = cli(
+    answer = run_cli(
         "run", folder / "bench.toml", "--set", size, "-o", folder / "out", "-q", "--no-page"
     )
     assert answer.code == 0, answer.err
@@ -196,13 +196,13 @@ def player_page(bench_folder, player_data, chromium):
             PressedPatch(x, fields=fields, film=player_data),
         )
     )
-    assert len(text.encode()) < 3e6 and data_of(text)["player"]["of"] == player_data["of"]
-    return chromium.opened(text)
+    assert len(text.encode()) < 3e6 and read_page_data(text)["player"]["of"] == player_data["of"]
+    return chromium.open_html(text)
 
 
 def frame_caption(page) -> str:
     """Return the caption of the present frame of the player."""
-    return page.js("document.getElementById('stage-told').textContent")
+    return page.evaluate("document.getElementById('stage-told').textContent")
 
 
 def test_exact_controls_change_player_frame(player_page, player_data):
@@ -213,41 +213,43 @@ def test_exact_controls_change_player_frame(player_page, player_data):
     )
     pictures = {}
     for number in (0, count // 2, count - 1):
-        player_page.js(
+        player_page.evaluate(
             f"(at => {{ at.value = {number}; at.dispatchEvent(new Event('input')); }})"
             "(document.getElementById('play-frame'))"
         )
         assert frame_caption(player_page).startswith(
             f"Frame {number + 1} of {count}, {player_data['times'][number]:.7g} s"
         )
-        pictures[player_page.js("document.getElementById('stage-pieces').toDataURL()")] = number
+        pictures[player_page.evaluate("document.getElementById('stage-pieces').toDataURL()")] = (
+            number
+        )
     assert len(pictures) == 3  # the three frames have different pictures
-    player_page.js("document.getElementById('stage').focus()")
+    player_page.evaluate("document.getElementById('stage').focus()")
     for key, number in (("ArrowLeft", count - 1), ("Home", 1), ("ArrowRight", 2), ("End", count)):
-        player_page.pressed(key)
+        player_page.press_key(key)
         assert frame_caption(player_page).startswith(f"Frame {number} of")
-    player_page.pressed(" ")
-    assert player_page.js("document.getElementById('play-run').textContent") == "pause"
-    assert player_page.js(
+    player_page.press_key(" ")
+    assert player_page.evaluate("document.getElementById('play-run').textContent") == "pause"
+    assert player_page.evaluate(
         "new Promise(done => setTimeout(() => done(document.getElementById('play-frame').value), 700))"
     ) != str(count - 1)
-    player_page.js("document.getElementById('play-run').click()")
-    assert player_page.js("document.getElementById('play-run').textContent") == "play"
+    player_page.evaluate("document.getElementById('play-run').click()")
+    assert player_page.evaluate("document.getElementById('play-run').textContent") == "play"
 
 
 def test_exact_pointer_shows_values_of_player(player_page, player_data):
     """At the pointer the page shows the pressure of the curve, and the von Mises stress of the piece."""
-    player_page.js(
+    player_page.evaluate(
         "document.getElementById('play-frame').value = 0;"
         "document.getElementById('play-frame').dispatchEvent(new Event('input'));"
         "document.getElementById('stage').scrollIntoView()"
     )
-    left, top, width, height = player_page.js(
+    left, top, width, height = player_page.evaluate(
         "(({x, y, width, height}) => [x, y, width, height])"
         "(document.getElementById('stage-curve').getBoundingClientRect())"
     )
-    player_page.pointed(left + width / 2, top + height / 2)
-    tip = player_page.js("document.getElementById('stage-tip').textContent")
+    player_page.send_pointer(left + width / 2, top + height / 2)
+    tip = player_page.evaluate("document.getElementById('stage-tip').textContent")
     position, value = (
         float(part.split()[1 if at == 0 else 0])
         for at, part in enumerate((tip.split(":")[0], tip.split(": pressure ")[1]))
@@ -255,14 +257,16 @@ def test_exact_pointer_shows_values_of_player(player_page, player_data):
     x = unpack_array(player_data["x"])
     sigma = unpack_array(player_data["curves"][0]["values"])[0]
     assert value == pytest.approx(sigma[np.argmin(np.abs(x - position))], rel=1e-3)
-    left, top, width, height = player_page.js(
+    left, top, width, height = player_page.evaluate(
         "(({x, y, width, height}) => [x, y, width, height])"
         "(document.getElementById('stage-pieces').getBoundingClientRect())"
     )
     for fraction, side in ((0.25, "upper"), (0.75, "lower")):
-        player_page.pointed(left + 0.45 * width, top + fraction * height)
-        assert f"{side} piece" in player_page.js("document.getElementById('stage-tip').textContent")
-        assert "von Mises stress" in player_page.js(
+        player_page.send_pointer(left + 0.45 * width, top + fraction * height)
+        assert f"{side} piece" in player_page.evaluate(
+            "document.getElementById('stage-tip').textContent"
+        )
+        assert "von Mises stress" in player_page.evaluate(
             "document.getElementById('stage-tip').textContent"
         )
 
@@ -280,7 +284,7 @@ def test_exact_player_follows_theme_print_and_width(player_page):
     def colours_on_screen() -> tuple:
         """Return the colour of the text and the mean grey level of the canvas of the curve."""
         return tuple(
-            player_page.js("""new Promise(done => setTimeout(() => {
+            player_page.evaluate("""new Promise(done => setTimeout(() => {
             const at = document.getElementById('stage-curve'), all = at.getContext('2d').getImageData(0, 0, at.width,
                 at.height).data;
             let sum = 0, weight = 0;
@@ -289,12 +293,12 @@ def test_exact_player_follows_theme_print_and_width(player_page):
             done([getComputedStyle(document.getElementById('stage-told')).color, sum / weight]); }, 100))""")
         )
 
-    player_page.themed(False, "")
+    player_page.set_theme(False, "")
     light = poll(
         colours_on_screen,
         lambda found: found[0] == "rgb(28, 36, 48)" and found == colours_on_screen(),
     )
-    player_page.themed(True, "")
+    player_page.set_theme(True, "")
     dark = poll(
         colours_on_screen,
         lambda found: found[0] == "rgb(228, 233, 239)" and found[1] > light[1] + 20,
@@ -303,51 +307,55 @@ def test_exact_player_follows_theme_print_and_width(player_page):
     assert dark[0] == "rgb(228, 233, 239)"
     assert dark[1] > light[1] + 20
     theme_drawn = "document.documentElement.dataset.drawn"
-    assert poll(lambda: player_page.js(theme_drawn), "dark".__eq__) == "dark"
-    player_page.themed(True, "print")  # paper has dark text on white in any theme of the reader
+    assert poll(lambda: player_page.evaluate(theme_drawn), "dark".__eq__) == "dark"
+    player_page.set_theme(True, "print")  # paper has dark text on white in any theme of the reader
     paper = poll(
         colours_on_screen, lambda found: found[0] == light[0] and abs(found[1] - light[1]) < 10
     )
-    assert player_page.js(theme_drawn) == "dark"
-    assert "invert" in player_page.js("getComputedStyle(document.querySelector('.chart')).filter")
+    assert player_page.evaluate(theme_drawn) == "dark"
+    assert "invert" in player_page.evaluate(
+        "getComputedStyle(document.querySelector('.chart')).filter"
+    )
     assert paper[0] == light[0] and abs(paper[1] - light[1]) < 10, (light, dark, paper)
-    assert player_page.printed().startswith(b"%PDF")
-    player_page.themed(False, "")
+    assert player_page.print_pdf().startswith(b"%PDF")
+    player_page.set_theme(False, "")
     assert poll(colours_on_screen, lambda found: found == light) == light
-    assert player_page.js("getComputedStyle(document.querySelector('.chart')).filter") == "none"
-    player_page.sized(420, 900)
+    assert (
+        player_page.evaluate("getComputedStyle(document.querySelector('.chart')).filter") == "none"
+    )
+    player_page.set_size(420, 900)
     try:
         read_width = (
             "new Promise(done => setTimeout(() => done(document.documentElement.scrollWidth), 100))"
         )
-        assert poll(lambda: player_page.js(read_width), lambda found: found <= 420) <= 420
+        assert poll(lambda: player_page.evaluate(read_width), lambda found: found <= 420) <= 420
     finally:
-        player_page.sized(1200, 900)
+        player_page.set_size(1200, 900)
 
 
 def test_always_markup_in_title_or_scene_is_escaped(player_page):
     """HTML markup in a title or a scene is shown as text and not executed."""
     assert (
-        not player_page.js("window.hacked")
-        and player_page.js("document.getElementById('evil')") is None
+        not player_page.evaluate("window.hacked")
+        and player_page.evaluate("document.getElementById('evil')") is None
     )
-    assert player_page.js("document.querySelector('h1').textContent").startswith(
+    assert player_page.evaluate("document.querySelector('h1').textContent").startswith(
         "<img src=x onerror="
     )
 
 
 def test_exact_view_writes_page_with_player(bench_folder, player_data, tmp_path, chromium):
     """The command `view` writes a page that contains only the player."""
-    answer = cli("view", bench_folder, "-o", tmp_path / "a.html")
+    answer = run_cli("view", bench_folder, "-o", tmp_path / "a.html")
     assert answer.code == 0 and answer.out.endswith(
         f"a.html: {len(player_data['times'])} frames\n"
     ), answer.err
-    page = chromium.opened((tmp_path / "a.html").read_text("utf-8"))
+    page = chromium.open_html((tmp_path / "a.html").read_text("utf-8"))
     assert (
         page.faults == []
-        and page.js("document.querySelector('h1').textContent") == bench_folder.name
+        and page.evaluate("document.querySelector('h1').textContent") == bench_folder.name
     )
-    assert page.js("document.getElementById('play-frame').max") == str(
+    assert page.evaluate("document.getElementById('play-frame').max") == str(
         len(player_data["times"]) - 1
     )
     assert frame_caption(page).startswith(f"Frame {player_data['first'] + 1} of ")

@@ -5,7 +5,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 
 import patchfem as pf
 from patchfem.export import describe_release, draw_charts, headline_sentence
@@ -54,7 +54,7 @@ def test_exact_headline_of_coulomb_oscillator_agrees_with_closed_form(tmp_path):
         flags=re.S,
     )
     scene.write_text(re.sub(r"damping = \S+", "damping = 0", text), "utf-8")
-    answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
+    answer = run_cli("run", scene, "-o", tmp_path / "out", "--no-page")
     headline = next(line for line in answer.out.splitlines() if line.startswith("Released at "))
     match = re.match(
         r"Released at 500 um, the output first swings to -(\S+) um, reverses (\d+) times and comes to "

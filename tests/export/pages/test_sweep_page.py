@@ -6,7 +6,14 @@ import re
 import numpy as np
 import pytest
 from chromium import LATER
-from page_data import data_of, own_part, swept_key, swept_measure, swept_table, unheard
+from page_data import (
+    find_accessibility_errors,
+    make_sweep_key,
+    make_sweep_measure,
+    make_sweep_table,
+    read_page_data,
+    strip_scripts,
+)
 
 from patchfem.export import shorten_number
 from patchfem.export.pages import library
@@ -22,7 +29,7 @@ AMPLITUDE = "relative_displacement_amplitude"
 
 def test_exact_page_has_numbers_in_input_units(sweep_table):
     """The page holds keys in the units of the input and measures in customary units, with their errors."""
-    data = data_of(page_html(sweep_table))
+    data = read_page_data(page_html(sweep_table))
     assert data["keys"][0]["unit"] == "mrad" and data["keys"][1]["unit"] == "N"
     np.testing.assert_allclose(
         data["keys"][0]["values"], sweep_table["keys"][0]["values"] * 1e3, rtol=1e-9
@@ -45,7 +52,7 @@ def test_exact_page_has_numbers_in_input_units(sweep_table):
 
 def test_exact_key_of_words_has_table_of_words(sweep_table):
     """A key with words as values holds the word of each of its numbers; other keys hold none."""
-    assert [key["words"] for key in data_of(page_html(sweep_table))["keys"]] == [None, None]
+    assert [key["words"] for key in read_page_data(page_html(sweep_table))["keys"]] == [None, None]
     sweep_table["keys"][0] |= {
         "name": "friction.law",
         "values": np.arange(12) % 3.0,
@@ -53,7 +60,7 @@ def test_exact_key_of_words_has_table_of_words(sweep_table):
         "log": False,
         "texts": [["coulomb", "iwan", "tanh"][case % 3] for case in range(12)],
     }
-    law, load = data_of(page_html(sweep_table))["keys"]
+    law, load = read_page_data(page_html(sweep_table))["keys"]
     assert law["words"] == [[0.0, "coulomb"], [1.0, "iwan"], [2.0, "tanh"]]
     assert load["words"] is None
 
@@ -62,15 +69,15 @@ def test_always_page_is_small_and_self_contained(sweep_table):
     """The page is one file below 3 MB that loads no other file and links only files of its folder."""
     text = page_html(sweep_table)
     assert len(text.encode()) < 3e6
-    targets = re.findall(r"(?:src|href)=[\"']?([^\"' >]+)", own_part(text))
+    targets = re.findall(r"(?:src|href)=[\"']?([^\"' >]+)", strip_scripts(text))
     assert targets and all(re.match(r"#|sweep\.|cases/", target) for target in targets)
-    assert not re.search(r"@import|url\(", own_part(text))
+    assert not re.search(r"@import|url\(", strip_scripts(text))
 
 
 def test_always_foreign_texts_are_escaped(sweep_table):
     """Titles, scenes, meanings and messages with HTML markup are escaped on the page."""
     page = page_html(sweep_table)
-    text = own_part(page)
+    text = strip_scripts(page)
     assert "Tilt &lt;/script&gt;&lt;b&gt;&amp;amp;" in text
     for markup in ("<b>&amp;", "<i>a scene", "<i>peak", "<refused>"):
         assert markup not in text
@@ -99,7 +106,7 @@ def test_exact_case_shows_value_with_error(sweep_table, value, error, text):
 
 def test_exact_page_names_scene_below_keys(sweep_table):
     """The page names the scene and the version below the swept keys."""
-    text = own_part(page_html(sweep_table | {"of": "<a> rig tilted by 0.1 mrad"}))
+    text = strip_scripts(page_html(sweep_table | {"of": "<a> rig tilted by 0.1 mrad"}))
     # the page states no computing time, because that of all processes is neither wall nor CPU time
     assert "patchfem 1.2.3</p>" in text
     assert "<p class=soft>Scene: &lt;a&gt; rig tilted by 0.1 mrad &middot; patchfem " in text
@@ -108,7 +115,7 @@ def test_exact_page_names_scene_below_keys(sweep_table):
 def test_always_page_lists_outcomes_and_failed_cases(sweep_table):
     """The page counts the outcomes and states the message of a failed case; measures without values are left out."""
     text = page_html(sweep_table)
-    assert "loop_area" not in [measure["name"] for measure in data_of(text)["measures"]]
+    assert "loop_area" not in [measure["name"] for measure in read_page_data(text)["measures"]]
     assert (
         "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows."
         in text
@@ -134,11 +141,11 @@ def test_always_page_of_many_cases_keeps_extremes():
     n_cases = 200_000
     random = np.random.default_rng(3)
     keys = [
-        swept_key(name, random.uniform(1, 2, n_cases), "N")
+        make_sweep_key(name, random.uniform(1, 2, n_cases), "N")
         for name in ("normal.load", "drive.force")
     ]
     measures = {
-        f"loop_area{k}": swept_measure(
+        f"loop_area{k}": make_sweep_measure(
             random.normal(size=n_cases), random.uniform(0, 1e-4, n_cases), "J"
         )
         for k in range(30)
@@ -146,8 +153,8 @@ def test_always_page_of_many_cases_keeps_extremes():
     outcome = ["steady" if case % 3 else "grows" for case in range(n_cases)]
     outcome[777] = "stuck"
     folders = [f"cases/{case}" for case in range(n_cases)]
-    text = page_html(swept_table(keys, measures, outcome=outcome, folders=folders, grid=False))
-    data = data_of(text)
+    text = page_html(make_sweep_table(keys, measures, outcome=outcome, folders=folders, grid=False))
+    data = read_page_data(text)
     assert len(text.encode()) < 3e6
     assert f"{len(data['outcome'])} of {n_cases} cases are drawn" in text
     cases = [int(link.removeprefix("cases/")) for link in data["links"]]
@@ -165,9 +172,9 @@ def test_always_page_of_large_grid_keeps_extremes():
     places = [grid.ravel() for grid in np.meshgrid(np.arange(500), np.arange(100), indexing="ij")]
     n_cases = places[0].size
     values = np.random.default_rng(4).normal(size=n_cases)
-    keys = [swept_key(f"key{k}", place) for k, place in enumerate(places)]
-    text = page_html(swept_table(keys, {"loop_area": swept_measure(values, 1e-3)}))
-    data = data_of(text)
+    keys = [make_sweep_key(f"key{k}", place) for k, place in enumerate(places)]
+    text = page_html(make_sweep_table(keys, {"loop_area": make_sweep_measure(values, 1e-3)}))
+    data = read_page_data(text)
     shown = np.array([key["values"] for key in data["keys"]])
     assert len(text.encode()) < 3e6 and 400 < shown.shape[1] < n_cases and not data["grid"]
     assert f"{shown.shape[1]} of {n_cases} cases are drawn: evenly spaced cases" in text
@@ -179,7 +186,7 @@ def test_exact_key_of_mixed_units_has_base_unit(sweep_table):
     """A key whose values are written in N and kN is shown in N."""
     load = sweep_table["keys"][1]
     load["texts"] = ["10 N" if value == 10 else f"{value / 1e3:g} kN" for value in load["values"]]
-    shown = data_of(page_html(sweep_table))["keys"][1]
+    shown = read_page_data(page_html(sweep_table))["keys"][1]
     assert shown["unit"] == "N" and shown["values"] == load["values"].tolist()
 
 
@@ -221,7 +228,7 @@ def test_exact_data_cannot_end_script_element():
         == "a<\\/script>b<\\!--c<\\/SCRIPT x</p"
     )
     hostile = document_html("t", "", [], {"x": "</script><!--"}, ("figures.js",))
-    assert data_of(hostile) == {"x": "</script><!--"}
+    assert read_page_data(hostile) == {"x": "</script><!--"}
 
 
 @pytest.mark.share(2)
@@ -244,7 +251,7 @@ def test_exact_labels_of_logarithmic_axis_are_round(chromium, sweep_table):
 
     Earlier an axis from 0.05 to 3 had labels only above 0.5.
     """
-    chromium.opened(page_html(sweep_table))
+    chromium.open_html(page_html(sweep_table))
     for ends, labels in (
         ((0.05, 3), [0.05, 0.1, 0.2, 0.5, 1, 2]),
         ((0.9, 40), [1, 2, 5, 10, 20]),
@@ -252,10 +259,15 @@ def test_exact_labels_of_logarithmic_axis_are_round(chromium, sweep_table):
         ((2e-7, 0.19), [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1]),
         ((0.04, 700), [0.1, 0.3, 1, 3, 10, 30, 100, 300]),
     ):
-        assert chromium.js(f"pictures.readable({ends[0]}, {ends[1]})") == pytest.approx(
+        assert chromium.evaluate(f"pictures.readable({ends[0]}, {ends[1]})") == pytest.approx(
             labels, rel=1e-12
         )
-    assert chromium.js("[2e-6, 0.05, 3, 2e7].map(pictures.short)") == ["2e-6", "0.05", "3", "2e7"]
+    assert chromium.evaluate("[2e-6, 0.05, 3, 2e7].map(pictures.short)") == [
+        "2e-6",
+        "0.05",
+        "3",
+        "2e7",
+    ]
     assert not chromium.faults
 
 
@@ -271,21 +283,21 @@ def test_exact_wide_range_has_logarithmic_axis_with_hollow_marks(chromium, sweep
     text = page_html(sweep_table | {"tolerance": 0.01})
     assert text.count(
         "<td class=n data-over>"
-    ) == 3 and "3 of 12 cases miss the tolerance of 1 %" in own_part(text)
+    ) == 3 and "3 of 12 cases miss the tolerance of 1 %" in strip_scripts(text)
     figure = """Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"""
     hollow = f"""{figure}.renderers.filter((r) => r.glyph.type === 'Scatter').flatMap((r) =>
         r.data_source.get_array('fill')).filter((c) => c === pictures.ink('--paper')).length"""
     for dark in (False, True):
-        chromium.opened(text, dark=dark)
-        assert chromium.js("document.getElementById('log').checked") is True
-        assert chromium.js(f"{figure}.y_scale.type") == "LogScale"
-        assert chromium.js(hollow) == 3 and not chromium.faults
-    chromium.js("document.getElementById('log').click()")
-    chromium.settled()
-    assert chromium.js(f"{figure}.y_scale.type") == "LinearScale" and not chromium.faults
+        chromium.open_html(text, dark=dark)
+        assert chromium.evaluate("document.getElementById('log').checked") is True
+        assert chromium.evaluate(f"{figure}.y_scale.type") == "LogScale"
+        assert chromium.evaluate(hollow) == 3 and not chromium.faults
+    chromium.evaluate("document.getElementById('log').click()")
+    chromium.wait_for_charts()
+    assert chromium.evaluate(f"{figure}.y_scale.type") == "LinearScale" and not chromium.faults
     amplitude["values"] = amplitude["values"] - 2e-9  # one value is negative
-    chromium.opened(page_html(sweep_table))
-    assert chromium.js("document.getElementById('log').checked") is False
+    chromium.open_html(page_html(sweep_table))
+    assert chromium.evaluate("document.getElementById('log').checked") is False
 
 
 def test_exact_axis_scale_can_be_switched(chromium, sweep_table):
@@ -293,16 +305,16 @@ def test_exact_axis_scale_can_be_switched(chromium, sweep_table):
     figure = "Bokeh.documents[Bokeh.documents.length - 1].roots()[0]"
     for key in sweep_table["keys"]:
         key["log"] = True
-    chromium.opened(page_html(sweep_table), width=420)
+    chromium.open_html(page_html(sweep_table), width=420)
     scales = []
     for _ in range(2):
-        scales.append(chromium.js(f"{figure}.x_scale.type"))
-        chromium.js("document.getElementById('log-along').click()")
-        chromium.settled()
+        scales.append(chromium.evaluate(f"{figure}.x_scale.type"))
+        chromium.evaluate("document.getElementById('log-along').click()")
+        chromium.wait_for_charts()
     assert scales == ["LogScale", "LinearScale"] and not chromium.faults
-    kinds = chromium.js(f"[...{figure}.references()].map((one) => one.type)")
+    kinds = chromium.evaluate(f"[...{figure}.references()].map((one) => one.type)")
     assert "VArea" in kinds and "Band" not in kinds
-    assert chromium.js("document.documentElement.scrollWidth") <= 420
+    assert chromium.evaluate("document.documentElement.scrollWidth") <= 420
 
 
 @pytest.mark.share(1)
@@ -395,9 +407,9 @@ def test_exact_fractions_are_given_in_percent():
         span_sentence(measures, {"contact_fraction": all_cases}, all_cases, ("contact_fraction",))
         == "Contact fraction ranges from 12.31 % to 100 %."
     )
-    tilt = swept_key("contact.tilt.angle", [0, 1e-4, 2e-4], "rad")
-    text = page_html(swept_table([tilt], {"contact_fraction": swept_measure(values)}))
-    (measure,) = data_of(text)["measures"]
+    tilt = make_sweep_key("contact.tilt.angle", [0, 1e-4, 2e-4], "rad")
+    text = page_html(make_sweep_table([tilt], {"contact_fraction": make_sweep_measure(values)}))
+    (measure,) = read_page_data(text)["measures"]
     assert measure["unit"] == "%" and measure["values"] == pytest.approx([100, 21.93, 12.31])
     assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
 
@@ -430,7 +442,7 @@ def test_exact_joined_sweeps_share_word_numbers(sweep_table):
     Earlier two sweeps with different first words gave both the number 0.
     """
     laws = [
-        swept_key("friction.law", np.arange(12) % 2, texts=list(words))
+        make_sweep_key("friction.law", np.arange(12) % 2, texts=list(words))
         for words in (("coulomb", "tanh") * 6, ("tanh", "iwan") * 6)
     ]
     joined = join_tables([sweep_table | {"keys": [law]} for law in laws], ["one", "other"])["keys"][
@@ -465,15 +477,17 @@ def test_exact_axis_of_a_decade_is_logarithmic(values, log):
 def test_always_old_browser_shows_notice(chromium, sweep_table):
     """A browser that cannot decompress the data of a page shows a notice."""
     text = page_html(sweep_table)
-    chromium.opened(text)
-    assert chromium.js("document.getElementById('old').hidden") and not chromium.faults
-    chromium._to(
+    chromium.open_html(text)
+    assert chromium.evaluate("document.getElementById('old').hidden") and not chromium.faults
+    chromium._load_html(
         text.replace("<body>", "<body><script>delete window.DecompressionStream</script>", 1)
     )
-    assert chromium.js("document.getElementById('old').innerText").startswith(
+    assert chromium.evaluate("document.getElementById('old').innerText").startswith(
         "The pictures of this page are packed"
     )
-    assert chromium.js("document.getElementById('old').offsetHeight") > 0 and not chromium.faults
+    assert (
+        chromium.evaluate("document.getElementById('old').offsetHeight") > 0 and not chromium.faults
+    )
 
 
 def test_always_page_is_accessible_to_screen_readers(sweep_table):
@@ -481,35 +495,49 @@ def test_always_page_is_accessible_to_screen_readers(sweep_table):
 
     A page without them is reported with each fault.
     """
-    assert unheard(page_html(sweep_table)) == []
-    assert unheard(library.read_file("player.html")) == []
+    assert find_accessibility_errors(page_html(sweep_table)) == []
+    assert find_accessibility_errors(library.read_file("player.html")) == []
     assert (
-        unheard(document_html("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))]))
+        find_accessibility_errors(
+            document_html("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))])
+        )
         == []
     )
     faulty_page = (
         "<html><h1>a</h1><h3>b</h3><label>c <output></output><input></label><svg></svg><th>d</th>"
     )
-    assert unheard(faulty_page) == ["<html>", "<input>", "<svg>", "<th>", "h1 before h3"]
+    assert find_accessibility_errors(faulty_page) == [
+        "<html>",
+        "<input>",
+        "<svg>",
+        "<th>",
+        "h1 before h3",
+    ]
 
 
 def test_always_chart_is_operated_by_keyboard(chromium, sweep_table):
     """A chart is one stop of the tab key; arrow keys move it, and + and 0 change its magnification."""
-    page = chromium.opened(page_html(sweep_table))
+    page = chromium.open_html(page_html(sweep_table))
     stops = """(function all(node) { return [...node.querySelectorAll('*')].flatMap((one) =>
         [...(one.tabIndex >= 0 ? [one.id] : []), ...(one.shadowRoot ? all(one.shadowRoot) : [])]) })"""
-    assert page.js(f"{stops}(document.getElementById('chart'))") == []
-    assert page.js("document.getElementById('chart').tabIndex") == 0
-    assert page.js("document.getElementById('chart').ariaDescription").startswith("arrow keys move")
+    assert page.evaluate(f"{stops}(document.getElementById('chart'))") == []
+    assert page.evaluate("document.getElementById('chart').tabIndex") == 0
+    assert page.evaluate("document.getElementById('chart').ariaDescription").startswith(
+        "arrow keys move"
+    )
     ends = "(({start, end}) => [start, end])(Bokeh.documents.at(-1).roots()[0].y_range)"
-    low, high = page.js(ends)
-    page.js("document.getElementById('chart').focus()")
-    page.pressed("+")
-    assert page.js(ends) == pytest.approx([low + 0.1 * (high - low), high - 0.1 * (high - low)])
-    page.pressed("ArrowUp")
-    assert page.js(ends) == pytest.approx([low + 0.18 * (high - low), high - 0.02 * (high - low)])
-    page.pressed("0")
-    assert page.js(ends) == pytest.approx([low, high])
+    low, high = page.evaluate(ends)
+    page.evaluate("document.getElementById('chart').focus()")
+    page.press_key("+")
+    assert page.evaluate(ends) == pytest.approx(
+        [low + 0.1 * (high - low), high - 0.1 * (high - low)]
+    )
+    page.press_key("ArrowUp")
+    assert page.evaluate(ends) == pytest.approx(
+        [low + 0.18 * (high - low), high - 0.02 * (high - low)]
+    )
+    page.press_key("0")
+    assert page.evaluate(ends) == pytest.approx([low, high])
     assert page.faults == []
 
 
@@ -555,17 +583,19 @@ def test_always_tables_and_figures_fit_page_width(chromium):
             Section("cases", "Cases", cases),
         ],
     )
-    wide_page = chromium.opened(text, 1400)
-    assert wide_page.js(HIDDEN) == []
-    assert wide_page.js(DOUBLE) == 0
-    assert wide_page.js("document.body.scrollWidth") <= 1400
-    narrow_page = chromium.opened(text, 420)
+    wide_page = chromium.open_html(text, 1400)
+    assert wide_page.evaluate(HIDDEN) == []
+    assert wide_page.evaluate(DOUBLE) == 0
+    assert wide_page.evaluate("document.body.scrollWidth") <= 1400
+    narrow_page = chromium.open_html(text, 420)
     assert [
-        label for label in narrow_page.js(HIDDEN) if not label.startswith("contact.tilt.angle")
+        label
+        for label in narrow_page.evaluate(HIDDEN)
+        if not label.startswith("contact.tilt.angle")
     ] == []
     assert (
-        narrow_page.js(DOUBLE) == 0
-        and narrow_page.js("document.documentElement.scrollWidth") <= 420
+        narrow_page.evaluate(DOUBLE) == 0
+        and narrow_page.evaluate("document.documentElement.scrollWidth") <= 420
     )
 
 
@@ -586,9 +616,9 @@ def test_always_tables_and_figures_fit_page_width(chromium):
 )
 def test_exact_page_states_target_of_click(links, sentence):
     """The page states whether a click on a case opens its page or its summary, or nothing if no case is stored."""
-    keys = [swept_key("normal.load", [1, 2], "N")]
+    keys = [make_sweep_key("normal.load", [1, 2], "N")]
     text = page_html(
-        swept_table(keys, {"loop_area": swept_measure([1, 2], unit="J")}, folders=links)
+        make_sweep_table(keys, {"loop_area": make_sweep_measure([1, 2], unit="J")}, folders=links)
     )
     assert sentence in text and ("Click on a case" in text) == bool(sentence)
 
@@ -599,10 +629,14 @@ def test_exact_key_names_break_after_dots():
     names_of_measures = (
         "absolute_acceleration_peak friction_force_peak slip_amplitude friction_work loop_area"
     )
-    measures = {name: swept_measure([1, 2]) for name in (AMPLITUDE, *names_of_measures.split())}
-    measures["energy_balance"] = swept_measure([1e-16, 2e-16])
-    keys = [swept_key(name, [1, 2], "N") for name in names]
-    text = page_html(swept_table(keys, measures, title="Sweep of " + " × ".join(names), grid=False))
+    measures = {
+        name: make_sweep_measure([1, 2]) for name in (AMPLITUDE, *names_of_measures.split())
+    }
+    measures["energy_balance"] = make_sweep_measure([1e-16, 2e-16])
+    keys = [make_sweep_key(name, [1, 2], "N") for name in names]
+    text = page_html(
+        make_sweep_table(keys, measures, title="Sweep of " + " × ".join(names), grid=False)
+    )
     assert "structure.<wbr>mode.<wbr>axial.<wbr>damping × " not in text.partition("</h1>")[2]
     assert "× structure.<wbr>mode.<wbr>axial.<wbr>damping</h1>" in text
     cases = text[text.index('<section id="cases">') : text.index('<section id="measures">')]

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from computed_cases import ComputedCases
-from limits import limited
+from limits import limit_file_size
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps import sweep
@@ -34,7 +34,7 @@ def scene_file(tmp_path_factory):
 def swept_folder(scene_file):
     """Return the folder of a sweep of 110 cases, ten of which are refused, stored only in columns."""
     folder = scene_file.parent / "swept"
-    assert cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
+    assert run_cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
     return folder
 
 
@@ -139,7 +139,7 @@ def test_exact_small_files_are_merged(tmp_path):
 
 def test_exact_columns_and_summaries_give_equal_tables(swept_folder, scene_file, tmp_path):
     """A sweep stored in columns has the same rows as one stored with summaries, in less than 600 bytes per case."""
-    assert cli("sweep", scene_file, *OVER, "-o", tmp_path / "a").code == 3
+    assert run_cli("sweep", scene_file, *OVER, "-o", tmp_path / "a").code == 3
     assert sorted(entry.name for entry in swept_folder.iterdir()) == [
         "chunks",
         "report.html",
@@ -176,7 +176,7 @@ def test_always_cases_of_damaged_file_run_again(
         if damage == "another sign":
             path.rename(path.with_stem(path.stem[:-4] + "0000"))
     computed = ComputedCases(monkeypatch)
-    assert cli("sweep", scene_file, *OVER, "-o", folder, "--resume", "--keep", "none").code == 3
+    assert run_cli("sweep", scene_file, *OVER, "-o", folder, "--resume", "--keep", "none").code == 3
     assert len(computed) == 110
     for name in TABLES:
         assert (folder / name).read_bytes() == (swept_folder / name).read_bytes()
@@ -186,12 +186,12 @@ def test_exact_sweep_with_only_summaries_is_resumed(scene_file, tmp_path, monkey
     """A sweep that is stored only in summaries, as in older versions, is resumed; a damaged summary runs again."""
     folder = tmp_path / "out"
     arguments = ("sweep", scene_file, *OVER, "-o", tmp_path / "out")
-    assert cli(*arguments).code == 3
+    assert run_cli(*arguments).code == 3
     before = {name: (folder / name).read_bytes() for name in TABLES}
     shutil.rmtree(folder / "chunks")
     (next((folder / "cases").iterdir()) / "summary.json").write_text("{")
     computed = ComputedCases(monkeypatch)
-    assert cli(*arguments, "--resume").code == 3 and len(computed) == 1
+    assert run_cli(*arguments, "--resume").code == 3 and len(computed) == 1
     assert {name: (folder / name).read_bytes() for name in TABLES} == before
 
 
@@ -200,7 +200,7 @@ def test_always_worker_without_folder_returns_results(
 ):
     """A worker that cannot write to the folder, as on a cluster without a common disk, returns its results."""
     monkeypatch.setattr("patchfem.export.sweeps.folder.Writer.__call__", lambda *given: False)
-    assert cli("sweep", scene_file, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
+    assert run_cli("sweep", scene_file, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
     for name in TABLES:
         assert (tmp_path / "out" / name).read_bytes() == (swept_folder / name).read_bytes()
 
@@ -212,8 +212,8 @@ def test_refuses_sweep_without_disk_space(scene_file, tmp_path, has_older_file):
     if has_older_file:
         folder.mkdir()
         (folder / "sweep.csv").write_text("older", encoding="utf-8")
-    with limited(200):  # the summary of a case needs a few kB
-        answer = cli("sweep", scene_file, "--over", "drive.acceleration=1 g,2 g", "-o", folder)
+    with limit_file_size(200):  # the summary of a case needs a few kB
+        answer = run_cli("sweep", scene_file, "--over", "drive.acceleration=1 g,2 g", "-o", folder)
     assert answer.code == 4 and "a case cannot be written" in answer.err
     assert [path.read_text() for path in tmp_path.rglob("*") if path.is_file()] == [
         "older"
@@ -227,7 +227,7 @@ def test_exact_columns_on_disk_give_equal_tables(swept_folder, scene_file, tmp_p
     monkeypatch.setattr(chunks, "MAX_CASES_PER_FILE", 16)
     monkeypatch.setattr(sweep, "MAX_CASES_PER_CHUNK", 16)
     folder = tmp_path / "out"
-    assert cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
+    assert run_cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
     for name in TABLES:
         assert (folder / name).read_bytes() == (swept_folder / name).read_bytes()
     assert 7 <= len(list((folder / "chunks").iterdir())) <= 14

@@ -6,7 +6,7 @@ import subprocess
 import sys
 
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.export.sweeps import manifest
@@ -23,7 +23,7 @@ def finished_sweep(tmp_path_factory):
     """Return the scene, the results folder and the answer of a finished sweep."""
     scene = tmp_path_factory.mktemp("receipt") / "rig.toml"
     scene.write_text(POINT + COULOMB + SHORT, encoding="utf-8")
-    return scene, scene.parent / "out", cli("sweep", scene, *OVER, "-o", scene.parent / "out")
+    return scene, scene.parent / "out", run_cli("sweep", scene, *OVER, "-o", scene.parent / "out")
 
 
 def request_words(*over) -> tuple:
@@ -51,7 +51,7 @@ def test_exact_finished_sweep_resumes_without_numpy(finished_sweep):
         check=True,
     )
     assert answer.code == 0 and done.stdout == answer.out
-    answer_json = cli("sweep", scene, *OVER, "-o", folder, "--resume", "--json")
+    answer_json = run_cli("sweep", scene, *OVER, "-o", folder, "--resume", "--json")
     assert '"cases": 3' in answer_json.out and answer_json.code == 0
 
 
@@ -59,7 +59,7 @@ def test_exact_finished_sweep_resumes_without_numpy(finished_sweep):
 def test_always_change_invalidates_manifest(finished_sweep, change):
     """The manifest of a sweep is not used after a change of a chunk, a table, the scene or the arguments."""
     scene, folder, _ = finished_sweep
-    assert cli("sweep", scene, *OVER, "-o", folder, "--resume").code == 0
+    assert run_cli("sweep", scene, *OVER, "-o", folder, "--resume").code == 0
     over = OVER[1]
     assert (
         manifest.read_manifest(folder, manifest.hash_request(scene, request_words(over)))["cases"][
@@ -86,7 +86,7 @@ def test_always_change_invalidates_manifest(finished_sweep, change):
     assert manifest.read_manifest(folder, manifest.hash_request(scene, request)) == {}
     scene.write_text(text, encoding="utf-8")
     # the sweep is complete again and has its manifest
-    answer = cli("sweep", scene, *OVER, "-o", folder, "--resume")
+    answer = run_cli("sweep", scene, *OVER, "-o", folder, "--resume")
     assert answer.code == 0 and manifest.read_manifest(
         folder, manifest.hash_request(scene, request_words(over))
     )
@@ -96,7 +96,7 @@ def test_exact_failed_case_prevents_manifest(finished_sweep, tmp_path):
     """A sweep with a failed case has no manifest."""
     scene, *_ = finished_sweep
     assert (
-        cli(
+        run_cli(
             "sweep",
             scene,
             "--over",
@@ -145,7 +145,7 @@ def test_always_change_of_referenced_file_runs_again(
 
     def run_sweep() -> float:
         """Run or resume the sweep and return the slip amplitude of its last case."""
-        done = cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out", "--resume")
+        done = run_cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out", "--resume")
         assert done.code == 0, done.err
         with open("out/sweep.csv", encoding="utf-8", newline="") as file:
             return float(list(csv.DictReader(file))[-1]["slip_amplitude"])
@@ -155,9 +155,11 @@ def test_always_change_of_referenced_file_runs_again(
     if not has_manifest:
         (tmp_path / "out" / manifest.MANIFEST_NAME).unlink()
     if "--set" in arguments:  # --set changes all cases, so the folder belongs to another scene
-        refused = cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out", "--resume")
+        refused = run_cli(
+            "sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out", "--resume"
+        )
         assert refused.code == 2 and "contains a sweep of another scene" in refused.err
-        assert cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out").code == 0
+        assert run_cli("sweep", "rig.toml", *arguments, "--keep", "none", "-o", "out").code == 0
     assert run_sweep() == pytest.approx(2 * first_amplitude, rel=1e-9)
 
 

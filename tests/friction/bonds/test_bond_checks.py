@@ -7,7 +7,7 @@ few uneven steps suffice.
 import numpy as np
 import pytest
 from friction_forms import reversal_force, virgin_force
-from friction_paths import pulled, upper_pressure, walk
+from friction_paths import march_path, march_tractions, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -50,7 +50,7 @@ def test_exact_virgin_force_agrees_with_closed_form(order, reading, initial, exp
     """The friction force of a first loading agrees with the closed form, for both directions of sliding."""
     for law in make_engines(order, reading, initial):
         for sign in (1, -1):
-            run = walk(law, sign * UNEVEN_PATH, UNIT_PRESSURE)
+            run = march_path(law, sign * UNEVEN_PATH, UNIT_PRESSURE)
             force = np.append(0.0, sign * run.traction[:, 0])
             assert np.interp([0.5, 1, 2, 4], UNEVEN_PATH, force) == pytest.approx(
                 expected, abs=1e-6
@@ -73,7 +73,7 @@ def test_exact_reversal_force_after_long_sliding(order, reading, expected):
     back = np.array([0.1, np.log(2) / 2, np.log(2), 1, 3])
     path = np.concatenate([np.linspace(0, 40, 9), 40 - back])
     for law in make_engines(order, reading, 1.0 if reading == "stretch" else 0.0):
-        force = pulled(law, path, UNIT_PRESSURE).traction[-5:, 0]
+        force = march_tractions(law, path, UNIT_PRESSURE).traction[-5:, 0]
         assert force == pytest.approx(expected, abs=1e-6)
         assert force == pytest.approx(reversal_force(back, 1.0, order, reading), abs=1e-12)
 

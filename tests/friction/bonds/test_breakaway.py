@@ -3,8 +3,8 @@
 import friction_forms
 import numpy as np
 import pytest
-from friction_paths import random_walk, slides, triangle, upper_pressure, walk
-from march_paths import follow
+from friction_paths import march_path, random_walk, slides, triangle_path, upper_pressure
+from march_paths import follow_path
 
 from patchfem.dynamics import points_model
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
@@ -24,8 +24,8 @@ def breakaway_bonds(fraction, order=1.0, **parameters):
 @pytest.mark.parametrize("amplitude", [0.1, 0.9, 1.5, 8.0])
 def test_exact_breakaway_loop_agrees_with_closed_form(fraction, amplitude):
     """Loop area and reversal force agree with the closed form; the area vanishes if the bonds stay elastic."""
-    path = triangle(amplitude, 80, 7)
-    run = walk(FirstOrderBonds(breakaway_bonds(fraction)), path, UNIT_PRESSURE)
+    path = triangle_path(amplitude, 80, 7)
+    run = march_path(FirstOrderBonds(breakaway_bonds(fraction)), path, UNIT_PRESSURE)
     work = run.mean[-14:, 0] @ np.diff(path)[-14:]
     area, end = friction_forms.stretch_loop(amplitude, 1.0, 1.0, fraction)
     if amplitude > fraction:  # below it the loop is a line about the mean of the first stroke
@@ -38,8 +38,8 @@ def test_exact_breakaway_loop_agrees_with_closed_form(fraction, amplitude):
 def test_exact_full_breakaway_equals_elastic_plastic(engine):
     """Bonds whose breakaway fraction tends to one have the forces of an elastic-plastic element."""
     path = random_walk(3, 60, 0.6)
-    bond_run = walk(engine(breakaway_bonds(1 - 1e-13)), path, UNIT_PRESSURE)
-    elastic_plastic_run = walk(ElasticPlastic(1.0, 1.0), path, UNIT_PRESSURE)
+    bond_run = march_path(engine(breakaway_bonds(1 - 1e-13)), path, UNIT_PRESSURE)
+    elastic_plastic_run = march_path(ElasticPlastic(1.0, 1.0), path, UNIT_PRESSURE)
     assert bond_run.traction == pytest.approx(elastic_plastic_run.traction, abs=1e-11)
     assert bond_run.mean == pytest.approx(elastic_plastic_run.mean, abs=1e-11)
 
@@ -52,7 +52,7 @@ def test_exact_breakaway_recursion_equals_sum_over_bonds(fraction, growth):
     law = breakaway_bonds(fraction, initial=0.7, **growth)
     path = random_walk(5, 150, 0.5)
     a, b = (
-        walk(engine, path, upper_pressure([1.0, 0.3]))
+        march_path(engine, path, upper_pressure([1.0, 0.3]))
         for engine in (FirstOrderBonds(law), Quadrature(law, 0.0))
     )
     for name in ("mean", "traction", "stored", "dissipated"):
@@ -64,9 +64,9 @@ def test_exact_compiled_breakaway_points_equal_recursion(growth):
     """The compiled contact elements with breakaway have the forces and energies of the NumPy recursion within 1e-12."""
     law = breakaway_bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
-    forces, energies, bad, _ = follow(points_model(law, [1.0], [1.0]), path, 1.0)
+    forces, energies, bad, _ = follow_path(points_model(law, [1.0], [1.0]), path, 1.0)
     assert bad == 0
-    run = walk(FirstOrderBonds(law), path, UNIT_PRESSURE)
+    run = march_path(FirstOrderBonds(law), path, UNIT_PRESSURE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
     assert energies[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)

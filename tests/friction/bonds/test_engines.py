@@ -4,8 +4,8 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from friction_paths import pulled, random_walk, triangle, upper_pressure
-from march_paths import OMEGA, follow, one_mode
+from friction_paths import march_tractions, random_walk, triangle_path, upper_pressure
+from march_paths import OMEGA, follow_path, make_one_mode
 from scene_texts import DRIVE, KILOGRAM
 
 from patchfem import build, plan
@@ -123,11 +123,11 @@ def test_exact_printed_law_creates_energy_per_cycle():
 
     Work equals dissipated energy, less the created energy, plus stored energy.
     """
-    path = triangle(0.01, 20, 40)[:-20]
+    path = triangle_path(0.01, 20, 40)[:-20]
     assert path[0] == path[-1] == 0
     for reading, expected in (("report", -3.9761e-4), ("stretch", 2.1858e-5)):
         law = Bonds(1.0, 1.0, 1.0, reading, initial=0.0)
-        forces, energies, n_failures, contact = follow(
+        forces, energies, n_failures, contact = follow_path(
             bond_list_model(law, 1.0, np.inf, 0.0), path, 1.0
         )
         work = forces[:-1, 1] @ np.diff(path)
@@ -158,7 +158,7 @@ def test_always_stretch_law_creates_negligible_energy(order, initial, size):
     % of the work, because the force jumps or has a cusp inside the step.
     """
     path = random_walk(8, 400, size)
-    _, _, n_failures, contact = follow(
+    _, _, n_failures, contact = follow_path(
         bond_list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0
     )
     assert n_failures == 0 and contact.status[6] <= 1e-7 * contact.status[7]
@@ -175,14 +175,14 @@ def test_exact_marched_list_agrees_with_numpy_sum(reading, order):
     law = Bonds(0.4, 2e-6, order, reading, initial=0.0)
     limit = 0.4 * 98.0665
     marched = march(
-        one_mode(OMEGA, 0.01, 1.0),
+        make_one_mode(OMEGA, 0.01, 1.0),
         SineDrive(5 * 9.80665, OMEGA),
         bond_list_model(law, limit, np.inf, 0.0),
         2,
         100,
         window=2,
     )
-    replay = pulled(
+    replay = march_tractions(
         Quadrature(law, tail=0.0), marched.window.slide, upper_pressure([98.0665]), 1 / 14300
     )
     ledger = marched.ledger
@@ -198,7 +198,7 @@ def test_exact_direct_march_equals_recursion_march():
     limit = 0.4 * 98.0665
     runs = [
         march(
-            one_mode(OMEGA, 0.003, 1.0), SineDrive(5 * 9.80665, OMEGA), model, 3, 100, window=2
+            make_one_mode(OMEGA, 0.003, 1.0), SineDrive(5 * 9.80665, OMEGA), model, 3, 100, window=2
         ).window
         for model in (
             bond_list_model(law, limit, np.inf, 0.0),

@@ -6,7 +6,7 @@ energy, and it agrees with the trapezoidal rule applied to the force.
 
 import numpy as np
 import pytest
-from march_paths import follow
+from march_paths import follow_path
 
 from patchfem.dynamics import bond_list_model
 from patchfem.friction import Bonds
@@ -49,7 +49,7 @@ def check_energy_balance(seed, count, reading, order, engine):
     for _ in range(count):
         law, path = draw_law_and_path(rng, reading, order)
         model = bond_list_model(law, 1.0, cutoff_age(order, tail) if tail else np.inf, merge)
-        forces, energies, n_failures, _ = follow(model, path, 10 ** rng.uniform(-2, 1))
+        forces, energies, n_failures, _ = follow_path(model, path, 10 ** rng.uniform(-2, 1))
         work = forces[:-1, 1] * np.diff(path)
         dissipated = energies[:-1, 0]
         total_work = np.abs(work).sum()
@@ -84,7 +84,7 @@ def test_order_of_list_work_quadrature_is_two(reading, order, engine):
     errors = []
     for steps in (100, 400):
         path = 1.7 * np.sin(2 * np.pi * np.arange(2 * steps + 1) / steps)
-        forces, _, _, _ = follow(model, path, 2 * np.pi / steps)
+        forces, _, _, _ = follow_path(model, path, 2 * np.pi / steps)
         work = forces[:-1, 1] * np.diff(path)
         errors.append(abs(np.trapezoid(forces[:, 0], path) - work.sum()) / np.abs(work).sum())
     assert errors[1] < 2e-4 and (

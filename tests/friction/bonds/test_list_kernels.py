@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 from friction_paths import (
-    energy_by_hand,
-    pulled,
+    march_path,
+    march_tractions,
     random_walk,
-    sum_by_hand,
-    triangle,
+    reference_energy,
+    reference_traction,
+    triangle_path,
     upper_pressure,
-    walk,
 )
-from list_paths import STATUS, follow_list
+from list_paths import STATUS, march_list
 from scipy.special import gammainc
 
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
@@ -31,8 +31,8 @@ def test_exact_direct_printed_law_equals_numpy_sum(order, initial):
     path = np.concatenate(
         [random_walk(3, 40, 0.7), random_walk(3, 40, 0.7)[-1] + np.array([0, 0.2, 0.4, 30, 30])]
     )
-    compiled = follow_list(law, path)
-    reference = pulled(Quadrature(law, tail=0.0), path, UNIT_PRESSURE)
+    compiled = march_list(law, path)
+    reference = march_tractions(Quadrature(law, tail=0.0), path, UNIT_PRESSURE)
     tolerance = 1e-12 if order in (0, 1, 2) else 2e-8
     assert compiled.after == pytest.approx(reference.traction[:, 0], abs=tolerance)
     assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
@@ -50,9 +50,9 @@ def test_exact_direct_stretch_law_equals_numpy_sum(order, tolerance, growth):
     Forces of order 0 were wrong by 5e-2 there before strips were split.
     """
     law = Bonds(1.0, 1.0, order, "stretch", **growth)
-    path = np.concatenate([triangle(1.5, 3, 13), [-1.43, -0.77, 4.0, 3.3, 3.9]])
-    compiled = follow_list(law, path, 0.4)
-    reference = pulled(Quadrature(law, tail=0.0), path, UNIT_PRESSURE, 0.4)
+    path = np.concatenate([triangle_path(1.5, 3, 13), [-1.43, -0.77, 4.0, 3.3, 3.9]])
+    compiled = march_list(law, path, 0.4)
+    reference = march_tractions(Quadrature(law, tail=0.0), path, UNIT_PRESSURE, 0.4)
     assert compiled.after == pytest.approx(reference.traction[:, 0], abs=tolerance)
     assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
@@ -64,8 +64,8 @@ def test_exact_direct_stretch_law_equals_recursion(growth):
     path = np.concatenate(
         [random_walk(5, 80, 0.5), random_walk(5, 80, 0.5)[-1] + np.array([0, 1e-5, 20.0, 1e3])]
     )
-    compiled = follow_list(law, path, 0.4)
-    recursion = walk(FirstOrderBonds(law), path, UNIT_PRESSURE, 0.4)
+    compiled = march_list(law, path, 0.4)
+    recursion = march_path(FirstOrderBonds(law), path, UNIT_PRESSURE, 0.4)
     assert compiled.after == pytest.approx(recursion.traction[:, 0], abs=1e-12)
     assert compiled.mean == pytest.approx(recursion.mean[:, 0], abs=1e-12)
     assert compiled.stored == pytest.approx(recursion.stored[:, 0], abs=1e-11)
@@ -77,10 +77,10 @@ def test_exact_direct_growing_bonds_equal_hand_sum(order, tolerance, initial):
     """The direct list of growing bonds agrees with a sum over the bonds by hand."""
     law = Bonds(1.0, 1.0, order, "report", initial=initial, **GROWTH)
     path = random_walk(3, 60, 0.3)
-    compiled = follow_list(law, path, 0.4)
+    compiled = march_list(law, path, 0.4)
     for k in (5, 20, 40, 60):
         assert compiled.after[k - 1] == pytest.approx(
-            sum_by_hand(law, path[: k + 1], UNIT_PRESSURE, 0.4)[0], abs=tolerance
+            reference_traction(law, path[: k + 1], UNIT_PRESSURE, 0.4)[0], abs=tolerance
         )
     assert compiled.ahead == pytest.approx(compiled.after, abs=tolerance)
 
@@ -96,10 +96,10 @@ def test_exact_young_growing_bonds_equal_hand_sum(order):
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
     path = 1.5 * np.sin(2 * np.pi * np.arange(276) / 200)
     dt = 2 * np.pi / 200
-    forces = follow_list(law, path, dt).after
+    forces = march_list(law, path, dt).after
     for k in (30, 75, 140, 190, 275):
         assert forces[k - 1] == pytest.approx(
-            sum_by_hand(law, path[: k + 1], UNIT_PRESSURE, dt)[0], abs=2e-6
+            reference_traction(law, path[: k + 1], UNIT_PRESSURE, dt)[0], abs=2e-6
         )
 
 
@@ -118,7 +118,7 @@ def test_exact_fractional_order_bonds_grown_at_rest(order, tolerance):
         initial=0.0,
     )
     path = np.append(np.linspace(0, 0.2, 11), 0.2)
-    forces = follow_list(law, path, np.append(np.full(10, 0.4), 1e4)).after
+    forces = march_list(law, path, np.append(np.full(10, 0.4), 1e4)).after
     assert forces[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=tolerance)
 
 
@@ -137,8 +137,8 @@ def test_exact_long_rest_of_growing_bonds_stays_finite():
     )
     full_length_law = Bonds(1.0, 1.0, 1.0, "report", initial=0.0)
     path = np.array([0.0, 0.1, 0.2, 0.2])
-    force = follow_list(law, path, [0.1, 0.1, 1e4]).after[-1]
-    expected = follow_list(full_length_law, path).after[-1]
+    force = march_list(law, path, [0.1, 0.1, 1e4]).after[-1]
+    expected = march_list(full_length_law, path).after[-1]
     assert force == pytest.approx(expected, abs=1e-6)
 
 
@@ -161,11 +161,11 @@ def test_exact_stored_energy_equals_hand_sum(reading, order, growth):
     """The stored energy of the list agrees with a sum over the bonds by hand."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = random_walk(4, 30, 0.4)
-    compiled = follow_list(law, path, 0.4)
+    compiled = march_list(law, path, 0.4)
     for k in (3, 17, 30):
         tolerance = 1e-3 if order < 0 else 3e-5
         assert compiled.stored[k - 1] == pytest.approx(
-            energy_by_hand(law, path[: k + 1], 0.4), abs=tolerance
+            reference_energy(law, path[: k + 1], 0.4), abs=tolerance
         )
 
 
@@ -178,10 +178,10 @@ def test_exact_step_mean_equals_force_integral(reading, order):
     law = Bonds(1.0, 1.0, order, reading, initial=0.0)
     start_path = np.array([0.0, 1.3, 0.9])
     for dq in (0.02, -0.05, 0.37, -3.0, 60.0):
-        mean = follow_list(law, np.append(start_path, start_path[-1] + dq)).mean[-1]
+        mean = march_list(law, np.append(start_path, start_path[-1] + dq)).mean[-1]
         fractions = np.linspace(0, 1, 4001)[1:] ** 3
         path = np.concatenate([start_path, start_path[-1] + dq * fractions])
-        force = follow_list(law, path).after
+        force = march_list(law, path).after
         forces = np.concatenate([force[1:2], force[2:]])
         expected = np.trapezoid(forces, np.append(0.0, fractions))
         assert mean == pytest.approx(expected, abs=2e-3 if abs(dq) > 1 else 3e-4)
@@ -194,7 +194,7 @@ def test_exact_step_mean_equals_force_integral(reading, order):
 def test_exact_force_after_step_of_million_bond_lengths(reading, order, tolerance):
     """The force after a step of a million bond lengths is the friction limit, with strips only within the cut-off."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0)
-    result = follow_list(law, np.array([0.0, 1e6, 1e6 + 0.05]), tail=1e-9)
+    result = march_list(law, np.array([0.0, 1e6, 1e6 + 0.05]), tail=1e-9)
     assert result.after == pytest.approx([1.0, 1.0], abs=tolerance)
     assert result.mean[0] == pytest.approx(1.0, abs=1e-4)
     assert result.status[STATUS.max_strips] <= 4 * 30 + 2
@@ -213,7 +213,7 @@ def test_exact_strips_of_tiny_growing_bonds_are_limited():
         rest_speed=1.0,
         initial=0.0,
     )
-    result = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
+    result = march_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
     assert (
         np.isfinite(result.after).all()
         and result.status[STATUS.max_strips] <= 300
@@ -231,9 +231,9 @@ def test_always_truncation_error_is_below_tail(reading, order, growth):
     """The truncated list differs from the full list by at most its tail, and has fewer strips."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
     path = random_walk(9, 300, 0.6)
-    full = follow_list(law, path, 0.5)
+    full = march_list(law, path, 0.5)
     for tail in (1e-2, 1e-5):
-        truncated = follow_list(law, path, 0.5, tail=tail)
+        truncated = march_list(law, path, 0.5, tail=tail)
         assert np.abs(truncated.after - full.after).max() <= tail
         assert (
             truncated.status[STATUS.end] - truncated.status[STATUS.head]
@@ -250,12 +250,12 @@ def test_always_truncation_error_is_below_tail(reading, order, growth):
 def test_order_of_merge_width_is_two(reading, order, growth):
     """The error of merging falls with the square of the merge width, while the number of strips grows."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
-    path = np.concatenate([triangle(3.0, 3, 200), [-3.0]])
-    full = follow_list(law, path, 0.05)
+    path = np.concatenate([triangle_path(3.0, 3, 200), [-3.0]])
+    full = march_list(law, path, 0.05)
     errors = []
     n_strips = []
     for merge in (0.01, 0.1):
-        merged = follow_list(law, path, 0.05, merge)
+        merged = march_list(law, path, 0.05, merge)
         errors.append(np.abs(merged.after - full.after).max())
         n_strips.append(merged.status[STATUS.max_strips])
     assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
@@ -268,9 +268,9 @@ def test_order_of_merge_width_is_two(reading, order, growth):
 def test_exact_repeated_passes_are_merged_into_one_strip(order):
     """Growing bonds of many passes over one range, merged into strips, agree with all strips."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
-    path = triangle(0.1, 30, 40)
-    full = follow_list(law, path, 0.05)
-    merged = follow_list(law, path, 0.05, 0.05)
+    path = triangle_path(0.1, 30, 40)
+    full = march_list(law, path, 0.05)
+    merged = march_list(law, path, 0.05, 0.05)
     assert merged.status[STATUS.n_spread] > 5
     assert merged.after == pytest.approx(full.after, abs=2e-3)
     assert merged.stored == pytest.approx(full.stored, abs=1e-4)

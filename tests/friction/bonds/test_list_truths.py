@@ -5,8 +5,8 @@ Closed forms (checks C5, C6 and C8), bounded memory over long runs, and equal ma
 
 import numpy as np
 import pytest
-from list_paths import STATUS, follow_list
-from march_paths import OMEGA, one_mode
+from list_paths import STATUS, march_list
+from march_paths import OMEGA, make_one_mode
 
 from patchfem.core import SineDrive
 from patchfem.dynamics import bond_list_model
@@ -33,9 +33,7 @@ def test_exact_loaded_bonds_heal_at_rest(order, options):
         order, {"ratio": 0.5, "rest_growth": 10.0, "slip_growth": 1e-3, "rest_speed": 1.0}
     )
     path = np.append(40 - np.geomspace(40, 1e-5, 1500), [40 - 1e-5] * 2)
-    forces = follow_list(law, path, np.append(np.full(1499, 1e-9), [0.1, 0.1]), **options).after[
-        -3:
-    ]
+    forces = march_list(law, path, np.append(np.full(1499, 1e-9), [0.1, 0.1]), **options).after[-3:]
     assert forces == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
 
 
@@ -47,10 +45,10 @@ def test_always_long_path_keeps_bounded_list(growth, count):
     steps = np.random.default_rng(3).normal(0, 0.05, count)
     steps[::1000] *= 400.0
     law = printed_law(1, growth)
-    result = follow_list(law, np.concatenate([[0.0], np.cumsum(steps)]), tail=1e-9, merge=0.01)
+    result = march_list(law, np.concatenate([[0.0], np.cumsum(steps)]), tail=1e-9, merge=0.01)
     last_path = np.concatenate([[0.0], np.cumsum(steps[-1500:])])
     assert result.status[STATUS.max_strips] < 1500
-    assert result.after[-1] == pytest.approx(follow_list(law, last_path).after[-1], abs=5e-5)
+    assert result.after[-1] == pytest.approx(march_list(law, last_path).after[-1], abs=5e-5)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +61,7 @@ def test_exact_marches_of_both_lists_agree(order, growth):
     limit = 0.4 * 98.0665
     runs = [
         march(
-            one_mode(OMEGA, 0.01, 1.0),
+            make_one_mode(OMEGA, 0.01, 1.0),
             SineDrive(5 * 9.80665, OMEGA),
             bond_list_model(law, limit, reach, merge),
             3,

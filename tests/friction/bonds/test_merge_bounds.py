@@ -7,7 +7,7 @@ them.
 import numpy as np
 import pytest
 from friction_paths import random_walk
-from list_paths import STATUS, follow_list
+from list_paths import STATUS, march_list
 
 from patchfem.friction import Bonds, RequestedEngine, choose_engine
 
@@ -24,8 +24,8 @@ def compare_merged_with_full(law, path, steps, tolerance):
     choice = choose_engine(
         law, tolerance, np.abs(moves).sum() / strokes, max(directions.size / strokes, 1), MERGED
     )
-    full = follow_list(law, path, dt)
-    merged = follow_list(law, path, dt, choice.merge, choice.tail)
+    full = march_list(law, path, dt)
+    merged = march_list(law, path, dt, choice.merge, choice.tail)
     is_moving = np.abs(moves) > 1e-9 * np.abs(moves).max()
     error = max(
         np.abs(merged.after - full.after).max(), np.abs(merged.mean - full.mean)[is_moving].max()

@@ -10,8 +10,8 @@ from itertools import pairwise
 import mpmath
 import numpy as np
 import pytest
-from friction_paths import drift, lower_pressure, pulled, upper_pressure, walk
-from modal_bases import basis_of
+from friction_paths import drift, lower_pressure, march_path, march_tractions, upper_pressure
+from modal_bases import make_modal_basis
 from scipy.special import gammainc
 from vibration_forms import sliding_amplitude
 
@@ -115,7 +115,7 @@ def test_exact_transfer_function_of_pressure_wave(order, eps, magnitude, lag):
         law = FirstOrderBonds(law) if order == 1 else Quadrature(law, tail=0.0)
         path = np.linspace(0, 30 * eps, count + 1)
         pressure = lower_pressure(x, 80.0, 2.0)
-        tau = pulled(law, path, pressure).traction[-1]
+        tau = march_tractions(law, path, pressure).traction[-1]
         position = x + path[-1]
         return 1j * (tau @ np.exp(-1j * k * position)) / 3
 
@@ -132,7 +132,7 @@ def test_exact_transfer_function_of_pressure_wave(order, eps, magnitude, lag):
 
 def sdof_basis(omega=OMEGA, zeta=0.0):
     """Return the modal basis of a single-degree-of-freedom oscillator."""
-    return basis_of(omega, zeta)
+    return make_modal_basis(omega, zeta)
 
 
 # ---- C17: contraction
@@ -227,10 +227,10 @@ def test_exact_traction_scales_with_bond_length(reading, order):
     for growth in ({}, GROWTH):
         scaled = {key: value * (1.0 if key == "ratio" else length) for key, value in growth.items()}
         for engine in laws:
-            unit_run = walk(
+            unit_run = march_path(
                 engine(Bonds(0.3, 1.0, order, reading, **growth)), path, UNIT_PRESSURE, 0.5
             )
-            run = walk(
+            run = march_path(
                 engine(Bonds(0.3, length, order, reading, **scaled)),
                 path * length,
                 UNIT_PRESSURE,
@@ -245,7 +245,7 @@ def test_exact_printed_law_with_extreme_orders(order):
     """For orders -0.9 and 20 the first loading, the reversal and the cut-off age agree with incomplete gamma functions."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0)
     path = np.concatenate([np.linspace(0, 60, 121), 60 - np.array([0.01, 0.5, 4.0, 12.0, 30.0])])
-    force = pulled(Quadrature(law, tail=0.0), path, UNIT_PRESSURE).traction[:, 0]
+    force = march_tractions(Quadrature(law, tail=0.0), path, UNIT_PRESSURE).traction[:, 0]
 
     def below(x):
         return float(mpmath.gammainc(mpmath.mpf(order) + 1, 0, x, regularized=True))

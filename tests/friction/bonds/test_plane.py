@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_paths import walk
+from friction_paths import march_path
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import quad
@@ -93,7 +93,7 @@ def test_exact_straight_path_equals_scalar_law(law, tolerance):
     knots = np.cumsum(np.append(0.0, rng.uniform(-1, 1.4, 25)))
     sigma = np.array([1.0, 0.3])
     path = np.stack([0.6 * knots, -0.8 * knots], axis=1)
-    scalar = walk(Quadrature(law, 0.0), knots, lambda q: sigma, 0.5)
+    scalar = march_path(Quadrature(law, 0.0), knots, lambda q: sigma, 0.5)
     plane_run = follow_polygon(Quadrature(law, 0.0), path, sigma, 0.5)
     direction = np.array([0.6, -0.8])[:, None]
     assert np.abs(plane_run[1] - direction * scalar.traction[:, None]).max() < tolerance

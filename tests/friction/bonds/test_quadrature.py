@@ -4,7 +4,14 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from friction_paths import lower_pressure, pulled, sum_by_hand, triangle, upper_pressure, walk
+from friction_paths import (
+    lower_pressure,
+    march_path,
+    march_tractions,
+    reference_traction,
+    triangle_path,
+    upper_pressure,
+)
 
 from patchfem.friction import Bonds, Quadrature
 from patchfem.friction.bonds.strips import Strips
@@ -32,9 +39,11 @@ def test_exact_printed_law_agrees_with_hand_sum(order, initial):
     """
     law = Bonds(1.0, 1.0, order, "report", initial=initial)
     path = random_displacements(4, 40)
-    run = pulled(Quadrature(law, tail=0.0), path, TWO_PRESSURES)
+    run = march_tractions(Quadrature(law, tail=0.0), path, TWO_PRESSURES)
     tolerance = {-0.5: 0.05, 0.5: 1e-4}.get(order, 1e-8 if order == 3.7 else 1e-12)
-    assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, TWO_PRESSURES), abs=tolerance)
+    assert run.traction[-1] == pytest.approx(
+        reference_traction(law, path, TWO_PRESSURES), abs=tolerance
+    )
 
 
 @pytest.mark.parametrize(
@@ -45,8 +54,8 @@ def test_exact_pressure_on_upper_or_lower_piece(reading, order, pressure):
     """The traction agrees with a sum by hand for a pressure fixed to the upper or to the lower piece."""
     law = Bonds(1.0, 1.0, order, reading, initial=0.5)
     path = random_displacements(5, 40)
-    run = pulled(Quadrature(law, tail=0.0), path, pressure)
-    assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, pressure), abs=1e-12)
+    run = march_tractions(Quadrature(law, tail=0.0), path, pressure)
+    assert run.traction[-1] == pytest.approx(reference_traction(law, path, pressure), abs=1e-12)
 
 
 @pytest.mark.parametrize("reading", ["report", "stretch"])
@@ -61,19 +70,23 @@ def test_exact_lost_contact_removes_older_bonds(reading):
     state = engine.start(pressures[0])
     for k, dq in enumerate(np.diff(path)):
         state = engine.step(state, dq, pressures[k], pressures[k + 1], 1.0).state
-    force_after = sum_by_hand(
+    force_after = reference_traction(
         Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[9:], upper_pressure([1.0])
     )[0]
-    force_of_first_step = sum_by_hand(
+    force_of_first_step = reference_traction(
         Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:10], upper_pressure([1.0])
     )[0]
     # a strip that begins without contact forms at the mean pressure of its ends: half the density
     strip_force = (
-        sum_by_hand(Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:], upper_pressure([1.0]))[0]
+        reference_traction(
+            Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:], upper_pressure([1.0])
+        )[0]
         - force_after
     )
     tau = engine.traction(state)
-    assert tau[0] == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]))[0], abs=1e-13)
+    assert tau[0] == pytest.approx(
+        reference_traction(law, path, upper_pressure([1.0]))[0], abs=1e-13
+    )
     assert (
         tau[1:] == pytest.approx(np.full(2, force_after + strip_force / 2), abs=1e-13)
         and force_of_first_step < 0
@@ -88,8 +101,10 @@ def test_exact_gauss_strips_with_smooth_orders(order):
     """The traction of the stretch law of order 2 and 3 agrees with a sum by hand within 1e-11."""
     path = np.concatenate([np.linspace(0, 3, 13), np.linspace(3, 1, 9)[1:]])
     law = Bonds(1.0, 1.0, order, "stretch", initial=0.3)
-    run = pulled(Quadrature(law, tail=0.0), path, TWO_PRESSURES)
-    assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, TWO_PRESSURES), abs=1e-11)
+    run = march_tractions(Quadrature(law, tail=0.0), path, TWO_PRESSURES)
+    assert run.traction[-1] == pytest.approx(
+        reference_traction(law, path, TWO_PRESSURES), abs=1e-11
+    )
 
 
 @pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
@@ -97,10 +112,10 @@ def test_exact_growing_printed_law_is_independent_of_step(order):
     """The traction of growing bonds agrees with a sum by hand for any step length (equation 2.10 is exact in a strip)."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
     for n_parts in (1, 2, 4):
-        path = triangle(1.0, 1, 8 * n_parts)[: 20 * n_parts + 1]
-        run = pulled(Quadrature(law, tail=0.0), path, TWO_PRESSURES, dt=0.4 / n_parts)
+        path = triangle_path(1.0, 1, 8 * n_parts)[: 20 * n_parts + 1]
+        run = march_tractions(Quadrature(law, tail=0.0), path, TWO_PRESSURES, dt=0.4 / n_parts)
         force = run.traction[-1, 0]
-        expected = sum_by_hand(law, path, TWO_PRESSURES, 0.4 / n_parts)[0]
+        expected = reference_traction(law, path, TWO_PRESSURES, 0.4 / n_parts)[0]
         assert force == pytest.approx(expected, abs=2e-6 if order > -0.5 else 1e-4)
 
 
@@ -128,8 +143,8 @@ def test_exact_advance_without_forces_equals_full_step(reading, order, growth, t
     law = Quadrature(Bonds(0.4, 1.0, order, reading, **growth), tail)
     pressure = lower_pressure(np.zeros(3), 5.0, 0.5)
     path = np.concatenate([random_displacements(6, 12, 0.4), [0.0, 0.0, 30.0]])
-    stepped = walk(law, path, pressure, 0.3)
-    carried = pulled(law, path, pressure, 0.3)
+    stepped = march_path(law, path, pressure, 0.3)
+    carried = march_tractions(law, path, pressure, 0.3)
     assert np.array_equal(stepped.traction, carried.traction)
     for field in fields(Strips):
         stepped_columns, carried_columns = (
@@ -165,9 +180,9 @@ def test_always_cut_off_error_is_below_bound(reading, order, growth):
             random_displacements(6, 151, 0.4)[-1] + np.linspace(0.2, 20, 100),
         ]
     )
-    full = pulled(Quadrature(law, 0.0), path, TWO_PRESSURES, 0.3)
+    full = march_tractions(Quadrature(law, 0.0), path, TWO_PRESSURES, 0.3)
     for tail in (1e-2, 1e-5):
-        truncated = pulled(Quadrature(law, tail), path, TWO_PRESSURES, 0.3)
+        truncated = march_tractions(Quadrature(law, tail), path, TWO_PRESSURES, 0.3)
         assert truncated.state.n_dropped > 0 and len(truncated.state.pressure) < len(
             full.state.pressure
         )
@@ -190,7 +205,7 @@ def test_exact_rests_and_long_steps_are_handled(reading, order, growth):
     """Rests and a step of a thousand bond lengths give finite tractions, and without growth the friction limit."""
     law = Bonds(1.0, 1.0, order, reading, **growth)
     path = np.array([0.0, 0.0, 0.3, 0.3, 1e3, 1e3])
-    run = walk(Quadrature(law), path, TWO_PRESSURES, 1.0)
+    run = march_path(Quadrature(law), path, TWO_PRESSURES, 1.0)
     assert np.isfinite(np.concatenate([run.mean, run.traction])).all()
     assert not run.traction[0].any()
     # in the printed law, loaded bonds heal at rest and the force changes without motion
@@ -217,5 +232,9 @@ def test_exact_dwell_does_not_grow_next_strip():
     )
     path = np.concatenate([np.linspace(0, 2, 41), [2.0, 2.05]])
     times = np.append(np.full(40, 0.5), [1.0, 0.5])
-    force = pulled(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[-1, 0]
-    assert force == pytest.approx(sum_by_hand(law, path, upper_pressure([1.0]), times)[0], abs=2e-4)
+    force = march_tractions(Quadrature(law, tail=0.0), path, upper_pressure([1.0]), times).traction[
+        -1, 0
+    ]
+    assert force == pytest.approx(
+        reference_traction(law, path, upper_pressure([1.0]), times)[0], abs=2e-4
+    )

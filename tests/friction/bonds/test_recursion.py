@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from friction_paths import lower_pressure, sum_by_hand, upper_pressure, walk
+from friction_paths import lower_pressure, march_path, reference_traction, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -48,8 +48,8 @@ def test_exact_recursion_equals_sum_over_bonds(piece, growth, seed):
     path = np.concatenate([[0], np.cumsum(steps)])
     times = rng.uniform(0.01, 1, 120)
     law = Bonds(0.4, 1.0, initial=0.8, **growth)
-    recursion = walk(FirstOrderBonds(law), path, make_pressure(piece), times)
-    quadrature = walk(Quadrature(law, tail=0.0), path, make_pressure(piece), times)
+    recursion = march_path(FirstOrderBonds(law), path, make_pressure(piece), times)
+    quadrature = march_path(Quadrature(law, tail=0.0), path, make_pressure(piece), times)
     if piece == "lower with bare places":
         contact_changes = np.diff(
             (np.array([make_pressure(piece)(q) for q in path]) <= 0).astype(int), axis=0
@@ -67,12 +67,12 @@ def test_exact_step_mean_equals_average_along_step():
     """The mean traction of a step agrees with Gauss quadrature over partial steps whose bonds are summed by hand."""
     law = Bonds(1.0, 1.0)
     path = np.array([0.0, 0.8, -0.5, 0.1, 2.0])
-    run = walk(FirstOrderBonds(law), path, make_pressure("upper"), 0.5)
+    run = march_path(FirstOrderBonds(law), path, make_pressure("upper"), 0.5)
     y, w = np.polynomial.legendre.leggauss(10)
     for k in range(1, 5):
         dq = path[k] - path[k - 1]
         parts = [
-            sum_by_hand(
+            reference_traction(
                 law,
                 np.append(path[:k], path[k - 1] + dq * (1 + a) / 2),
                 make_pressure("upper"),
@@ -104,7 +104,7 @@ def test_always_sum_over_bonds_is_passive(steps, growth):
     """Dissipated and stored energy of the sum over bonds are never negative."""
     law = Quadrature(Bonds(1.0, 1.0, **growth), tail=0.0)
     path = np.concatenate([[0], np.cumsum(steps)])
-    run = walk(law, path, make_pressure("lower with bare places"), 0.3)
+    run = march_path(law, path, make_pressure("lower with bare places"), 0.3)
     total = max(np.abs(run.mean * np.diff(path)[:, None]).sum(), 1e-3)
     assert run.dissipated.min() >= -1e-12 * total and run.stored.min() >= 0
 
@@ -123,7 +123,7 @@ def test_always_stretch_law_of_any_order_is_passive(order, growth):
                 for a, b in zip(np.append(0, reversals), np.append(reversals, 0))
             ]
         )
-        run = walk(
+        run = march_path(
             Quadrature(Bonds(1.0, 1.0, order, initial=0.0, **growth), tail=0.0),
             path,
             upper_pressure([1.0]),
@@ -141,7 +141,7 @@ def test_exact_huge_steps_reach_steady_sliding(growth):
     """A step of a million bond lengths reaches the friction limit of steady sliding without overflow."""
     law = Bonds(0.3, 1.0, **growth)
     for engine in (FirstOrderBonds, Quadrature):
-        run = walk(
+        run = march_path(
             engine(law), np.array([0.0, 1e6, -1e6, -1e6, -1e6 + 1e-9]), make_pressure("upper"), 1.0
         )
         assert np.isfinite(
@@ -161,8 +161,8 @@ def test_exact_zero_steps_do_not_change_state():
     for engine in (FirstOrderBonds, Quadrature):
         path = np.array([0, 0.4, 0.4, 0.4, 0.9])
         times = np.array([0.5, 0.0, 0.0, 0.5])
-        run = walk(engine(law), path, make_pressure("upper"), times)
-        shortened = walk(engine(law), path[[0, 1, 4]], make_pressure("upper"), times[[0, 3]])
+        run = march_path(engine(law), path, make_pressure("upper"), times)
+        shortened = march_path(engine(law), path[[0, 1, 4]], make_pressure("upper"), times[[0, 3]])
         assert run.traction[-1] == pytest.approx(shortened.traction[-1], abs=1e-14)
         assert (
             run.mean[1] == pytest.approx(run.traction[0], abs=1e-14) and not run.dissipated[1].any()

@@ -5,7 +5,7 @@ from dataclasses import replace
 import friction_forms
 import numpy as np
 import pytest
-from command_line import FROM_PYTHON, loaded
+from command_line import FROM_PYTHON, modules_after
 from scene_texts import BENCH, GROWING, POINT, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.special import erfc
 
@@ -291,6 +291,6 @@ def test_exact_unused_effects_are_not_imported(tmp_path):
         "runs.results.heat",
         "runs.bench.averaged",
     }
-    assert not {f"patchfem.{name}" for name in unused_modules} & loaded(
+    assert not {f"patchfem.{name}" for name in unused_modules} & modules_after(
         FROM_PYTHON, tmp_path / "scene.toml"
     )

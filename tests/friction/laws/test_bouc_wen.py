@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from law_runs import LOAD, bench_along, shrinking
+from law_runs import LOAD, run_bench_along_path, shrinking_sine
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -37,7 +37,9 @@ def test_exact_symmetric_loop_agrees_with_closed_form(exponent):
     """The symmetric loop of shape 1/2 agrees with its closed form: linear unloading, loading as 1 - exp(-x) or tanh x."""
     amplitude = 3e-6
     time = np.arange(12001) / 1e5
-    result = bench_along(law_keys(exponent, 0.5), time, amplitude * np.sin(2 * np.pi * 100 * time))
+    result = run_bench_along_path(
+        law_keys(exponent, 0.5), time, amplitude * np.sin(2 * np.pi * 100 * time)
+    )
     loading_curve = (lambda x: -np.expm1(-x)) if exponent == 1 else np.tanh
     z_peak = brentq(lambda z: loading_curve(2 * amplitude / EPS - z) - z, 0.0, 1.0, xtol=1e-15)
     x = 2 * amplitude / EPS - z_peak
@@ -52,8 +54,8 @@ def test_exact_symmetric_loop_agrees_with_closed_form(exponent):
 @pytest.mark.parametrize("exponent, shape", [(1.0, 0.5), (2.0, 0.8), (1.5, 0.2), (4.0, 1.0)])
 def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape):
     """Force and stored energy on the bench agree with the integrated rate equation, and the energy balance closes."""
-    time, slide = shrinking(60)
-    result = bench_along(law_keys(exponent, shape), time, slide)
+    time, slide = shrinking_sine(60)
+    result = run_bench_along_path(law_keys(exponent, shape), time, slide)
     z = integrate_law(slide, exponent, shape)
     assert np.abs(result.force - LIMIT * z).max() <= 1e-6 * LIMIT
     work, stored, dissipated, created = result.ledger
@@ -96,10 +98,10 @@ def test_exact_steady_loop_agrees_with_rate_equation(exponent, shape):
 
 def test_exact_exponent_and_shape_one_equal_bond_law():
     """A Bouc-Wen law with exponent 1 and shape 1 has the forces of the stretch form of the bond law."""
-    time, slide = shrinking()
+    time, slide = shrinking_sine()
     bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{EPS!r} m"\n'
-    bouc_wen = bench_along(law_keys(1.0, 1.0), time, slide)
-    bond_law = bench_along(bonds, time, slide)
+    bouc_wen = run_bench_along_path(law_keys(1.0, 1.0), time, slide)
+    bond_law = run_bench_along_path(bonds, time, slide)
     assert bouc_wen.force == pytest.approx(bond_law.force, abs=1e-10 * LIMIT)
     assert bouc_wen.ledger[0] == pytest.approx(
         bond_law.ledger[0], abs=1e-10 * bouc_wen.ledger[0, -1]

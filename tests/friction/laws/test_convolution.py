@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from friction_paths import pulled, triangle, upper_pressure, walk
+from friction_paths import march_path, march_tractions, triangle_path, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
@@ -106,7 +106,7 @@ def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
     engine = law(bonds, 0.0) if law is Quadrature else law(bonds)
     pressure = lower_piece_pressure(nodes, sigma)
     coarse, fine = (
-        pulled(engine, direction * np.linspace(0, 20, steps + 1), pressure).traction[-1]
+        march_tractions(engine, direction * np.linspace(0, 20, steps + 1), pressure).traction[-1]
         for steps in (160, 320)
     )
     averaged = Convolution(0.4, 1.0, order, nodes, sigma)
@@ -120,13 +120,13 @@ def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
 
 def test_exact_uniform_pressure_reduces_to_coulomb():
     """The averaged law equals Coulomb's law under uniform pressure, and tends to it as the bond length tends to zero."""
-    path = triangle(2.0, 2, 8)
+    path = triangle_path(2.0, 2, 8)
     nodes = np.linspace(0, 100, 41)
     sigma = np.full(41, 2.0)
     is_inner = (nodes > 45) & (nodes < 55)
-    coulomb_run = walk(Coulomb(0.3), path, upper_pressure(sigma))
+    coulomb_run = march_path(Coulomb(0.3), path, upper_pressure(sigma))
     for law in (Convolution(0.3, 0.5, 1.0, nodes), Convolution(0.3, 0.5, 1.0)):
-        averaged_run = walk(law, path, upper_pressure(sigma))
+        averaged_run = march_path(law, path, upper_pressure(sigma))
         assert averaged_run.mean[:, is_inner] == pytest.approx(
             coulomb_run.mean[:, is_inner], rel=1e-13
         )
@@ -135,8 +135,10 @@ def test_exact_uniform_pressure_reduces_to_coulomb():
         )
     wavy_pressure = 2 + np.sin(nodes)
     for eps in (1e-2, 1e-3, 1e-4):
-        averaged_run = walk(Convolution(0.3, eps, 1.0, nodes), path, upper_pressure(wavy_pressure))
-        coulomb_limit = walk(Coulomb(0.3), path, upper_pressure(wavy_pressure))
+        averaged_run = march_path(
+            Convolution(0.3, eps, 1.0, nodes), path, upper_pressure(wavy_pressure)
+        )
+        coulomb_limit = march_path(Coulomb(0.3), path, upper_pressure(wavy_pressure))
         assert (
             np.abs(averaged_run.traction - coulomb_limit.traction)[:, 1:-1].max()
             < 0.3 * 2 * eps * 1.01
@@ -167,7 +169,7 @@ def test_always_averaged_law_is_passive(steps, on_lower_piece):
     sigma = np.maximum(np.sin(nodes), 0.0)
     law = Convolution(0.5, 0.8, 1.0, nodes, sigma if on_lower_piece else None)
     pressure = lower_piece_pressure(nodes, sigma) if on_lower_piece else upper_pressure(sigma)
-    result = walk(law, np.cumsum([0.0, *steps]), pressure)
+    result = march_path(law, np.cumsum([0.0, *steps]), pressure)
     assert (result.dissipated >= -1e-14).all()
     assert (np.abs(result.traction) <= 0.5 * sigma.max() + 1e-12).all()
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from law_runs import LOAD, bench_along, shrinking
-from scene_texts import COATED, mistakes, only
+from law_runs import LOAD, run_bench_along_path, shrinking_sine
+from scene_texts import COATED, get_only_mistake, list_mistakes
 
 from patchfem.friction import max_yield_displacement
 from patchfem.friction.laws.iwan import slider_cells
@@ -55,7 +55,7 @@ def test_order_of_micro_slip_dissipation_is_chi_plus_three(chi):
     for fraction in (1e-3, 1e-2):
         u = fraction * phi_max
         time = np.arange(801) / 40000
-        result = bench_along(law, time, u * np.sin(2 * np.pi * 100 * time))
+        result = run_bench_along_path(law, time, u * np.sin(2 * np.pi * 100 * time))
         losses.append(result.ledger[2, -1] - result.ledger[2, 400])
         forces.append(np.abs(result.force).max())
         assert losses[-1] == pytest.approx(
@@ -68,8 +68,8 @@ def test_order_of_micro_slip_dissipation_is_chi_plus_three(chi):
 
 def test_exact_bench_loop_agrees_with_slider_density():
     """A bench path with minor loops agrees with the density resolved by 200 000 sliders within 1e-6 of the limit."""
-    time, slide = shrinking()
-    result = bench_along(LAW, time, slide)
+    time, slide = shrinking_sine()
+    result = run_bench_along_path(LAW, time, slide)
     r, s, phi_max = density_parameters(FORCE, STIFFNESS, CHI, BETA)
     n_sliders = 200_000
     phi = phi_max * ((np.arange(n_sliders) + 0.5) / n_sliders) ** (
@@ -100,6 +100,8 @@ def test_refuses_lower_shapes_and_varying_load():
     motion = '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"\n'
     bench = "[friction]\n" + LAW + motion
     tilt = '[contact.tilt]\nangle = "0.01 mrad"\non = "lower"\n'
-    assert "put the shapes on the upper" in only(COATED + tilt + bench)
+    assert "put the shapes on the upper" in get_only_mistake(COATED + tilt + bench)
     varying = '[normal]\nload = "100 N"\namplitude = "10 N"\nfrequency = "5 Hz"\n'
-    assert "normal.amplitude: not supported yet with law 'iwan'" in mistakes(varying + bench)[0]
+    assert (
+        "normal.amplitude: not supported yet with law 'iwan'" in list_mistakes(varying + bench)[0]
+    )

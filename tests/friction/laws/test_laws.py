@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from friction_forms import jenkins_loop
-from friction_paths import triangle, upper_pressure, walk
+from friction_paths import march_path, triangle_path, upper_pressure
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,8 +19,8 @@ ROWS = st.lists(st.tuples(st.floats(-3, 3), PRESSURE, PRESSURE), min_size=1, max
 @pytest.mark.parametrize("per_stroke", [2, 6, 34])
 def test_exact_elastic_plastic_loop_agrees_with_closed_form(amplitude, length, per_stroke):
     """The loop area 4 mu N (A - eps) and the reversal force are exact for any number of steps per stroke."""
-    path = triangle(amplitude, 2, per_stroke)
-    run = walk(ElasticPlastic(0.3, length), path, TWO_PRESSURES)
+    path = triangle_path(amplitude, 2, per_stroke)
+    run = march_path(ElasticPlastic(0.3, length), path, TWO_PRESSURES)
     cycle = slice(-2 * per_stroke, None)
     work = run.mean[cycle].T @ np.diff(path)[cycle]
     area, end = jenkins_loop(amplitude, length, 0.3)
@@ -117,7 +117,7 @@ def test_exact_step_does_not_modify_input_state(law):
     before = np.array(state)
     law.step(state, 0.7, np.ones(2), np.ones(2), 1.0)
     assert np.array_equal(before, np.array(state))
-    run = walk(law, np.array([0.0, 1e6, 0.0, 0.0]), upper_pressure([1.0, 0.0]))
+    run = march_path(law, np.array([0.0, 1e6, 0.0, 0.0]), upper_pressure([1.0, 0.0]))
     assert np.isfinite(np.concatenate([run.mean, run.traction, run.dissipated])).all()
     assert run.traction[1] == pytest.approx([-0.3, 0.0]) and run.mean[1] == pytest.approx(
         [-0.3, 0.0], rel=1e-5

@@ -2,9 +2,17 @@
 
 import numpy as np
 import pytest
-from law_runs import bench_along, fitted, masses, plain_masses, released, rig, shrinking
+from law_runs import (
+    fit_law,
+    run_bench_along_path,
+    run_release,
+    run_rig,
+    run_two_masses,
+    run_two_masses_uncompiled,
+    shrinking_sine,
+)
 from march_paths import share_one_loop
-from scene_texts import COATED, DRIVE, MODE, mistakes, only
+from scene_texts import COATED, DRIVE, MODE, get_only_mistake, list_mistakes
 
 from patchfem import load
 
@@ -24,8 +32,8 @@ DAMPED = LUGRE + 'micro_damping = "900 N s/m"\nviscous = "300 N s/m"\n'
 )
 def test_exact_march_agrees_with_harmonic_balance(law):
     """The measures of a march and of the harmonic balance differ by no more than their stated errors."""
-    marched = rig(law)
-    steady = rig(law, "accuracy.method=harmonic")
+    marched = run_rig(law)
+    steady = run_rig(law, "accuracy.method=harmonic")
     assert marched.outcome.value == "steady"
     for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
         marched_measure = marched.measures[name]
@@ -47,8 +55,8 @@ def test_exact_released_bonds_agree_in_both_engines(extra_keys):
 
     Slip is the relative displacement less the stretch of the bonds, which is zero at the start.
     """
-    smooth = released(BONDS + extra_keys)
-    marched = released(BONDS + extra_keys, "accuracy.method=march")
+    smooth = run_release(BONDS + extra_keys)
+    marched = run_release(BONDS + extra_keys, "accuracy.method=march")
     for run in (smooth, marched):
         assert run.slide[0] == run.slip[0] == 60e-6
         # displacement and slip differ by the stretch of the bonds
@@ -66,9 +74,9 @@ def test_exact_two_equal_interfaces_move_equally(law, monkeypatch):
     """Two equal interfaces have the relative displacement of a single interface."""
     if law == IWAN:
         share_one_loop(monkeypatch)
-    two_masses = masses(law, 2)
+    two_masses = run_two_masses(law, 2)
     slides = two_masses.response.extra["slides"]
-    single_slide = masses(law, 1).response.slide
+    single_slide = run_two_masses(law, 1).response.slide
     assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
     assert slides[:, 0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
 
@@ -76,7 +84,7 @@ def test_exact_two_equal_interfaces_move_equally(law, monkeypatch):
 @pytest.mark.slow
 def test_exact_uncompiled_equal_interfaces_move_equally():
     """Two equal interfaces move as a single interface when the kernels run as Python."""
-    slides, single_slide, peaks = plain_masses(BOUC_WEN.format(2.0, 0.7))
+    slides, single_slide, peaks = run_two_masses_uncompiled(BOUC_WEN.format(2.0, 0.7))
     assert slides[0] == pytest.approx(slides[1], abs=1e-12 * np.abs(slides).max())
     assert slides[0] == pytest.approx(single_slide, abs=1e-7 * np.abs(single_slide).max())
     assert (
@@ -112,12 +120,12 @@ def test_exact_fit_recovers_parameters_of_loop(
     tmp_path, law, initial_values, free_parameters, values
 ):
     """A fit to a loop computed with known parameters recovers them within 1e-5."""
-    time, slide = shrinking(60)
-    force = bench_along(law, time, slide).force
+    time, slide = shrinking_sine(60)
+    force = run_bench_along_path(law, time, slide).force
     guess = law
     for value, initial_value in initial_values.items():
         guess = guess.replace(value, initial_value)
-    assert fitted(
+    assert fit_law(
         tmp_path, guess, (time, slide, force), free_parameters
     ).keys.fit.values == pytest.approx(values, rel=1e-5)
 
@@ -148,7 +156,7 @@ def without_key(scene: str, key: str) -> str:
 def test_refuses_law_without_required_key(law, keys):
     """A law without one of its required keys is refused."""
     for key in keys.split():
-        assert f"friction.{key}: missing" in only(without_key(rig_scene(law), key))
+        assert f"friction.{key}: missing" in get_only_mistake(without_key(rig_scene(law), key))
 
 
 @pytest.mark.parametrize(
@@ -169,21 +177,21 @@ def test_refuses_law_without_required_key(law, keys):
 )
 def test_refuses_law_parameter_out_of_range(law, change, message):
     """A parameter outside the range of its law is refused with the name of the key or the reason."""
-    assert message in only(rig_scene(law), f"friction.{change}")
+    assert message in get_only_mistake(rig_scene(law), f"friction.{change}")
 
 
 @pytest.mark.parametrize("law", [IWAN, POWER, DAHL, TANH])
 def test_refuses_partial_slip_for_hysteretic_laws(law):
     """The laws without partial slip are refused with `contact.shear`."""
     scene = COATED + "[contact.shear]\n[friction]\n" + law + MODE + DRIVE
-    assert "with [contact.shear]" in only(scene)
+    assert "with [contact.shear]" in get_only_mistake(scene)
 
 
 @pytest.mark.parametrize("law", [IWAN, POWER, DAMPED])
 def test_refuses_varying_load_for_hysteretic_laws(law):
     """The laws with memory are refused with a varying load on a rig."""
     sets = ("normal.amplitude=1 N", "normal.frequency=3 Hz")
-    assert "with normal.amplitude" in mistakes(rig_scene(law), *sets)[0]
+    assert "with normal.amplitude" in list_mistakes(rig_scene(law), *sets)[0]
 
 
 def test_exact_missing_keys_have_defaults():

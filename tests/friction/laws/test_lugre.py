@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from law_runs import LOAD, bench_along, shrinking
+from law_runs import LOAD, run_bench_along_path, shrinking_sine
 from scipy.integrate import solve_ivp
 
 from patchfem.compiled import load_uncompiled
@@ -30,7 +30,7 @@ def test_exact_steady_sliding_follows_stribeck_curve(speed):
     """The force in steady sliding is the Stribeck curve plus the viscous force, in both directions."""
     time = np.linspace(0.0, 1e-3 / speed, 201)
     for direction in (1.0, -1.0):
-        result = bench_along(DAMPED, time, direction * speed * time)
+        result = run_bench_along_path(DAMPED, time, direction * speed * time)
         assert result.force[-1] == pytest.approx(
             direction * (stribeck_limit(speed) + 300 * speed), rel=1e-12
         )
@@ -38,10 +38,10 @@ def test_exact_steady_sliding_follows_stribeck_curve(speed):
 
 def test_exact_dahl_law_equals_bond_law():
     """Without weakening and damping the law equals the stretch form of the bond law of order one."""
-    time, slide = shrinking()
+    time, slide = shrinking_sine()
     bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{STATIC / STIFFNESS!r} m"\n'
-    dahl = bench_along(DAHL, time, slide)
-    bond_law = bench_along(bonds, time, slide)
+    dahl = run_bench_along_path(DAHL, time, slide)
+    bond_law = run_bench_along_path(bonds, time, slide)
     assert dahl.force == pytest.approx(bond_law.force, abs=1e-10 * STATIC)
     max_ratio = np.abs(dahl.slide).max() * STIFFNESS / STATIC
     assert dahl.force.max() == pytest.approx(
@@ -51,8 +51,8 @@ def test_exact_dahl_law_equals_bond_law():
 
 def test_exact_bench_steps_agree_with_rate_equation():
     """Stored energy and work of each coarse bench step agree with an integration of order eight."""
-    time, slide = shrinking(40)
-    result = bench_along(DAMPED, time, slide)
+    time, slide = shrinking_sine(40)
+    result = run_bench_along_path(DAMPED, time, slide)
     z = 0.0
     for k, (dq, dt) in enumerate(zip(np.diff(slide), np.diff(time))):
         v = dq / dt

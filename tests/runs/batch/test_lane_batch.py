@@ -7,7 +7,7 @@ runs is `lanes` of tests/support/campaigns.py.
 
 import numpy as np
 import pytest
-from lane_cases import LAWS, SCENE, draw_points, rows
+from lane_cases import LAWS, SCENE, compare_answers, draw_points
 from test_lumped import solve_by_group
 
 from patchfem.api import build, get_base_scene, load, run_many
@@ -36,7 +36,7 @@ def count_deviating_cases(lanes, reference) -> int:
     the sum of both errors."""
     return sum(
         lanes.outcome[case] != reference.outcome[case] or not all(row.holds for row in case_rows)
-        for case, case_rows in enumerate(rows(lanes, reference))
+        for case, case_rows in enumerate(compare_answers(lanes, reference))
     )
 
 
@@ -59,7 +59,10 @@ def assert_lanes_agree(law: str, seed: int, count: int, max_cases: int | None = 
     )
     lanes = results.select(np.array(in_lanes))
     assert (lanes.outcome == reference.outcome).all()
-    assert np.mean([row.holds for compared in rows(lanes, reference) for row in compared]) >= 0.97
+    assert (
+        np.mean([row.holds for compared in compare_answers(lanes, reference) for row in compared])
+        >= 0.97
+    )
 
 
 # The other laws need two more compiled loops each: one for lanes and one for single runs.

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from batch_beside import held_against
+from batch_beside import assert_equal_to_single_runs
 from scene_texts import MODE
 
 from patchfem.api import build, get_base_scene, load
@@ -71,7 +71,7 @@ def solve_by_group(cases) -> CaseResults:
 def test_exact_batch_agrees_with_single_runs(law, count):
     """The exact batch of lumped cases agrees with single runs in values, errors and texts."""
     cases = draw_models(law, 1, count)
-    held_against(cases, one_by_one.solve(cases), solve_by_group(cases))
+    assert_equal_to_single_runs(cases, one_by_one.solve(cases), solve_by_group(cases))
 
 
 def test_always_errors_of_coarse_iwan_cells_cover_fine_cells():

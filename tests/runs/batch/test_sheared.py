@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from batch_beside import held_against
+from batch_beside import assert_equal_to_single_runs
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
@@ -58,7 +58,7 @@ def count_cases_solved_in_batch(law: str, seed: int, count: int) -> int:
             ),
         )
         results = batches.solve_models(cases)
-    held_against(cases, solve_one_by_one(cases), results)
+    assert_equal_to_single_runs(cases, solve_one_by_one(cases), results)
     return count - len(single_cases)
 
 

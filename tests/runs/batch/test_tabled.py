@@ -6,7 +6,7 @@ The long campaign against single runs is `lanes` of tests/support/campaigns.py.
 
 import numpy as np
 import pytest
-from lane_cases import PATCH, draw_patches, rows
+from lane_cases import PATCH, compare_answers, draw_patches
 
 import patchfem as pf
 from patchfem.api import get_base_scene
@@ -24,7 +24,7 @@ def compare_lanes_with_exact(family: str, seed: int, count: int) -> tuple:
     lanes = tabled.solve(models)
     exact = sheared.solve(models)
     assert list(lanes.outcome) == list(exact.outcome) and not lanes.messages
-    all_rows = [row for case_rows in rows(lanes, exact) for row in case_rows]
+    all_rows = [row for case_rows in compare_answers(lanes, exact) for row in case_rows]
     return lanes, [row for row in all_rows if not row.holds], len(all_rows)
 
 

@@ -8,6 +8,6 @@ if __name__ == "__main__":
 
 from reference import joint_laws, keys, limits, records
 
-for page in (keys, keys.Equations, records.Measures, records.Materials, limits, joint_laws):
+for page in (keys, keys.Equations, records.MeasuresPage, records.MaterialsPage, limits, joint_laws):
     page.FILE.write_text(page.text(), encoding="utf-8")
     print(page.FILE)

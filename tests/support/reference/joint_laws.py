@@ -5,7 +5,7 @@ from pathlib import Path
 from patchfem.scene import KNOWLEDGE, WISHES
 from patchfem.scene.joint_laws import JOINT_LAWS
 
-from .keys import FOLDER, grid
+from .keys import FOLDER, format_table
 
 FILE: Path = FOLDER / "guide" / "friction.md"
 BEGIN = "<!-- joint laws -->\n"
@@ -17,17 +17,17 @@ def text() -> str:
     """Return the page of the guide with its table of joint laws generated again."""
     before, _, rest = FILE.read_text("utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
-    words = f"{_define('know', KNOWLEDGE)}\n{_define('want', WISHES)}"
-    return f"{before}{BEGIN}{words}\n\n{grid(HEAD, _list_rows())}\n\n{END}{after}"
+    words = f"{_format_definitions('know', KNOWLEDGE)}\n{_format_definitions('want', WISHES)}"
+    return f"{before}{BEGIN}{words}\n\n{format_table(HEAD, _list_rows())}\n\n{END}{after}"
 
 
-def _define(question: str, meanings: dict) -> str:
+def _format_definitions(question: str, meanings: dict) -> str:
     """Return a list item with the meaning of every answer to a question."""
     answers = "; ".join(f"`{word}`: {meaning}" for word, meaning in meanings.items())
     return f"- What you {question}: {answers}."
 
 
-def _format_words(words: tuple) -> str:
+def _format_code(words: tuple) -> str:
     """Return words or keys in the form of code."""
     return ", ".join(f"`{word}`" for word in words)
 
@@ -36,7 +36,7 @@ def _list_rows() -> list[tuple]:
     """Return the rows of the table as texts."""
     rows = []
     for row in JOINT_LAWS:
-        keys = _format_words(("static", *row.keys))
+        keys = _format_code(("static", *row.keys))
         limits = f"{row.gives}. *Limits:* {row.cannot}"
         known, wanted = ", ".join(row.known), ", ".join(row.wanted)
         rows.append((known, wanted, f"**{row.law}**: {keys}", limits))

@@ -47,25 +47,27 @@ def text() -> str:
     sections = [
         HEAD,
         "## Tables and keys",
-        *_keys(),
+        *_format_sections(),
         "## Units",
-        grid(("kind", "units, the first in SI", "example"), units),
+        format_table(("kind", "units, the first in SI", "example"), units),
     ]
     return "\n\n".join(section.strip("\n") for section in sections) + "\n"
 
 
-def tables(model: type = Tables, at: str = "") -> Iterator[tuple]:
+def iterate_tables(model: type = Tables, header: str = "") -> Iterator[tuple]:
     """Yield (header, model) of every table of a scene in order, ("", Tables) first; the header of an array is [[...]].
 
-    model: the pydantic class to begin with; at: its header.
+    model: the pydantic class to begin with; header: its header.
     """
-    yield (at, model)
+    yield (header, model)
     for key, name in attributes_by_key(model).items():
         # An interface has the same tables as [contact].
         if _is_table(model, name) and (model, name) != (Interface, "contact"):
-            path = f"{at.strip('[]')}.{key}".strip(".")
-            many = get_origin(model.model_fields[name].annotation) is tuple
-            yield from tables(find_inner_table(model, name), f"[[{path}]]" if many else f"[{path}]")
+            path = f"{header.strip('[]')}.{key}".strip(".")
+            is_array = get_origin(model.model_fields[name].annotation) is tuple
+            yield from iterate_tables(
+                find_inner_table(model, name), f"[[{path}]]" if is_array else f"[{path}]"
+            )
 
 
 def _is_table(model: type, name: str) -> bool:
@@ -73,11 +75,11 @@ def _is_table(model: type, name: str) -> bool:
     return find_inner_table(model, name) is not None and not is_table_or_value(model, name)
 
 
-def _keys() -> list:
+def _format_sections() -> list:
     """Return the sections of all tables with their keys."""
     heads = {}
     out = []
-    for header, model in tables():
+    for header, model in iterate_tables():
         heads.setdefault(model, []).append(header)
     for model, named in heads.items():
         parent = model.__mro__[1]
@@ -100,15 +102,15 @@ def _keys() -> list:
         ]
         if own:
             out.append(
-                grid(
+                format_table(
                     ("key", "kind", "default", "required", "meaning"),
-                    [_row(model, key, named[0].strip("[]")) for key in own],
+                    [_format_row(model, key, named[0].strip("[]")) for key in own],
                 )
             )
     return out
 
 
-def _row(model: type, key: str, at: str) -> tuple:
+def _format_row(model: type, key: str, at: str) -> tuple:
     """Return the row of a key: name, kind, default, condition and meaning."""
     name = attributes_by_key(model)[key]
     field = model.model_fields[name]
@@ -120,23 +122,25 @@ def _row(model: type, key: str, at: str) -> tuple:
         )
     elif default:
         default = f"`{default}`"
-    required = "yes" if field.is_required() else _needed(model, key, path.rpartition(".")[0])
+    required = (
+        "yes" if field.is_required() else _format_condition(model, key, path.rpartition(".")[0])
+    )
     said = find_meaning(model, key) + ("; not supported yet" if path == UNSUPPORTED_KEY else "")
-    return f"`{key}`", _kind(model, name), default, required, said
+    return f"`{key}`", _format_kind(model, name), default, required, said
 
 
-def _needed(model: type, key: str, table: str) -> str:
+def _format_condition(model: type, key: str, table: str) -> str:
     """Return the condition that makes a key necessary: "with law `tanh`", the values of a selector, or a sentence."""
-    found = find_key_record(model, key)
-    said = [found.required] if found and found.required else []
-    for selector, used in NEEDS.items():
-        values = [f"`{value}`" for value, (needs, _) in used.items() if key in split_keys(needs)]
+    record = find_key_record(model, key)
+    conditions = [record.required] if record and record.required else []
+    for selector, options in NEEDS.items():
+        values = [f"`{value}`" for value, (needs, _) in options.items() if key in split_keys(needs)]
         if values and selector.rpartition(".")[0] == table:
-            said.append(f"with {selector.rpartition('.')[2]} {', '.join(values)}")
-    return "; ".join(said)
+            conditions.append(f"with {selector.rpartition('.')[2]} {', '.join(values)}")
+    return "; ".join(conditions)
 
 
-def _kind(model: type, name: str) -> str:
+def _format_kind(model: type, name: str) -> str:
     """Return the kind of value of a key, with its bounds."""
     annotation = model.model_fields[name].annotation
     types = (annotation, *iterate_annotation_parts(annotation))
@@ -152,9 +156,9 @@ def _kind(model: type, name: str) -> str:
     elif float in types or int in types or not words:
         words.append("number" if float in types else "whole number" if int in types else "text")
     arrays = [get_args(part) for part in types if get_origin(part) is tuple]
-    many = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
-    words = dict.fromkeys(map(_plural, words) if many else words)
-    return ", ".join([many + ", ".join(words), *_limits(model, name)])
+    prefix = "" if not arrays else "list of " if ... in arrays[0] else "pair of "
+    words = dict.fromkeys(map(_plural, words) if prefix else words)
+    return ", ".join([prefix + ", ".join(words), *_format_bounds(model, name)])
 
 
 def _plural(word: str) -> str:
@@ -168,7 +172,7 @@ def _plural(word: str) -> str:
     )
 
 
-def _limits(model: type, name: str) -> list:
+def _format_bounds(model: type, name: str) -> list:
     """Return the bounds of a key, such as ">= 1"."""
     annotation = model.model_fields[name].annotation
     marks = [
@@ -190,16 +194,16 @@ def _limits(model: type, name: str) -> list:
     )
 
 
-def bounds() -> Iterator[tuple]:
+def iterate_bounds() -> Iterator[tuple]:
     """Yield (dotted key, kind with its bounds) of every key that is a whole number or has an upper bound."""
-    for header, model in tables():
+    for header, model in iterate_tables():
         for key, name in attributes_by_key(model).items():
             if _is_table(model, name):
                 continue
-            said = _kind(model, name)
-            bound = _limits(model, name)
-            if bound and ("whole number" in said or any(one.startswith("<") for one in bound)):
-                yield f"{header.strip('[]')}.{key}".strip("."), said
+            kind = _format_kind(model, name)
+            bound = _format_bounds(model, name)
+            if bound and ("whole number" in kind or any(text.startswith("<") for text in bound)):
+                yield f"{header.strip('[]')}.{key}".strip("."), kind
 
 
 class Equations:
@@ -213,10 +217,10 @@ class Equations:
         """Return the page of the theory with its table of effects generated again."""
         before, _, rest = cls.FILE.read_text("utf-8").partition(cls.BEGIN)
         after = rest.partition(cls.END)[2]
-        return f"{before}{cls.BEGIN}\n{effects_table()}\n\n{cls.END}{after}"
+        return f"{before}{cls.BEGIN}\n{format_effects()}\n\n{cls.END}{after}"
 
 
-def effects_table() -> str:
+def format_effects() -> str:
     """Return the table of all effects: required keys, optional keys, and equations."""
     rows = []
     for name, effect in EFFECTS.items():
@@ -230,10 +234,10 @@ def effects_table() -> str:
             if not name.startswith("structure.interface.")
             else []
         )
-    return grid(("effect", "required keys", "optional keys", "equations"), rows)
+    return format_table(("effect", "required keys", "optional keys", "equations"), rows)
 
 
-def grid(head: tuple, rows: list) -> str:
+def format_table(head: tuple, rows: list) -> str:
     """Return a Markdown table from its head and rows of texts."""
     lines = [
         head,

@@ -5,8 +5,19 @@ from importlib import import_module
 from patchfem.runs.patch.result import MAX_SMALL_STRAIN, MIN_COUPLING_RATIO
 from patchfem.scene.keys.types import DIVISOR_KINDS, MAX_MAGNITUDE
 
-from .keys import FOLDER, bounds, grid
-from .tried import BENCHES, METHODS, MORE, POINT, RIG, RIGS, Beside, across, laws, refused
+from .keys import FOLDER, format_table, iterate_bounds
+from .tried import (
+    BENCHES,
+    METHODS,
+    MORE,
+    POINT,
+    RIG,
+    RIGS,
+    SceneColumn,
+    find_lateral_refusal,
+    find_refusal,
+    list_laws,
+)
 
 FILE = FOLDER / "LIMITS.md"
 HEAD = """\
@@ -107,7 +118,7 @@ infinite; any computed value of this peak would depend on the mesh.
 
 
 METHOD_COLUMNS = tuple(
-    Beside(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
+    SceneColumn(f"`{method}`", POINT + RIG, (f"accuracy.method={method}",)) for method in METHODS
 )
 TABLES = (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on a bench", BENCHES))
 
@@ -116,26 +127,26 @@ def text() -> str:
     """Return the page patchfem/scene/LIMITS.md; scenes are assembled and checked, but not run."""
     body = []
     for title, columns in TABLES:
-        body += [f"## {title}", _compatibility_table(columns)]
+        body += [f"## {title}", _format_compatibility(columns)]
     body += [
         "On a bench, the prescribed slide can be two-dimensional under these laws: "
-        + _listed(name for name, one in laws().items() if not across(one))
+        + _join_names(name for name, one in list_laws().items() if not find_lateral_refusal(one))
         + ". The slide cannot be two-dimensional under these laws: "
-        + _listed(name for name, one in laws().items() if across(one))
+        + _join_names(name for name, one in list_laws().items() if find_lateral_refusal(one))
         + ".",
         "## Methods",
         "In this table each scene is a rig with a single contact point under a sine drive. The "
         "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
-        _compatibility_table(METHOD_COLUMNS),
+        _format_compatibility(METHOD_COLUMNS),
         "## Numbers",
         f"The magnitude of a quantity must be at most {MAX_MAGNITUDE:g} in SI units. If the quantity is of a kind by "
         "which the program divides ("
         + ", ".join(sorted(DIVISOR_KINDS))
         + "), its magnitude must also be at least "
         f"{1 / MAX_MAGNITUDE:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
-        _bounds(),
+        _format_bounds(),
         "## Sizes",
-        _sizes(),
+        _format_sizes(),
         "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
         "the process. The message names the key whose value requires so much memory.",
         "## What the models leave out",
@@ -144,7 +155,7 @@ def text() -> str:
     return "\n\n".join([HEAD.strip(), *body]) + "\n"
 
 
-def messages() -> str:
+def format_messages() -> str:
     """Return the page of the messages with which the scenes of the tables of limits are refused."""
     parts = [
         "# Messages of unsupported combinations",
@@ -154,54 +165,56 @@ def messages() -> str:
     for title, columns in (*TABLES, ("Methods", METHOD_COLUMNS)):
         rows = [
             (law, words, "; ".join(sentences))
-            for (law, words), sentences in refusals(columns).items()
+            for (law, words), sentences in find_refusals(columns).items()
         ]
-        parts += [f"## {title}", grid(("law", "with", "message"), rows)]
+        parts += [f"## {title}", format_table(("law", "with", "message"), rows)]
     return "\n\n".join(parts) + "\n"
 
 
-def refusals(columns: tuple) -> dict:
+def find_refusals(columns: tuple) -> dict:
     """Return {(law, heading of a column): sentences} of the combinations that are refused."""
     rows = {}
-    for law, keys in laws().items():
+    for law, keys in list_laws().items():
         for column in columns:
-            if sentences := refused(keys, column):
+            if sentences := find_refusal(keys, column):
                 rows[law, column.words] = sentences
     return rows
 
 
-def _compatibility_table(columns: tuple) -> str:
+def _format_compatibility(columns: tuple) -> str:
     """Return the table that shows for each law which columns are permitted."""
-    rows = refusals(columns)
-    return grid(
+    rows = find_refusals(columns)
+    return format_table(
         ("law", *(column.words for column in columns)),
         [
             (name, *("no" if (name, column.words) in rows else "yes" for column in columns))
-            for name in laws()
+            for name in list_laws()
         ],
     )
 
 
-def _listed(names) -> str:
+def _join_names(names) -> str:
     """Return names as an enumeration."""
     return "; ".join(f"*{name}*" for name in names) or "none"
 
 
-def _bounds() -> str:
+def _format_bounds() -> str:
     """Return the table of permitted values."""
-    return grid(("key", "permitted values"), [(f"`{key}`", said) for key, said in bounds()])
+    return format_table(
+        ("key", "permitted values"), [(f"`{key}`", kind) for key, kind in iterate_bounds()]
+    )
 
 
-def _sizes() -> str:
+def _format_sizes() -> str:
     """Return the table of the largest sizes."""
     rows = []
     for name, words in SIZES.items():
         module, _, constant = name.rpartition(".")
         value = getattr(import_module(f"patchfem.{module}"), constant)
-        shown = (
+        value_text = (
             f"{value / 2**20:.4g} MiB"
             if words.startswith("bytes")
             else f"{value:,.0f}".replace(",", " ")
         )
-        rows.append((words.removeprefix("bytes of "), shown))
-    return grid(("quantity", "largest value"), rows)
+        rows.append((words.removeprefix("bytes of "), value_text))
+    return format_table(("quantity", "largest value"), rows)

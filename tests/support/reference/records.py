@@ -4,12 +4,12 @@ from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene import MATERIALS
 
-from .keys import FOLDER, grid
+from .keys import FOLDER, format_table
 
 MADE = "`python tests/support/reference` generates this page from the program's own records."
 
 
-class Measures:
+class MeasuresPage:
     """Page of the measures of `response.rows` and `runs.results.patch_rows`."""
 
     FILE = FOLDER / "MEASURES.md"
@@ -39,8 +39,8 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
     @classmethod
     def text(cls) -> str:
         """Return the page."""
-        still, moving = (
-            [(f"`{one.name}`", one.unit, _floor(one), one.text) for one in rows]
+        static_rows, motion_rows = (
+            [(f"`{row.name}`", row.unit, _format_floor(row), row.text) for row in rows]
             for rows in (STATIC, MOTION)
         )
         head = ("measure", "unit", "floor", "meaning")
@@ -49,16 +49,16 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
                 [
                     cls.HEAD.strip(),
                     "## Of a pressed patch",
-                    grid(head, still),
+                    format_table(head, static_rows),
                     "## Of a motion",
-                    grid(head, moving),
+                    format_table(head, motion_rows),
                 ]
             )
             + "\n"
         )
 
 
-def _floor(row) -> str:
+def _format_floor(row) -> str:
     """Return the floor of a row, with its relative part if it has one."""
     if row.larger_term is None:
         return f"{row.floor:g}"
@@ -67,7 +67,7 @@ def _floor(row) -> str:
     )
 
 
-class Materials:
+class MaterialsPage:
     """Page of the materials that a scene may name."""
 
     FILE = FOLDER / "MATERIALS.md"
@@ -90,18 +90,18 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
     def text(cls) -> str:
         """Return the page."""
         rows = []
-        warm = []
-        firm = []
+        heat_rows = []
+        strength_rows = []
         for name, record in MATERIALS.items():
             quoted = f"`{name}`"
             numbers = (record.young / 1e9, record.poisson, record.density)
             strength = "-"
             if record.strength is not None:
                 strength = f"{record.strength.strength / 1e6:g}"
-                firm.append((quoted, strength, record.strength.source))
+                strength_rows.append((quoted, strength, record.strength.source))
             if record.heat is not None:
                 heat = record.heat
-                warm.append(
+                heat_rows.append(
                     (quoted, f"{heat.conductivity:g}", f"{heat.heat_capacity:g}", heat.source)
                 )
             others = ", ".join(record.other_names)
@@ -124,12 +124,12 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
             "\n\n".join(
                 [
                     cls.HEAD.strip(),
-                    grid(heads[0], rows),
+                    format_table(heads[0], rows),
                     "## Heat",
                     "If a scene has `[friction.temperature]` with an activation temperature above 0, a "
                     "warning of the run gives the temperature rise of the faces due to friction, estimated "
                     "from these values.",
-                    grid(heads[1], warm),
+                    format_table(heads[1], heat_rows),
                     "## Strength",
                     "The pieces are assumed to be elastic. A note appears if the von Mises stress in a piece "
                     "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
@@ -139,7 +139,7 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
                     "and PTFE have none because it depends on the grade. A strength is the specified "
                     "minimum of the condition that the source names, unless the source says otherwise; for "
                     "another condition, give `yield` in the scene.",
-                    grid(heads[2], firm),
+                    format_table(heads[2], strength_rows),
                 ]
             )
             + "\n"

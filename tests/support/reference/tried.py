@@ -71,7 +71,7 @@ FORMS = {
 METHODS = ("auto", "exact", "march", "harmonic")
 
 
-class Beside(NamedTuple):
+class SceneColumn(NamedTuple):
     """Column of a table of limits: heading, text of a scene without its law, and keys set in it."""
 
     words: str
@@ -80,84 +80,89 @@ class Beside(NamedTuple):
 
 
 RIGS = (
-    Beside("one point", POINT + RIG),
-    Beside("a patch", PATCH + RIG),
-    Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + RIG),
-    Beside("`[contact.strips]`", PATCH + STRIPS + RIG),
-    Beside("`[contact.strips]`, `[contact.shear]`", PATCH + STRIPS + "[contact.shear]\n" + RIG),
-    Beside(
+    SceneColumn("one point", POINT + RIG),
+    SceneColumn("a patch", PATCH + RIG),
+    SceneColumn("`[contact.shear]`", PATCH + "[contact.shear]\n" + RIG),
+    SceneColumn("`[contact.strips]`", PATCH + STRIPS + RIG),
+    SceneColumn(
+        "`[contact.strips]`, `[contact.shear]`", PATCH + STRIPS + "[contact.shear]\n" + RIG
+    ),
+    SceneColumn(
         "`[contact.strips]`, a mode with yaw",
         PATCH + STRIPS + RIG,
         ("structure.mode.axial.yaw=2 rad/m",),
     ),
-    Beside("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
-    Beside("changing load", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
-    Beside("a mode with heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
-    Beside(
+    SceneColumn("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
+    SceneColumn("changing load", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+    SceneColumn("a mode with heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
+    SceneColumn(
         "`[contact.shear]`, a mode with pitch",
         PATCH + "[contact.shear]\n" + RIG,
         ("structure.mode.axial.pitch=1 rad/m",),
     ),
 )
 MORE = (
-    Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
-    Beside(
+    SceneColumn("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
+    SceneColumn(
         "`[contact.grooves]`, `[contact.shear]`",
         PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG,
     ),
-    Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
-    Beside(
+    SceneColumn("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
+    SceneColumn(
         "an interlocking spring",
         POINT + RIG,
         ("structure.bonded.stiffness=1e5 N/m", "structure.bonded.wavelength=80 um"),
     ),
-    Beside("several interfaces", MASSES),
-    Beside("a patch at each interface", MASSES + "# each presses a patch\n"),
-    Beside(
+    SceneColumn("several interfaces", MASSES),
+    SceneColumn("a patch at each interface", MASSES + "# each presses a patch\n"),
+    SceneColumn(
         "a patch with shear at each interface", MASSES + "# each presses a patch that gives way\n"
     ),
-    Beside("an interface that slides in a plane", MASSES + "# each slides in a plane\n"),
-    Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
+    SceneColumn("an interface that slides in a plane", MASSES + "# each slides in a plane\n"),
+    SceneColumn("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
 )
 BENCHES = (
-    Beside("one point", POINT + BENCH),
-    Beside("a patch", PATCH + BENCH),
-    Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
-    Beside("`[contact.strips]`", PATCH + STRIPS + BENCH),
-    Beside("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
-    Beside("changing load", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
-    Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + BENCH),
-    Beside(
+    SceneColumn("one point", POINT + BENCH),
+    SceneColumn("a patch", PATCH + BENCH),
+    SceneColumn("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
+    SceneColumn("`[contact.strips]`", PATCH + STRIPS + BENCH),
+    SceneColumn("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
+    SceneColumn(
+        "changing load", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")
+    ),
+    SceneColumn("`[normal.grooves]`", POINT + GROOVES.format("normal") + BENCH),
+    SceneColumn(
         "`[contact.grooves]`, `[contact.shear]`",
         PATCH + GROOVES.format("contact") + "[contact.shear]\n" + BENCH,
     ),
-    Beside("`[wear]`", PATCH + BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
+    SceneColumn("`[wear]`", PATCH + BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
 )
 
 
-def laws() -> dict:
+def list_laws() -> dict:
     """Return {name of a form of a law: text of its table}."""
     out = {}
     for law, effect in LAWS.items():
         needs = effect.keys[0].replace("|stiffness", "").split()
         needed = "".join(f"{key} = {VALUES[key]}\n" for key in needs if key in VALUES)
-        for name, more in FORMS.get(law, {law: ""}).items():
-            out[name] = f'law = "{law}"\nstatic = 0.3\n{needed}{more}'
+        for name, extra in FORMS.get(law, {law: ""}).items():
+            out[name] = f'law = "{law}"\nstatic = 0.3\n{needed}{extra}'
     return out
 
 
 @cache
-def refused(keys: str, beside: Beside) -> tuple:
+def find_refusal(keys: str, beside: SceneColumn) -> tuple:
     """Return the sentences with which a scene is refused, without their positions; () if it is valid."""
     if "masses" in beside.text:
-        own = 'load = "100 N"\n'
+        load = 'load = "100 N"\n'
         if "patch" in beside.text:
-            own = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace(
+            load = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace(
                 "[contact", "[structure.interface.contact"
             )
-        plane = {k: f"lateral = [{3 - k}, 0]\n" * ("plane" in beside.text) for k in (1, 2)}
+        lateral = {k: f"lateral = [{3 - k}, 0]\n" * ("plane" in beside.text) for k in (1, 2)}
         text = beside.text + "".join(
-            f"[[structure.interface]]\nbetween = [{k}, 0]\n{plane[k]}{keys}{own}" for k in plane
+            f"[[structure.interface]]\nbetween = [{k}, 0]\n{lateral[k]}{keys}{load}"
+            for k in lateral
         )
     else:
         text = beside.text + f"[friction]\n{keys}"
@@ -168,7 +173,7 @@ def refused(keys: str, beside: Beside) -> tuple:
     return ()
 
 
-def across(keys: str) -> tuple:
+def find_lateral_refusal(keys: str) -> tuple:
     """Return why a bench with one point and this law cannot slide in two directions; () if it can."""
     reason = find_lateral_slide_obstacle(loads(POINT + BENCH + f"[friction]\n{keys}").tables())
     return (f"slide.file: {reason}",) if reason else ()

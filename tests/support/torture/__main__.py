@@ -13,7 +13,7 @@ if __name__ == "__main__":
 from torture import driver
 
 
-def main(words=None) -> int:
+def main(arguments=None) -> int:
     """Run the command line and return the exit code."""
     parser = argparse.ArgumentParser(prog="torture", description=__doc__.splitlines()[0])
     parser.add_argument(
@@ -22,26 +22,28 @@ def main(words=None) -> int:
     parser.add_argument("--campaign", default="", help="one campaign, or several with commas")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", type=int, help="place of one trial in one --campaign, from 0 on")
-    given = parser.parse_args(words)
-    names = given.campaign.split(",") if given.campaign else list(driver.CAMPAIGNS)
+    options = parser.parse_args(arguments)
+    names = options.campaign.split(",") if options.campaign else list(driver.CAMPAIGNS)
     if unknown := [name for name in names if name not in driver.CAMPAIGNS]:
         parser.error(f"--campaign {unknown[0]}: one of {', '.join(driver.CAMPAIGNS)}")
-    if not 0 < given.share <= 1:
-        parser.error(f"--share {given.share}: above 0 and up to 1 is needed")
-    if given.only is not None and (len(names) != 1 or given.only < 0):
+    if not 0 < options.share <= 1:
+        parser.error(f"--share {options.share}: above 0 and up to 1 is needed")
+    if options.only is not None and (len(names) != 1 or options.only < 0):
         parser.error("--only N: the place of one trial in one --campaign, from 0 on")
     if sys.platform == "win32":
         print("a system on which a process can fork is needed, as Linux and macOS", file=sys.stderr)
         return 4
 
-    def say(text: str) -> None:
+    def print_message(text: str) -> None:
         """Print a message to stderr."""
         print(text, file=sys.stderr, flush=True)
 
     from patchfem.__main__ import run_command
 
-    rows = driver.torture(run_command, given.share, names, given.seed, given.only, say)
-    print(driver.table(rows), flush=True)
+    rows = driver.run_campaigns(
+        run_command, options.share, names, options.seed, options.only, print_message
+    )
+    print(driver.format_table(rows), flush=True)
     return 3 if any(row.faults for row in rows) else 0
 
 

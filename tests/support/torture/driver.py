@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .trial import Trial, alone, captured, emptied
+from .trial import Trial, capture, make_empty_folder, run_in_fork
 
 
 class Campaign(NamedTuple):
@@ -30,19 +30,19 @@ class Campaign(NamedTuple):
 
 
 CAMPAIGNS = {
-    "grammar": Campaign(7000, "scenes.by_grammar", "scenes with wrong keys and values"),
-    "bytes": Campaign(3000, "scenes.by_bytes", "scenes with wrong bytes"),
-    "words": Campaign(1000, "words.lines", "command lines with odd words"),
-    "profiles": Campaign(1000, "tables.profiles", "traces of a surface"),
-    "signals": Campaign(1000, "tables.signals", "recorded drives"),
-    "paths": Campaign(1000, "tables.paths", "recorded slides"),
-    "rows": Campaign(1000, "tables.rows", "measured rows"),
-    "loops": Campaign(1000, "tables.loops", "friction loops"),
-    "universal": Campaign(1000, "tables.universal", "universal files"),
-    "energy": Campaign(1000, "physics.energy", "books of energy of laws and engines"),
-    "hostile": Campaign(240, "hostile.files", "files made to harm, twelve kinds"),
-    "memory": Campaign(50, "processes.memory", "limits of memory"),
-    "determinism": Campaign(20, "processes.determinism", "runs again, more threads"),
+    "grammar": Campaign(7000, "scenes.run_grammar_trial", "scenes with wrong keys and values"),
+    "bytes": Campaign(3000, "scenes.run_bytes_trial", "scenes with wrong bytes"),
+    "words": Campaign(1000, "words.run_words_trial", "command lines with odd words"),
+    "profiles": Campaign(1000, "tables.run_profiles_trial", "traces of a surface"),
+    "signals": Campaign(1000, "tables.run_signals_trial", "recorded drives"),
+    "paths": Campaign(1000, "tables.run_paths_trial", "recorded slides"),
+    "rows": Campaign(1000, "tables.run_rows_trial", "measured rows"),
+    "loops": Campaign(1000, "tables.run_loops_trial", "friction loops"),
+    "universal": Campaign(1000, "tables.run_universal_trial", "universal files"),
+    "energy": Campaign(1000, "physics.run_trial", "books of energy of laws and engines"),
+    "hostile": Campaign(240, "hostile.run_trial", "files made to harm, twelve kinds"),
+    "memory": Campaign(50, "processes.run_memory_trial", "limits of memory"),
+    "determinism": Campaign(20, "processes.run_determinism_trial", "runs again, more threads"),
 }
 WARM = (  # Scenes that load the modules of most trials, so that a forked trial already has them.
     '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'
@@ -53,7 +53,7 @@ WARM = (  # Scenes that load the modules of most trials, so that a forked trial 
 )
 
 
-class Row(NamedTuple):
+class CampaignResult(NamedTuple):
     """Result of a campaign; faults: (index, description)."""
 
     name: str
@@ -62,12 +62,12 @@ class Row(NamedTuple):
     seconds: float
 
 
-def random_numbers(name: str, seed: int, index: int) -> np.random.Generator:
+def make_generator(name: str, seed: int, index: int) -> np.random.Generator:
     """Return the random generator of a trial, which depends only on its campaign, seed and index."""
     return np.random.default_rng([seed, index, zlib.crc32(name.encode())])
 
 
-def torture(
+def run_campaigns(
     command: Callable, share: float, names: list, seed: int, only: int | None, say: Callable
 ) -> list:
     """Run campaigns and return a row for each.
@@ -76,28 +76,28 @@ def torture(
     least one trial; names: of campaigns; only: the index of a single trial, None for all; say:
     called with each fault when it is found.
     """
-    out = []
-    with tempfile.TemporaryDirectory(prefix="torture") as place:
-        warm(command, Path(place))
+    results = []
+    with tempfile.TemporaryDirectory(prefix="torture") as folder:
+        preload(command, Path(folder))
         for name in names:
-            begin = perf_counter()
+            started = perf_counter()
             faults = []
             numbers = (
                 [only] if only is not None else range(max(1, round(share * CAMPAIGNS[name].size)))
             )
             for index in numbers:
-                text = tried(command, name, seed, index, Path(place))
+                text = run_trial(command, name, seed, index, Path(folder))
                 if text:
                     faults.append((index, text))
                     say(
                         f"{name} {index}: {text}\n"
                         f"  again: python tests/support/torture --campaign {name} --seed {seed} --only {index}"
                     )
-            out.append(Row(name, len(numbers), faults, perf_counter() - begin))
-    return out
+            results.append(CampaignResult(name, len(numbers), faults, perf_counter() - started))
+    return results
 
 
-def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> str:
+def run_trial(command: Callable, name: str, seed: int, index: int, folder: Path) -> str:
     """Return the fault of a trial, empty if there is none.
 
     An apparent hang is repeated with the time that compilation may take; then the compiled code is
@@ -107,37 +107,41 @@ def tried(command: Callable, name: str, seed: int, index: int, place: Path) -> s
     module, function = campaign.made.split(".")
     work = getattr(import_module(f"{__package__}.{module}"), function)
 
-    def attempt(patience: float) -> str:
+    def attempt_trial(patience: float) -> str:
         """Run the trial with a factor on its time limits."""
 
-        def trial(tell):
+        def make_trial(tell):
             """Return the trial with its random numbers and folder."""
             return Trial(
-                random_numbers(name, seed, index), emptied(place / name), command, tell, patience
+                make_generator(name, seed, index),
+                make_empty_folder(folder / name),
+                command,
+                tell,
+                patience,
             )
 
-        return alone(work, trial, campaign.clock * patience)
+        return run_in_fork(work, make_trial, campaign.clock * patience)
 
-    text = attempt(1.0)
-    if text.startswith("hang") and not attempt(6.0).startswith("hang"):
-        text = attempt(1.0)
+    text = attempt_trial(1.0)
+    if text.startswith("hang") and not attempt_trial(6.0).startswith("hang"):
+        text = attempt_trial(1.0)
     return text
 
 
-def warm(command: Callable, place: Path) -> None:
+def preload(command: Callable, folder: Path) -> None:
     """Import in this process, before any fork, the modules that most trials would import."""
     import h5py  # noqa: F401
 
     for number, text in zip(count(), WARM):
-        scene = place / f"warm{number}.toml"
+        scene = folder / f"warm{number}.toml"
         scene.write_text(text, "utf-8")
-        captured(command, ["run", str(scene), "-o", str(place / f"warm{number}"), "--no-page"])
-        shutil.rmtree(place / f"warm{number}", ignore_errors=True)
+        capture(command, ["run", str(scene), "-o", str(folder / f"warm{number}"), "--no-page"])
+        shutil.rmtree(folder / f"warm{number}", ignore_errors=True)
     gc.collect()
     gc.freeze()
 
 
-def table(rows: list) -> str:
+def format_table(rows: list) -> str:
     """Return the campaigns as lines: name, trials, failures, seconds."""
     width = max(len(row.name) for row in rows)
     lines = [f"{'campaign':<{width}}  {'tried':>6}  {'failed':>6}  {'seconds':>8}"]

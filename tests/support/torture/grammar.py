@@ -35,12 +35,12 @@ SUBSTRATES = (
 )
 
 
-def quantity(trial: Trial, low: float, high: float, unit: str) -> str:
+def draw_quantity(trial: Trial, low: float, high: float, unit: str) -> str:
     """Return a quantity as text, such as "0.0012 m", with a log-uniform value."""
-    return f"{trial.wide(low, high)!r} {unit}"
+    return f"{trial.log_uniform(low, high)!r} {unit}"
 
 
-def scene(trial: Trial, kind: str = "") -> dict:
+def draw_scene(trial: Trial, kind: str = "") -> dict:
     """Return a random scene; kind: patch, bench, rig, masses or linear, drawn if empty."""
     kind = kind or trial.draw(
         "patch", "patch", "bench", "bench", "rig", "rig", "rig", "masses", "linear"
@@ -48,225 +48,240 @@ def scene(trial: Trial, kind: str = "") -> dict:
     out = {"title": f"{kind} of chance"}
     if kind in ("patch", "bench", "rig"):
         out |= (
-            {"contact": patch(trial)}
+            {"contact": draw_patch(trial)}
             if kind == "patch" or trial.chance(0.35)
-            else {"normal": point(trial)}
+            else {"normal": draw_point(trial)}
         )
     if kind in ("bench", "rig"):
-        out["friction"] = friction(trial, "width" in out.get("normal", {}) or "contact" in out)
+        out["friction"] = draw_friction(trial, "width" in out.get("normal", {}) or "contact" in out)
     if kind == "bench":
-        out["slide"] = slide(trial)
+        out["slide"] = draw_slide(trial)
         if trial.chance(0.1):
             out["wear"] = {
-                "coefficient": quantity(trial, 1e-16, 1e-13, "m^2/N"),
-                "cycles": trial.wide(10, 1e5),
+                "coefficient": draw_quantity(trial, 1e-16, 1e-13, "m^2/N"),
+                "cycles": trial.log_uniform(10, 1e5),
             }
     if kind in ("rig", "linear"):
-        out["structure"] = modes(trial, kind)
+        out["structure"] = draw_modes(trial, kind)
     if kind == "masses":
-        out["structure"] = masses(trial)
+        out["structure"] = draw_masses(trial)
     if kind not in ("patch", "bench"):
-        out["drive"] = drive(trial, out["structure"])
-    out["accuracy"] = accuracy(trial, kind)
+        out["drive"] = draw_drive(trial, out["structure"])
+    out["accuracy"] = draw_accuracy(trial, kind)
     return out
 
 
-def patch(trial: Trial) -> dict:
+def draw_patch(trial: Trial) -> dict:
     """Return [contact] with some of its tables."""
-    length = trial.wide(*LENGTH)
+    length = trial.log_uniform(*LENGTH)
     out = {
         "length": f"{length!r} m",
-        "width": quantity(trial, *WIDTH, "m"),
-        "height": quantity(trial, *HEIGHT, "m"),
+        "width": draw_quantity(trial, *WIDTH, "m"),
+        "height": draw_quantity(trial, *HEIGHT, "m"),
         "substrate": trial.draw(*SUBSTRATES),
-        "load": quantity(trial, 5, 500, "N"),
+        "load": draw_quantity(trial, 5, 500, "N"),
     }
     if trial.chance(0.8):
         out["element_size"] = f"{length / trial.r.integers(8, 40):.4g} m"
     tables = {
-        "coating": lambda: {"material": "WC-Co", "thickness": quantity(trial, 2e-5, 4e-4, "m")},
+        "coating": lambda: {
+            "material": "WC-Co",
+            "thickness": draw_quantity(trial, 2e-5, 4e-4, "m"),
+        },
         "tilt": lambda: {
-            "angle": quantity(trial, 1e-6, 1e-3, "rad"),
+            "angle": draw_quantity(trial, 1e-6, 1e-3, "rad"),
             "on": trial.draw("upper", "lower"),
         },
         "load_line": lambda: {"offset": f"{length * trial.r.uniform(-0.6, 0.6):.4g} m"},
         "holder": lambda: {trial.draw("rotational_stiffness", "tangential_stiffness"): ""},
-        "crown": lambda: {"radius": quantity(trial, 0.05, 50, "m")},
+        "crown": lambda: {"radius": draw_quantity(trial, 0.05, 50, "m")},
         "step": lambda: {
-            "height": quantity(trial, 1e-8, 1e-5, "m"),
+            "height": draw_quantity(trial, 1e-8, 1e-5, "m"),
             "at": f"{length * trial.r.uniform(-0.5, 0.5):.4g} m",
         },
-        "asperities": lambda: asperities(trial),
+        "asperities": lambda: draw_asperities(trial),
         "shear": dict,
         "strips": lambda: {
             "count": int(trial.r.integers(1, 5)),
-            "roll": quantity(trial, 1e-7, 1e-3, "rad"),
+            "roll": draw_quantity(trial, 1e-7, 1e-3, "rad"),
         },
-        "grooves": lambda: grooves(trial),
-        "upper": lambda: {trial.draw("height", "length"): quantity(trial, 3e-3, 1e-2, "m")},
-        "lower": lambda: {trial.draw("chamfer", "end_radius"): quantity(trial, 1e-5, 5e-4, "m")},
-        "approach": lambda: {"distance": quantity(trial, 1e-8, 1e-6, "m")},
+        "grooves": lambda: draw_grooves(trial),
+        "upper": lambda: {trial.draw("height", "length"): draw_quantity(trial, 3e-3, 1e-2, "m")},
+        "lower": lambda: {
+            trial.draw("chamfer", "end_radius"): draw_quantity(trial, 1e-5, 5e-4, "m")
+        },
+        "approach": lambda: {"distance": draw_quantity(trial, 1e-8, 1e-6, "m")},
     }
-    for name, made in tables.items():
+    for name, draw_table in tables.items():
         if trial.chance(0.12):
-            out[name] = made()
+            out[name] = draw_table()
     for key, unit in (("rotational_stiffness", "N m/rad"), ("tangential_stiffness", "N/m")):
         if key in out.get("holder", {}):
-            out["holder"][key] = quantity(trial, 1e3, 1e7, unit)
+            out["holder"][key] = draw_quantity(trial, 1e3, 1e7, unit)
     if "approach" in out:
         del out["load"]
     return out
 
 
-def asperities(trial: Trial) -> dict:
+def draw_asperities(trial: Trial) -> dict:
     """Return [contact.asperities] with the keys of its law."""
     law = trial.draw("linear", "exponential", "hertz")
     keys = {
-        "linear": {"normal_stiffness": quantity(trial, 1e11, 1e14, "Pa/m")},
+        "linear": {"normal_stiffness": draw_quantity(trial, 1e11, 1e14, "Pa/m")},
         "exponential": {
-            "normal_stiffness": quantity(trial, 1e11, 1e14, "Pa/m"),
-            "decay_length": quantity(trial, 1e-8, 1e-6, "m"),
+            "normal_stiffness": draw_quantity(trial, 1e11, 1e14, "Pa/m"),
+            "decay_length": draw_quantity(trial, 1e-8, 1e-6, "m"),
         },
         "hertz": {
-            "radius": quantity(trial, 1e-6, 1e-4, "m"),
-            "density": quantity(trial, 1e8, 1e11, "1/m^2"),
-            "height_deviation": quantity(trial, 1e-8, 1e-6, "m"),
+            "radius": draw_quantity(trial, 1e-6, 1e-4, "m"),
+            "density": draw_quantity(trial, 1e8, 1e11, "1/m^2"),
+            "height_deviation": draw_quantity(trial, 1e-8, 1e-6, "m"),
         },
     }[law]
     return (
         {"law": law}
         | keys
-        | ({"tangential_ratio": trial.wide(0.1, 1.0)} if trial.chance(0.3) else {})
+        | ({"tangential_ratio": trial.log_uniform(0.1, 1.0)} if trial.chance(0.3) else {})
     )
 
 
-def grooves(trial: Trial) -> dict:
+def draw_grooves(trial: Trial) -> dict:
     """Return [contact.grooves] or [normal.grooves]."""
     return {
-        "wavelength": quantity(trial, 2e-5, 2e-4, "m"),
-        "amplitude": quantity(trial, 1e-7, 1e-5, "m"),
+        "wavelength": draw_quantity(trial, 2e-5, 2e-4, "m"),
+        "amplitude": draw_quantity(trial, 1e-7, 1e-5, "m"),
     }
 
 
-def point(trial: Trial) -> dict:
+def draw_point(trial: Trial) -> dict:
     """Return [normal]; in about one of eight scenes the load varies."""
-    load = trial.wide(5, 500)
+    load = trial.log_uniform(5, 500)
     out = {"load": f"{load!r} N"}
     if trial.chance(0.12):
         out |= {
             "amplitude": f"{load * trial.r.uniform(0.1, 1.5):.4g} N",
-            "frequency": quantity(trial, 20, 300, "Hz"),
+            "frequency": draw_quantity(trial, 20, 300, "Hz"),
         }
     if trial.chance(0.1):
-        out["width"] = quantity(trial, 1e-3, 1e-2, "m")
+        out["width"] = draw_quantity(trial, 1e-3, 1e-2, "m")
     if trial.chance(0.08):
-        out["grooves"] = grooves(trial)
+        out["grooves"] = draw_grooves(trial)
     return out
 
 
-def friction(trial: Trial, spread: bool = False, law: str = "") -> dict:
+def draw_friction(trial: Trial, spread: bool = False, law: str = "") -> dict:
     """Return [friction], or the same keys of an interface: a law with its required and some optional keys."""
     law = law or trial.draw(*LAWS)
-    needs, may = (words.replace("|stiffness", "").split() for words in LAWS[law].keys)
+    required, optional = (words.replace("|stiffness", "").split() for words in LAWS[law].keys)
     out = {"law": law, "static": round(float(trial.r.uniform(0.3, 0.8)), 3)}
     grows = trial.chance(0.3)
-    for key in (*needs, *(key for key in may if trial.chance(0.25))):
+    for key in (*required, *(key for key in optional if trial.chance(0.25))):
         if (
             key in OF_LAWS
             and key not in ("rest_growth", "slip_growth")
             and (key != "spread" or spread)
         ):
             low, high, unit = OF_LAWS[key]
-            out[key] = quantity(trial, low, high, unit) if unit else trial.wide(low, high)
-    if "chi" in needs:
+            out[key] = (
+                draw_quantity(trial, low, high, unit) if unit else trial.log_uniform(low, high)
+            )
+    if "chi" in required:
         out["chi"] = round(-float(trial.r.uniform(0, 0.9)), 3)
-    if grows and "rest_growth" in (*needs, *may):
-        out |= {key: quantity(trial, *OF_LAWS[key]) for key in ("rest_growth", "slip_growth")}
-    if "reading" in may and trial.chance(0.2):
+    if grows and "rest_growth" in (*required, *optional):
+        out |= {key: draw_quantity(trial, *OF_LAWS[key]) for key in ("rest_growth", "slip_growth")}
+    if "reading" in optional and trial.chance(0.2):
         out["reading"] = "report"
     return out
 
 
-def slide(trial: Trial) -> dict:
+def draw_slide(trial: Trial) -> dict:
     """Return [slide] of any kind except a file."""
     kind = trial.draw("constant", "sine", "triangle", "dwell")
-    reach = {"distance": quantity(trial, 1e-6, 1e-4, "m")}
-    speed = {"speed": quantity(trial, 1e-4, 1e-2, "m/s")}
-    swing = {"amplitude": quantity(trial, 1e-6, 1e-4, "m"), "cycles": int(trial.r.integers(1, 4))}
+    reach = {"distance": draw_quantity(trial, 1e-6, 1e-4, "m")}
+    speed = {"speed": draw_quantity(trial, 1e-4, 1e-2, "m/s")}
+    swing = {
+        "amplitude": draw_quantity(trial, 1e-6, 1e-4, "m"),
+        "cycles": int(trial.r.integers(1, 4)),
+    }
     more = {
         "constant": reach | speed,
-        "sine": swing | {"frequency": quantity(trial, 1, 200, "Hz")},
+        "sine": swing | {"frequency": draw_quantity(trial, 1, 200, "Hz")},
         "triangle": swing | speed,
-        "dwell": reach | speed | {"hold": quantity(trial, 1e-3, 0.1, "s")},
+        "dwell": reach | speed | {"hold": draw_quantity(trial, 1e-3, 0.1, "s")},
     }[kind]
     return {"kind": kind} | more
 
 
-def modes(trial: Trial, kind: str = "rig") -> dict:
+def draw_modes(trial: Trial, kind: str = "rig") -> dict:
     """Return [structure] with one to three modes."""
-    first = trial.wide(40, 300)
+    first = trial.log_uniform(40, 300)
     out = []
     for k in range(trial.draw(1, 1, 1, 2, 3)):
         mode = {
             "name": f"m{k}",
-            "frequency": f"{first * (1 if k == 0 else trial.wide(0.5, 3)):.4g} Hz",
+            "frequency": f"{first * (1 if k == 0 else trial.log_uniform(0.5, 3)):.4g} Hz",
             "damping": trial.draw(0.003, 0.01, 0.05, 0.2),
             "slide": 1.0 if k == 0 else 0.3,
             "base": 0.8 if k == 0 else 0.1,
         }
         if k and trial.chance(0.2):
             mode |= (
-                {"pitch": quantity(trial, 1, 20, "rad/m")} if trial.chance(0.5) else {"normal": 0.1}
+                {"pitch": draw_quantity(trial, 1, 20, "rad/m")}
+                if trial.chance(0.5)
+                else {"normal": 0.1}
             )
         out.append(mode)
-    table = {"moving_mass": quantity(trial, 0.2, 2, "kg"), "mode": out}
+    table = {"moving_mass": draw_quantity(trial, 0.2, 2, "kg"), "mode": out}
     if kind == "rig" and trial.chance(0.1):
-        table["bonded"] = {"stiffness": quantity(trial, 1e4, 1e6, "N/m")}
+        table["bonded"] = {"stiffness": draw_quantity(trial, 1e4, 1e6, "N/m")}
     if trial.chance(0.06):
-        table["stiffening"] = {"cubic": quantity(trial, 1e9, 1e12, "N/m^3")}
+        table["stiffening"] = {"cubic": draw_quantity(trial, 1e9, 1e12, "N/m^3")}
     return table
 
 
-def masses(trial: Trial) -> dict:
+def draw_masses(trial: Trial) -> dict:
     """Return [structure] with two masses, springs, dampers and one or two interfaces."""
     between = ([1, 0], [2, 1], [2, 0])
-    laws = [friction(trial) for _ in range(trial.draw(1, 2))]
+    laws = [draw_friction(trial) for _ in range(trial.draw(1, 2))]
     return {
-        "masses": [quantity(trial, 0.2, 2, "kg") for _ in range(2)],
+        "masses": [draw_quantity(trial, 0.2, 2, "kg") for _ in range(2)],
         "spring": [
-            {"between": pair, "stiffness": quantity(trial, 5e4, 2e6, "N/m")} for pair in between
+            {"between": pair, "stiffness": draw_quantity(trial, 5e4, 2e6, "N/m")}
+            for pair in between
         ],
         "damper": [
-            {"between": pair, "coefficient": quantity(trial, 1, 50, "N s/m")}
+            {"between": pair, "coefficient": draw_quantity(trial, 1, 50, "N s/m")}
             for pair in between[:2]
         ],
         "interface": [
-            {"between": between[2 * k], "load": quantity(trial, 5, 200, "N")} | law
+            {"between": between[2 * k], "load": draw_quantity(trial, 5, 200, "N")} | law
             for k, law in enumerate(laws)
         ],
     }
 
 
-def drive(trial: Trial, structure: dict) -> dict:
+def draw_drive(trial: Trial, structure: dict) -> dict:
     """Return [drive] with the keys of its waveform; a release also sets the start of the structure."""
     count = len(structure.get("masses", structure.get("mode", ())))
     kind = trial.draw("base", "base", "base", "force", "free")
     if kind == "free":
         structure["start"] = {
-            "displacement": [quantity(trial, 1e-5, 1e-3, "m") for _ in range(count)]
+            "displacement": [draw_quantity(trial, 1e-5, 1e-3, "m") for _ in range(count)]
         }
         return {"kind": kind, "cycles": int(trial.r.integers(3, 20))}
-    wave = trial.draw("sine", "sine", "sine", *(one for one in WAVEFORMS if one != "file"))
+    wave = trial.draw(
+        "sine", "sine", "sine", *(waveform for waveform in WAVEFORMS if waveform != "file")
+    )
     size = (
-        {"force": quantity(trial, 1, 100, "N")}
+        {"force": draw_quantity(trial, 1, 100, "N")}
         if kind == "force"
         else {trial.draw("acceleration", "acceleration", "displacement"): ""}
     )
     if kind == "base":
         size = {
-            key: quantity(trial, 2, 60, "m/s^2")
+            key: draw_quantity(trial, 2, 60, "m/s^2")
             if key == "acceleration"
-            else quantity(trial, 1e-5, 5e-4, "m")
+            else draw_quantity(trial, 1e-5, 5e-4, "m")
             for key in size
         }
     out = {"kind": kind, "waveform": wave}
@@ -280,19 +295,19 @@ def drive(trial: Trial, structure: dict) -> dict:
     else:
         out |= size
     if wave in ("sine", "levels"):
-        out["frequency"] = quantity(trial, 50, 300, "Hz")
+        out["frequency"] = draw_quantity(trial, 50, 300, "Hz")
     if wave == "sweep":
         out |= {
-            "from": quantity(trial, 60, 120, "Hz"),
-            "to": quantity(trial, 130, 300, "Hz"),
-            "rate": quantity(trial, 300, 3000, "Hz/s"),
+            "from": draw_quantity(trial, 60, 120, "Hz"),
+            "to": draw_quantity(trial, 130, 300, "Hz"),
+            "rate": draw_quantity(trial, 300, 3000, "Hz/s"),
         }
     else:
         out["cycles"] = int(trial.r.integers(3, 20))
     return out
 
 
-def accuracy(trial: Trial, kind: str) -> dict:
+def draw_accuracy(trial: Trial, kind: str) -> dict:
     """Return [accuracy]: a coarse tolerance, and a method in one of five scenes."""
     out = {"tolerance": trial.draw(1e-2, 1e-2, 3e-3)}
     if kind in ("rig", "linear", "masses") and trial.chance(0.2):

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from .tables import RIG, RUBS
-from .toml import text_of
-from .trial import Trial, Wrong
+from .toml import to_toml
+from .trial import Trial, TrialFailure
 
 MARK = "was-run"  # File that exists only if code was executed.
 BOMB = (
@@ -24,7 +24,7 @@ BOMB = (
 OUTSIDE = b"<?xml version='1.0'?><!DOCTYPE x [<!ENTITY y SYSTEM 'file:///etc/passwd'>]><VTKFile>&y;</VTKFile>"
 
 
-class Planted:
+class MaliciousPickle:
     """Object whose unpickling would run a command."""
 
     def __reduce__(self):
@@ -32,42 +32,42 @@ class Planted:
         return os.system, (f"touch {MARK}",)
 
 
-def files(trial: Trial) -> None:
+def run_trial(trial: Trial) -> None:
     """Read a malicious file with a command that accepts its suffix, and check that it did no harm."""
     kind = KINDS[int(trial.r.integers(len(KINDS)))]
     words = kind(trial)
     trial.run(*words, seconds=20.0)
-    rest = [
+    written = [
         path
         for path in (Path(MARK), trial.folder.parent / "escaped", trial.folder.parent / MARK)
         if path.exists()
     ]
-    if rest:
-        raise Wrong(f"{kind.__name__}: {rest[0].name} was written")
+    if written:
+        raise TrialFailure(f"{kind.__name__}: {written[0].name} was written")
 
 
-def pickled(trial: Trial) -> list:
+def make_pickle(trial: Trial) -> list:
     """Make a pickle with any suffix that a command reads."""
     name = trial.draw(
         "x.npy", "x.npz", "x.mat", "x.csv", "x.uff", "x.sdf", "x.x3p", "x.plu", "x.toml", "x.npy"
     )
     if name.endswith(".npy") and trial.chance(0.5):
-        np.save(name, np.array([Planted()], object), allow_pickle=True)
+        np.save(name, np.array([MaliciousPickle()], object), allow_pickle=True)
     elif name.endswith(".npz") and trial.chance(0.5):
-        np.savez(name, M=np.array([Planted()], object), K=np.eye(1))
+        np.savez(name, M=np.array([MaliciousPickle()], object), K=np.eye(1))
     else:
-        Path(name).write_bytes(pickle.dumps(Planted()))
-    return read_by(trial, name)
+        Path(name).write_bytes(pickle.dumps(MaliciousPickle()))
+    return make_command(trial, name)
 
 
-def read_by(trial: Trial, name: str) -> list:
+def make_command(trial: Trial, name: str) -> list:
     """Return a command that reads a file: as a surface, as records, as a rig, or as a scene."""
     ending = Path(name).suffix
     if ending == ".toml":
         return [trial.draw("check", "plan", "run", "cite"), name]
     if ending in (".npz", ".mat", ".uff") and trial.chance(0.6):
         Path("rig.toml").write_text(
-            text_of(
+            to_toml(
                 RIG
                 | {
                     "structure": {"file": name, "slide_at": "1"},
@@ -86,7 +86,7 @@ def read_by(trial: Trial, name: str) -> list:
         return ["import", name, "-o", "out.csv"]
     if ending in (".msh", ".vtu", ".inp", ".med"):
         Path("mesh.toml").write_text(
-            text_of(
+            to_toml(
                 {
                     "contact": {
                         "length": "2 mm",
@@ -103,7 +103,7 @@ def read_by(trial: Trial, name: str) -> list:
     return ["profile", name, "--units", "um,um"]
 
 
-def zip_bomb(trial: Trial) -> list:
+def make_zip_bomb(trial: Trial) -> list:
     """Make a small archive that unpacks to 620 MB."""
     name = trial.draw("x.npz", "x.x3p", "x.npz")
     with zipfile.ZipFile(name, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -117,19 +117,19 @@ def zip_bomb(trial: Trial) -> list:
             file.write(head.getvalue() if name == "x.npz" else b"<a>")
             for _ in range(620):
                 file.write(bytes(10**6))
-    return read_by(trial, name)
+    return make_command(trial, name)
 
 
-def zip_slip(trial: Trial) -> list:
+def make_zip_slip(trial: Trial) -> list:
     """Make an archive whose members lie outside its folder."""
     name = trial.draw("x.x3p", "x.npz")
     with zipfile.ZipFile(name, "w") as archive:
-        for one in ("../escaped", "/tmp/escaped", "main.xml", "../../escaped/main.xml"):
-            archive.writestr(one, "<a/>")
-    return read_by(trial, name)
+        for member in ("../escaped", "/tmp/escaped", "main.xml", "../../escaped/main.xml"):
+            archive.writestr(member, "<a/>")
+    return make_command(trial, name)
 
 
-def xml_bomb(trial: Trial) -> list:
+def make_xml_bomb(trial: Trial) -> list:
     """Make XML with nested entities, or with the entity of a system file."""
     name = trial.draw("x.vtu", "x.x3p")
     text = trial.draw(BOMB, OUTSIDE)
@@ -138,31 +138,31 @@ def xml_bomb(trial: Trial) -> list:
             archive.writestr("main.xml", text)
     else:
         Path(name).write_bytes(text)
-    return read_by(trial, name)
+    return make_command(trial, name)
 
 
-def waits(trial: Trial) -> list:
+def make_blocking_file(trial: Trial) -> list:
     """Make a pipe without a writer, an endless device, a folder, or a circular link."""
     name = "x" + trial.draw(
         ".toml", ".csv", ".npy", ".npz", ".mat", ".uff", ".msh", ".vtu", ".inp", ".x3p"
     )
-    how = trial.draw("pipe", "zero", "folder", "circle", "random")
-    if how == "pipe":
+    form = trial.draw("pipe", "zero", "folder", "circle", "random")
+    if form == "pipe":
         os.mkfifo(name)
-    elif how == "folder":
+    elif form == "folder":
         os.mkdir(name)
     else:
-        os.symlink({"zero": "/dev/zero", "circle": name, "random": "/dev/urandom"}[how], name)
-    return read_by(trial, name)
+        os.symlink({"zero": "/dev/zero", "circle": name, "random": "/dev/urandom"}[form], name)
+    return make_command(trial, name)
 
 
-def endless(trial: Trial) -> list:
+def make_huge_file(trial: Trial) -> list:
     """Make a file with one line, number or name of megabytes, or a sparse file of gigabytes."""
     name = "x" + trial.draw(
         ".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf"
     )
-    how = trial.draw("line", "number", "quote", "hole", "commas", "lines")
-    if how == "hole":
+    form = trial.draw("line", "number", "quote", "hole", "commas", "lines")
+    if form == "hole":
         with open(name, "wb") as file:
             file.write(b"x [um],z [um]\n")
             file.truncate(8 * 2**30)
@@ -174,12 +174,12 @@ def endless(trial: Trial) -> list:
                 "quote": '"' + "a\n" * 10**6,
                 "commas": "," * 10**7,
                 "lines": "\n" * 10**7,
-            }[how]
+            }[form]
         )
-    return read_by(trial, name)
+    return make_command(trial, name)
 
 
-def heads(trial: Trial) -> list:
+def make_wrong_header(trial: Trial) -> list:
     """Make an array whose header states sizes or types that the file does not contain."""
     shape = trial.draw(
         "(1000000000000, 2)",
@@ -195,13 +195,13 @@ def heads(trial: Trial) -> list:
     Path("x.npy").write_bytes(
         b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text + bytes(64)
     )
-    return read_by(trial, "x.npy")
+    return make_command(trial, "x.npy")
 
 
-def folders(trial: Trial) -> list:
+def make_results_folder(trial: Trial) -> list:
     """Make a results folder whose files were not written by a run."""
     os.mkdir("old")
-    told = {
+    summary = {
         "patchfem": "9",
         "title": "<script>alert(1)</script>",
         "kind": trial.draw("rig", "patch", 7, None),
@@ -219,7 +219,7 @@ def folders(trial: Trial) -> list:
         "seconds": {},
     }
     Path("old/summary.json").write_text(
-        trial.draw(json.dumps(told), "[]", "{", "", "null", "[" * 10**5, "1e999")
+        trial.draw(json.dumps(summary), "[]", "{", "", "null", "[" * 10**5, "1e999")
     )
     if trial.chance(0.6):
         Path("old/result.nc").write_bytes(
@@ -240,7 +240,7 @@ def folders(trial: Trial) -> list:
     )
 
 
-def device(name: str, number: int) -> None:
+def make_device(name: str, number: int) -> None:
     """Make a device in the working folder (3: null, 7: full), or a pipe if devices are not permitted.
 
     The devices of the system must not be put at risk.
@@ -251,18 +251,18 @@ def device(name: str, number: int) -> None:
         os.mkfifo(name)
 
 
-def outputs(trial: Trial) -> list:
+def try_outputs(trial: Trial) -> list:
     """Write results to a place that is not suitable, and check that no file of others is lost."""
     Path("scene.toml").write_text(
-        text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "9 um", "frequency": "1 Hz"}})
+        to_toml(RUBS | {"slide": {"kind": "sine", "amplitude": "9 um", "frequency": "1 Hz"}})
     )
     os.mkdir("mine")
     Path("mine/thesis.txt").write_text("years")
     os.symlink("mine", "link")
     os.symlink("nowhere", "dangling")
     Path("file").write_text("mine")
-    device("null", 3)
-    place = trial.draw(
+    make_device("null", 3)
+    target = trial.draw(
         "mine",
         "link",
         "dangling",
@@ -282,15 +282,17 @@ def outputs(trial: Trial) -> list:
         "~",
         "mine/thesis.txt",
     )
-    ended = trial.run("run", "scene.toml", "-o", place, "--no-page")
+    result = trial.run("run", "scene.toml", "-o", target, "--no-page")
     if Path("mine/thesis.txt").read_text() != "years" or (
-        place == "file" and Path("file").read_text() != "mine"
+        target == "file" and Path("file").read_text() != "mine"
     ):
-        raise Wrong(f"-o {place}: a file of somebody else is gone (exit code {ended.code})")
+        raise TrialFailure(
+            f"-o {target}: a file of somebody else is gone (exit code {result.code})"
+        )
     return ["check", "scene.toml"]
 
 
-def escaping(trial: Trial) -> list:
+def make_upward_names(trial: Trial) -> list:
     """Make files and a command whose names lead out of the folder: cases of a sweep, modes, headers."""
     tables = RIG | {
         "title": "../../escaped",
@@ -302,12 +304,12 @@ def escaping(trial: Trial) -> list:
             | {"name": trial.draw("../escaped", "/tmp/escaped", "<b>", "a/b")}
         ]
     }
-    Path("scene.toml").write_text(text_of(tables), "utf-8")
+    Path("scene.toml").write_text(to_toml(tables), "utf-8")
     column = "".join(f"{k},{k % 3}\n" for k in range(30))
     Path("a.csv").write_text("x [um],z [um]\n" + column)
     shutil.copy("a.csv", "../a.csv")
     Path("patch.toml").write_text(
-        text_of(
+        to_toml(
             {
                 "contact": {
                     "length": "9 mm",
@@ -336,16 +338,16 @@ def escaping(trial: Trial) -> list:
 
 
 KINDS = (
-    pickled,
-    zip_bomb,
-    zip_slip,
-    xml_bomb,
-    waits,
-    endless,
-    heads,
-    folders,
-    outputs,
-    escaping,
-    pickled,
-    waits,
+    make_pickle,
+    make_zip_bomb,
+    make_zip_slip,
+    make_xml_bomb,
+    make_blocking_file,
+    make_huge_file,
+    make_wrong_header,
+    make_results_folder,
+    try_outputs,
+    make_upward_names,
+    make_pickle,
+    make_blocking_file,
 )

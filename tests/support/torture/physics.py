@@ -2,50 +2,52 @@
 
 from . import grammar
 from .results import BALANCE
-from .toml import text_of
-from .trial import Trial, Wrong
+from .toml import to_toml
+from .trial import Trial, TrialFailure
 
 WORK = 0.05  # Permitted difference of the trapezoidal work of coarse samples, relative to the work.
 CREATED = -1e-12  # Least dissipation of a passive law, relative to the total work.
 ENGINES = ("auto", "auto", "exact", "march", "harmonic")
 
 
-def energy(trial: Trial) -> None:
+def run_trial(trial: Trial) -> None:
     """Run a rig or bench of any law and engine; its energy must balance, and no law may create energy."""
     kind = trial.draw("rig", "rig", "rig", "bench", "masses", "linear")
-    tables = grammar.scene(trial, kind)
+    tables = grammar.draw_scene(trial, kind)
     tables.pop("wear", None)
     if kind not in ("bench", "linear"):
         tables["accuracy"]["method"] = trial.draw(*ENGINES)
-    found = solved(trial, tables)
-    if found is None:  # In most cases the scene has no such engine.
+    result = solve_tables(trial, tables)
+    if result is None:  # In most cases the scene has no such engine.
         tables["accuracy"]["method"] = "auto"
-        found = solved(trial, tables)
-    if found is None:
+        result = solve_tables(trial, tables)
+    if result is None:
         return
-    balance, work = (found.measures.get(name) for name in ("energy_balance", "work_check"))
-    settled = found.outcome.value not in ("not_converged", "grows")
+    balance, work = (result.measures.get(name) for name in ("energy_balance", "work_check"))
+    is_converged = result.outcome.value not in ("not_converged", "grows")
     if (
         balance is not None
         and balance.value is not None
-        and settled
+        and is_converged
         and balance.value > max(BALANCE, balance.error or 0.0)
     ):
-        raise Wrong(f"{found.outcome.value} with an energy balance of {balance.value:.3g}")
+        raise TrialFailure(f"{result.outcome.value} with an energy balance of {balance.value:.3g}")
     if (
         work is not None
         and work.value is not None
-        and settled
+        and is_converged
         and work.value > WORK
-        and not found.warnings
+        and not result.warnings
     ):
-        raise Wrong(f"{found.outcome.value} with a work check of {work.value:.3g} and no warning")
+        raise TrialFailure(
+            f"{result.outcome.value} with a work check of {work.value:.3g} and no warning"
+        )
     # Results without convergence are marked as unusable.
-    if found.outcome.value != "not_converged":
-        passive(found, tables)
+    if result.outcome.value != "not_converged":
+        check_passivity(result, tables)
 
 
-def passive(found, tables: dict) -> None:
+def check_passivity(result, tables: dict) -> None:
     """Raise TrialFailure if a passive law created energy over the run, or over a cycle of a periodic motion."""
     laws = (
         [tables["friction"]]
@@ -56,41 +58,45 @@ def passive(found, tables: dict) -> None:
         law.get("reading") == "report" or law["law"] == "convolution" for law in laws
     ):
         return
-    book = found.extra.get("book", {})
-    passed = max((abs(value) for value in book.values() if isinstance(value, float)), default=0.0)
-    least = CREATED * passed
-    if book.get("friction", 0.0) < least:
-        raise Wrong(f"friction dissipated {book['friction']:.3g} J of {passed:.3g} J that passed")
-    area = found.measures.get("loop_area")
+    energies = result.extra.get("book", {})
+    largest_energy = max(
+        (abs(value) for value in energies.values() if isinstance(value, float)), default=0.0
+    )
+    min_dissipation = CREATED * largest_energy
+    if energies.get("friction", 0.0) < min_dissipation:
+        raise TrialFailure(
+            f"friction dissipated {energies['friction']:.3g} J of {largest_energy:.3g} J that passed"
+        )
+    area = result.measures.get("loop_area")
     if (
         area is not None
         and area.value is not None
-        and found.outcome.value == "steady"
-        and area.value < -(area.error or 0.0) - 1e-9 * passed
+        and result.outcome.value == "steady"
+        and area.value < -(area.error or 0.0) - 1e-9 * largest_energy
     ):
-        raise Wrong(f"a loop of {area.value:.3g} ± {area.error or 0.0:.2g} J")
+        raise TrialFailure(f"a loop of {area.value:.3g} ± {area.error or 0.0:.2g} J")
 
 
-def solved(trial: Trial, tables: dict, most: float = 3.0, valid: bool = False):
-    """Return the Result of a scene; None if it is refused, does not converge or is planned above `most` seconds.
+def solve_tables(trial: Trial, tables: dict, max_seconds: float = 3.0, valid: bool = False):
+    """Return the Result of a scene; None if it is refused, does not converge or is planned above `max_seconds` seconds.
 
     valid: raise TrialFailure if it is refused.
     """
     from patchfem.api import NotConverged, PatchfemError, load, plan, run
 
-    text = text_of(tables)
+    text = to_toml(tables)
     (trial.folder / "scene.toml").write_text(text, "utf-8")
     trial.tell("patchfem run scene.toml")
     try:
-        read = load(trial.folder / "scene.toml")
-        seconds = plan(read).seconds
-        if seconds > most:
+        scene = load(trial.folder / "scene.toml")
+        seconds = plan(scene).seconds
+        if seconds > max_seconds:
             return None
         trial.limit(seconds + 10.0)
-        return run(read, say=lambda text: None)
+        return run(scene, say=lambda text: None)
     except NotConverged:
         return None
     except Exception as error:
         if isinstance(error, PatchfemError) and not valid:
             return None
-        raise Wrong(f"{type(error).__name__}: {error}") from None
+        raise TrialFailure(f"{type(error).__name__}: {error}") from None

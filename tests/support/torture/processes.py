@@ -9,14 +9,14 @@ import h5py
 import numpy as np
 
 from . import grammar
-from .results import whole
-from .toml import text_of
-from .trial import Trial, Wrong
+from .results import check_results
+from .toml import to_toml
+from .trial import Trial, TrialFailure
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def print_of(folder: Path) -> str:
+def hash_results(folder: Path) -> str:
     """Return a hash of every number of a run except its computing times."""
     out = hashlib.sha256()
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
@@ -31,41 +31,41 @@ def print_of(folder: Path) -> str:
     return out.hexdigest()
 
 
-def determinism(trial: Trial) -> None:
+def run_determinism_trial(trial: Trial) -> None:
     """Run a scene in new processes, twice and with more threads; all results must be bit-identical."""
     for _ in range(8):
-        (trial.folder / "scene.toml").write_text(text_of(grammar.scene(trial)), "utf-8")
-        seconds = trial.announced("scene.toml")
+        (trial.folder / "scene.toml").write_text(to_toml(grammar.draw_scene(trial)), "utf-8")
+        seconds = trial.planned_seconds("scene.toml")
         if seconds is not None and seconds < 4.0:
             break
     else:
         return
-    found = {}
+    hashes = {}
     for number in (1, 1, 2, 4):
-        folder = f"run{len(found)}"
-        ended = trial.spawn(
+        folder = f"run{len(hashes)}"
+        result = trial.spawn(
             "run", "scene.toml", "-o", folder, "--no-page", env=dict.fromkeys(THREADS, str(number))
         )
         if not (trial.folder / folder).exists():
-            found[folder] = f"{ended.code} {ended.err}"
+            hashes[folder] = f"{result.code} {result.err}"
         else:
-            found[folder] = print_of(trial.folder / folder)
-    if len(set(found.values())) > 1:
-        raise Wrong(f"runs of one scene differ: {found}")
+            hashes[folder] = hash_results(trial.folder / folder)
+    if len(set(hashes.values())) > 1:
+        raise TrialFailure(f"runs of one scene differ: {hashes}")
 
 
-def memory(trial: Trial) -> None:
+def run_memory_trial(trial: Trial) -> None:
     """Run a random scene with limited address space."""
-    tables = grammar.scene(trial)
-    tables["accuracy"]["steps_per_cycle"] = int(trial.wide(100, 1e6))
-    (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")
-    most = int(trial.wide(3e8, 3e9))
-    ended = trial.spawn(
+    tables = grammar.draw_scene(trial)
+    tables["accuracy"]["steps_per_cycle"] = int(trial.log_uniform(100, 1e6))
+    (trial.folder / "scene.toml").write_text(to_toml(tables), "utf-8")
+    max_bytes = int(trial.log_uniform(3e8, 3e9))
+    result = trial.spawn(
         trial.draw("run", "run", "plan", "check"),
         "scene.toml",
         seconds=60,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (max_bytes, max_bytes)),
         allowed=(0, 2, 3, 4),
     )
-    if ended.code == 0 and (trial.folder / "out" / "scene").exists():
-        whole(trial.folder / "out" / "scene")
+    if result.code == 0 and (trial.folder / "out" / "scene").exists():
+        check_results(trial.folder / "out" / "scene")

@@ -8,10 +8,10 @@ import numpy as np
 import pyuff  # These are imported before any fork, so that not every trial has to import them.
 import scipy.optimize  # noqa: F401
 
-from .results import ran
-from .scenes import damage
-from .toml import text_of
-from .trial import Trial, Wrong, strict
+from .results import run_scene
+from .scenes import damage_bytes
+from .toml import to_toml
+from .trial import Trial, TrialFailure, parse_strict_json
 
 HEADS = {
     "trace": "x [um],z [um]",
@@ -63,13 +63,13 @@ ODD = (
 )
 
 
-def numbers(trial: Trial, kind: str) -> list:
+def draw_rows(trial: Trial, kind: str) -> list:
     """Return the rows of a valid table of a kind as lists of texts."""
     count = int(trial.r.integers(12, 60))
     step = trial.r.uniform(0.5, 1.5, count) if trial.chance(0.5) else np.ones(count)
-    rough = np.cumsum(trial.r.normal(size=count))
+    walk = np.cumsum(trial.r.normal(size=count))
     if kind == "trace":
-        columns = (np.cumsum(step), rough)
+        columns = (np.cumsum(step), walk)
     elif kind == "rows":
         rows = [
             (
@@ -83,19 +83,19 @@ def numbers(trial: Trial, kind: str) -> list:
         ]
         return [list(row) for row in rows]
     else:
-        columns = [np.cumsum(step) * 1e-3, rough * (1e-6 if kind == "path" else 1.0)]
+        columns = [np.cumsum(step) * 1e-3, walk * (1e-6 if kind == "path" else 1.0)]
         columns[1] = columns[1] - columns[1][0] * (kind == "path")
         columns[0] = columns[0] - columns[0][0]
-        columns += [np.tanh(rough)] if kind == "loop" else []
+        columns += [np.tanh(walk)] if kind == "loop" else []
     return [[repr(float(value)) for value in row] for row in zip(*columns)]
 
 
-def csv(trial: Trial, kind: str) -> tuple:
+def make_damaged_csv(trial: Trial, kind: str) -> tuple:
     """Return the bytes of a damaged table, and whether it must be refused."""
-    rows = numbers(trial, kind)
+    rows = draw_rows(trial, kind)
     head = HEADS[kind]
-    bad = False
-    how = trial.draw(
+    is_invalid = False
+    damage = trial.draw(
         "whole",
         "cell",
         "cell",
@@ -113,79 +113,81 @@ def csv(trial: Trial, kind: str) -> tuple:
         "huge",
     )
     row = int(trial.r.integers(len(rows)))
-    if how == "cell":
+    if damage == "cell":
         rows[row][int(trial.r.integers(2))] = trial.draw(*ODD)
-    elif how == "word":
+    elif damage == "word":
         rows[row][int(trial.r.integers(2))] = trial.draw("abc", "1.5 apples", "--", "1..2", "1e")
-        bad = True
-    elif how == "unit":
+        is_invalid = True
+    elif damage == "unit":
         head = (
             head.replace("[um]", "[parsec]").replace("[s]", "[fortnight]").replace("[Hz]", "[rpm]")
         )
-        bad = True
-    elif how == "empty":
+        is_invalid = True
+    elif damage == "empty":
         rows = []
-        bad = kind != "rows"
-    elif how == "headless":
+        is_invalid = kind != "rows"
+    elif damage == "headless":
         head = ""
-        bad = True
-    elif how == "back" and kind in ("signal", "path", "loop"):
+        is_invalid = True
+    elif damage == "back" and kind in ("signal", "path", "loop"):
         rows[1:] = rows[:0:-1]
-        bad = True
-    elif how == "short":
+        is_invalid = True
+    elif damage == "short":
         rows[row] = rows[row][:1]
-        bad = True
-    elif how == "long":
+        is_invalid = True
+    elif damage == "long":
         rows[row] = [*rows[row], "1", "2"]
-    elif how == "order":
+    elif damage == "order":
         trial.r.shuffle(rows)
-    elif how == "huge":
+    elif damage == "huge":
         rows[row][1] = trial.draw("1e300", "-1e300", "1e25")
-    sign = ";" if how == "comma" else trial.draw(",", ",", ",", "\t")
+    delimiter = ";" if damage == "comma" else trial.draw(",", ",", ",", "\t")
     text = trial.draw("\n", "\n", "\r\n").join(
-        [head.replace(",", sign)] * bool(head) + [sign.join(r) for r in rows]
+        [head.replace(",", delimiter)] * bool(head) + [delimiter.join(r) for r in rows]
     )
-    if how == "comma":
+    if damage == "comma":
         text = text.replace(".", ",")
     data = text.encode(trial.draw("utf-8", "utf-8", "utf-8-sig", "utf-16"), "replace")
-    if how == "damage":
-        return wounded(trial, data), False
-    return data, bad
+    if damage == "damage":
+        return damage_data(trial, data), False
+    return data, is_invalid
 
 
-def wounded(trial: Trial, data: bytes) -> bytes:
+def damage_data(trial: Trial, data: bytes) -> bytes:
     """Return a copy of the data with some damaged bytes."""
     out = bytearray(data)
     for _ in range(trial.draw(1, 1, 2, 5)):
-        damage(trial, out)
+        damage_bytes(trial, out)
     return bytes(out)
 
 
-def of_scene(trial: Trial, tables: dict, name: str, data: bytes, bad: bool) -> None:
+def run_scene_with_file(
+    trial: Trial, tables: dict, name: str, data: bytes, is_invalid: bool
+) -> None:
     """Check, plan and run a scene that reads a file; TrialFailure if an invalid file is accepted."""
     (trial.folder / name).write_bytes(data)
-    (trial.folder / "scene.toml").write_text(text_of(tables), "utf-8")
-    if ran(trial, "scene.toml") is not None and bad:
-        raise Wrong(f"{name} has no meaning and was taken")
+    (trial.folder / "scene.toml").write_text(to_toml(tables), "utf-8")
+    if run_scene(trial, "scene.toml") is not None and is_invalid:
+        raise TrialFailure(f"{name} has no meaning and was taken")
 
 
-def profiles(trial: Trial) -> None:
+def run_profiles_trial(trial: Trial) -> None:
     """Read traces alone, compare them, or press them."""
-    data, bad = csv(trial, "trace")
+    data, is_invalid = make_damaged_csv(trial, "trace")
     (trial.folder / "trace.csv").write_bytes(data)
-    answered(
+    run_json_command(
         trial,
-        bad,
+        is_invalid,
         "profile",
         "trace.csv",
         "--json",
         *(("--cutoff", "5 um") if trial.chance(0.3) else ()),
     )
     if trial.chance(0.3):
-        (trial.folder / "other.csv").write_bytes(csv(trial, "trace")[0])
-        answered(
+        (trial.folder / "other.csv").write_bytes(make_damaged_csv(trial, "trace")[0])
+        run_json_command(
             trial,
-            bad,
+            is_invalid,
             "compare",
             "trace.csv",
             "other.csv",
@@ -205,58 +207,66 @@ def profiles(trial: Trial) -> None:
             "element_size": "0.5 mm",
             "profile": {"file": "trace.csv"},
         }
-        of_scene(
-            trial, {"contact": contact, "accuracy": {"tolerance": 1e-2}}, "trace.csv", data, bad
+        run_scene_with_file(
+            trial,
+            {"contact": contact, "accuracy": {"tolerance": 1e-2}},
+            "trace.csv",
+            data,
+            is_invalid,
         )
 
 
-def answered(trial: Trial, bad: bool, *words) -> None:
+def run_json_command(trial: Trial, is_invalid: bool, *words) -> None:
     """Run a command whose output is JSON; TrialFailure if an invalid file is accepted."""
-    ended = trial.run(*words)
-    if ended.code == 0:
-        if bad:
-            raise Wrong("a file without meaning was taken")
-        strict(ended.out)
+    result = trial.run(*words)
+    if result.code == 0:
+        if is_invalid:
+            raise TrialFailure("a file without meaning was taken")
+        parse_strict_json(result.out)
 
 
-def signals(trial: Trial) -> None:
+def run_signals_trial(trial: Trial) -> None:
     """Run a rig with a recorded base motion."""
-    data, bad = csv(trial, "signal")
-    of_scene(
+    data, is_invalid = make_damaged_csv(trial, "signal")
+    run_scene_with_file(
         trial,
         RIG | {"drive": {"kind": "base", "waveform": "file", "file": "s.csv"}},
         "s.csv",
         data,
-        bad,
+        is_invalid,
     )
 
 
-def paths(trial: Trial) -> None:
+def run_paths_trial(trial: Trial) -> None:
     """Run a bench with a recorded displacement."""
-    data, bad = csv(trial, "path")
-    of_scene(trial, RUBS | {"slide": {"kind": "file", "file": "p.csv"}}, "p.csv", data, bad)
+    data, is_invalid = make_damaged_csv(trial, "path")
+    run_scene_with_file(
+        trial, RUBS | {"slide": {"kind": "file", "file": "p.csv"}}, "p.csv", data, is_invalid
+    )
 
 
-def rows(trial: Trial) -> None:
+def run_rows_trial(trial: Trial) -> None:
     """Run a rig with measured rows."""
-    data, bad = csv(trial, "rows")
-    of_scene(trial, RIG | {"drive": BASE, "measured": {"file": "t.csv"}}, "t.csv", data, bad)
+    data, is_invalid = make_damaged_csv(trial, "rows")
+    run_scene_with_file(
+        trial, RIG | {"drive": BASE, "measured": {"file": "t.csv"}}, "t.csv", data, is_invalid
+    )
 
 
-def loops(trial: Trial) -> None:
+def run_loops_trial(trial: Trial) -> None:
     """Fit a bench to a friction loop, or import the loop."""
-    data, bad = csv(trial, "loop")
+    data, is_invalid = make_damaged_csv(trial, "loop")
     (trial.folder / "loop.csv").write_bytes(data)
     if trial.chance(0.7):
-        answered(trial, bad, "import", "loop.csv", "-o", "out.csv", "--json")
+        run_json_command(trial, is_invalid, "import", "loop.csv", "-o", "out.csv", "--json")
         return
     (trial.folder / "scene.toml").write_text(
-        text_of(RUBS | {"slide": {"kind": "sine", "amplitude": "10 um", "frequency": "10 Hz"}}),
+        to_toml(RUBS | {"slide": {"kind": "sine", "amplitude": "10 um", "frequency": "10 Hz"}}),
         "utf-8",
     )
-    answered(
+    run_json_command(
         trial,
-        bad,
+        is_invalid,
         "fit",
         "scene.toml",
         "--to",
@@ -270,10 +280,10 @@ def loops(trial: Trial) -> None:
     )
 
 
-def universal(trial: Trial) -> None:
+def run_universal_trial(trial: Trial) -> None:
     """Import records of a universal file."""
     time = np.arange(64) / 500
-    one = {
+    record = {
         "type": 58,
         "binary": trial.draw(0, 1),
         "func_type": trial.draw(1, 1, 4),
@@ -288,15 +298,15 @@ def universal(trial: Trial) -> None:
         "x": time,
         "data": trial.r.normal(size=64) * trial.draw(1.0, 1e300, np.nan),
     }
-    pyuff.UFF(str(trial.folder / "made.uff")).write_sets([one, one | {"rsp_node": 2}], "add")
+    pyuff.UFF(str(trial.folder / "made.uff")).write_sets([record, record | {"rsp_node": 2}], "add")
     data = (trial.folder / "made.uff").read_bytes()
-    (trial.folder / "lab.uff").write_bytes(data if trial.chance(0.2) else wounded(trial, data))
+    (trial.folder / "lab.uff").write_bytes(data if trial.chance(0.2) else damage_data(trial, data))
     out = trial.draw("out.csv", "out.csv", "out.toml", "out.uff")
     channel = trial.draw("force=1:+x", "displacement=2:+x", "acceleration=1:+x")
     trial.run("import", "lab.uff", "-o", out, "--map", channel)
     if trial.chance(0.3):
         (trial.folder / "scene.toml").write_text(
-            text_of(RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}),
+            to_toml(RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}),
             "utf-8",
         )
-        ran(trial, "scene.toml")
+        run_scene(trial, "scene.toml")

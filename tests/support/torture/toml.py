@@ -6,25 +6,25 @@ from patchfem.scene import Tables
 from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_quantity_kind
 
 
-def text_of(tables: dict) -> str:
+def to_toml(tables: dict) -> str:
     """Return the scene as TOML: values first, then tables; lists of dicts are arrays of tables."""
-    return "".join(_lines(tables, ""))
+    return "".join(_iterate_lines(tables, ""))
 
 
-def _lines(table: dict, at: str):
+def _iterate_lines(table: dict, prefix: str):
     """Yield the lines of a table and of its subtables."""
     for key, value in table.items():
         if not _is_table(value):
-            yield f"{word(key)} = {value_of(value)}\n"
+            yield f"{format_key(key)} = {format_value(value)}\n"
     for key, value in table.items():
-        name = f"{at}.{word(key)}" if at else word(key)
+        name = f"{prefix}.{format_key(key)}" if prefix else format_key(key)
         if isinstance(value, dict):
             yield f"[{name}]\n"
-            yield from _lines(value, name)
+            yield from _iterate_lines(value, name)
         elif _is_table(value):
-            for one in value:
+            for entry in value:
                 yield f"[[{name}]]\n"
-                yield from _lines(one, name)
+                yield from _iterate_lines(entry, name)
 
 
 def _is_table(value) -> bool:
@@ -34,16 +34,16 @@ def _is_table(value) -> bool:
     )
 
 
-def word(key: str) -> str:
+def format_key(key: str) -> str:
     """Return a key as TOML, with quotes if necessary."""
     return (
         key
         if key and all(c.isascii() and (c.isalnum() or c in "_-") for c in key)
-        else value_of(key)
+        else format_value(key)
     )
 
 
-def value_of(value) -> str:
+def format_value(value) -> str:
     """Return a value as TOML; a `Raw` is not changed."""
     if isinstance(value, Raw):
         return str(value)
@@ -52,15 +52,17 @@ def value_of(value) -> str:
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(value_of, value)) + "]"
+        return "[" + ", ".join(map(format_value, value)) + "]"
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{word(k)} = {value_of(v)}" for k, v in value.items()) + "}"
+        return (
+            "{" + ", ".join(f"{format_key(k)} = {format_value(v)}" for k, v in value.items()) + "}"
+        )
     if isinstance(value, str):
-        return '"' + "".join(_letter(c) for c in value) + '"'
+        return '"' + "".join(_escape(c) for c in value) + '"'
     return str(value)
 
 
-def _letter(c: str) -> str:
+def _escape(c: str) -> str:
     """Return a character of a TOML string, escaped if necessary."""
     return f"\\u{ord(c):04x}" if ord(c) < 32 or ord(c) == 127 else "\\" + c if c in '"\\' else c
 
@@ -69,19 +71,19 @@ class Raw(str):
     """Text that is written into the scene without quotes."""
 
 
-def places(table: dict, at: tuple = ()) -> list:
+def list_paths(table: dict, prefix: tuple = ()) -> list:
     """Return the path of every key and table as tuples of keys and numbers."""
     out = []
     for key, value in table.items() if isinstance(table, dict) else enumerate(table):
-        out.append((*at, key))
+        out.append((*prefix, key))
         if isinstance(value, dict) or (
             isinstance(value, list) and value and isinstance(value[0], dict)
         ):
-            out += places(value, (*at, key))
+            out += list_paths(value, (*prefix, key))
     return out
 
 
-def parent(tables: dict, path: tuple):
+def get_parent(tables: dict, path: tuple):
     """Return the table or list that contains the last key of a path."""
     for key in path[:-1]:
         tables = tables[key]
@@ -89,17 +91,17 @@ def parent(tables: dict, path: tuple):
 
 
 @cache
-def known() -> tuple:
+def list_schema_keys() -> tuple:
     """Return (path, kind of quantity or None, model of the table or None) of every key of a scene, arrays at index 0."""
-    return tuple(_known(Tables, ()))
+    return tuple(_iterate_keys(Tables, ()))
 
 
-def _known(model, at: tuple):
+def _iterate_keys(model, prefix: tuple):
     """Yield the keys of a model and of the tables in it."""
     for key, name in attributes_by_key(model).items():
         inner = find_inner_table(model, name)
-        many = inner is not None and "tuple" in str(model.model_fields[name].annotation)
-        path = (*at, key, 0) if many else (*at, key)
+        is_array = inner is not None and "tuple" in str(model.model_fields[name].annotation)
+        path = (*prefix, key, 0) if is_array else (*prefix, key)
         yield path, find_quantity_kind(model, name), inner
-        if inner is not None and len(at) < 6:
-            yield from _known(inner, path)
+        if inner is not None and len(prefix) < 6:
+            yield from _iterate_keys(inner, path)

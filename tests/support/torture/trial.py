@@ -25,11 +25,11 @@ RAW = re.compile(
 CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 
 
-class Wrong(Exception):
+class TrialFailure(Exception):
     """Raised if the program does something that it must never do."""
 
 
-class Ended(NamedTuple):
+class CommandResult(NamedTuple):
     """Result of a command: exit code (negative: the signal that ended it), stdout, stderr."""
 
     code: int
@@ -59,7 +59,7 @@ class Trial:
         self.tell = tell
         self.patience = patience
 
-    def run(self, *words, seconds: float = 0.0) -> Ended:
+    def run(self, *words, seconds: float = 0.0) -> CommandResult:
         """Run a command in this process and check how it ends.
 
         It is stopped PATIENCE after the planned `seconds` of CPU time.
@@ -67,16 +67,16 @@ class Trial:
         words = [str(word) for word in words]
         self.tell("patchfem " + " ".join(words))
         self.limit(seconds + PATIENCE)
-        ended = judged(captured(self.command, words))
+        result = check_result(capture(self.command, words))
         self.limit(0.0)
-        return ended
+        return result
 
     def limit(self, seconds: float) -> None:
         """End this process after some seconds of CPU time, or twenty times as many of elapsed time; 0: never."""
         signal.setitimer(signal.ITIMER_PROF, seconds * self.patience)
         signal.setitimer(signal.ITIMER_REAL, 20 * seconds * self.patience)
 
-    def spawn(self, *words, seconds: float = 120.0, allowed=CODES, **options) -> Ended:
+    def spawn(self, *words, seconds: float = 120.0, allowed=CODES, **options) -> CommandResult:
         """Run a command in a new interpreter and check its end.
 
         options: those of subprocess.run (env is added to that of this process).
@@ -85,44 +85,47 @@ class Trial:
         self.tell("patchfem " + " ".join(words))
         options["env"] = {**os.environ, **options.get("env", {})}
         try:
-            done = subprocess.run(
-                process(*words), capture_output=True, timeout=seconds * self.patience, **options
+            completed = subprocess.run(
+                make_command_line(*words),
+                capture_output=True,
+                timeout=seconds * self.patience,
+                **options,
             )
         except subprocess.TimeoutExpired:
-            raise Wrong(f"no end within {seconds:.0f} s") from None
+            raise TrialFailure(f"no end within {seconds:.0f} s") from None
         coding = options["env"].get("PYTHONIOENCODING", "utf-8")
-        ended = Ended(
-            done.returncode,
-            *(stream.decode(coding, "replace") for stream in (done.stdout, done.stderr)),
+        ended = CommandResult(
+            completed.returncode,
+            *(stream.decode(coding, "replace") for stream in (completed.stdout, completed.stderr)),
         )
-        return judged(ended, allowed)
+        return check_result(ended, allowed)
 
-    def announced(self, file, *words) -> float | None:
+    def planned_seconds(self, file, *words) -> float | None:
         """Return the seconds that `plan` estimates for a scene; None if it is refused."""
-        ended = self.run("plan", file, "--json", *words)
-        return float(strict(ended.out)["seconds"]) if ended.code == 0 else None
+        result = self.run("plan", file, "--json", *words)
+        return float(parse_strict_json(result.out)["seconds"]) if result.code == 0 else None
 
     def draw(self, *choices):
         """Return one of the choices at random."""
         return choices[int(self.r.integers(len(choices)))]
 
-    def chance(self, share: float) -> bool:
-        """Return True with the probability `share`."""
-        return bool(self.r.random() < share)
+    def chance(self, probability: float) -> bool:
+        """Return True with the probability `probability`."""
+        return bool(self.r.random() < probability)
 
-    def wide(self, low: float, high: float) -> float:
+    def log_uniform(self, low: float, high: float) -> float:
         """Return a log-uniform number between low and high > 0 with four digits."""
         return float(f"{math.exp(self.r.uniform(math.log(low), math.log(high))):.4g}")
 
 
-def process(*words) -> list:
+def make_command_line(*words) -> list:
     """Return the command line that runs these words in a new interpreter."""
     return [sys.executable, "-m", "patchfem", *map(str, words)]
 
 
-def captured(command: Callable, words: list) -> Ended:
+def capture(command: Callable, words: list) -> CommandResult:
     """Run a command and capture both streams, including output that bypasses Python."""
-    kept = [os.dup(1), os.dup(2)]
+    saved = [os.dup(1), os.dup(2)]
     with open("/dev/null", "rb") as nothing, contextlib.ExitStack() as stack:
         files = [
             stack.enter_context(
@@ -149,19 +152,19 @@ def captured(command: Callable, words: list) -> Ended:
         ]
         try:
             with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
-                code = _code(command, words)
+                code = _run_and_get_code(command, words)
         finally:
-            for number, one in enumerate(kept, 1):
-                os.dup2(one, number)
-                os.close(one)
+            for number, saved_descriptor in enumerate(saved, 1):
+                os.dup2(saved_descriptor, number)
+                os.close(saved_descriptor)
         texts = []
         for file in files:
             file.seek(0)
             texts.append(file.read().decode("utf-8", "replace"))
-    return Ended(code, *texts)
+    return CommandResult(code, *texts)
 
 
-def _code(command: Callable, words: list) -> int:
+def _run_and_get_code(command: Callable, words: list) -> int:
     """Run a command and return its exit code; 1 for an exception."""
     try:
         return command(words)
@@ -174,20 +177,20 @@ def _code(command: Callable, words: list) -> int:
         return 1
 
 
-def judged(ended: Ended, allowed=CODES) -> Ended:
+def check_result(result: CommandResult, allowed=CODES) -> CommandResult:
     """Return the result; TrialFailure for a code, a stream or a missing message that no command may end with."""
-    lines = [line for line in ended.err.splitlines() if line.strip()]
+    lines = [line for line in result.err.splitlines() if line.strip()]
     last = lines[-1][:300] if lines else "no word on stderr"
-    if ended.code not in allowed:
-        raise Wrong(f"exit code {ended.code}: {last}")
-    for stream in (ended.out, ended.err):
+    if result.code not in allowed:
+        raise TrialFailure(f"exit code {result.code}: {last}")
+    for stream in (result.out, result.err):
         if found := RAW.search(stream):
-            place = stream.rfind("\n", 0, found.start()) + 1
-            raise Wrong(
-                f"exit code {ended.code}, raw words: {stream[place : place + 300].splitlines()[0]}"
+            line_start = stream.rfind("\n", 0, found.start()) + 1
+            raise TrialFailure(
+                f"exit code {result.code}, raw words: {stream[line_start : line_start + 300].splitlines()[0]}"
             )
         if found := CONTROL.search(stream):
-            raise Wrong(
+            raise TrialFailure(
                 f"a control character {found[0]!r} on the screen: "
                 f"{stream[max(0, found.start() - 60) : found.end()]!r}"
             )
@@ -195,26 +198,26 @@ def judged(ended: Ended, allowed=CODES) -> Ended:
         longest := max(map(len, lines), default=0)
         # The limit holds for stderr only; stdout may contain a title or JSON of any length.
     ) > LONGEST:
-        raise Wrong(f"a line of {longest} characters: {last}")
-    if ended.code in (2, 3, 4, 130) and not any(len(line) > 12 for line in lines):
-        raise Wrong(f"exit code {ended.code} without a helpful line: {last}")
-    return ended
+        raise TrialFailure(f"a line of {longest} characters: {last}")
+    if result.code in (2, 3, 4, 130) and not any(len(line) > 12 for line in lines):
+        raise TrialFailure(f"exit code {result.code} without a helpful line: {last}")
+    return result
 
 
-def strict(text: str) -> dict:
+def parse_strict_json(text: str) -> dict:
     """Return parsed JSON; TrialFailure if it is invalid or contains NaN or infinity."""
 
-    def refuse(name):
+    def reject_constant(name):
         """Raise TrialFailure for NaN or infinity."""
-        raise Wrong(f"{name} in JSON")
+        raise TrialFailure(f"{name} in JSON")
 
     try:
-        return json.loads(text, parse_constant=refuse)
+        return json.loads(text, parse_constant=reject_constant)
     except ValueError as error:
-        raise Wrong(f"not JSON: {error}: {text[:80]!r}") from None
+        raise TrialFailure(f"not JSON: {error}: {text[:80]!r}") from None
 
 
-def alone(work: Callable, trial: Callable, clock: float) -> str:
+def run_in_fork(work: Callable, trial: Callable, clock: float) -> str:
     """Run `work(trial)` in a forked process and return the fault, empty if there is none.
 
     work: function of the campaign; trial: tell -> Trial, called in the child; clock: seconds after
@@ -224,29 +227,29 @@ def alone(work: Callable, trial: Callable, clock: float) -> str:
     child = os.fork()
     if child == 0:
         os.close(reading)
-        _child(work, trial, writing)
+        _run_child(work, trial, writing)
     os.close(writing)
-    said = _heard(child, reading, clock)
+    messages = _read_messages(child, reading, clock)
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(child, signal.SIGKILL)  # The processes that the trial started are ended too.
     _, status = os.waitpid(child, 0)
-    doing = next((line[1:] for line in reversed(said) if line.startswith(">")), "")
-    if said and said[-1].startswith("="):
-        text = said[-1][1:]
+    doing = next((line[1:] for line in reversed(messages) if line.startswith(">")), "")
+    if messages and messages[-1].startswith("="):
+        text = messages[-1][1:]
         return text and f"{text} [{doing}]"
     number = os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
-    how = (
+    kind = (
         "hang"
         if number in (signal.SIGPROF, signal.SIGALRM, signal.SIGKILL)
         else f"crash by signal {number}"
     )
-    return f"{how} [{doing}]"
+    return f"{kind} [{doing}]"
 
 
-def _child(work: Callable, trial: Callable, writing: int) -> None:
+def _run_child(work: Callable, trial: Callable, writing: int) -> None:
     """Run the trial in the forked process, which never returns."""
 
-    def tell(text: str, mark: str = ">") -> None:
+    def write_message(text: str, mark: str = ">") -> None:
         """Write a message to the parent process."""
         os.write(writing, (mark + " ".join(text.split())[:3000] + "\n").encode("utf-8", "replace"))
 
@@ -254,27 +257,27 @@ def _child(work: Callable, trial: Callable, writing: int) -> None:
         os.setpgid(0, 0)
         for number in (signal.SIGPROF, signal.SIGALRM):
             signal.signal(number, signal.SIG_DFL)
-        given = trial(tell)
-        os.chdir(given.folder)
-        work(given)
-        given.limit(0.0)
-        tell("", "=")
-    except Wrong as wrong:
-        tell(str(wrong), "=")
+        own_trial = trial(write_message)
+        os.chdir(own_trial.folder)
+        work(own_trial)
+        own_trial.limit(0.0)
+        write_message("", "=")
+    except TrialFailure as wrong:
+        write_message(str(wrong), "=")
     except BaseException as error:
-        place = error.__traceback__
-        while place.tb_next is not None:
-            place = place.tb_next
-        tell(
-            f"the trial itself failed: {type(error).__name__}: {error} at {place.tb_frame.f_code.co_filename}:"
-            f"{place.tb_lineno}",
+        traceback = error.__traceback__
+        while traceback.tb_next is not None:
+            traceback = traceback.tb_next
+        write_message(
+            f"the trial itself failed: {type(error).__name__}: {error} at {traceback.tb_frame.f_code.co_filename}:"
+            f"{traceback.tb_lineno}",
             "=",
         )
     finally:
         os._exit(0)
 
 
-def _heard(child: int, reading: int, clock: float) -> list:
+def _read_messages(child: int, reading: int, clock: float) -> list:
     """Return the lines of the child until it closes its end; the child is killed after `clock` seconds."""
     import select
     from time import monotonic
@@ -295,7 +298,7 @@ def _heard(child: int, reading: int, clock: float) -> list:
     return text.decode("utf-8", "replace").splitlines()
 
 
-def emptied(folder: Path) -> Path:
+def make_empty_folder(folder: Path) -> Path:
     """Make a folder empty, or create it."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)

@@ -2,8 +2,8 @@
 
 from . import grammar
 from .scenes import NUMBERS, TEXTS
-from .tables import RIG, RUBS, csv
-from .toml import known, text_of
+from .tables import RIG, RUBS, make_damaged_csv
+from .toml import list_schema_keys, to_toml
 from .trial import Trial
 
 PATCH = {
@@ -76,29 +76,29 @@ KEYS = (
 LENGTHS = ("0.25 mm", "0 mm", "-1 mm", "1e9 m", "1e-30 m", "mm", "nan mm", "5", "")
 
 
-def lines(trial: Trial) -> None:
+def run_words_trial(trial: Trial) -> None:
     """Run one random command line, with its files in the folder."""
     for name, tables in SCENES.items():
-        (trial.folder / name).write_text(text_of(tables), "utf-8")
+        (trial.folder / name).write_text(to_toml(tables), "utf-8")
     for name, kind in (
         ("a.csv", "trace"),
         ("b.csv", "trace"),
         ("loop.csv", "loop"),
         ("rows.csv", "rows"),
     ):
-        (trial.folder / name).write_bytes(csv(trial, kind)[0])
+        (trial.folder / name).write_bytes(make_damaged_csv(trial, kind)[0])
     verb = trial.draw("sweep", "fit", "demo", "doctor", "torture", "nothing", "", *FORMS)
     words = [verb, *FORMS.get(verb, lambda trial: [])(trial)]
     for _ in range(trial.draw(0, 0, 0, 1, 2)):
-        at = 1 + int(trial.r.integers(len(words)))
-        words[at:at] = [trial.draw(*ODD)()] if trial.chance(0.5) else [anything(trial)]
+        position = 1 + int(trial.r.integers(len(words)))
+        words[position:position] = [trial.draw(*ODD)()] if trial.chance(0.5) else [draw_word(trial)]
     # These commands are slow by design, so they get an invalid option.
     if "demo" in words or "torture" in words:
         words = words[:1] + [word for word in words[1:] if word.startswith("--")] + ["--nothing"]
     trial.run(*words, seconds=30.0)
 
 
-def anything(trial: Trial) -> str:
+def draw_word(trial: Trial) -> str:
     """Return a word without meaning."""
     return str(
         trial.draw(
@@ -135,7 +135,7 @@ ODD = (
 )
 
 
-def file(trial: Trial) -> str:
+def draw_file(trial: Trial) -> str:
     """Return the name of a file, in most cases of a scene."""
     return trial.draw(
         "patch.toml",
@@ -149,12 +149,16 @@ def file(trial: Trial) -> str:
     )
 
 
-def key(trial: Trial) -> str:
+def draw_key(trial: Trial) -> str:
     """Return a key of a scene, or nearly one."""
-    return trial.draw(*KEYS) if trial.chance(0.8) else ".".join(map(str, trial.draw(*known())[0]))
+    return (
+        trial.draw(*KEYS)
+        if trial.chance(0.8)
+        else ".".join(map(str, trial.draw(*list_schema_keys())[0]))
+    )
 
 
-def sets(trial: Trial) -> list:
+def draw_sets(trial: Trial) -> list:
     """Return none to two options --set."""
     out = []
     for _ in range(trial.draw(0, 0, 1, 2)):
@@ -178,19 +182,19 @@ def sets(trial: Trial) -> list:
             "0 m/s^2",
             "\x1b[1m",
         )
-        out += ["--set", f"{key(trial)}{trial.draw('=', '=', '=', '', '==', ' = ')}{value}"]
+        out += ["--set", f"{draw_key(trial)}{trial.draw('=', '=', '=', '', '==', ' = ')}{value}"]
     return out
 
 
-def over(trial: Trial) -> list:
+def draw_over(trial: Trial) -> list:
     """Return one or two options --over."""
     out = []
     for _ in range(trial.draw(1, 1, 2)):
-        out += ["--over", f"{key(trial)}={trial.draw(*RANGES)}"]
+        out += ["--over", f"{draw_key(trial)}={trial.draw(*RANGES)}"]
     return out
 
 
-def profile(t: Trial) -> list:
+def draw_profile_words(t: Trial) -> list:
     """Return the words of the command profile."""
     options = (
         ["b.csv"],
@@ -202,11 +206,11 @@ def profile(t: Trial) -> list:
     )
     return [
         t.draw("a.csv", "rows.csv", "nowhere", "."),
-        *(one for each in options if t.chance(0.3) for one in each),
+        *(word for option in options if t.chance(0.3) for word in option),
     ]
 
 
-def fit(t: Trial) -> list:
+def draw_fit_words(t: Trial) -> list:
     """Return the words of the command fit."""
     span = t.draw("0.1..0.6", "0.6..0.1", "1 N..2 N", "x", "", "..", "0..0", "nan..1")
     return [
@@ -214,7 +218,7 @@ def fit(t: Trial) -> list:
         "--to",
         t.draw("loop.csv", "a.csv", "nowhere", "", "worn_depth_max=1 um..2 um"),
         "--free",
-        f"{key(t)}={span}",
+        f"{draw_key(t)}={span}",
         "-o",
         "out",
         *t.draw(
@@ -227,9 +231,9 @@ def fit(t: Trial) -> list:
     ]
 
 
-def imported(t: Trial) -> list:
+def draw_import_words(t: Trial) -> list:
     """Return the words of the command import."""
-    how = t.draw(
+    option = t.draw(
         [],
         ["--map", t.draw("force=force", "x", "=", "force=1:+x [N]", "time=t [s]")],
         ["--zero"],
@@ -241,29 +245,29 @@ def imported(t: Trial) -> list:
         t.draw("loop.csv", "a.csv", "nowhere.mat", "rows.csv"),
         "-o",
         t.draw("o.csv", "o.toml", "o.uff", "o.x"),
-        *how,
+        *option,
     ]
 
 
 FORMS = {
     "run": lambda t: [
-        file(t),
-        *sets(t),
+        draw_file(t),
+        *draw_sets(t),
         "-o",
         t.draw("out", "out", "a.csv", ".", ""),
         *t.draw([], ["--json"], ["-q"], ["-v", "--no-page"]),
     ],
     "plan": lambda t: [
-        file(t),
-        *sets(t),
-        *(over(t) if t.chance(0.5) else []),
+        draw_file(t),
+        *draw_sets(t),
+        *(draw_over(t) if t.chance(0.5) else []),
         *t.draw([], ["--json"], ["--probe"]),
     ],
-    "check": lambda t: [file(t), *sets(t), *t.draw([], ["--json"])],
+    "check": lambda t: [draw_file(t), *draw_sets(t), *t.draw([], ["--json"])],
     "sweep": lambda t: [
-        file(t),
-        *over(t),
-        *sets(t),
+        draw_file(t),
+        *draw_over(t),
+        *draw_sets(t),
         "-o",
         "out",
         *t.draw(
@@ -281,12 +285,12 @@ FORMS = {
         "out",
         *t.draw([], ["--over", t.draw("steps_per_cycle", "element_size", "nothing", "")]),
     ],
-    "fit": fit,
-    "profile": profile,
-    "import": imported,
+    "fit": draw_fit_words,
+    "profile": draw_profile_words,
+    "import": draw_import_words,
     "mesh": lambda t: [
-        file(t),
-        *sets(t),
+        draw_file(t),
+        *draw_sets(t),
         "-o",
         t.draw("m.msh", "m.vtu", "m.xyz", "m", "", "no/m.msh", "."),
     ],
@@ -297,7 +301,7 @@ FORMS = {
         t.draw("x", "y", "z", ""),
         "-o",
         "out",
-        *t.draw([], ["--scene", file(t), *sets(t)], ["--units", "um,um"]),
+        *t.draw([], ["--scene", draw_file(t), *draw_sets(t)], ["--units", "um,um"]),
     ],
     "export": lambda t: [
         t.draw("out", "nowhere", ".", "a.csv"),
@@ -316,5 +320,5 @@ FORMS = {
         *t.draw([], ["joint"], ["nothing"], ["joint", "-o", "rig.toml"], ["joint", "-o", "."])
     ],
     "schema": lambda t: ["-o", t.draw("s.json", ".", "no/s.json", "")],
-    "cite": lambda t: [*t.draw([], [file(t)])],
+    "cite": lambda t: [*t.draw([], [draw_file(t)])],
 }

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pairs import KINDS, pair, track
+from pairs import KINDS, make_track_pair, make_worn_pair
 
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
@@ -21,8 +21,8 @@ SHARES = (0.1, 0.3, 0.5)
 def make_pairs(count: int):
     """Yield pairs and tracks of seeds that were not used for tuning."""
     for seed in range(HELD_OUT, HELD_OUT + count):
-        yield from (pair(seed, share=share) for share in SHARES)
-        yield from (track(kind, seed, 2001) for kind in KINDS)
+        yield from (make_worn_pair(seed, worn_fraction=share) for share in SHARES)
+        yield from (make_track_pair(kind, seed, 2001) for kind in KINDS)
 
 
 @pytest.mark.slow
@@ -47,7 +47,7 @@ def test_exact_headline_begins_with_wrong_order(share):
 
     Unworn traces have no order, and nothing is stated.
     """
-    p = pair(30077, share=share)
+    p = make_worn_pair(30077, worn_fraction=share)
     right_order = compare_traces(p.before, p.after)
     wrong_order = compare_traces(p.after, p.before)
     assert not right_order.is_exchanged and EXCHANGED not in compose_verdict([right_order])[0]
@@ -66,7 +66,7 @@ def test_always_flat_floor_is_not_called_exchanged():
 
     Then 21 of 100 heights would agree, against 76 in the right order.
     """
-    p = track("band", 95000, 2001)
+    p = make_track_pair("band", 95000, 2001)
     found = compare_traces(p.before, p.after)
     assert found.basis == "place" and not found.is_exchanged
     assert found.motion.shift.low <= p.shift <= found.motion.shift.high
@@ -77,7 +77,7 @@ def test_always_flat_floor_is_not_called_exchanged():
 @pytest.fixture(scope="module")
 def worn_comparison():
     """Return the comparison of a pair of traces with a worn part."""
-    return compare_traces(*pair(90301)[:2])
+    return compare_traces(*make_worn_pair(90301)[:2])
 
 
 @pytest.mark.parametrize(

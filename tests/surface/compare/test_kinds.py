@@ -10,7 +10,7 @@ import known_pairs
 import numpy as np
 import pytest
 from pairs import UM
-from worn_kinds import made
+from worn_kinds import make_trace_pair
 
 from patchfem.core import frozen_array
 from patchfem.surface import Profile
@@ -44,10 +44,10 @@ GROWN = ("deposits", "exchanged")
 def make_pair(kind: str, seed: int) -> tuple:
     """Return both traces and the worn depths [m] at the samples of the second one."""
     if kind in OWN:
-        pair = made(kind, seed)
+        pair = make_trace_pair(kind, seed)
         return pair.before, pair.after, pair.worn
-    pair = known_pairs.pair(kind, seed)
-    return *known_pairs.profiles(pair), pair.worn
+    pair = known_pairs.draw_pair(kind, seed)
+    return *known_pairs.make_profiles(pair), pair.worn
 
 
 def find_faults(kind: str, seed: int) -> tuple:
@@ -124,7 +124,7 @@ def test_exact_uniform_wear_is_unbounded():
     A tilt between the traces may hide a mean wear of tilt times half the length, as the sentence
     states.
     """
-    pair = made("unworn", HELD_OUT + 50)
+    pair = make_trace_pair("unworn", HELD_OUT + 50)
     x = frozen_array(pair.after.x + 50e-3)
     before = Profile(frozen_array(pair.before.x + 50e-3), pair.before.z, "before")
     after = Profile(x, frozen_array(pair.after.z - 3 * UM - 2e-3 * x), "after")
@@ -156,7 +156,7 @@ def test_exact_uniform_wear_is_unbounded():
 
 def test_exact_spike_is_removed_and_groove_remains():
     """A spike is removed with its neighbouring samples, and a groove remains; with keep_spikes the spike counts."""
-    pair = made("groove", HELD_OUT + 99)
+    pair = make_trace_pair("groove", HELD_OUT + 99)
     assert remove_spikes(pair.after) is pair.after
     z = np.array(pair.before.z)
     z[50] += 200 * UM
@@ -178,7 +178,7 @@ def test_exact_spike_is_removed_and_groove_remains():
 @pytest.mark.parametrize("shape", ["speck", "hollow", "grown"])
 def test_exact_wide_dust_and_dropouts_are_removed(shape):
     """Dust of nine samples and dropouts of ten samples are removed and do not count as wear or growth."""
-    pair = made("groove", HELD_OUT + 75)
+    pair = make_trace_pair("groove", HELD_OUT + 75)
     k = np.arange(pair.before.x.size)
     before = np.array(pair.before.z)
     after = np.array(pair.after.z)
@@ -199,7 +199,7 @@ def test_exact_wide_dust_and_dropouts_are_removed(shape):
 @pytest.mark.parametrize("kind, seed", [("edge", 60), ("edge", 61), ("groove", 60)])
 def test_always_track_sizes_are_consistent(kind, seed):
     """Width, mean depth and areas of a track belong to one range of x, and their intervals cover the truth."""
-    pair = made(kind, HELD_OUT + seed)
+    pair = make_trace_pair(kind, HELD_OUT + seed)
     comparison = compare_traces(pair.before, pair.after)
     track = comparison.tracks.sizes
     first, last = (track[name].value for name in ("from", "to"))

@@ -6,7 +6,7 @@ the length. The rules were set on seeds 0 to 39; the seeds of these tests are ot
 
 import numpy as np
 import pytest
-from pairs import UM, pair
+from pairs import UM, make_worn_pair
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface import Profile
@@ -297,7 +297,7 @@ def test_exact_valley_in_second_trace_is_reported():
 
 def test_always_worn_tops_are_not_a_track():
     """Worn tops of a rough surface are not reported as a track."""
-    p = pair(30077, share=0.6)
+    p = make_worn_pair(30077, worn_fraction=0.6)
     found = compare_traces(p.before, p.after)
     assert found.tracks.spans == ()
     assert found.tracks.valley is None

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from pairs import UM, pair
+from pairs import UM, make_worn_pair
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
@@ -29,7 +29,10 @@ def test_always_unchanged_surfaces_rarely_count_as_reduced(count):
     """
     seeds = range(70000, 70000 + count)
     sizes = [
-        [measure_size(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)]
+        [
+            measure_size(make_worn_pair(seed + part, worn_fraction=0.0).before, UM)
+            for part in (0, 5000)
+        ]
         for seed in seeds
     ]
     ratios = [
@@ -57,7 +60,7 @@ def test_always_unchanged_aligned_surfaces_rarely_count_as_reduced():
     words = []
     widths = []
     for seed in range(30100, 30140):
-        p = pair(seed, share=0.0)
+        p = make_worn_pair(seed, worn_fraction=0.0)
         ratio = compare_traces(p.before, p.after).ratios.amplitude
         words.append(describe_ratio_change(ratio))
         widths.append(ratio.high / ratio.low)
@@ -96,7 +99,7 @@ def test_exact_confidence_of_interval_that_ends_at_one():
 
 def test_always_worn_peaks_give_reduced_waves():
     """Wear of the peaks gives the verdict "waves reduced" with the direction and the confidence."""
-    p = pair(30077, share=0.5)
+    p = make_worn_pair(30077, worn_fraction=0.5)
     headline, sentences = compose_verdict([compare_traces(p.before, p.after, "x")])
     assert headline == "worn, waves reduced" and sentences[0].startswith("Worn along x: ")
     assert sentences[1].startswith("Depths are measured from the ")
@@ -130,7 +133,7 @@ def test_always_scan_comparison_shows_smoother_direction():
 def test_always_pairs_of_two_directions_are_compared():
     """Two pairs of traces, along x and y, are compared for anisotropy before and after wear."""
     parts = [
-        compare_traces(pair(seed).before, pair(seed).after, name)
+        compare_traces(make_worn_pair(seed).before, make_worn_pair(seed).after, name)
         for seed, name in ((30001, "x"), (30002, "y"))
     ]
     found = compare_directions(parts)
@@ -140,7 +143,7 @@ def test_always_pairs_of_two_directions_are_compared():
 
 def test_always_traces_are_compared_at_coarser_step():
     """A trace with a coarser step is compared at its step, and amplitude ratio and depth agree within 1 %."""
-    p = pair(30003)
+    p = make_worn_pair(30003)
     fine = compare_traces(p.before, p.after)
     coarse = compare_traces(
         p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse")
@@ -152,7 +155,7 @@ def test_always_traces_are_compared_at_coarser_step():
 
 def test_refuses_trace_too_short_for_band():
     """A trace that is too short for the band of wavelengths is refused."""
-    p = pair(1)
+    p = make_worn_pair(1)
     short = Profile(p.before.x[:150], p.before.z[:150], "short")
     with pytest.raises(PatchfemError, match="not the whole band"):
         compare_traces(short, short)

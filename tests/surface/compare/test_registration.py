@@ -5,7 +5,7 @@ The method was tuned on seeds 0 to 150; the seeds of these tests are others.
 
 import numpy as np
 import pytest
-from pairs import UM, pair, surface
+from pairs import UM, make_surface, make_worn_pair
 from rubbing import rub
 from synthetic import report_area
 
@@ -22,7 +22,7 @@ HELD_OUT = 80000
 
 def score_pair(seed: int) -> tuple:
     """Return errors of shift, mean and largest depth [m], whether their intervals cover the truth, and the basis."""
-    p = pair(seed)
+    p = make_worn_pair(seed)
     found = compare_traces(p.before, p.after)
     worn = np.interp(found.alignment.x, p.after.x, p.worn)
     quantities = (
@@ -66,7 +66,7 @@ def test_always_intervals_of_200_pairs_cover_truth():
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_alignment_without_noise(seed):
     """Without noise shift, tilt, offset and depth agree with the truth within 0.05 nm."""
-    p = pair(seed, noise=0.0)
+    p = make_worn_pair(seed, noise=0.0)
     found = align(p.before, p.after, search_shift(p.before, p.after).shift)
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
@@ -80,7 +80,7 @@ def test_exact_alignment_without_noise(seed):
 
 def test_exact_identical_traces_show_no_change():
     """A trace compared with itself has no shift, tilt or wear, ratios of 1, and the verdict "no change"."""
-    p = pair(1)
+    p = make_worn_pair(1)
     found = compare_traces(p.before, p.before)
     assert found.motion.shift.value == pytest.approx(0.0, abs=1e-15)
     assert found.motion.tilt.value == pytest.approx(0.0, abs=1e-12)
@@ -102,7 +102,7 @@ def test_always_levelling_both_traces_hides_wear():
 
     The alignment on unworn valleys finds a depth within 5 nm.
     """
-    p = pair(30001, shift=0.0)
+    p = make_worn_pair(30001, shift=0.0)
     levelled = float((level(p.before).z - level(p.after).z).mean())
     mean_depth = compare_traces(p.before, p.after).worn.mean.value
     assert p.worn.mean() > 1 * UM
@@ -115,7 +115,8 @@ def test_always_traces_of_different_places_have_no_depth(count):
     """Traces of two different places have no shift and no depth, and the reason states why."""
     for seed in range(count):
         found = compare_traces(
-            pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after
+            make_worn_pair(seed + 40000, worn_fraction=0.0).before,
+            make_worn_pair(seed + 50000, worn_fraction=0.0).after,
         )
         assert found.basis == "" and found.worn.mean.value is found.motion.shift.value is None
         assert "no common part" in found.worn.mean.reason
@@ -128,7 +129,7 @@ def test_always_traces_of_different_places_have_no_depth(count):
 def test_always_unworn_traces_show_no_wear(count):
     """Unworn traces of one place are aligned with a mean difference below 4 nm, and no wear is reported."""
     for seed in range(30050, 30050 + count):
-        p = pair(seed, share=0.0)
+        p = make_worn_pair(seed, worn_fraction=0.0)
         found = compare_traces(p.before, p.after)
         assert found.basis == "place"
         assert found.worn.mean.value is None and abs(found.alignment.depth.mean()) < 0.004 * UM
@@ -181,7 +182,7 @@ def test_always_periodic_surface_is_not_aligned():
 
 def test_always_stretch_along_x_is_corrected():
     """A stretch of x by 0.4 % is estimated within 3e-5 and corrected."""
-    p = pair(5)
+    p = make_worn_pair(5)
     stretched = Profile(frozen_array(p.after.x * 1.004), p.after.z, "after")
     found = compare_traces(p.before, stretched)
     assert found.motion.stretch.value == pytest.approx(1.004, abs=3e-5)
@@ -194,7 +195,7 @@ def test_always_stretch_along_x_is_corrected():
 
 def test_always_deposits_do_not_reduce_wear():
     """Deposits are reported with their area and do not reduce the mean worn depth."""
-    p = pair(5)
+    p = make_worn_pair(5)
     z = np.array(p.after.z)
     is_unworn = np.interp(p.after.x, p.after.x, p.worn) == 0
     indices = np.flatnonzero(is_unworn)[100:140]
@@ -208,7 +209,7 @@ def test_always_deposits_do_not_reduce_wear():
 
 def test_always_traces_with_gaps_are_aligned():
     """Traces with gaps are aligned with the same shift within 20 nm."""
-    p = pair(5)
+    p = make_worn_pair(5)
     before = np.array(p.before.z)
     after = np.array(p.after.z)
     before[700:720] = np.nan
@@ -226,7 +227,7 @@ def make_groove_pair(seed: int, depth: float, roughness: float) -> tuple:
     """Return a rough trace, another one with a parabolic groove of 0.6 mm, and the area of the groove."""
     x = np.arange(1001) * 2 * UM
     t = (x - 1e-3) / 0.3e-3
-    sides = [surface(seed + offset, roughness)(0.4 * x) for offset in (0, 3000)]
+    sides = [make_surface(seed + offset, roughness)(0.4 * x) for offset in (0, 3000)]
     cut = np.where(abs(t) < 1, depth * (1 - t**2), 0.0)
     noise = 0.02 * UM * np.random.default_rng(seed).standard_normal((2, x.size))
     return (

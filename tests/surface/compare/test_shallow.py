@@ -74,6 +74,6 @@ def test_always_pairs_without_track_show_no_wear(count):
     alarms = 0
     for seed in range(93000, 93000 + count):
         for kind in ("unworn", "scale", "even", "wedge"):
-            found = compare_traces(*known_pairs.profiles(known_pairs.pair(kind, seed)))
+            found = compare_traces(*known_pairs.make_profiles(known_pairs.draw_pair(kind, seed)))
             alarms += found.worn.mean.value is not None
     assert alarms <= 0.05 * 4 * count

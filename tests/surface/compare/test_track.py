@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pairs import KINDS, UM, pair, track
+from pairs import KINDS, UM, make_track_pair, make_worn_pair
 
 from patchfem.core import frozen_array
 from patchfem.surface import Profile, level
@@ -26,7 +26,7 @@ def score_tracks(kind: str, count: int) -> tuple:
     covers = []
     ends = []
     for seed in range(HELD_OUT, HELD_OUT + count):
-        p = track(kind, seed)
+        p = make_track_pair(kind, seed)
         worn = compare_traces(p.before, p.after, shift=p.shift + 0.3 * UM).worn
         errors.append(worn.largest.value - p.worn.max())
         covers.append(worn.largest.low <= p.worn.max() <= worn.largest.high)
@@ -62,7 +62,7 @@ def test_always_intervals_of_200_tracks_cover_truth(kind):
 
 def test_exact_depth_and_ends_without_noise():
     """Without noise the largest depth agrees within 0.1 nm, and the ends within 1 nm."""
-    p = track("band", 7, noise=0.0)
+    p = make_track_pair("band", 7, noise=0.0)
     worn = compare_traces(p.before, p.after, shift=p.shift).worn
     worn_x = p.after.x[p.worn > 0]
     assert worn.largest.value == pytest.approx(p.worn.max(), abs=1e-4 * UM)
@@ -95,7 +95,9 @@ def test_exact_rounded_digits_are_not_wear(seed):
 
 @pytest.mark.share(0, 2)
 @pytest.mark.parametrize(
-    "traces", [*(track(kind, 90300) for kind in KINDS), pair(90300)], ids=[*KINDS, "peaks"]
+    "traces",
+    [*(make_track_pair(kind, 90300) for kind in KINDS), make_worn_pair(90300)],
+    ids=[*KINDS, "peaks"],
 )
 def test_always_wrong_file_order_is_reported(traces):
     """Headline and sentences report files in the wrong order, and only those."""
@@ -114,7 +116,7 @@ def test_always_wrong_file_order_is_reported(traces):
 
 def test_always_rougher_flanks_are_not_unworn():
     """A box of 8 um in a trace of the same spectrum is a track, but not in a trace of four times the roughness."""
-    before, other = (level(pair(seed).before) for seed in (90304, 90305))
+    before, other = (level(make_worn_pair(seed).before) for seed in (90304, 90305))
     box = 8 * UM * (np.abs(other.x - 500 * UM) < 150 * UM)
     found = find_flanks(before, replace(other, z=frozen_array(other.z - box)))
     assert found is not None and found.largest[0] > 8 * UM
@@ -123,7 +125,7 @@ def test_always_rougher_flanks_are_not_unworn():
 
 def test_always_unworn_traces_have_no_worn_range():
     """Unworn traces have no worn range."""
-    p = pair(90302, share=0.0)
+    p = make_worn_pair(90302, worn_fraction=0.0)
     assert compare_traces(p.before, p.after, shift=p.shift).worn.extent is None
 
 

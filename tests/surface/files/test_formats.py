@@ -14,7 +14,7 @@ from patchfem.surface import Profile, read_profile, read_surface
 from patchfem.surface.areal import Areal
 from patchfem.surface.files import instruments
 
-Z = write.scan()
+Z = write.draw_scan()
 HOLES = np.where(np.arange(24).reshape(4, 6) % 5 == 2, np.nan, Z)
 STEPS = (0.5e-6, 0.75e-6)
 UM = ("um", "um")
@@ -36,11 +36,11 @@ def assert_scan_equal(found, z, tolerance=0.0, steps=STEPS) -> None:
 
 
 AXES = (
-    write.axis("CX", increment=STEPS[0])
-    + write.axis("CY", increment=STEPS[1])
-    + write.axis("CZ", "A")
+    write.format_axis("CX", increment=STEPS[0])
+    + write.format_axis("CY", increment=STEPS[1])
+    + write.format_axis("CZ", "A")
 )
-MATRIX = write.matrix(6, 4)
+MATRIX = write.format_matrix(6, 4)
 RAW = Z.tobytes()
 TRACE = np.column_stack([np.arange(24) * 0.5, Z.ravel() * 1e6])
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
@@ -48,8 +48,8 @@ POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in
 
 def make_x3p(record=None, axes=AXES, raw=RAW, feature="SUR", **more) -> bytes:
     """Return an X3P file of a third record, by default a matrix with its heights in a binary file."""
-    record = MATRIX + write.link(raw) if record is None else record
-    return write.x3p(write.main_xml(axes, record, feature), raw, **more)
+    record = MATRIX + write.format_link(raw) if record is None else record
+    return write.make_x3p(write.make_main_xml(axes, record, feature), raw, **more)
 
 
 def make_data_list(rows) -> str:
@@ -75,7 +75,7 @@ def make_columns(header: str, separator=",", order="xyz", z=Z) -> bytes:
 PLACES = POINTS * [1e-6, 1e-6, 1e-6]
 PLACES[:, 2] = Z.ravel()
 SHUFFLED = np.random.default_rng(0).permutation(PLACES)
-ABSOLUTE = "".join(write.axis(name, "A") for name in ("CX", "CY", "CZ"))
+ABSOLUTE = "".join(write.format_axis(name, "A") for name in ("CX", "CY", "CZ"))
 LIST = "<ListDimension>24</ListDimension>"
 COLUMNS = dict(zip("XYZ", (POINTS[:, k].reshape(4, 6) for k in range(3))))
 EXACT = [("D", 1.0, 0), ("F", 1.0, 1e-12), ("I", 2e-10, 1.01e-10), ("L", 1e-14, 0.51e-14)]
@@ -84,38 +84,38 @@ EXACT = [("D", 1.0, 0), ("F", 1.0, 1e-12), ("I", 2e-10, 1.01e-10), ("L", 1e-14, 
 # by valid.bin.
 SCANS = {
     **{
-        f"x3p of type {kind}, {name}": (write.x3p_of(z, kind, increment), "a.x3p", None, z, near)
+        f"x3p of type {kind}, {name}": (write.heights_to_x3p(z, kind, increment), "a.x3p", None, z, near)
         for kind, increment, near in EXACT
         for name, z in (("whole", Z), ("with holes", HOLES))
     },
     **{
         f"x3p with {value} of type {kind}": (
-            write.x3p_of(np.where(np.isnan(HOLES), value, HOLES), kind), "a.x3p", None, HOLES, near)
+            write.heights_to_x3p(np.where(np.isnan(HOLES), value, HOLES), kind), "a.x3p", None, HOLES, near)
         for kind, _, near in EXACT[:2]
         for value in (np.inf, -np.inf)
     },
-    "x3p with an offset": (write.x3p_of(Z, "I", 2e-10, 3e-6), "a.x3p", None, Z, 1.01e-10),
-    "x3p without a prefix": (write.x3p_of(Z, prefix=""), "a.x3p", None, Z, 0),
-    "x3p with a long dash": (write.x3p_of(Z, revision="ISO5436 – 2000"), "a.x3p", None, Z, 0),
+    "x3p with an offset": (write.heights_to_x3p(Z, "I", 2e-10, 3e-6), "a.x3p", None, Z, 1.01e-10),
+    "x3p without a prefix": (write.heights_to_x3p(Z, prefix=""), "a.x3p", None, Z, 0),
+    "x3p with a long dash": (write.heights_to_x3p(Z, revision="ISO5436 – 2000"), "a.x3p", None, Z, 0),
     "x3p in a folder": (make_x3p(folder="sample/"), "a.x3p", None, Z, 0),
     "x3p in gzip": (gzip.compress(make_x3p()), "a.x3p.gz", None, Z, 0),
     "x3p with heights in the xml": (make_x3p(MATRIX + make_data_list(Z.ravel())), "a.x3p", None, Z, 0),
     "x3p with holes in the xml": (make_x3p(MATRIX + make_data_list(HOLES.ravel())), "a.x3p", None, HOLES, 0),
     "x3p with absolute places": (
-        make_x3p(MATRIX + write.link(PLACES.tobytes()), ABSOLUTE, PLACES.tobytes(), "PCL"), "a.x3p", None, Z, 0),
+        make_x3p(MATRIX + write.format_link(PLACES.tobytes()), ABSOLUTE, PLACES.tobytes(), "PCL"), "a.x3p", None, Z, 0),
     "x3p with points in any order": (
-        make_x3p(LIST + write.link(SHUFFLED.tobytes()), ABSOLUTE, SHUFFLED.tobytes(), "PCL"), "a.x3p", None, Z, 0),
+        make_x3p(LIST + write.format_link(SHUFFLED.tobytes()), ABSOLUTE, SHUFFLED.tobytes(), "PCL"), "a.x3p", None, Z, 0),
     "x3p with absolute places in the xml": (make_x3p(MATRIX + make_data_list(PLACES), ABSOLUTE), "a.x3p", None, Z, 0),
     "x3p with points in the xml": (make_x3p(LIST + make_data_list(SHUFFLED), ABSOLUTE), "a.x3p", None, Z, 0),
-    "npy": (write.npy(POINTS), "a.npy", UM, Z, 1e-20),
-    "npy from the far end": (write.npy(POINTS[::-1]), "a.npy", UM, Z, 1e-20),
-    "mat beside a row": (write.mat(points=POINTS, note=np.arange(9.0)[None]), "a.mat", UM, Z, 1e-20),
-    "mat unpacked": (write.mat(False, points=POINTS, size=24.0), "a.mat", UM, Z, 1e-20),
+    "npy": (write.make_npy(POINTS), "a.npy", UM, Z, 1e-20),
+    "npy from the far end": (write.make_npy(POINTS[::-1]), "a.npy", UM, Z, 1e-20),
+    "mat beside a row": (write.make_mat(points=POINTS, note=np.arange(9.0)[None]), "a.mat", UM, Z, 1e-20),
+    "mat unpacked": (write.make_mat(False, points=POINTS, size=24.0), "a.mat", UM, Z, 1e-20),
     "mat with axes": (
-        write.mat(x=np.arange(6) * 0.5, y=np.arange(4) * 0.75, z=Z * 1e6), "a.mat", UM, Z, 1e-20),
+        write.make_mat(x=np.arange(6) * 0.5, y=np.arange(4) * 0.75, z=Z * 1e6), "a.mat", UM, Z, 1e-20),
     "mat of three columns": (
-        write.mat(x=POINTS[:, 0], y=POINTS[:, 1], gap=POINTS[:, 2]), "a.mat", UM, Z, 1e-20),
-    "mat of three matrices": (write.mat(**COLUMNS, text="scan"), "a.mat", UM, Z, 1e-20),
+        write.make_mat(x=POINTS[:, 0], y=POINTS[:, 1], gap=POINTS[:, 2]), "a.mat", UM, Z, 1e-20),
+    "mat of three matrices": (write.make_mat(**COLUMNS, text="scan"), "a.mat", UM, Z, 1e-20),
     "text": (make_columns("x [um],y [um],z [um]"), "a.txt", None, Z, 1e-20),
     "text with a comment": (make_columns("# x_um,y_um,z_um"), "a.txt", None, Z, 1e-20),
     "text without a header": (make_columns("")[1:], "a.txt", UM, Z, 1e-20),
@@ -134,9 +134,10 @@ def test_exact_scan_in_each_format_agrees(tmp_path, data, name, units, z, tolera
 
 def test_exact_x3p_profile_agrees(tmp_path):
     """An X3P file of a profile gives a trace with the written heights."""
-    axes = write.axis("CX", increment=STEPS[0]) + write.axis("CZ", "A")
+    axes = write.format_axis("CX", increment=STEPS[0]) + write.format_axis("CZ", "A")
     found = read_bytes(
-        tmp_path, make_x3p(write.matrix(24, 1) + write.link(Z.tobytes()), axes, feature="PRF")
+        tmp_path,
+        make_x3p(write.format_matrix(24, 1) + write.format_link(Z.tobytes()), axes, feature="PRF"),
     )
     assert isinstance(found, Profile) and np.array_equal(found.z, Z.ravel())
     assert found.x == pytest.approx(np.arange(24) * STEPS[0], abs=1e-20)
@@ -153,32 +154,33 @@ def test_always_wrong_checksum_gives_note(tmp_path):
 
 def plain_axes(kind="A", data="D") -> str:
     """Return axes without increments, and heights of a kind and a type."""
-    return write.axis("CX") + write.axis("CY") + write.axis("CZ", kind, data)
+    return write.format_axis("CX") + write.format_axis("CY") + write.format_axis("CZ", kind, data)
 
 
 REFUSED = {  # bytes, file name, given units, and the expected message
     "wrong checksum": (
-        make_x3p(MATRIX + write.link(Z.tobytes()), raw=HOLES.tobytes()), "a.x3p", None,
+        make_x3p(MATRIX + write.format_link(Z.tobytes()), raw=HOLES.tobytes()), "a.x3p", None,
         "the checksum of bindata/data.bin is wrong: the heights were changed"),
-    "two layers": (make_x3p(write.matrix(6, 2, 2), plain_axes()), "a.x3p", None,
+    "two layers": (make_x3p(write.format_matrix(6, 2, 2), plain_axes()), "a.x3p", None,
                    "SizeZ is 2; a surface must have one layer"),
-    "too few bytes": (make_x3p(write.matrix(7, 4) + write.link(Z.tobytes()), plain_axes()), "a.x3p", None,
+    "too few bytes": (make_x3p(write.format_matrix(7, 4) + write.format_link(Z.tobytes()), plain_axes()), "a.x3p", None,
                       "192 bytes of heights, but 28 heights of type D are needed"),
     "sixteen bits called 64": (
-        make_x3p(MATRIX + write.link(bytes(48)), plain_axes(), bytes(48)), "a.x3p", None,
+        make_x3p(MATRIX + write.format_link(bytes(48)), plain_axes(), bytes(48)), "a.x3p", None,
         "48 bytes of heights, but 24 heights of type D are needed"),
     "an unknown type": (make_x3p(MATRIX, plain_axes(data="Q")), "a.x3p", None,
                         "DataType of CZ is 'Q'; one of I, L, F, D is needed"),
-    "sizes of a bomb": (make_x3p(write.matrix(2 * 10**9, 1), plain_axes()), "a.x3p", None,
+    "sizes of a bomb": (make_x3p(write.format_matrix(2 * 10**9, 1), plain_axes()), "a.x3p", None,
                         r"SizeX is '2000000000'; a whole number from 1 to 5e\+07 is needed"),
     "heights that climb": (make_x3p(MATRIX + "<DataList/>", plain_axes("I")), "a.x3p", None,
                            r"the heights \(CZ\) are incremental; export the surface anew"),
     "no axes": (make_x3p(MATRIX, ""), "a.x3p", None, "main.xml lacks Record1/Axes/CX"),
-    "no heights": (make_x3p(MATRIX + write.link(b"", name="other.bin"), plain_axes()), "a.x3p", None,
+    "no heights": (make_x3p(MATRIX + write.format_link(b"", name="other.bin"), plain_axes()), "a.x3p", None,
                    "no other.bin inside it"),
-    "broken xml": (write.x3p(b"<a><b></a>"), "a.x3p", None, "main.xml is damaged"),
+    "broken xml": (write.make_x3p(b"<a><b></a>"), "a.x3p", None, "main.xml is damaged"),
     "a number that is none": (
-        make_x3p(MATRIX, write.axis("CX", increment="1_0") + write.axis("CY") + write.axis("CZ", "A")), "a.x3p", None,
+        make_x3p(MATRIX, write.format_axis("CX", increment="1_0") + write.format_axis("CY")
+            + write.format_axis("CZ", "A")), "a.x3p", None,
         "Increment of CX is '1_0'; a number is needed"),
     "no raster": (b"x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n", "a.txt", None,
                   "7 different x and 7 different y do"),
@@ -192,7 +194,7 @@ REFUSED = {  # bytes, file name, given units, and the expected message
                   "heights span 8 mm over a length of 1 um; is the unit"),
     **{
         f"{what} of {name}": (data, name, units, sentence)
-        for data, name in ((write.npy(TRACE), "a.npy"), (write.mat(points=POINTS), "a.mat"))
+        for data, name in ((write.make_npy(TRACE), "a.npy"), (write.make_mat(points=POINTS), "a.mat"))
         for what, units, sentence in (
             ("no units", None, r'names no units.*units=\("mm", "um"\)\), or write it as text'),
             ("an unknown unit", ("um", "furlong"), "unknown unit 'furlong'; use one of m, km"))
@@ -201,26 +203,26 @@ REFUSED = {  # bytes, file name, given units, and the expected message
                                   "unknown unit 'furlong'; use one of m, km"),
     "one unit": (b"x [um],z [um]\n0,1\n5,2\n", "a.csv", "um",
                  r'give two units, of x and of z, such as \("mm", "um"\), not'),
-    "npy of no columns": (write.npy(np.zeros((4, 6))), "a.npy", UM,
+    "npy of no columns": (write.make_npy(np.zeros((4, 6))), "a.npy", UM,
                           r"an array of shape \(4, 6\); columns x, z or x, y, z are needed"),
-    "npy of complex numbers": (write.npy(TRACE.astype(complex)), "a.npy", UM,
+    "npy of complex numbers": (write.make_npy(TRACE.astype(complex)), "a.npy", UM,
                                "contains '<c16'; save plain numbers"),
-    "npy cut off": (write.npy(TRACE)[:-8], "a.npy", UM,
+    "npy cut off": (write.make_npy(TRACE)[:-8], "a.npy", UM,
                     "376 bytes of data are not the 48 numbers of type float64"),
-    "npy of a negative size": (write.npy(TRACE).replace(b"(24, 2)", b"(24,-2)"), "a.npy", UM,
+    "npy of a negative size": (write.make_npy(TRACE).replace(b"(24, 2)", b"(24,-2)"), "a.npy", UM,
                                "header of the .npy file is damaged"),
-    "mat of two traces": (write.mat(a=TRACE, b=TRACE), "a.mat", UM,
+    "mat of two traces": (write.make_mat(a=TRACE, b=TRACE), "a.mat", UM,
                           r"holds a \(24, 2\), b \(24, 2\); variables x, z or x, y"),
-    "mat of other sizes": (write.mat(x=np.arange(6.0), y=np.arange(3.0), z=Z), "a.mat", UM,
+    "mat of other sizes": (write.make_mat(x=np.arange(6.0), y=np.arange(3.0), z=Z), "a.mat", UM,
                            r"of shapes .* do not fit"),
     "mat of version 7.3": (b"MATLAB 7.3 MAT-file, HDF5" + bytes(600), "a.mat", UM,
                            "version 7.3 is damaged .*; save it anew"),
-    "mat cut off": (write.mat(points=POINTS)[:-9], "a.mat", UM, "cut off or damaged; save it anew"),
+    "mat cut off": (write.make_mat(points=POINTS)[:-9], "a.mat", UM, "cut off or damaged; save it anew"),
     "dektak without its columns": (
-        write.dektak(Z.ravel()).replace(b"Lateral", b"Time"), "a.csv", None,
+        write.make_dektak(Z.ravel()).replace(b"Lateral", b"Time"), "a.csv", None,
         "without the columns `Lateral um,Raw Micrometer`"),
     "dektak in volts": (
-        write.dektak(Z.ravel()).replace(b"Raw Micrometer", b"Raw Volt"), "a.csv", None,
+        write.make_dektak(Z.ravel()).replace(b"Raw Micrometer", b"Raw Volt"), "a.csv", None,
         r":13: unknown unit 'Volt'; export the scan in Micrometer or Angstrom"),
 }  # fmt: skip
 
@@ -232,7 +234,9 @@ def test_refuses_faulty_file(tmp_path, data, name, units, message):
         read_bytes(tmp_path, data, name, units)
 
 
-@pytest.mark.parametrize("data", [write.sdf_binary(Z), write.sdf_ascii(Z)], ids=["binary", "text"])
+@pytest.mark.parametrize(
+    "data", [write.make_binary_sdf(Z), write.make_ascii_sdf(Z)], ids=["binary", "text"]
+)
 @pytest.mark.skipif(
     find_spec("SurfaceTopography") is None, reason="the extra `profiles` is not installed"
 )
@@ -246,7 +250,7 @@ def test_always_steep_heights_in_metres_give_note(tmp_path):
 
     The samples of the standard have heights of a metre.
     """
-    found = read_bytes(tmp_path, write.x3p_of(Z * 1e6), "a.x3p")
+    found = read_bytes(tmp_path, write.heights_to_x3p(Z * 1e6), "a.x3p")
     assert found.z == pytest.approx(Z * 1e6, rel=1e-14)
     assert found.notes[0].startswith(f"{tmp_path / 'a.x3p'}: heights span ")
     assert found.notes[0].endswith(
@@ -259,7 +263,7 @@ def test_always_steep_heights_in_metres_give_note(tmp_path):
 )
 def test_exact_npy_columns_give_trace(tmp_path, table):
     """The two columns of a .npy file give a trace, for all orders and types of its array."""
-    found = read_bytes(tmp_path, write.npy(table), "scan.npy", UM)
+    found = read_bytes(tmp_path, write.make_npy(table), "scan.npy", UM)
     assert isinstance(found, Profile) and found.x == pytest.approx(TRACE[:, 0] * 1e-6)
     assert found.z == pytest.approx(Z.ravel(), rel=1e-6 if table.dtype == "f4" else 1e-14)
 
@@ -267,14 +271,14 @@ def test_exact_npy_columns_give_trace(tmp_path, table):
 def test_exact_dektak_export_agrees(tmp_path):
     """A Dektak export gives the heights and the exact step of 50 um over 320 points, although it prints rounded x."""
     z = np.random.default_rng(1).normal(size=320)
-    found = read_bytes(tmp_path, write.dektak(z), "scan.csv")
+    found = read_bytes(tmp_path, write.make_dektak(z), "scan.csv")
     assert found.x == pytest.approx(np.arange(320) * 0.15625e-6, rel=1e-14)
     assert found.z == pytest.approx(np.round(z, 5) * 1e-6, rel=1e-14)
     assert np.array_equal(
-        read_bytes(tmp_path, write.dektak(z, results=False), "scan.csv").z, found.z
+        read_bytes(tmp_path, write.make_dektak(z, results=False), "scan.csv").z, found.z
     )
     utf16_trace = read_bytes(
-        tmp_path, write.dektak(z).decode("latin-1").encode("utf-16"), "scan.csv"
+        tmp_path, write.make_dektak(z).decode("latin-1").encode("utf-16"), "scan.csv"
     )
     assert np.array_equal(utf16_trace.z, found.z)
 
@@ -282,19 +286,21 @@ def test_exact_dektak_export_agrees(tmp_path):
 def test_always_truncated_dektak_export_keeps_printed_x(tmp_path):
     """A truncated Dektak export keeps its printed x, with a note that its length does not fit the header."""
     z = np.random.default_rng(1).normal(size=320)
-    found = read_bytes(tmp_path, b"\n".join(write.dektak(z).split(b"\n")[:200]), "scan.csv")
+    found = read_bytes(tmp_path, b"\n".join(write.make_dektak(z).split(b"\n")[:200]), "scan.csv")
     assert "the length of 50 um in the header does not fit" in found.notes[0]
     assert found.x == pytest.approx(np.arange(found.x.size) * 0.15625e-6, abs=0.06e-6)
 
 
 def test_exact_read_profile_accepts_traces_only(tmp_path):
     """The function read_profile reads a trace of any format, also from a .zip, and refuses a scan."""
-    (tmp_path / "a.x3p").write_bytes(write.x3p_of(Z))
+    (tmp_path / "a.x3p").write_bytes(write.heights_to_x3p(Z))
     with pytest.raises(
         PatchfemError, match="scan of 4 x 6 heights, but a single trace is needed; write one row of"
     ):
         read_profile(tmp_path / "a.x3p")
-    (tmp_path / "a.zip").write_bytes(write.zipped({"one/a.csv": b"x [um],z [nm]\n0,1\n1,2\n2,4\n"}))
+    (tmp_path / "a.zip").write_bytes(
+        write.make_zip({"one/a.csv": b"x [um],z [nm]\n0,1\n1,2\n2,4\n"})
+    )
     assert read_profile(tmp_path / "a.zip").z == pytest.approx([1e-9, 2e-9, 4e-9], rel=1e-15)
 
 

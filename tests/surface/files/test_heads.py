@@ -454,7 +454,7 @@ def test_always_heights_below_atom_give_note(tmp_path):
     """Heights smaller than an atom are read with a note that questions their unit."""
     found = read_text(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
     assert found.notes[0].endswith("atom; is the unit of the heights right?")
-    (tmp_path / "logo.x3p").write_bytes(write.x3p_of(write.scan() * 1e-7))
+    (tmp_path / "logo.x3p").write_bytes(write.heights_to_x3p(write.draw_scan() * 1e-7))
     assert (
         read_surface(tmp_path / "logo.x3p")
         .notes[0]

@@ -17,13 +17,17 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.surface import read_surface
 from patchfem.surface.areal import Areal
 
-Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.scan())
+Z = np.where(np.arange(24).reshape(4, 6) == 9, np.nan, write.draw_scan())
 POINTS = np.array([(x * 0.5, y * 0.75, Z[y, x] * 1e6) for y in range(4) for x in range(6)])
 RAW = Z.astype("<f8").tobytes()
-AXES = write.axis("CX", increment=5e-7) + write.axis("CY", increment=7.5e-7) + write.axis("CZ", "A")
-LISTED = write.main_xml(
+AXES = (
+    write.format_axis("CX", increment=5e-7)
+    + write.format_axis("CY", increment=7.5e-7)
+    + write.format_axis("CZ", "A")
+)
+LISTED = write.make_main_xml(
     AXES,
-    write.matrix(6, 4)
+    write.format_matrix(6, 4)
     + "<DataList>"
     + "".join("<Datum/>" if np.isnan(v) else f"<Datum>{float(v)!r}</Datum>" for v in Z.ravel())
     + "</DataList>",
@@ -43,17 +47,17 @@ SEEDS = {
         f"{k};{row.replace(',', ';')}\n" for k, row in enumerate(ROWS.split()))).encode(), bytes),
     "utf-16": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode("utf-16"), bytes),
     "gzip": ("a.csv.gz", gzip.compress(f"x [um],y [um],z [um]\n{LINES}".encode(), mtime=0), bytes),
-    "dektak": ("a.csv", write.dektak(np.sin(np.arange(60.0)), 9.375), bytes),
-    "npy": ("a.npy", write.npy(POINTS), bytes),
-    "mat": ("a.mat", write.mat(False, points=POINTS), bytes),
-    "mat packed": ("a.mat", write.mat(points=POINTS), bytes),
-    "x3p": ("a.x3p", write.x3p_of(Z, "I", 1e-10), bytes),
-    "x3p main.xml": ("a.x3p", write.main_xml(AXES, write.matrix(6, 4) + write.link(RAW)),
-                     lambda xml: write.x3p(xml, RAW)),
-    "x3p list": ("a.x3p", LISTED, write.x3p),
-    "x3p heights": ("a.x3p", RAW, lambda raw: write.x3p(
-        write.main_xml(AXES, write.matrix(6, 4) + write.link(raw)), raw)),
-    "zip": ("a.zip", write.zipped({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),
+    "dektak": ("a.csv", write.make_dektak(np.sin(np.arange(60.0)), 9.375), bytes),
+    "npy": ("a.npy", write.make_npy(POINTS), bytes),
+    "mat": ("a.mat", write.make_mat(False, points=POINTS), bytes),
+    "mat packed": ("a.mat", write.make_mat(points=POINTS), bytes),
+    "x3p": ("a.x3p", write.heights_to_x3p(Z, "I", 1e-10), bytes),
+    "x3p main.xml": ("a.x3p", write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(RAW)),
+                     lambda xml: write.make_x3p(xml, RAW)),
+    "x3p list": ("a.x3p", LISTED, write.make_x3p),
+    "x3p heights": ("a.x3p", RAW, lambda raw: write.make_x3p(
+        write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(raw)), raw)),
+    "zip": ("a.zip", write.make_zip({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),
 }  # fmt: skip
 WORDS = (
     b"-1",

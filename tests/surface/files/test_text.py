@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from traces import UM, bumpy, text
+from traces import UM, draw_uneven_trace, format_trace
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.scene import UNIT_FACTORS
@@ -33,37 +33,37 @@ def test_exact_units_of_files_equal_units_of_scenes():
     assert UNITS == UNIT_FACTORS["length"]
 
 
-X, Z = bumpy()
+X, Z = draw_uneven_trace()
 SPELLINGS = {
-    "comma": text(X, Z),
-    "semicolon": text(X, Z, "x [um]; z [um]", ";"),
-    "tab": text(X, Z, "x [um]\tz [um]", "\t"),
-    "blanks": text(X, Z, "x [um]   z [um]", "   "),
-    "windows": text(X, Z).replace("\n", "\r\n"),
-    "mark": "\ufeff" + text(X, Z),
-    "micro sign": text(X, Z, "x [µm],z [μm]"),
-    "latin-1": text(X, Z, "x [µm],z [µm]").encode("latin-1"),
-    "utf-16": text(X, Z).encode("utf-16"),
-    "brackets": text(X, Z, '"X (um)", "Z (um)"'),
-    "header in a comment": "# stylus, 2.5 um tip\n\n" + text(X, Z, "# x [um],z [um]"),
-    "comments": "% one\n// two\n" + text(X, Z) + "# end\n\n,\n",
-    "empty columns behind": text(X, Z, "x [um],z [um],,").replace("\n", ",,\n"),
-    "columns swapped": text(Z, X, "z [um],x [um]"),
-    "from the far end": text(X[::-1], Z[::-1]),
-    "underscores": text(X, Z, "x_um,z_um"),
-    "strokes": text(X, Z, "x/µm;z / um", ";"),
-    "underscores in a comment that goes on": text(X, Z, "# x_um,z_um  derived from (a, b), by hand"),
-    "bars": text(X, Z, "x [um]|z [um]", "|"),
-    "decimal comma": text(X, Z, "x [um];z [um]", ";").replace(".", ","),
-    "decimal comma and tabs": "# 2.5 um tip\n" + text(X, Z, "x [um]\tz [um]", "\t").replace(".", ",") + "# 1.5\n",
-    "decimal comma and blanks": text(X, Z, "x [um], z [um]", "  ").replace(".", ","),
+    "comma": format_trace(X, Z),
+    "semicolon": format_trace(X, Z, "x [um]; z [um]", ";"),
+    "tab": format_trace(X, Z, "x [um]\tz [um]", "\t"),
+    "blanks": format_trace(X, Z, "x [um]   z [um]", "   "),
+    "windows": format_trace(X, Z).replace("\n", "\r\n"),
+    "mark": "\ufeff" + format_trace(X, Z),
+    "micro sign": format_trace(X, Z, "x [µm],z [μm]"),
+    "latin-1": format_trace(X, Z, "x [µm],z [µm]").encode("latin-1"),
+    "utf-16": format_trace(X, Z).encode("utf-16"),
+    "brackets": format_trace(X, Z, '"X (um)", "Z (um)"'),
+    "header in a comment": "# stylus, 2.5 um tip\n\n" + format_trace(X, Z, "# x [um],z [um]"),
+    "comments": "% one\n// two\n" + format_trace(X, Z) + "# end\n\n,\n",
+    "empty columns behind": format_trace(X, Z, "x [um],z [um],,").replace("\n", ",,\n"),
+    "columns swapped": format_trace(Z, X, "z [um],x [um]"),
+    "from the far end": format_trace(X[::-1], Z[::-1]),
+    "underscores": format_trace(X, Z, "x_um,z_um"),
+    "strokes": format_trace(X, Z, "x/µm;z / um", ";"),
+    "underscores in a comment that goes on": format_trace(X, Z, "# x_um,z_um  derived from (a, b), by hand"),
+    "bars": format_trace(X, Z, "x [um]|z [um]", "|"),
+    "decimal comma": format_trace(X, Z, "x [um];z [um]", ";").replace(".", ","),
+    "decimal comma and tabs": "# 2.5 um tip\n" + format_trace(X, Z, "x [um]\tz [um]", "\t").replace(".", ",") + "# 1.5\n",
+    "decimal comma and blanks": format_trace(X, Z, "x [um], z [um]", "  ").replace(".", ","),
     "decimal comma in quotes": "x [um],z [um]\n" + "".join(f'"{a:.17g}","{b:.17g}"\n'.replace(".", ",").replace(
         '","', '"\x00"').replace("\x00", ",") for a, b in zip(X, Z)),
-    "other delimiter in the header": text(X, Z, "x [um] z [um]", ";"),
-    "a blank line between rows": text(X, Z).replace("\n", "\n\n"),
-    "old macintosh": text(X, Z).replace("\n", "\r"),
-    "gzip": gzip.compress(text(X, Z).encode()),
-    "gzip of blanks": gzip.compress(text(X, Z, "x [um] z [um]", " ").encode()),
+    "other delimiter in the header": format_trace(X, Z, "x [um] z [um]", ";"),
+    "a blank line between rows": format_trace(X, Z).replace("\n", "\n\n"),
+    "old macintosh": format_trace(X, Z).replace("\n", "\r"),
+    "gzip": gzip.compress(format_trace(X, Z).encode()),
+    "gzip of blanks": gzip.compress(format_trace(X, Z, "x [um] z [um]", " ").encode()),
 }  # fmt: skip
 
 
@@ -144,7 +144,7 @@ SPELLED_UNITS = {
 def test_exact_unit_spellings_of_instruments(tmp_path, word):
     """The spellings of units that instruments use give the same heights."""
     heights = np.array([0, 2.54e-6, -2.54e-6])
-    content = text([0, 10, 20], heights / SPELLED_UNITS[word], f"x [um],z [{word}]")
+    content = format_trace([0, 10, 20], heights / SPELLED_UNITS[word], f"x [um],z [{word}]")
     assert read_content(tmp_path, content).z == pytest.approx(heights, rel=1e-12)
 
 
@@ -228,7 +228,7 @@ def test_refuses_missing_damaged_and_large_files(tmp_path):
     with pytest.raises(PatchfemError, match="cannot be read"):
         read_profile("a\0b")
     with pytest.raises(PatchfemError, match=r"damaged .*; pack it again"):
-        read_content(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
+        read_content(tmp_path, gzip.compress(format_trace(X, Z).encode())[:-20])
     bomb = gzip.compress(b"0" * (1 << 22))
     for content in (bomb, b" " * (1 << 21)):
         with pytest.raises(PatchfemError, match="more than 1 MiB of text; thin out the samples"):

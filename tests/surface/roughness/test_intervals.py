@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from ring_traces import traces
+from ring_traces import draw_traces
 
 from patchfem.surface import Heights, Profile, level
 from patchfem.surface.roughness.filter import filter_trace
@@ -43,12 +43,12 @@ def compute_parameters(z, names=None) -> list:
 def interval_coverage(count: int, seed: int, names=None, n_reference: int = 2000) -> dict:
     """Return the fraction of `count` traces whose interval covers the mean over `n_reference`, by name."""
     sums: dict = {}
-    for z in traces(n_reference, LENGTH, UM, 6e-6, seed + 1):
+    for z in draw_traces(n_reference, LENGTH, UM, 6e-6, seed + 1):
         for _, row, value in compute_parameters(z, names):
             sums.setdefault(row.name, []).append(np.nan if value is None else value)
     truth = {name: np.nanmean(values) for name, values in sums.items()}
     covers: dict = {name: [] for name in truth}
-    for z in traces(count, LENGTH, UM, 6e-6, seed):
+    for z in draw_traces(count, LENGTH, UM, 6e-6, seed):
         intervals_by_record: dict = {}
         for heights, row, value in compute_parameters(z, names):
             if value is None:
@@ -107,7 +107,7 @@ def test_exact_heavy_tails_reduce_degrees_of_freedom():
 
 def test_always_longer_trace_has_narrower_interval():
     """Four times the length halves the interval within 20 %, for both kinds of intervals."""
-    z = traces(1, 64e-3, UM, 6e-6, 5)[0]
+    z = draw_traces(1, 64e-3, UM, 6e-6, 5)[0]
     for name in ("Rq", "Ra", "Rsk"):
         row = TABLE[name]
         widths = []
@@ -120,7 +120,7 @@ def test_always_longer_trace_has_narrower_interval():
 
 def test_exact_simulated_traces_have_spectrum():
     """Simulated traces have the mean square of the spectrum within 10 % and are reproducible."""
-    z = traces(1, 2e-3, UM, 6e-6, 9)[0]
+    z = draw_traces(1, 2e-3, UM, 6e-6, 9)[0]
     heights = Heights(z - z.mean(), UM)
     found = estimate_spectrum(heights.z, UM)
     simulated = simulate_traces(found, heights, None)
@@ -132,7 +132,7 @@ def test_exact_simulated_traces_have_spectrum():
 
 def test_exact_interval_of_ratio_stays_within_bounds():
     """The interval of a material ratio stays between 0 and 1."""
-    z = traces(1, 0.3e-3, UM, 6e-6, 2)[0]
+    z = draw_traces(1, 0.3e-3, UM, 6e-6, 2)[0]
     heights = Heights(z - z.mean(), UM)
     for name in ("PMr1", "PMr2"):
         low, high = Intervals(heights, 1).interval(TABLE[name], TABLE[name].compute(heights))

@@ -5,7 +5,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from command_line import cli
+from command_line import run_cli
 from scene_texts import PIECE
 from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter1d
@@ -165,7 +165,7 @@ def write_trace(folder, seed=1) -> str:
 def test_exact_three_ways_to_define_peaks_agree(tmp_path, monkeypatch):
     """A trace file, its rms values as printed by `profile`, and its peaks give the same contact stiffness."""
     monkeypatch.chdir(tmp_path)
-    answer = cli("profile", write_trace(tmp_path))
+    answer = run_cli("profile", write_trace(tmp_path))
     block = answer.out[answer.out.index("[contact.asperities]") :].split("  At a pressure")[0]
     found = tomllib.loads("\n".join(line.strip() for line in block.splitlines()))["contact"][
         "asperities"
@@ -260,7 +260,7 @@ def test_exact_profile_combines_two_faces(tmp_path):
     """The command `profile` prints the rms height of two faces together, the root of the sum of squares."""
     files = [write_trace(tmp_path, seed) for seed in (1, 2)]
     profiles = pf.profile(*files)["profiles"]
-    combined = cli("profile", *files).out.partition("two faces")[2]
+    combined = run_cli("profile", *files).out.partition("two faces")[2]
     height = np.hypot(*(profile_data["asperities"]["rms_height"] for profile_data in profiles))
     assert f'rms_height = "{height * 1e6:.5g} um"' in combined
 
@@ -340,7 +340,7 @@ def test_exact_printed_peaks_give_same_patch(tmp_path, monkeypatch):
     rng = np.random.default_rng(11)
     waves = [(2e-8 * n**-0.8, 12.7e-3 / n) for n in (5, *rng.integers(10, 900, 60).tolist())]
     *_, skin, text = split_trace(tmp_path, waves)
-    answer = cli("profile", "trace.csv", "--cutoff", "0.4 mm")
+    answer = run_cli("profile", "trace.csv", "--cutoff", "0.4 mm")
     profile_data = pf.profile("trace.csv", cutoff="0.4 mm")["profiles"][0]
     assert profile_data["asperities"]["rms_height"] == pytest.approx(
         profile_data["measures"]["Rq"]["value"], rel=1e-9
@@ -348,7 +348,7 @@ def test_exact_printed_peaks_give_same_patch(tmp_path, monkeypatch):
     assert profile_data["asperities"]["cutoff"] == 0.4e-3
     assert "only waves below the cut-off of 400 um" in answer.out
     assert profile_data["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
-    without_cutoff = cli("profile", "trace.csv").out
+    without_cutoff = run_cli("profile", "trace.csv").out
     assert (
         "cutoff =" not in without_cutoff
         and "otherwise the long waves count twice" in without_cutoff

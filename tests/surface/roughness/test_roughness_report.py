@@ -6,7 +6,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from ring_traces import traces
+from ring_traces import draw_traces
 from synthetic import sine
 
 from patchfem.core import PatchfemError
@@ -130,7 +130,7 @@ def test_exact_non_gaussian_heights_have_no_interval():
 
     A Gaussian trace, a sine and its cube have intervals.
     """
-    gauss = traces(1, 8e-3, UM, 6 * UM, 3)[0]
+    gauss = draw_traces(1, 8e-3, UM, 6 * UM, 3)[0]
     x = np.arange(gauss.size) * UM
     pits = gauss - 30 * UM * np.maximum(1 - ((x % 800e-6 - 400e-6) / 10e-6) ** 2, 0)
     for z in (np.minimum(gauss, 3 * UM), pits, 6 * UM * np.exp(gauss / gauss.std())):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_scans import aligned
+from made_scans import make_alignment
 
 from patchfem.surface.areal import Areal
 from patchfem.surface.scans import change
@@ -36,7 +36,9 @@ def measure_track(depth):
     axis = CELL * np.arange(COUNT)
     noise = 2e-9
     depth = depth + noise * np.random.default_rng(0).normal(size=depth.shape)
-    return measure_scan_track(aligned(depth, noise), depth, depth > 5 * noise, (axis, axis), 0.2e-9)
+    return measure_scan_track(
+        make_alignment(depth, noise), depth, depth > 5 * noise, (axis, axis), 0.2e-9
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scan_pairs
-from command_line import cli
+from command_line import run_cli
 
 from patchfem.__main__ import main
 from patchfem.export.results import FILES
@@ -296,7 +296,7 @@ def test_exact_identical_scans_show_no_wear(grooved_scans, tmp_path):
     scan = grooved_scans[0]
     file = tmp_path / "scan.x3p"
     write_x3p(file, scan.x[:100], scan.y[:100], scan.z[:100, :100], "a scan")
-    answer = cli("compare", file, file, "-o", tmp_path / "out")
+    answer = run_cli("compare", file, file, "-o", tmp_path / "out")
     assert answer.code == 0 and answer.out.startswith(
         "no wear shown\n  The heights of both scans are the same"
     )
@@ -304,14 +304,15 @@ def test_exact_identical_scans_show_no_wear(grooved_scans, tmp_path):
     assert "<title>scan.x3p and scan.x3p" in (tmp_path / "out" / "report.html").read_text()
     assert {path.name for path in (tmp_path / "out").iterdir()} <= set(FILES)
     assert (
-        "a shift can be given only for traces" in cli("compare", file, file, "--shift", "0 mm").err
+        "a shift can be given only for traces"
+        in run_cli("compare", file, file, "--shift", "0 mm").err
     )
     (tmp_path / "trace.csv").write_text(
         "x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(400))
     )
     assert (
         "two or four traces are needed, or two areal scans"
-        in cli("compare", file, tmp_path / "trace.csv").err
+        in run_cli("compare", file, tmp_path / "trace.csv").err
     )
 
 
@@ -345,7 +346,7 @@ def test_always_independent_pairs_are_evaluated(seed, tolerance):
 
     They are a crater, a track with pile-up, deposits, exchanged files and worn asperities.
     """
-    pair = scan_pairs.make(seed)
+    pair = scan_pairs.draw_pair(seed)
     before, after = (
         Areal(*(pair.spacing * np.arange(n) for n in z.shape[::-1]), z, "a scan")
         for z in (pair.before, pair.after)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_scans import aligned
+from made_scans import make_alignment
 from scipy.ndimage import gaussian_filter
 
 from patchfem.surface.scans.volumes import measure_volumes
@@ -28,7 +28,7 @@ def test_always_volume_interval_covers_missing_wall(from_depth):
     pit = 1e-6 * np.clip((60e-6 - radius) / 25e-6, 0.0, 1.0) ** 0.7
     depth = np.where((pit > from_depth * 1e-6) & (pit < 0.98e-6), np.nan, add_noise(pit))
     truth = float(pit.sum()) * STEP**2
-    found = measure_volumes(aligned(depth, NOISE), AXIS, AXIS).values["worn_volume"]
+    found = measure_volumes(make_alignment(depth, NOISE), AXIS, AXIS).values["worn_volume"]
     assert 0.5 * truth < found.low <= truth <= found.high
     assert found.high - found.value > 0.1 * truth  # noise alone would give 1 %
 
@@ -41,9 +41,9 @@ def test_always_volume_interval_accounts_for_correlation(sigma, count):
     n_covered = 0
     widths = []
     for seed in range(count):
-        found = measure_volumes(aligned(add_noise(GROOVE, seed, sigma), NOISE), AXIS, AXIS).values[
-            "worn_volume"
-        ]
+        found = measure_volumes(
+            make_alignment(add_noise(GROOVE, seed, sigma), NOISE), AXIS, AXIS
+        ).values["worn_volume"]
         n_covered += found.low <= truth <= found.high
         widths.append((found.high - found.low) / truth)
     assert n_covered >= 0.9 * count
@@ -52,7 +52,7 @@ def test_always_volume_interval_accounts_for_correlation(sigma, count):
 
 def test_exact_worn_fraction_of_groove():
     """The worn fraction of a groove agrees within 2 %; it is 60 heights wide, of which 59 are below the surface."""
-    found = measure_volumes(aligned(add_noise(1e3 * GROOVE), NOISE), AXIS, AXIS).values[
+    found = measure_volumes(make_alignment(add_noise(1e3 * GROOVE), NOISE), AXIS, AXIS).values[
         "worn_share"
     ]
     assert found.value == pytest.approx(60 / 240, rel=0.02)
@@ -62,13 +62,13 @@ def test_exact_worn_fraction_of_groove():
 @pytest.mark.parametrize("sign, name", [(1.0, "worn_volume"), (-1.0, "grown_volume")])
 def test_exact_growth_is_measured_like_wear(sign, name):
     """A map with the opposite sign has the same volume as growth."""
-    found = measure_volumes(aligned(sign * add_noise(GROOVE), NOISE), AXIS, AXIS).values
-    reference = measure_volumes(aligned(add_noise(GROOVE), NOISE), AXIS, AXIS).values
+    found = measure_volumes(make_alignment(sign * add_noise(GROOVE), NOISE), AXIS, AXIS).values
+    reference = measure_volumes(make_alignment(add_noise(GROOVE), NOISE), AXIS, AXIS).values
     assert found[name].value == pytest.approx(reference["worn_volume"].value, rel=1e-9)
     assert found[name].low > 0.95 * float(GROOVE.sum()) * STEP**2
 
 
 def test_always_noise_alone_gives_no_volume():
     """Noise alone gives zero worn and grown volumes."""
-    found = measure_volumes(aligned(add_noise(0 * X, 3, 2.0), NOISE), AXIS, AXIS).values
+    found = measure_volumes(make_alignment(add_noise(0 * X, 3, 2.0), NOISE), AXIS, AXIS).values
     assert found["worn_volume"][:2] == (0.0, 0.0) and found["grown_volume"][:2] == (0.0, 0.0)
