@@ -11,7 +11,7 @@ import pytest
 from command_line import run_cli
 from scene_texts import BENCH, COATED, COULOMB
 
-OTHER = {
+REPLACEMENTS = {
     "bytes": np.array([b"a"]),
     "scalar": np.float64(1.0),
     "three": np.zeros((2, 2, 2)),
@@ -22,7 +22,7 @@ OTHER = {
     "none": np.full(5, np.nan),
 }
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
-SHARE = 571  # Interval of the damages that are tested in a quick run.
+SAMPLE_INTERVAL = 571  # Interval of the damages that are tested in a quick run.
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def damage_dataset(path: Path, name: str, damage: str) -> None:
         elif damage == "beyond":
             file[name] = old * 1e7 if old.dtype.kind == "f" else old[::-1]
         elif damage != "gone":
-            file[name] = OTHER[damage]
+            file[name] = REPLACEMENTS[damage]
 
 
 def list_damages(made: Path) -> list:
@@ -83,7 +83,7 @@ def list_damages(made: Path) -> list:
             if not name.startswith("VTKHDF/Steps/") and "FieldData" not in name:
                 entries += [
                     (folder, file, name, damage)
-                    for damage in ("gone", "ring", "cut", "beyond", *OTHER)
+                    for damage in ("gone", "ring", "cut", "beyond", *REPLACEMENTS)
                 ]
     return entries
 
@@ -131,7 +131,7 @@ def test_always_damaged_arrays_are_refused_with_message(results_folders, tmp_pat
     entries = list_damages(results_folders)
     shutil.copytree(results_folders / "b", tmp_path / "b")
     for number, (folder, file, name, damage) in enumerate(entries):
-        if is_sample and number % SHARE:
+        if is_sample and number % SAMPLE_INTERVAL:
             continue
         shutil.rmtree(tmp_path / folder, ignore_errors=True)
         shutil.copytree(results_folders / folder, tmp_path / folder)

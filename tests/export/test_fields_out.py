@@ -29,7 +29,7 @@ from patchfem.export.fields.vtkhdf import NAME
 from patchfem.export.fields.vtu import export_fields
 from patchfem.export.results import FILES
 
-ON_THE_INTERFACE = {"normal_stress", "gap", "status", "normal_bond_lower", "normal_bond_upper"}
+INTERFACE_ARRAYS = {"normal_stress", "gap", "status", "normal_bond_lower", "normal_bond_upper"}
 
 
 def read_grid_with_vtk(path):
@@ -74,7 +74,7 @@ def join_blocks(small, number: int) -> tuple:
             [block.point_data["displacement"][number] for block in small.blocks.values()]
         )
     }
-    for name in ON_THE_INTERFACE:
+    for name in INTERFACE_ARRAYS:
         values = small.blocks["interface"].point_data[name][number]
         point_data[name] = np.concatenate(
             [np.full(24, -1 if name == "status" else np.nan, values.dtype), values]
@@ -102,7 +102,7 @@ def test_exact_blocks_have_values_of_pieces(tmp_path):
     assert tuple(small.blocks) == NAMES
     for side, piece in zip(("lower", "upper"), small.pair):
         block = small.blocks[side]
-        assert not ON_THE_INTERFACE & {*block.point_data, *block.cell_data}
+        assert not INTERFACE_ARRAYS & {*block.point_data, *block.cell_data}
         assert np.array_equal(block.points[:, :2], piece["points"]) and not block.points[:, 2].any()
         assert np.array_equal(
             block.point_data["displacement"][..., :2], piece["displacement"].astype(np.float32)

@@ -16,8 +16,8 @@ from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film_settings
 from patchfem.export.drawing.flat import STYLE, Picture
 from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
-WIDE, HIGH = 1200, 680
-TITLE = 180  # Height of the titles, one of which names the folder [px].
+WIDTH, HEIGHT = 1200, 680
+TITLE_HEIGHT = 180  # Height of the titles, one of which names the folder [px].
 RECORDER = """\
 #!{python}
 import sys
@@ -121,7 +121,7 @@ def test_exact_gif_frames_agree_with_pictures(small_folder, drawn_frames, tmp_pa
     with Image.open(tmp_path / "a.gif") as gif:
         assert (gif.n_frames, gif.size, gif.info["loop"]) == (
             len(settings.numbers),
-            (WIDE, HIGH),
+            (WIDTH, HEIGHT),
             0,
         )
         frames = []
@@ -131,20 +131,27 @@ def test_exact_gif_frames_agree_with_pictures(small_folder, drawn_frames, tmp_pa
     constant_columns = [
         x
         for x in range(480, 640)
-        if all(np.array_equal(frame[TITLE:, x], pictures[0][TITLE:, x]) for frame in pictures)
+        if all(
+            np.array_equal(frame[TITLE_HEIGHT:, x], pictures[0][TITLE_HEIGHT:, x])
+            for frame in pictures
+        )
     ]
     colour_bar = max(constant_columns, key=lambda x: len(np.unique(pictures[0][:, x], axis=0)))
     assert (
         len(np.unique(frames[0][:, colour_bar], axis=0)) > 50
     )  # the colour bar that all frames share
     for frame, picture in zip(frames, pictures, strict=True):
-        assert np.array_equal(frame[TITLE:, colour_bar], frames[0][TITLE:, colour_bar])
+        assert np.array_equal(
+            frame[TITLE_HEIGHT:, colour_bar], frames[0][TITLE_HEIGHT:, colour_bar]
+        )
         difference = np.abs(frame - picture)[
-            TITLE:
+            TITLE_HEIGHT:
         ]  # differences arise from the reduction to 256 colours
         # the remaining pixels are smoothed edges of lines
         assert difference.mean() < 0.5 and np.percentile(difference, 99) < 8
-        assert (np.abs(frame - pictures[0])[TITLE:].mean() > 1) == (picture is not pictures[0])
+        assert (np.abs(frame - pictures[0])[TITLE_HEIGHT:].mean() > 1) == (
+            picture is not pictures[0]
+        )
     assert [path.name for path in tmp_path.iterdir()] == ["a.gif"]
 
 
@@ -163,11 +170,11 @@ def test_exact_ffmpeg_receives_all_frames(small_folder, drawn_frames, tmp_path, 
     answer = run_cli("view", small_folder, "-o", tmp_path / "a.mp4")
     assert answer.code == 0, answer.err
     arguments, data = (tmp_path / "a.mp4").read_bytes().split(b"\n", 1)
-    assert f"-s {WIDE}x{HIGH} ".encode() in arguments and WIDE % 2 == HIGH % 2 == 0
-    received = np.frombuffer(data, np.uint8).reshape(-1, HIGH, WIDE, 4)[..., :3].astype(int)
+    assert f"-s {WIDTH}x{HEIGHT} ".encode() in arguments and WIDTH % 2 == HEIGHT % 2 == 0
+    received = np.frombuffer(data, np.uint8).reshape(-1, HEIGHT, WIDTH, 4)[..., :3].astype(int)
     assert len(received) == len(drawn_frames[1])
     for frame, picture in zip(received, drawn_frames[1]):
-        assert np.array_equal(frame[TITLE:], picture[TITLE:])
+        assert np.array_equal(frame[TITLE_HEIGHT:], picture[TITLE_HEIGHT:])
 
 
 def test_refuses_mp4_that_ffmpeg_cannot_write(small_folder, tmp_path, monkeypatch):

@@ -12,13 +12,13 @@ CHROMIUM = (
     shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 )
 BENCH = POINT + COULOMB + '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "1 mm/s"\n'
-ONE, TWO = ["--over", "friction.static=0.1,0.2,0.3"], ["--over", "normal.load=50 N,80 N"]
+ONE_KEY, SECOND_KEY = ["--over", "friction.static=0.1,0.2,0.3"], ["--over", "normal.load=50 N,80 N"]
 PAGES = {
     "run": ("run",),
-    "one key": ("sweep", *ONE),
-    "map": ("sweep", *ONE, *TWO),
+    "one key": ("sweep", *ONE_KEY),
+    "map": ("sweep", *ONE_KEY, *SECOND_KEY),
     "cloud": ("sweep", "--over", "friction.static=0.1..0.3", "--random", "5"),
-    "many lines": ("sweep", *ONE, "--over", "normal.load=50 N..90 N:12"),
+    "many lines": ("sweep", *ONE_KEY, "--over", "normal.load=50 N..90 N:12"),
 }
 
 

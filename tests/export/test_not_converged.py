@@ -9,7 +9,7 @@ from scene_texts import DRIVE, MODE, PLASTIC, POINT, SMALL_PATCH
 import patchfem as pf
 
 # At resonance, neither damping nor friction limits an undamped mode that slips.
-UNBOUNDED = (
+UNBOUNDED_SETTINGS = (
     "--set",
     "structure.mode.axial.damping=0",
     "--set",
@@ -29,7 +29,7 @@ def test_exact_pressed_patch_is_stored_as_not_converged(tmp_path):
     scene = tmp_path / "rig.toml"
     folder = tmp_path / "out"
     scene.write_text(SMALL_PATCH + PLASTIC + MODE + DRIVE)
-    answer = run_cli("run", scene, "-o", folder, *UNBOUNDED)
+    answer = run_cli("run", scene, "-o", folder, *UNBOUNDED_SETTINGS)
     assert answer.code == 3 and "undamped mode" in answer.err and f"results: {folder}" in answer.out
     summary = json.loads((folder / "summary.json").read_text("utf-8"))
     assert summary["outcome"] == "not_converged" and summary["kind"] == "rig"
@@ -48,7 +48,10 @@ def test_exact_pressed_patch_is_stored_as_not_converged(tmp_path):
     ) as raised:  # Python raises NotConverged with the same partial results
         pf.run(
             scene,
-            **{key: value for key, _, value in (entry.partition("=") for entry in UNBOUNDED[1::2])},
+            **{
+                key: value
+                for key, _, value in (entry.partition("=") for entry in UNBOUNDED_SETTINGS[1::2])
+            },
         )
     assert raised.value.partial_result.outcome == "not_converged"
 
@@ -58,7 +61,7 @@ def test_exact_unconverged_rig_without_patch_has_no_folder(tmp_path):
     scene = tmp_path / "rig.toml"
     folder = tmp_path / "out"
     scene.write_text(POINT + PLASTIC + MODE + DRIVE)
-    answer = run_cli("run", scene, "-o", folder, *UNBOUNDED)
+    answer = run_cli("run", scene, "-o", folder, *UNBOUNDED_SETTINGS)
     assert answer.code == 3 and answer.out == "" and len(answer.err.strip().splitlines()) == 1
     assert "undamped mode" in answer.err and "so there is no results folder" in answer.err
     assert not folder.exists() and not (tmp_path / "out.partial").exists()

@@ -175,6 +175,7 @@ class PageParser(HTMLParser):
     """Parser that collects the ids, links, tags and table cells of a page."""
 
     def __init__(self, text):
+        """Parse the text of a page."""
         super().__init__()
         self.ids = []
         self.links = []

@@ -17,7 +17,7 @@ from patchfem.core import Missing
 from patchfem.export import folder as results_folder
 from patchfem.export import netcdf, report
 
-WHOLE = {"summary.json", "result.nc", "scene.resolved.toml"}
+RESULT_FILES = {"summary.json", "result.nc", "scene.resolved.toml"}
 
 
 @pytest.fixture
@@ -90,7 +90,7 @@ def test_exact_run_without_page_writes_all_results(scene_file, tmp_path):
     """With --no-page a run writes all results except report.html."""
     answer = run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 0 and "without report.html" in answer.out
-    assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
+    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES
     answer_json = run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page", "--json")
     assert json.loads(answer_json.out)["outcome"] == "done" and not answer_json.err
 
@@ -98,19 +98,20 @@ def test_exact_run_without_page_writes_all_results(scene_file, tmp_path):
 def test_exact_page_is_added_to_results(scene_file, tmp_path):
     """The page is added to the results and lists all measures; a later run without a page removes it."""
     assert run_cli("run", scene_file, "-o", tmp_path / "out").code == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE | {"report.html"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES | {"report.html"}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert page.endswith("</html>\n") and all(name in page for name in summary["measures"])
     # the page of an earlier run is removed
     assert run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page").code == 0
-    assert {path.name for path in (tmp_path / "out").iterdir()} == WHOLE
+    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES
 
 
 class ActingStream(io.StringIO):
     """Standard output that calls a function once, after the line that names the results folder is printed."""
 
     def __init__(self, act):
+        """Keep the function that is called later."""
         super().__init__()
         self.act = act
         self.has_acted = False
@@ -134,7 +135,7 @@ def run_with_action(scene, out, action) -> CommandResult:
 
 def check_results_without_page(out) -> None:
     """Check that the results are complete and no part of a page remains."""
-    assert {path.name for path in out.iterdir()} == WHOLE
+    assert {path.name for path in out.iterdir()} == RESULT_FILES
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
@@ -193,7 +194,7 @@ def test_refuses_page_in_results_of_another_run(scene_file, tmp_path):
     answer = run_with_action(scene_file, out, replace_results)
     assert answer.code == 4 and "replaced by another run" in answer.err
     for folder in (out, tmp_path / "first"):
-        assert {path.name for path in folder.iterdir()} == WHOLE
+        assert {path.name for path in folder.iterdir()} == RESULT_FILES
 
 
 def test_refuses_page_for_moved_folder(scene_file, tmp_path):

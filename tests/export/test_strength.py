@@ -29,7 +29,7 @@ radius = "14.5 mm"
 [accuracy]
 tolerance = 1e-1
 """
-FLAT = """\
+FLAT_SCENE = """\
 [contact]
 length = "12.7 mm"
 width = "12.7 mm"
@@ -38,7 +38,7 @@ load = "{load}"
 element_size = "100 um"
 substrate = "steel"
 """
-OWN = '{young = "210 GPa", poisson = 0.30, density = "7850 kg/m^3"}'
+CUSTOM_MATERIAL = '{young = "210 GPa", poisson = 0.30, density = "7850 kg/m^3"}'
 
 
 def mises_below_centre(depth):
@@ -95,12 +95,12 @@ def test_exact_yield_note_agrees_with_hertz(tmp_path):
 
 def test_exact_custom_material_has_no_yield_note(tmp_path):
     """A material that is defined in the scene without a yield strength has no note."""
-    assert find_yield_notes(tmp_path, 2 * YIELD / 0.558, OWN) == []
+    assert find_yield_notes(tmp_path, 2 * YIELD / 0.558, CUSTOM_MATERIAL) == []
 
 
 def test_exact_yield_note_of_custom_material(tmp_path):
     """For a material that is defined in the scene, the note uses the yield strength of the scene."""
-    material = OWN.replace("}", ', yield = "400 MPa"}')
+    material = CUSTOM_MATERIAL.replace("}", ', yield = "400 MPa"}')
     assert find_yield_notes(tmp_path, 0.9 * 400e6 / 0.558, material) == []
     (note,) = find_yield_notes(tmp_path, 1.1 * 400e6 / 0.558, material)
     assert "in the material of the" in note and "400 MPa (given in the scene)" in note
@@ -108,7 +108,10 @@ def test_exact_yield_note_of_custom_material(tmp_path):
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 def test_exact_yield_bound_from_peak_pressure(tmp_path, plane):
-    """Without files the note on yielding follows from a lower bound of the von Mises stress under the pressure p.
+    """A result that is not saved has a note on yielding from a lower bound of the von Mises stress.
+
+    Under the pressure p it is 0.390 p in plane strain and 0.866 p in plane stress, the minimum over
+    stresses along the face.
 
     The bound is 0.390 p in plane strain and 0.866 p in plane stress, the minimum over stresses
     along the face.
@@ -140,7 +143,7 @@ def test_exact_fixed_corners_are_ignored_in_yield_note(tmp_path, load, n_notes):
     Flat pieces under 198 MPa have no note and those under 279 MPa have one; the corners had 222 to
     264 MPa on finer meshes.
     """
-    result = pf.run(FLAT.format(load=load))
+    result = pf.run(FLAT_SCENE.format(load=load))
     result.save(tmp_path / "out")
     assert sum("yield strength" in note for note in result.notes) == n_notes
 

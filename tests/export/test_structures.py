@@ -13,7 +13,7 @@ from patchfem import build
 
 CUBIC = '[structure.stiffening]\ncubic = "1e12 N/m^3"\n'
 WAVE = 'amplitude = "3 N"\nfrequency = "70 Hz"\n'
-RUB = POINT + PLASTIC + STRUCTURE
+FRICTION_RIG = POINT + PLASTIC + STRUCTURE
 
 
 def export_structure(folder, text: str, ending: str):
@@ -28,8 +28,8 @@ def export_structure(folder, text: str, ending: str):
 @pytest.mark.parametrize(
     "text",
     [
-        RUB,
-        RUB.replace('kind = "base"', 'kind = "force"').replace(
+        FRICTION_RIG,
+        FRICTION_RIG.replace('kind = "base"', 'kind = "force"').replace(
             'acceleration = "5 g"', 'force = "40 N"'
         ),
     ],
@@ -143,7 +143,7 @@ def test_exact_matlab_file_has_nlvib_elements(tmp_path):
         )
 
 
-FORCED = RUB.replace('kind = "base"', 'kind = "force"').replace(
+FORCE_DRIVEN_RIG = FRICTION_RIG.replace('kind = "base"', 'kind = "force"').replace(
     'acceleration = "5 g"', 'force = "40 N"'
 )
 
@@ -156,7 +156,7 @@ def test_exact_documentation_lists_exported_variables(tmp_path):
         for row in (line.split("|") for line in page.splitlines() if line.startswith("| `"))
     }
     shapes = {".mat": {}, ".npz": {}}
-    for text in (RUB, FORCED, POINT + make_friction_table("tanh") + STRUCTURE):
+    for text in (FRICTION_RIG, FORCE_DRIVEN_RIG, POINT + make_friction_table("tanh") + STRUCTURE):
         for ending, shape_by_name in shapes.items():
             path = export_structure(tmp_path, text, ending)[1]
             values = loadmat(path) if ending == ".mat" else dict(np.load(path))
@@ -185,12 +185,15 @@ def test_exact_tanh_element_has_reference_speed(tmp_path):
 
 def test_exact_released_rig_has_no_excitation(tmp_path):
     """The export of a released rig has no excitation."""
-    text = RUB.split("[drive]")[0] + '[drive]\nkind = "free"\ndisplacement = "20 um"\ncycles = 5\n'
+    text = (
+        FRICTION_RIG.split("[drive]")[0]
+        + '[drive]\nkind = "free"\ndisplacement = "20 um"\ncycles = 5\n'
+    )
     with np.load(export_structure(tmp_path, text, ".npz")[1]) as exported:
         assert not exported["Fex1"].any() and not {"force", "base", "Omega"} & set(exported.files)
 
 
-HEAD = RUB.split("[drive]")[0]
+HEAD = FRICTION_RIG.split("[drive]")[0]
 LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlevels = ["1 g", "2 g"]\ncycles = 5\n'
 
 
@@ -198,20 +201,20 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
     "text, message",
     [
         (
-            RUB,
+            FRICTION_RIG,
             "1 coordinate, 1 friction element; in these coordinates x the output is output·x, Fex1 is the force on each "
             "of them, the slide of interface i is row i of slide·x\n",
         ),
         (
-            RUB + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n',
+            FRICTION_RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n',
             "; not in the file: [wear]\n",
         ),
         (
-            RUB.replace("[structure]", '[structure]\ntravel = "5 mm"'),
+            FRICTION_RIG.replace("[structure]", '[structure]\ntravel = "5 mm"'),
             "; not in the file: structure.travel\n",
         ),
         (
-            RUB.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
+            FRICTION_RIG.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
             "; not in the file: the initial motion\n",
         ),
         (
@@ -268,7 +271,7 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
             ".npz",
             "cannot be written with [normal.grooves]",
         ),
-        (RUB, ".csv", "a structure is exported as .mat or .npz"),
+        (FRICTION_RIG, ".csv", "a structure is exported as .mat or .npz"),
         (
             POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n',
             ".mat",

@@ -99,24 +99,28 @@ def test_refuses_missing_heights_and_invalid_fraction():
     assert wave_spectrum(Profile(X, 0 * X, "a")).element_length(0.9) == np.inf
 
 
-@pytest.mark.parametrize("share", [0.01, 0.3, 0.9])
-def test_exact_a_wave_is_resolved_if_its_contact_spans_an_element(share):
-    """Truth: Westergaard's contact of one sine. Waves longer than it have no height and touch everywhere."""
+@pytest.mark.parametrize("pressure_ratio", [0.01, 0.3, 0.9])
+def test_exact_wave_is_resolved_if_contact_spans_element(pressure_ratio):
+    """A wave is resolved if its contact width of Westergaard is at least one element.
+
+    Longer waves have no height here and touch everywhere.
+    """
     amplitude = 1e-6
     wavelength = 2 * LENGTH / 40
     spectrum = wave_spectrum(make_cosines([40], [amplitude]))
     closing = closed_forms.westergaard_full_pressure(wavelength, amplitude, 1.0)
     width = 2 * float(
-        closed_forms.westergaard_half_width(share * closing, wavelength, amplitude, 1.0)
+        closed_forms.westergaard_half_width(pressure_ratio * closing, wavelength, amplitude, 1.0)
     )
     largest = min(width, wavelength / 2)
-    assert spectrum.shortest_resolved_wave(0.99 * largest, share * closing) == pytest.approx(
-        wavelength
-    )
-    assert spectrum.shortest_resolved_wave(1.01 * largest, share * closing) > wavelength
+    assert spectrum.shortest_resolved_wave(
+        0.99 * largest, pressure_ratio * closing
+    ) == pytest.approx(wavelength)
+    assert spectrum.shortest_resolved_wave(1.01 * largest, pressure_ratio * closing) > wavelength
 
 
-def test_exact_under_full_contact_two_elements_resolve_a_wave_and_no_load_resolves_none():
+def test_exact_full_contact_needs_two_elements_per_wave():
+    """In full contact two elements resolve a wave, and at vanishing load no wave is resolved."""
     spectrum = wave_spectrum(make_cosines([2, 40, 300], [1e-6, 1e-6, 1e-6]))
     assert spectrum.shortest_resolved_wave(LENGTH / 300.01, 1.0) == pytest.approx(LENGTH / 150)
     assert spectrum.shortest_resolved_wave(LENGTH / 299.99, 1.0) == pytest.approx(2 * LENGTH / 299)

@@ -15,9 +15,9 @@ from patchfem.core import PatchfemError
 from patchfem.surface import Profile, average_at_nodes, place_over_patch
 from patchfem.surface.nodes import AS_LONG
 
-HALF = 6.35e-3
-EVEN = np.linspace(-HALF, HALF, 201)
-H = EVEN[1] - EVEN[0]
+HALF_LENGTH = 6.35e-3
+NODES = np.linspace(-HALF_LENGTH, HALF_LENGTH, 201)
+H = NODES[1] - NODES[0]
 
 
 def make_trace(x, z, name="before.csv") -> Profile:
@@ -73,10 +73,10 @@ def test_exact_node_averages_agree_with_quadrature(grid, seed):
 def test_exact_reduction_of_waves_by_averaging(elements):
     """Averaging reduces a wave by sin(pi h / wave)/(pi h / wave): to 0 at one element, 64 % at two, 90 % at four."""
     wave = elements * H
-    x = np.linspace(-HALF, HALF, 200 * 400 + 1)
-    averaged = average_at_nodes(sine(x, 1.0, wave, 0.7), EVEN)
+    x = np.linspace(-HALF_LENGTH, HALF_LENGTH, 200 * 400 + 1)
+    averaged = average_at_nodes(sine(x, 1.0, wave, 0.7), NODES)
     assert averaged[2:-2] == pytest.approx(
-        np.sinc(1 / elements) * sine(EVEN, 1.0, wave, 0.7).z[2:-2], abs=1e-4
+        np.sinc(1 / elements) * sine(NODES, 1.0, wave, 0.7).z[2:-2], abs=1e-4
     )
 
 
@@ -84,21 +84,24 @@ def test_exact_covering_trace_keeps_its_coordinate():
     """A trace that covers the patch keeps its own coordinate, or is centred on request."""
     x = np.linspace(-8e-3, 20e-3, 5000)
     for placing in ("auto", "own"):
-        profile = place_over_patch(make_trace(x, x), EVEN, placing)
-        assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN, abs=2e-15)
+        profile = place_over_patch(make_trace(x, x), NODES, placing)
+        assert average_at_nodes(profile, NODES) == pytest.approx(NODES, abs=2e-15)
         assert profile.notes == ()
-        assert profile.x[0] <= -HALF < profile.x[1] and profile.x[-2] < HALF <= profile.x[-1]
-    centred = place_over_patch(make_trace(x, x), EVEN, "centred")
-    assert average_at_nodes(centred, EVEN) == pytest.approx(EVEN + 6e-3, abs=2e-15)
+        assert (
+            profile.x[0] <= -HALF_LENGTH < profile.x[1]
+            and profile.x[-2] < HALF_LENGTH <= profile.x[-1]
+        )
+    centred = place_over_patch(make_trace(x, x), NODES, "centred")
+    assert average_at_nodes(centred, NODES) == pytest.approx(NODES + 6e-3, abs=2e-15)
     assert centred.notes == ()
-    assert np.array_equal(place_over_patch(profile, EVEN).x, profile.x)
+    assert np.array_equal(place_over_patch(profile, NODES).x, profile.x)
 
 
 def test_exact_non_covering_trace_is_centred_with_note():
     """A trace that does not cover the patch with its own coordinate is centred, with a note."""
     x = np.linspace(0, 15e-3, 5000)
-    profile = place_over_patch(make_trace(x, x), EVEN)
-    assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN + 7.5e-3, abs=2e-15)
+    profile = place_over_patch(make_trace(x, x), NODES)
+    assert average_at_nodes(profile, NODES) == pytest.approx(NODES + 7.5e-3, abs=2e-15)
     assert profile.notes == (
         "before.csv: x runs from 0 um to 15 mm in the file and does not cover the patch, "
         "from -6.35 mm to 6.35 mm; the trace is centred on the patch, which adds -7.5 mm to x",
@@ -107,9 +110,9 @@ def test_exact_non_covering_trace_is_centred_with_note():
 
 def test_exact_trace_of_patch_length_is_centred_with_note():
     """A trace as long as the patch is centred, with a note of its own wording."""
-    x = np.linspace(0, 2 * HALF, 5000)
-    profile = place_over_patch(make_trace(x, x), EVEN)
-    assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN + HALF, abs=1e-14)
+    x = np.linspace(0, 2 * HALF_LENGTH, 5000)
+    profile = place_over_patch(make_trace(x, x), NODES)
+    assert average_at_nodes(profile, NODES) == pytest.approx(NODES + HALF_LENGTH, abs=1e-14)
     assert profile.notes == (
         f"before.csv: {AS_LONG}, 12.7 mm, and is centred on it, which adds -6.35 mm to x",
     )
@@ -117,7 +120,9 @@ def test_exact_trace_of_patch_length_is_centred_with_note():
 
 def test_exact_coarse_samples_give_note():
     """A trace with samples wider apart than the elements is interpolated, with a note."""
-    profile = place_over_patch(make_trace(np.linspace(-HALF, HALF, 51), np.zeros(51)), EVEN)
+    profile = place_over_patch(
+        make_trace(np.linspace(-HALF_LENGTH, HALF_LENGTH, 51), np.zeros(51)), NODES
+    )
     assert profile.notes == (
         "before.csv: samples lie 254 um apart, but elements are only 63.5 um long; the "
         "surface between samples is interpolated",
@@ -126,50 +131,50 @@ def test_exact_coarse_samples_give_note():
 
 def test_exact_trace_is_extended_by_half_element():
     """A trace that ends up to half an element inside the patch is extended horizontally; a shorter one is refused."""
-    x = np.linspace(-HALF + 0.49 * H, HALF - 0.49 * H, 4000)
-    gap = average_at_nodes(place_over_patch(make_trace(x, np.full(x.size, 2e-6)), EVEN), EVEN)
+    x = np.linspace(-HALF_LENGTH + 0.49 * H, HALF_LENGTH - 0.49 * H, 4000)
+    gap = average_at_nodes(place_over_patch(make_trace(x, np.full(x.size, 2e-6)), NODES), NODES)
     assert gap == pytest.approx(2e-6, rel=1e-12)
     with pytest.raises(PatchfemError):
-        place_over_patch(make_trace(x * (1 - 0.03 * H / HALF), x), EVEN)
+        place_over_patch(make_trace(x * (1 - 0.03 * H / HALF_LENGTH), x), NODES)
 
 
 def test_exact_missing_ends_are_ignored():
     """Missing heights at the ends do not count as part of the trace, which is centred without them."""
     x = np.linspace(-10e-3, 10e-3, 4001)
     z = np.where(np.abs(x - 1e-3) < 7e-3, x, np.nan)
-    profile = place_over_patch(make_trace(x, z), EVEN)
+    profile = place_over_patch(make_trace(x, z), NODES)
     assert "the trace is centred on the patch, which adds -1 mm to x" in profile.notes[0]
     assert not profile.missing.any()
-    assert average_at_nodes(profile, EVEN) == pytest.approx(EVEN + 1e-3, abs=1e-15)
+    assert average_at_nodes(profile, NODES) == pytest.approx(NODES + 1e-3, abs=1e-15)
 
 
 def test_refuses_trace_that_does_not_cover_patch():
     """A trace that is shorter than the patch, or does not cover it with its own coordinate, is refused."""
     x = np.linspace(0, 10e-3, 100)
     with pytest.raises(PatchfemError) as caught:
-        place_over_patch(make_trace(x, x), EVEN)
+        place_over_patch(make_trace(x, x), NODES)
     assert str(caught.value) == (
         "before.csv: the profile is 10 mm long, but the patch is 12.7 mm long; measure a "
         'longer trace or set contact.length = "10 mm"'
     )
     with pytest.raises(PatchfemError) as caught:
-        place_over_patch(make_trace(2 * x, x), EVEN, "own")
+        place_over_patch(make_trace(2 * x, x), NODES, "own")
     assert str(caught.value) == (
         "before.csv: the profile runs from 0 um to 20 mm, but the patch reaches from -6.35 mm "
         "to 6.35 mm; shift x so that the profile covers the patch"
     )
     with pytest.raises(PatchfemError, match="the profile runs from 0 um to 20 mm"):
-        average_at_nodes(make_trace(2 * x, x), EVEN)
+        average_at_nodes(make_trace(2 * x, x), NODES)
 
 
 def test_refuses_missing_heights_invalid_nodes_and_placing():
     """Missing heights, invalid nodes and an unknown placing are refused."""
-    x = np.linspace(-HALF, HALF, 100)
+    x = np.linspace(-HALF_LENGTH, HALF_LENGTH, 100)
     with pytest.raises(
         PatchfemError, match=r"before\.csv: 1 heights are missing; clean the trace first"
     ):
-        average_at_nodes(make_trace(x, np.where(x == x[50], np.nan, x)), EVEN)
-    for nodes in (EVEN[:1], EVEN[::-1], np.zeros((2, 2))):
+        average_at_nodes(make_trace(x, np.where(x == x[50], np.nan, x)), NODES)
+    for nodes in (NODES[:1], NODES[::-1], np.zeros((2, 2))):
         for function in (average_at_nodes, place_over_patch):
             with pytest.raises(
                 PatchfemError, match="a profile needs two or more nodes with rising x"
@@ -178,9 +183,9 @@ def test_refuses_missing_heights_invalid_nodes_and_placing():
     with pytest.raises(
         PatchfemError, match="unknown placing 'middle' of a profile; use auto, own or centred"
     ):
-        place_over_patch(make_trace(x, x), EVEN, "middle")
+        place_over_patch(make_trace(x, x), NODES, "middle")
     with pytest.raises(PatchfemError, match=r"before\.csv: 1 heights; a trace needs at least two"):
-        place_over_patch(make_trace(x, np.where(x == x[50], 0, np.nan)), EVEN)
+        place_over_patch(make_trace(x, np.where(x == x[50], 0, np.nan)), NODES)
 
 
 @given(node_grids(), st.floats(-1e-2, 1e-2), st.sampled_from(["auto", "centred"]))

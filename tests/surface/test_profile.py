@@ -38,7 +38,7 @@ def test_exact_levelling_removes_only_the_line(slope, offset, seed):
 
 
 def test_exact_good_trace_is_unchanged():
-    """Cleaning returns a trace without faults itself."""
+    """Cleaning returns the same object if a trace has no faults."""
     trace = make_rough_trace()
     assert clean(trace, 100e-6) is trace
 

@@ -52,7 +52,9 @@ def read_uff_functions(path):
 
 
 def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
-    """A loop in a file of pyuff is imported and fitted; the fitted parameters agree within 1e-6.
+    """A loop in a file of pyuff is imported and fitted; the parameters agree with those of the loop within 1e-6.
+
+    The exported file has the same numbers as the imported one, to the last bit.
 
     The exported file has the same numbers as the imported one, to the last bit.
     """
@@ -177,7 +179,7 @@ def test_exact_loop_over_slide_encloses_loop_area(method, tmp_path):
 
 
 def test_exact_uff_header_states_number_of_bytes(tmp_path):
-    """The header of a universal file states the bytes of real and complex data, with and without abscissae."""
+    """The header of a universal file states the number of bytes of real and complex data."""
     x = np.arange(5.0)
     for k, (data, spacing, numbers) in enumerate(((x, 1, 5), (x + 1j, 1, 10), (x + 1j, 0, 15))):
         write_sets(tmp_path / f"{k}.uff", [make_record(x, data, 12, abscissa_spacing=spacing)])

@@ -8,7 +8,10 @@ from page_data import make_sweep_key, make_sweep_measure, make_sweep_table
 
 @pytest.fixture
 def sweep_table() -> dict:
-    """Return a sweep of three loads and four tilts; a measure in closed form, one failed case, one that grows."""
+    """Return a sweep of three loads and four tilts with a measure in closed form.
+
+    One case failed, and the amplitude of another one still grows.
+    """
     tilt, load = (
         grid.ravel()
         for grid in np.meshgrid([1e-6, 1e-5, 1e-4, 1e-3], [10.0, 20.0, 40.0], indexing="ij")
@@ -41,7 +44,7 @@ def sweep_table() -> dict:
 
 @pytest.fixture(scope="session")
 def chromium(tmp_path_factory):
-    """Return the browser that all tests of a process share; without a browser they are skipped."""
+    """Return the browser that all tests of a process share; skip the tests if no browser is installed."""
     if find_chromium() is None:
         pytest.skip("no Chromium here")
     browser = Chromium(tmp_path_factory.mktemp("chromium"))
@@ -51,5 +54,5 @@ def chromium(tmp_path_factory):
 
 @pytest.fixture
 def load_page(chromium):
-    """Return a function from a page to its document after 6 s of the page's clock."""
+    """Return a function that loads a page in a browser and returns its document after 6 s of the page's clock."""
     return lambda page: chromium.html_after(page, 6000)

@@ -165,7 +165,9 @@ def test_always_random_cases_are_ranked_with_scatter(random_sweep):
 
 
 def test_exact_quantiles_include_cases_that_miss_tolerance():
-    """Quantiles are those of all cases with a value, also of those that miss the tolerance.
+    """Quantiles are computed over all cases with a value, also those that miss the tolerance.
+
+    Without the 12 smallest of 40 values the 5 % quantile was 2.3 times as large.
 
     Without the 12 smallest of 40 values the 5 % quantile was 2.3 times as large.
     """
@@ -331,7 +333,9 @@ def test_exact_too_few_steady_cases_give_no_ranking():
 
 
 def test_exact_maxima_at_range_ends_are_counted():
-    """The answer counts three of five curves with their maximum at an end of the swept frequencies.
+    """The answer states that three of five curves have their maximum at an end of the swept frequencies.
+
+    A case without motion is not counted.
 
     A case without motion is not counted.
     """
@@ -439,7 +443,10 @@ def test_exact_scatter_is_unknown_with_many_transient_cases():
 
 
 def test_exact_keys_with_overlapping_intervals_rank_equally():
-    """Keys whose sensitivity intervals overlap have no order in the ranking; a grid gives indices without intervals."""
+    """Keys whose sensitivity intervals overlap are ranked equally.
+
+    Indices of a grid have no intervals.
+    """
     name = "loop_area"
     load = SobolIndex("contact.load", 0.5, 0.58, 0.46, 0.66)
     friction = SobolIndex("friction.static", 0.5, 0.56, 0.44, 0.6)

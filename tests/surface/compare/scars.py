@@ -42,7 +42,7 @@ def rough_surface(seed: int):
 
 
 def make_worn_pair(kind: str, seed: int) -> tuple:
-    """Return the traces (before, after) and the true values [SI] of a comparison by name."""
+    """Return the traces (before, after) and the true values [SI] of the compared quantities by name."""
     random = np.random.default_rng([seed, 1, KINDS.index(kind)])
     shape, width, depth = {
         "standard": ("parabola", 2000, 1.5),

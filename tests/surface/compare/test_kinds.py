@@ -22,7 +22,7 @@ from patchfem.surface.profile import remove_spikes
 
 HELD_OUT = 52000
 # Seeds other than 41000: pairs that were once evaluated wrongly, or pairs that are evaluated fast.
-FIRST = {
+OTHER_SEEDS = {
     "wedge": 41002,
     "dropouts": 41001,
     "mirrored": 41014,
@@ -31,19 +31,26 @@ FIRST = {
     "elsewhere": 41001,
     "groove": 41002,
 }
-DEAR = [
+EXPENSIVE_KINDS = [
     pytest.param(kind, marks=pytest.mark.slow)
     for kind in ("elsewhere", "bent groove", "dusty groove", "worn elsewhere")
 ]
 # kinds that `worn_kinds` generates
-OWN = ("arch", "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")
-RUBBED = (*known_pairs.RUBBED, "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")
-GROWN = ("deposits", "exchanged")
+WORN_KINDS = ("arch", "trough", "coarse", "dusty groove", "bent groove", "worn elsewhere")
+KINDS_WITH_WEAR = (
+    *known_pairs.RUBBED,
+    "trough",
+    "coarse",
+    "dusty groove",
+    "bent groove",
+    "worn elsewhere",
+)
+KINDS_WITH_GROWTH = ("deposits", "exchanged")
 
 
 def make_pair(kind: str, seed: int) -> tuple:
     """Return both traces and the worn depths [m] at the samples of the second one."""
-    if kind in OWN:
+    if kind in WORN_KINDS:
         pair = make_trace_pair(kind, seed)
         return pair.before, pair.after, pair.worn
     pair = known_pairs.draw_pair(kind, seed)
@@ -58,14 +65,14 @@ def find_faults(kind: str, seed: int) -> tuple:
     text = " ".join((headline, *sentences))
     covers = []
     is_false = [
-        kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
-        kind not in RUBBED and "at most" in text,
+        kind not in KINDS_WITH_WEAR and headline.replace("; ", "").startswith("worn"),
+        kind not in KINDS_WITH_WEAR and "at most" in text,
         kind in known_pairs.SAME
         and any(word in headline for word in ("reduced", "increased", "flatter")),
         kind == "scale"
         and ("reduced" in headline or "increased" in headline)
         and "calibrate z" not in text,
-        kind not in GROWN and headline.startswith(EXCHANGED),
+        kind not in KINDS_WITH_GROWTH and headline.startswith(EXCHANGED),
         comparison.is_mirrored != (kind == "mirrored" and comparison.alignment is not None),
         (comparison.alignment is None) != headline.startswith("not comparable")
         and not comparison.is_exchanged,
@@ -90,10 +97,10 @@ def find_faults(kind: str, seed: int) -> tuple:
     [
         *(
             kind
-            for kind in (*known_pairs.KINDS, *OWN)
-            if kind not in [one.values[0] for one in DEAR]
+            for kind in (*known_pairs.KINDS, *WORN_KINDS)
+            if kind not in [one.values[0] for one in EXPENSIVE_KINDS]
         ),
-        *DEAR,
+        *EXPENSIVE_KINDS,
     ],
 )
 def test_always_sentences_about_kind_are_true(kind):
@@ -101,13 +108,15 @@ def test_always_sentences_about_kind_are_true(kind):
 
     Earlier edges, interpolated dust and calibrated z gave a false depth or word.
     """
-    false_sentences, covers = find_faults(kind, FIRST.get(kind, HELD_OUT if kind in OWN else 41000))
+    false_sentences, covers = find_faults(
+        kind, OTHER_SEEDS.get(kind, HELD_OUT if kind in WORN_KINDS else 41000)
+    )
     assert not false_sentences and all(covers), (false_sentences, covers)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "kinds, first, count", [(known_pairs.KINDS, 41000, 14), (OWN, HELD_OUT, 40)]
+    "kinds, first, count", [(known_pairs.KINDS, 41000, 14), (WORN_KINDS, HELD_OUT, 40)]
 )
 def test_always_sentences_about_200_pairs_are_true(kinds, first, count):
     """At most one of 50 pairs has a false sentence, as expected by chance, and at least 90 % of the intervals cover."""

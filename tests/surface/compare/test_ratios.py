@@ -142,7 +142,10 @@ def test_always_pairs_of_two_directions_are_compared():
 
 
 def test_always_traces_are_compared_at_coarser_step():
-    """A trace with a coarser step is compared at its step, and amplitude ratio and depth agree within 1 %."""
+    """Two traces of different steps are compared at the coarser step.
+
+    Amplitude ratio and depth agree with those of the fine traces within 1 %.
+    """
     p = make_worn_pair(30003)
     fine = compare_traces(p.before, p.after)
     coarse = compare_traces(

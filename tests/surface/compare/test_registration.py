@@ -243,7 +243,7 @@ def make_groove_pair(seed: int, depth: float, roughness: float) -> tuple:
     "depth, roughness, max_rms_error", [(10 * UM, 1 * UM, 0.1), (20 * UM, 0.5 * UM, 0.04)]
 )
 def test_always_area_of_groove_between_flanks(depth, roughness, max_rms_error, count):
-    """At least 80 % of the intervals cover the area of a groove between unworn flanks of another place."""
+    """For traces of two places, at least 80 % of the intervals cover the area of a groove between unworn flanks."""
     covers = []
     errors = []
     for seed in range(count):
@@ -259,7 +259,7 @@ def test_always_area_of_groove_between_flanks(depth, roughness, max_rms_error, c
 
 @pytest.mark.slow
 def test_exact_groove_in_straight_line():
-    """The area and depth of a groove in a straight line agree within 1e-5."""
+    """The area and depth of a groove in a straight line agree with the closed form within 1e-5."""
     x = np.arange(4001) * 0.5 * UM
     t = (x - 0.9e-3) / 0.3e-3
     cut = np.where(abs(t) < 1, 10 * UM * (1 - t**2), 0.0)

@@ -6,9 +6,9 @@ import pytest
 from patchfem.surface.compare.drift import model_drift
 
 COUNT = 2400
-PLACE = (np.arange(COUNT) + 0.5) / COUNT
-MIDDLE = abs(PLACE - 0.5) < 0.15
-END = PLACE > 0.75
+POSITION = (np.arange(COUNT) + 0.5) / COUNT
+MIDDLE = abs(POSITION - 0.5) < 0.15
+END = POSITION > 0.75
 
 
 def gap_errors(gap, walk: float, seeds: range) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_exact_polynomial_datum_is_removed_with_drift(degree):
     """A datum that is a polynomial of the given degree is removed within 2e-3."""
     random = np.random.default_rng(1)
     model = model_drift(random.standard_normal(COUNT), ~MIDDLE, degree, 10, random)
-    datum = 5.0 - 3.0 * PLACE + (4.0 * PLACE**2 if degree == 2 else 0.0)
+    datum = 5.0 - 3.0 * POSITION + (4.0 * POSITION**2 if degree == 2 else 0.0)
     inner = slice(30, -30)  # beyond the centres of the outermost parts the drift is constant
     assert np.abs(model.remove(datum)[inner]).max() < 2e-3
 

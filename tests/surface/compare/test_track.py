@@ -61,7 +61,7 @@ def test_always_intervals_of_200_tracks_cover_truth(kind):
 
 
 def test_exact_depth_and_ends_without_noise():
-    """Without noise the largest depth agrees within 0.1 nm, and the ends within 1 nm."""
+    """Without noise the largest depth agrees with the made track within 0.1 nm, and the ends within 1 nm."""
     p = make_track_pair("band", 7, noise=0.0)
     worn = compare_traces(p.before, p.after, shift=p.shift).worn
     worn_x = p.after.x[p.worn > 0]

@@ -194,7 +194,7 @@ def test_always_worn_tops_have_depth_within_worn_range():
     assert any("between these places" in text for text in compose_verdict([found])[1])
 
 
-LONG = 12000  # Number of samples of a trace with a track of 2 mm.
+N_LONG_TRACE = 12000  # Number of samples of a trace with a track of 2 mm.
 
 
 def make_rounded_track(seed: int, depth: float, shape: str = "parabola") -> tuple:
@@ -203,7 +203,7 @@ def make_rounded_track(seed: int, depth: float, shape: str = "parabola") -> tupl
     The second trace is shifted by 40.4 um, tilted by 200 urad and has noise of 0.1 um.
     """
     random = np.random.default_rng([seed, 1988])
-    x = np.arange(float(LONG))
+    x = np.arange(float(N_LONG_TRACE))
     waves = np.fft.rfftfreq(16384)
     rough = sum(
         factor
@@ -221,15 +221,15 @@ def make_rounded_track(seed: int, depth: float, shape: str = "parabola") -> tupl
         "cosine": np.where(abs(t) < 1, (1 + np.cos(np.pi * t)) / 2, 0.0),
         "none": 0 * t,
     }[shape]
-    after = shifted - depth * dip + 0.1 * random.standard_normal(LONG) + 0.5 + 2e-4 * x
+    after = shifted - depth * dip + 0.1 * random.standard_normal(N_LONG_TRACE) + 0.5 + 2e-4 * x
     return tuple(
         Profile(frozen_array(x * UM), frozen_array(z * UM), name)
-        for z, name in ((rough[:LONG], "before"), (after, "after"))
+        for z, name in ((rough[:N_LONG_TRACE], "before"), (after, "after"))
     )
 
 
 # True sizes of a parabola that is 1 um deep [um, um^2].
-TRUE = {
+TRUE_SIZES = {
     "worn_depth_within": 2 / 3,
     "track_depth": 2 / 3,
     "track_depth_floor": 1.0,
@@ -254,7 +254,7 @@ def coverage_by_name(seeds, depth: float) -> dict:
     covers = {}
     for seed in seeds:
         found = compare_rounded_track(seed, depth).values
-        for name, size in TRUE.items():
+        for name, size in TRUE_SIZES.items():
             truth = size * (
                 depth * UM**2 if "area" in name else depth * UM if "depth" in name else UM
             )

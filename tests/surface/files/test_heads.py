@@ -18,7 +18,7 @@ from patchfem.surface.files.raw import fetch
 
 Z = np.arange(1.0, 13.0).reshape(3, 4)
 ROWS = "1 2 3 4\n5 6 7 8\n9 10 11 12\n"
-LONG = np.random.default_rng(3).normal(size=(4, 300))
+LONG_ROWS = np.random.default_rng(3).normal(size=(4, 300))
 
 
 def read_text(tmp_path, text, units=None, name="scan.txt", encoding="utf-8"):
@@ -65,7 +65,7 @@ def test_exact_gwyddion_text_in_english_and_german(tmp_path, keywords, rows, enc
 
 def test_exact_matrix_of_long_rows_with_missing_heights(tmp_path):
     """A matrix with rows of more than a thousand characters is read, with missing heights as nan, Bad, *** or empty."""
-    z = np.where(np.arange(LONG.size).reshape(LONG.shape) % 97 == 5, np.nan, LONG)
+    z = np.where(np.arange(LONG_ROWS.size).reshape(LONG_ROWS.shape) % 97 == 5, np.nan, LONG_ROWS)
     header = "# Width: 300 µm\n# Height: 8 µm\n# Value units: um\n"
     rows = ["\t".join(repr(float(height)) for height in row) for row in z]
     for placeholder in ("nan", "Bad", "***", ""):
@@ -78,7 +78,7 @@ def test_exact_matrix_of_long_rows_with_missing_heights(tmp_path):
     )
 
 
-HEADS = {
+HEADERS = {
     "spip": (
         "# File Format = ASCII\n# Created by SPIP 6.3.2.0 2014-12-12 11:16\n# x-pixels = 4\n# y-pixels = 3\n"
         "# x-length = 2000\n# y-length = 1500\n# x-offset = 0\n# y-offset = 0\n# Bit2nm = 0.5\n# Start of Data:\n",
@@ -132,7 +132,7 @@ HEADS = {
 }
 
 
-@pytest.mark.parametrize("header, steps, unit", HEADS.values(), ids=HEADS)
+@pytest.mark.parametrize("header, steps, unit", HEADERS.values(), ids=HEADERS)
 def test_exact_headers_of_other_programs(tmp_path, header, steps, unit):
     """The header of each program gives the steps and the unit of the heights."""
     assert_scan_equal(read_text(tmp_path, header + ROWS), steps, Z * unit)
@@ -156,7 +156,7 @@ def test_exact_headers_agree_with_surface_topography(tmp_path, use_interpreter):
         "pixel size",
         "sizes of SurfaceTopography",
     ):
-        ours = read_text(tmp_path, HEADS[name][0] + ROWS)
+        ours = read_text(tmp_path, HEADERS[name][0] + ROWS)
         theirs = instruments.read_instrument(fetch(tmp_path / "scan.txt"), None)
         assert ours.z == pytest.approx(theirs.z, rel=1e-12), name
         assert ours.x == pytest.approx(theirs.x, rel=1e-12) and ours.y == pytest.approx(
@@ -293,7 +293,7 @@ def test_exact_matrix_with_given_pixel_size(tmp_path):
             read_text(tmp_path, text, units)
 
 
-CURES = {  # refused text, message, text after the remedy, and given units
+REMEDIES = {  # refused text, message, text after the remedy, and given units
     "a bare matrix": (
         ROWS,
         "the width of the scan is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 "
@@ -419,7 +419,7 @@ CURES = {  # refused text, message, text after the remedy, and given units
 }
 
 
-@pytest.mark.parametrize("faulty, message, corrected, units", CURES.values(), ids=CURES)
+@pytest.mark.parametrize("faulty, message, corrected, units", REMEDIES.values(), ids=REMEDIES)
 def test_refuses_faulty_text_with_valid_remedy(tmp_path, faulty, message, corrected, units):
     """A faulty text is refused with a remedy, and is read after the remedy is applied."""
     with pytest.raises(PatchfemError) as caught:

@@ -44,7 +44,7 @@ def test_exact_mean_line_agrees_with_definition(cutoff, seed):
 
 
 def test_exact_tilted_mean_line_is_weighted_fit():
-    """With tilted ends the mean line is a weighted least-squares line at each sample."""
+    """With the option `tilted` the mean line is a weighted least-squares line at each sample."""
     z = np.random.default_rng(3).normal(size=400)
     x = np.arange(400)
     cutoff = 90.0
@@ -73,7 +73,7 @@ def test_exact_waviness_plus_roughness_is_levelled_trace():
 
 
 def test_exact_evenly_spaced_trace_is_unchanged():
-    """Resampling returns an evenly spaced trace without missing heights itself."""
+    """Resampling returns the same object if a trace is evenly spaced and complete."""
     trace = sine(np.arange(100) * UM, UM, 30 * UM)
     assert resample_evenly(trace) is trace
 

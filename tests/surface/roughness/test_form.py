@@ -65,7 +65,7 @@ def test_exact_scan_polynomial_agrees_with_least_squares(degree):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_exact_circle_is_removed_from_trace(sign):
-    """A circle of 5 mm radius over 4 mm is removed within 0.1 nm, and its radius is stated."""
+    """A circle of 5 mm radius in a trace of 4 mm is removed with a remainder below 0.1 nm, and its radius is stated."""
     x = np.arange(4001) * UM
     flat, name = subtract_form(
         make_trace(sign * circle_heights(x, 5 * MM, 1.6 * MM, -4 * MM)), "cylinder"

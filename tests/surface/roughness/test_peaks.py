@@ -97,7 +97,9 @@ def test_exact_peaks_scale_with_units():
 
 
 def test_exact_moments_of_two_sines():
-    """Moments of a sum of two sines agree within 0.2 % with closed forms.
+    """Moments of a sum of two sines agree with the closed forms within 0.2 %.
+
+    A difference over h reduces a wave k by sin(k h/2)/(k h/2).
 
     A difference over h reduces a wave k by sin(k h/2)/(k h/2).
     """
@@ -243,7 +245,7 @@ def test_refuses_incomplete_peak_definition(keys, message, tmp_path):
 
 
 def test_exact_short_trace_has_peaks(tmp_path):
-    """A short trace has peaks although every second of its samples gives none, as the verdict states."""
+    """A short trace has peaks; the verdict states that every second of its samples would give none."""
     x = np.arange(24)
     z = 2 * np.sin(0.5 * x) + 0.3 * np.random.default_rng(3).normal(size=24)
     (tmp_path / "short.csv").write_text(
@@ -265,18 +267,18 @@ def test_exact_profile_combines_two_faces(tmp_path):
     assert f'rms_height = "{height * 1e6:.5g} um"' in combined
 
 
-CUT = 0.4e-3
+CUTOFF = 0.4e-3
 
 
 def waviness_fraction(wave) -> float:
     """Return the fraction of a wave [m] that the filter of ISO 16610-21 leaves in the waviness, half at the cut-off."""
-    return 0.5 ** (CUT / wave) ** 2
+    return 0.5 ** (CUTOFF / wave) ** 2
 
 
 def split_trace(folder, waves) -> tuple:
     """Return nodes [m], gap [m], skin and scene of a patch that uses one trace for its profile and its asperities.
 
-    The trace is a sum of cosines [(amplitude, wavelength) in m], split at CUT.
+    The trace is a sum of cosines [(amplitude, wavelength) in m], split at CUTOFF.
     """
     x = np.linspace(-6.35e-3, 6.35e-3, 25401)
     z = sum(a * np.cos(2 * np.pi * x / wave + k) for k, (a, wave) in enumerate(waves))

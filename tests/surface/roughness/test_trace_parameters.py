@@ -85,7 +85,7 @@ def test_exact_trace_with_one_element_has_no_spacing():
 
 
 def test_exact_core_of_gaussian_heights():
-    """The core parameters of Gaussian heights agree within 0.1 % with the normal law."""
+    """The core parameters of Gaussian heights agree with those of the normal law within 0.1 %."""
     n = 200_001
     ratio = (np.arange(n) + 0.5) / n
     found = fit_core(Heights(norm.isf(ratio), UM))
@@ -116,7 +116,7 @@ def test_exact_core_of_plateau_with_valleys():
 
 
 def test_exact_abbott_curve_of_sine():
-    """The Abbott curve of a sine is A cos(pi p) of the ratio p, within 1 % of A."""
+    """The Abbott curve of a sine agrees with A cos(pi p), where p is the material ratio, within 1 % of A."""
     ratio, level = abbott_curve(make_wave(), 101)
     assert level == pytest.approx(UM * np.cos(np.pi * ratio), abs=0.01 * UM)
 

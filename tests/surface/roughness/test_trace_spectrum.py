@@ -38,7 +38,7 @@ def test_exact_sine_tapers_agree_with_definition(tapers):
 @pytest.mark.parametrize("wavelength", [70, 80, 90])
 @pytest.mark.parametrize("phase", [0, 1, 2])
 def test_exact_amplitude_and_wavelength_of_sine(wavelength, phase):
-    """The band amplitude of a sine agrees within 0.5 %, and its dominant wavelength within 1 %."""
+    """The band amplitude and the dominant wavelength of a sine agree with its own within 0.5 % and 1 %."""
     trace = sine(np.arange(4000) * UM, 7e-6, wavelength * UM, phase)
     assert band_amplitude_of_trace(trace) == pytest.approx(7e-6, rel=5e-3)
     assert estimate_spectrum(level(trace).z, UM).dominant_wavelength == pytest.approx(

@@ -51,7 +51,10 @@ def measure_track(depth):
     ],
 )
 def test_exact_track_direction_section_and_volume(angle, length, ridges):
-    """Direction, section and volume of a track agree within 1.5 to 2 %, and at most two intervals miss the truth."""
+    """The sizes of a track agree with those of the made one within 1.5 %, and its volume within 2 %.
+
+    At most two of the 12 intervals miss the truth.
+    """
     depth, centre = make_track_depth(angle, length, ridges)
     found = measure_track(depth)
     area = 2 / 3 * DEPTH * WIDTH

@@ -93,7 +93,7 @@ def groove_comparison(grooved_scans):
 
 
 def test_exact_volume_and_position_of_groove(groove_comparison):
-    """The volume of a groove agrees within 0.5 %, its depth within 1 %, and the shift within 20 nm."""
+    """Volume, depth and shift of a groove agree with the made one within 0.5 %, 1 % and 20 nm."""
     found = groove_comparison
     truth = common_volume(0.03, (12e-6, -18e-6), groove_depth)
     volume = found.values["worn_volume"]
@@ -190,6 +190,8 @@ def test_always_wedge_wear_has_alternative():
 @pytest.mark.parametrize("sign, half", [(1, 0.29), (-1, 0.21)])
 def test_always_half_worn_scan_leaves_open_wear_or_growth(sign, half):
     """If a flat floor covers about half of the scan, wear of this part and growth of the rest are both possible.
+
+    The interval of the volume covers the truth in either case.
 
     The volume of the first reading covers the truth.
     """

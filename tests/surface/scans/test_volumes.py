@@ -51,7 +51,10 @@ def test_always_volume_interval_accounts_for_correlation(sigma, count):
 
 
 def test_exact_worn_fraction_of_groove():
-    """The worn fraction of a groove agrees within 2 %; it is 60 heights wide, of which 59 are below the surface."""
+    """The worn fraction of a groove agrees with its area within 2 %.
+
+    The groove is 60 heights wide, of which 59 are below the surface.
+    """
     found = measure_volumes(make_alignment(add_noise(1e3 * GROOVE), NOISE), AXIS, AXIS).values[
         "worn_share"
     ]
