@@ -97,7 +97,7 @@ def compare(
     the levelled difference as X3P and text. To compare the perpendicular direction too, append its two traces. With
     --pairs, all pairs of a table are compared; the results are then mean, scatter and interval over the pairs. BEFORE
     and AFTER may also be two results folders. AFTER must then belong to a run with [wear], and the page shows the wear
-    between the two runs. With --predicted, the worn depth of a run is laid over that of the traces, and the wear
+    between the two runs. With --predicted, the worn depth of a run is overlaid on that of the traces, and the wear
     coefficient is fitted with its interval.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn

@@ -14,14 +14,14 @@ from .streams import make_printable
 
 
 def flag_option(text: str, *names: str) -> type:
-    """Return the type of an option without a value; text: its help."""
+    """Return the type of a valueless option; `text` is its help text."""
     return Annotated[
         bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
     ]
 
 
 def repeated_option(text: str, name: str | None = None) -> type:
-    """Return the type of an option that takes a text and may be repeated; text: its help."""
+    """Return the type of a repeatable option with a text value; `text` is its help text."""
     return Annotated[
         tuple[str, ...], Parameter(name=name, negative=(), help=text, show_default=False)
     ]
@@ -143,12 +143,12 @@ def load_scene(path: Path, sets, faults=None, prepare=None):
 
 
 def load_model(path: Path, sets):
-    """Build the model of the scene in a file; SceneError names every mistake."""
+    """Build the model of the scene in a file; raise SceneError with every mistake."""
     return model.build(load_scene(path, sets))
 
 
 def load_model_without_sweep(path: Path, sets):
-    """Build the model of a scene without its table [sweep], which a note states."""
+    """Build the model of a scene without its [sweep] table; a note reports this."""
     scene = load_scene(path, sets)
     if scene.sweep:
         note(

@@ -37,7 +37,7 @@ def new(
 ):
     """Print a template scene of this KIND; without KIND, list the kinds.
 
-    With --ask, or --know and --want, write the scene of a joint with the law that answers your questions.
+    With --ask, or --know and --want, write the scene of a joint with the law that suits your answers.
 
     Example: patchfem new joint -o mine.toml
     """

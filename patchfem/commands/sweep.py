@@ -95,7 +95,7 @@ class CaseOptions:
         )
 
     def request(self):
-        """Return the request; UsageError if options do not fit together."""
+        """Return the request; raise UsageError if the options are incompatible."""
         if self.random and self.sobol:
             raise UsageError("--random and --sobol: use only one of them")
         if min(self.random, self.sobol, self.seed) < 0:

@@ -181,7 +181,7 @@ class Friction(Table):
 
 
 class Slide(Table):
-    """A prescribed slide; `kind` decides which of the other keys are needed."""
+    """A prescribed relative displacement; `kind` determines which of the other keys are needed."""
 
     kind: key(
         Literal["constant", "sine", "triangle", "dwell", "file"],

@@ -129,9 +129,9 @@ def text() -> str:
     for title, columns in TABLES:
         body += [f"## {title}", _format_compatibility(columns)]
     body += [
-        "On a bench, the prescribed slide can be two-dimensional under these laws: "
+        "On a bench, the prescribed displacement can be two-dimensional with these laws: "
         + _join_names(name for name, one in list_laws().items() if not find_lateral_refusal(one))
-        + ". The slide cannot be two-dimensional under these laws: "
+        + ". It cannot be two-dimensional with these laws: "
         + _join_names(name for name, one in list_laws().items() if find_lateral_refusal(one))
         + ".",
         "## Methods",

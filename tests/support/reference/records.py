@@ -21,13 +21,13 @@ class MeasuresPage:
 Values in `summary.json` are in SI and have all digits. The error is the estimated half-width of the interval that
 contains the exact value of the model. The floor is an absolute error that is always permitted: a warning appears if the
 error exceeds tolerance × |value| + floor. If the column "floor" has two entries, the larger entry is the floor. Printed
-values are rounded at the second significant digit of their error. A value that is printed without an error is exact to
+values are rounded to the second significant digit of their error. A value that is printed without an error is exact to
 its last digit. A value whose magnitude is below the floor is printed as 0.
 
 Measures of a motion are evaluated over a window at the end of the run: the last ten cycles or the last tenth of the
 run, whichever is shorter, but at least one cycle; under tones the window holds whole beats, under a random drive all of
-the record but what the start leaves. If the drive has no frequency, as in a release, a cycle is the period that the
-first mode that is not rigid has without friction. In a release only `relative_displacement_amplitude` is that of the
+the record but what the start leaves. If the drive has no frequency, as in a release, a cycle is the frictionless
+period of the first mode that is not a rigid-body mode. In a release only `relative_displacement_amplitude` is that of the
 last whole cycle of the motion; peaks of acceleration and force, slip and stick are those of the window, in which the
 motion may still decay. The window of a bench is its last cycle; its energies, its friction work and its peaks,
 `friction_force_peak` and `friction_ratio_peak`, are those of the whole run. A measure "per cycle" is the mean over the
@@ -135,10 +135,10 @@ Case, blanks, hyphens and underscores do not matter in a name, except the case o
                     "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
                     "that of the mesh, without the fifth of the height of the piece next to its fixed far "
                     "face, or its lower bound that follows from the pressure peak. Hard coatings and "
-                    "ceramics break before they yield, so they have no strength here; cast iron, bronze "
-                    "and PTFE have none because it depends on the grade. A strength is the specified "
-                    "minimum of the condition that the source names, unless the source says otherwise; for "
-                    "another condition, give `yield` in the scene.",
+                    "ceramics fracture before they yield, so no yield strength is given for them here; "
+                    "none is given for cast iron, bronze and PTFE, because it depends on the grade. A "
+                    "strength is the specified minimum for the condition stated in the source, unless the "
+                    "source states otherwise; for another condition, give `yield` in the scene.",
                     format_table(heads[2], strength_rows),
                 ]
             )
