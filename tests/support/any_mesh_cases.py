@@ -64,16 +64,16 @@ def triangulate_graded_rows(half_length, height, size, coating=0.0):
         )
         levels.append(depth)
     rows = []
-    fine = np.linspace(-half_length, half_length, 20001)
+    samples = np.linspace(-half_length, half_length, 20001)
     for k, y in enumerate(levels):
         number = np.concatenate(
-            [[0.0], np.cumsum(np.diff(fine) / size((fine[1:] + fine[:-1]) / 2, y))]
+            [[0.0], np.cumsum(np.diff(samples) / size((samples[1:] + samples[:-1]) / 2, y))]
         )
         count = max(4, round(number[-1] / 2) * 2)
         targets = np.linspace(0, number[-1], count + 1)
         if k % 2:
             targets = np.concatenate([[0.0], (targets[1:] + targets[:-1]) / 2, targets[-1:]])
-        x = np.interp(targets, number, fine)
+        x = np.interp(targets, number, samples)
         rows.append(np.stack([(x - x[::-1]) / 2, np.full(x.size, y)], axis=1))
     points = np.concatenate(rows)
     cells = Delaunay(points).simplices
@@ -96,15 +96,17 @@ NAMES = {v: k for k, v in (CELL_TAGS | EDGE_TAGS).items()}
 def make_pair(kind="mixed", grid=GRID):
     """Return points, cells, edges and tags of the mesh of a pair; kind "mixed" splits every other quadrilateral."""
     pair = make_pair_mesh(grid)
-    split = {"quads": np.zeros, "triangles": np.ones}.get(kind, lambda n, t: np.arange(n) % 2 == 0)
-    split = split(len(pair["quads"]), bool)
-    cut = pair["quads"][split]
+    is_split = {"quads": np.zeros, "triangles": np.ones}.get(
+        kind, lambda n, t: np.arange(n) % 2 == 0
+    )
+    is_split = is_split(len(pair["quads"]), bool)
+    cut = pair["quads"][is_split]
     return SimpleNamespace(
         points=pair["points"].copy(),
         triangles=np.concatenate([cut[:, [0, 1, 2]], cut[:, [0, 2, 3]]]),
-        quads=pair["quads"][~split],
-        triangle_tags=np.tile(pair["tags"][split], 2),
-        quad_tags=pair["tags"][~split],
+        quads=pair["quads"][~is_split],
+        triangle_tags=np.tile(pair["tags"][is_split], 2),
+        quad_tags=pair["tags"][~is_split],
         edges=pair["edges"],
         edge_tags=pair["edge_tags"],
     )
@@ -195,10 +197,10 @@ def write_med(m, path):
     """Write a mesh as a MED file in which every family of cells belongs to one group."""
     import meshio
 
-    found = find_cell_blocks(m)
-    names = sorted({int(tag) for _, _, tags in found for tag in tags})
-    mesh = meshio.Mesh(m.points, [(kind, cells) for kind, cells, _ in found])
-    mesh.cell_data = {"cell_tags": [-np.asarray(tags, int) for _, _, tags in found]}
+    cell_blocks = find_cell_blocks(m)
+    names = sorted({int(tag) for _, _, tags in cell_blocks for tag in tags})
+    mesh = meshio.Mesh(m.points, [(kind, cells) for kind, cells, _ in cell_blocks])
+    mesh.cell_data = {"cell_tags": [-np.asarray(tags, int) for _, _, tags in cell_blocks]}
     mesh.cell_tags = {-tag: [NAMES[tag]] for tag in names}
     meshio.write(path, mesh)
 
@@ -221,9 +223,9 @@ def write_and_read_pair(m, folder, form="gmsh 2.2 binary"):
     return read_pieces(path)
 
 
-def shift_points(m, at, by):
-    """Shift the points with indices `at` by the vector `by`."""
-    m.points[at] += by
+def shift_points(m, indices, shift):
+    """Shift the points with indices `indices` by the vector `shift`."""
+    m.points[indices] += shift
 
 
 def find_interface_node(m, side="upper", k=3):

@@ -30,9 +30,9 @@ def find_chromium() -> str | None:
     """Return the path of the installed Chromium or Chrome, or None."""
     return next(
         (
-            found
-            for found in map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
-            if found
+            path
+            for path in map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+            if path
         ),
         None,
     )
@@ -53,11 +53,11 @@ class Chromium:
         self.buffer = b""
         (take, self.out), (self.into, give) = os.pipe(), os.pipe()
         # The browser reads commands from descriptor 3 and writes to descriptor 4.
-        far = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]
+        ends = [fcntl.fcntl(one, fcntl.F_DUPFD, 10) for one in (take, give)]
         null = os.open(os.devnull, os.O_RDWR)
         places = [
             (os.POSIX_SPAWN_DUP2, *pair)
-            for pair in ((null, 1), (null, 2), (far[0], 3), (far[1], 4))
+            for pair in ((null, 1), (null, 2), (ends[0], 3), (ends[1], 4))
         ]
         words = [
             find_chromium(),
@@ -67,7 +67,7 @@ class Chromium:
             "about:blank",
         ]
         self.process = os.posix_spawn(words[0], words, os.environ, file_actions=places)
-        for one in (take, give, null, *far):
+        for one in (take, give, null, *ends):
             os.close(one)
         self.session = None
         self.target = next(
@@ -90,21 +90,24 @@ class Chromium:
         while b"\0" not in self.buffer:
             if not select.select([self.into], [], [], PATIENCE)[0]:
                 raise TimeoutError(f"the browser has said nothing for {PATIENCE} s")
-            if not (more := os.read(self.into, 1 << 20)):
+            if not (received := os.read(self.into, 1 << 20)):
                 raise EOFError("the browser has ended")
-            self.buffer += more
+            self.buffer += received
         text, _, self.buffer = self.buffer.partition(b"\0")
-        said = json.loads(text)
-        if said.get("method") == "Runtime.exceptionThrown":
-            what = said["params"]["exceptionDetails"]
-            self.faults.append(what.get("exception", {}).get("description") or what["text"])
-        if said.get("method") == "Runtime.consoleAPICalled" and said["params"]["type"] == "error":
+        message = json.loads(text)
+        if message.get("method") == "Runtime.exceptionThrown":
+            details = message["params"]["exceptionDetails"]
+            self.faults.append(details.get("exception", {}).get("description") or details["text"])
+        if (
+            message.get("method") == "Runtime.consoleAPICalled"
+            and message["params"]["type"] == "error"
+        ):
             self.faults.append(
-                " ".join(str(part.get("value", "")) for part in said["params"]["args"])
+                " ".join(str(part.get("value", "")) for part in message["params"]["args"])
             )
-        if "method" in said:
-            self.events.append(said["method"])
-        return said
+        if "method" in message:
+            self.events.append(message["method"])
+        return message
 
     def call(self, method: str, **params) -> dict:
         """Send a command of the DevTools protocol and return its result."""
@@ -112,10 +115,10 @@ class Chromium:
         message = {"id": self.number, "method": method, "params": params}
         message |= {"sessionId": self.session} if self.session else {}
         os.write(self.out, json.dumps(message).encode() + b"\0")
-        while (said := self._receive()).get("id") != self.number:
+        while (reply := self._receive()).get("id") != self.number:
             pass
-        assert "error" not in said, said
-        return said["result"]
+        assert "error" not in reply, reply
+        return reply["result"]
 
     def call_and_wait(self, event: str, method: str, **params) -> None:
         """Send a command and wait for an event, which may arrive before the result."""
@@ -218,11 +221,11 @@ class Chromium:
 
     def evaluate(self, text: str):
         """Return the value of a JavaScript expression in the page; a promise is awaited."""
-        found = self.call(
+        reply = self.call(
             "Runtime.evaluate", expression=text, awaitPromise=True, returnByValue=True
         )
-        assert "exceptionDetails" not in found, found["exceptionDetails"]
-        return found["result"].get("value")
+        assert "exceptionDetails" not in reply, reply["exceptionDetails"]
+        return reply["result"].get("value")
 
     def send_pointer(self, x: float, y: float, kind: str = "mouseMoved", **more) -> None:
         """Move or press the pointer at a position in the window."""
@@ -251,14 +254,14 @@ class Chromium:
                 **text,
             )
 
-    def take_screenshot(self, path: Path | None = None, whole: bool = False) -> bytes:
-        """Return the window as a PNG image, or the full page if `whole` is set."""
-        found = base64.b64decode(
-            self.call("Page.captureScreenshot", captureBeyondViewport=whole)["data"]
+    def take_screenshot(self, path: Path | None = None, full_page: bool = False) -> bytes:
+        """Return the window as a PNG image, or the full page if `full_page` is set."""
+        image = base64.b64decode(
+            self.call("Page.captureScreenshot", captureBeyondViewport=full_page)["data"]
         )
         if path is not None:
-            Path(path).write_bytes(found)
-        return found
+            Path(path).write_bytes(image)
+        return image
 
     def print_pdf(self) -> bytes:
         """Return the page as a PDF."""

@@ -31,4 +31,5 @@ class ComputedCases:
         return self._compute(models, *more)
 
     def __len__(self) -> int:
+        """Return the number of recorded models."""
         return len(self.models)

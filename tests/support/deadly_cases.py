@@ -15,6 +15,7 @@ class KillingMeasure:
     once: bool = False
 
     def __call__(self, number, model, found, case) -> int:
+        """Kill this process if the case is one of `numbers`, else return its number."""
         mark = self.seen / str(number)
         if number in self.numbers and not (self.once and mark.exists()):
             with open(mark, "a") as file:

@@ -85,17 +85,17 @@ def simulate_release(k, limit, damping: float, start: float) -> tuple:
     out = np.empty(STEPS // KEPT * PERIODS)
     force = np.zeros(k.size)
     x = start
-    before = x + 0.5 * step**2 * OWN**2 * x  # The motion from rest is an even function of time.
+    previous = x + 0.5 * step**2 * OWN**2 * x  # The motion from rest is an even function of time.
     loss = damping * OWN * step
     for n in range(out.size * KEPT):
         if n % KEPT == 0:
             out[n // KEPT] = x
-        after = (2 * x - (1 - loss) * before - step**2 * (OWN**2 * x + force.sum() / MASS)) / (
-            1 + loss
-        )
-        force = np.clip(force + k * (after - x), -limit, limit)
-        before = x
-        x = after
+        following = (
+            2 * x - (1 - loss) * previous - step**2 * (OWN**2 * x + force.sum() / MASS)
+        ) / (1 + loss)
+        force = np.clip(force + k * (following - x), -limit, limit)
+        previous = x
+        x = following
     return step * KEPT * np.arange(out.size), out
 
 
@@ -162,6 +162,7 @@ def minimize_from_truth(case: DecayCase, path: Path, keys: list) -> float:
     base = BaseScene(pf.load(case.scene))
 
     def residual(values) -> np.ndarray:
+        """Return the normalized residuals of frequency and damping."""
         model = build(
             base.override([key.format_assignment(float(value)) for key, value in zip(keys, values)])
         )

@@ -58,12 +58,14 @@ def choose_directions(
         trial = np.array(signs)
         trial[active] = option
         stuck = np.flatnonzero(trial == 0)
-        known = pull - interfaces.T @ (np.abs(trial) * trial * kinetic) / mass
+        without_stuck = pull - interfaces.T @ (np.abs(trial) * trial * kinetic) / mass
         force = np.zeros(len(interfaces))
         if stuck.size:
             rows = interfaces[stuck]
-            force[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ known, rcond=1e-10)[0]
-        accel = interfaces @ (known - interfaces.T @ force / mass)
+            force[stuck] = np.linalg.lstsq(rows @ rows.T / mass, rows @ without_stuck, rcond=1e-10)[
+                0
+            ]
+        accel = interfaces @ (without_stuck - interfaces.T @ force / mass)
         is_consistent = all(
             abs(force[c]) <= static[c] * (1 + tol)
             if trial[c] == 0
@@ -133,6 +135,7 @@ def run_reference(modes, segments, static, kinetic, end, z, v, rtol=1e-12, most_
         states.append((t, tuple(signs), y[:n].copy(), y[n:].copy()))
 
         def slope(t, y, signs=signs, part=part):
+            """Return the time derivative of the state."""
             force = friction_forces(signs, part, t, y[:n], y[n:])
             return np.concatenate(
                 [y[n:], free_acceleration(part, t, y[:n], y[n:]) - interfaces.T @ force / mass]
@@ -225,14 +228,14 @@ def march_reference(modes, drive, limit, end, z, v, steps):
         )
         mean_speed = interfaces @ (free + v) / 2
         for _ in range(200):
-            before = force.copy()
+            previous = force.copy()
             for c in range(len(interfaces)):
                 force[c] = np.clip(
                     force[c] + (mean_speed[c] - h / 2 * gram[c] @ force) / (h / 2 * gram[c, c]),
                     -limit[c],
                     limit[c],
                 )
-            if np.abs(force - before).max() < 1e-13 * limit.max():
+            if np.abs(force - previous).max() < 1e-13 * limit.max():
                 break
         new = free - h * inverse @ (interfaces.T @ force) / modes.mass
         z = z + h * (v + new) / 2

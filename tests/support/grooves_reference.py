@@ -74,14 +74,14 @@ def sliding_forces(
     cosine = 1 / np.hypot(1, slope)
     sine = slope * cosine
     # Components of the contact force along x and upwards, per newton of normal force.
-    across = sine + direction * mu * cosine
-    up = cosine - direction * mu * sine
+    horizontal = sine + direction * mu * cosine
+    vertical = cosine - direction * mu * sine
     free = -2 * c.zeta * c.omega * v - c.omega**2 * q - c.acceleration * np.sin(c.drive * t)
     acceleration, normal_force = np.linalg.solve(
-        [[c.mass, across], [-c.lifted * slope, up]],
+        [[c.mass, horizontal], [-c.lifted * slope, vertical]],
         [c.mass * free, c.load + c.lifted * curvature * v * v],
     )
-    return acceleration, normal_force, normal_force * across
+    return acceleration, normal_force, normal_force * horizontal
 
 
 def sticking_force(c: GrooveCase, t: float, q: float) -> tuple:
@@ -128,11 +128,11 @@ def integrate_case(c: GrooveCase, end: float, times) -> tuple:
         def derivatives(s, x, way=direction):
             """Return the derivatives of displacement, speed and the three energies."""
             gain, press, _ = sliding_forces(c, s, x[0], x[1], way, c.kinetic)
-            own = way * c.kinetic * press * np.hypot(1, flank_slope(c, x[0])[0]) * x[1]
+            friction_power = way * c.kinetic * press * np.hypot(1, flank_slope(c, x[0])[0]) * x[1]
             return [
                 x[1],
                 gain,
-                own,
+                friction_power,
                 -c.mass * c.acceleration * np.sin(c.drive * s) * x[1],
                 c.load * flank_slope(c, x[0])[0] * x[1],
             ]

@@ -86,9 +86,9 @@ def march_exactly(modes, drive, stiffness, limit, state, stretch, steps, cycles=
             new = np.clip(
                 stretch + modes.slide @ free[:n] + gain * (end - force) - q, -limit, limit
             )
-            before = end
+            previous = end
             end = stiffness @ new
-            if abs(end - before) < 1e-14:
+            if abs(end - previous) < 1e-14:
                 break
         y = free + e[:, 2 * n + 3] * (end - force) / dt
         stretch = new

@@ -19,10 +19,12 @@ LOADERS = ("load", "import_module")  # Functions whose first argument is the nam
 class Import(NamedTuple):
     """A name imported by a module."""
 
-    target: str  # dotted name of the module inside the package ("" is its top), or the name of another package
-    name: str  # name imported from the target, "" for the module itself
-    is_own: bool  # whether the target belongs to the package
-    is_text: bool  # whether the name of the module is a text, as in `compiled.load("dynamics.loop_kernels")`
+    # Dotted name of the module inside the package ("" is its top), or name of another package.
+    target: str
+    name: str  # Name imported from the target, "" for the module itself.
+    is_own: bool  # The target belongs to the package.
+    # The module is named by a string, as in `compiled.load("dynamics.loop_kernels")`.
+    is_text: bool
 
 
 def read_sources(root: Path, folder: str = PACKAGE) -> dict:
@@ -38,7 +40,7 @@ def read_sources(root: Path, folder: str = PACKAGE) -> dict:
 def syntax_nodes(text: str) -> tuple:
     """Parse a source file once and return all its nodes, the module first."""
     was_enabled = gc.isenabled()
-    gc.disable()  # the collector would visit all nodes of all files again and again
+    gc.disable()  # Otherwise the garbage collector would visit all nodes of all files repeatedly.
     try:
         return tuple(ast.walk(ast.parse(text)))
     finally:
@@ -61,11 +63,11 @@ def list_imports(name: str, text: str, tree: dict) -> tuple:
 @cache
 def _list_imports(name: str, text: str, names: tuple) -> tuple:
     """Return the imports of a file, given the dotted names of all files; cached."""
-    known = folders_and_modules(names)
+    known_names = folders_and_modules(names)
     is_package = any(other.startswith(f"{name}.") for other in names)
     folder = name if is_package else name.rpartition(".")[0]
     package = [PACKAGE, *(part for part in folder.split(".") if part)]
-    found = []
+    imports_found = []
     for node in syntax_nodes(text):
         for dotted, imported in _imported_names(node, package):
             head, _, target = dotted.partition(".")
@@ -73,12 +75,12 @@ def _list_imports(name: str, text: str, names: tuple) -> tuple:
             is_text = isinstance(node, ast.Call)
             module = f"{target}.{imported}".strip(".")
             # `from ..contact import gaps` imports a module
-            if is_own and imported and module in known and module in names:
+            if is_own and imported and module in known_names and module in names:
                 target = module
                 imported = ""
-            if (target and target in known) or not (is_text and is_own):
-                found.append(Import(target if is_own else head, imported, is_own, is_text))
-    return tuple(found)
+            if (target and target in known_names) or not (is_text and is_own):
+                imports_found.append(Import(target if is_own else head, imported, is_own, is_text))
+    return tuple(imports_found)
 
 
 def _imported_names(node, package: list):

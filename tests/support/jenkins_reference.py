@@ -13,7 +13,7 @@ class JenkinsReference:
         self.rtol = rtol
         self.atol = atol
         self.method = method
-        self.k, self.y = ([np.asarray(one[j], float) for one in elements] for j in (0, 1))
+        self.k, self.y = ([np.asarray(element[j], float) for element in elements] for j in (0, 1))
         self.stretch = [np.zeros(k.size) for k in self.k]
         # Direction of each slipping element, 0 of those that stick.
         self.way = [np.zeros(k.size) for k in self.k]
@@ -45,6 +45,7 @@ class JenkinsReference:
             frozen = self.faces @ self.state[:n]
 
             def rate(t, x, frozen=frozen):
+                """Return the time derivative of the state."""
                 z = x[:n]
                 v = x[n:]
                 push = self.drive.values(t)
@@ -59,6 +60,7 @@ class JenkinsReference:
                 )
 
             def margin(t, x, frozen=frozen):
+                """Return the smallest distance to yield of the elements that do not slip."""
                 slide = self.faces @ x[:n]
                 return (
                     min(
@@ -82,7 +84,7 @@ class JenkinsReference:
             for event in events:
                 event.terminal = True
                 event.direction = -1
-            found = solve_ivp(
+            solution = solve_ivp(
                 rate,
                 (self.time, end),
                 self.state,
@@ -93,15 +95,15 @@ class JenkinsReference:
                 events=events,
             )
             self.restarts += 1
-            self._update_elements(found, frozen)
+            self._update_elements(solution, frozen)
         return self.state
 
-    def _update_elements(self, found, frozen):
+    def _update_elements(self, solution, frozen):
         """Update the stretches and slip directions of the elements at the end of a piece."""
         n = self.modes.omega.size
-        self.peak = max(self.peak, np.abs(self.modes.output @ found.y[:n]).max())
-        self.time = float(found.t[-1])
-        self.state = found.y[:, -1]
+        self.peak = max(self.peak, np.abs(self.modes.output @ solution.y[:n]).max())
+        self.time = float(solution.t[-1])
+        self.state = solution.y[:, -1]
         slide = self.faces @ self.state[:n]
         speed = self.faces @ self.state[n:]
         for f in range(len(self.k)):
@@ -109,9 +111,9 @@ class JenkinsReference:
             self.stretch[f] = np.where(
                 slips, self.way[f] * self.y[f], self.stretch[f] + slide[f] - frozen[f]
             )
-            if found.status == 1:
+            if solution.status == 1:
                 turned = (
-                    f + 1 < len(found.t_events) + 1
+                    f + 1 < len(solution.t_events) + 1
                     and slips.any()
                     and self.way[f][slips][0] * speed[f] <= 1e-12
                 )

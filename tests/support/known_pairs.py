@@ -43,7 +43,7 @@ class TracePair:
 
     kind: str
     seed: int
-    before: tuple  # x, z (n) each
+    before: tuple  # Positions x and heights z, (n,) [m] each.
     after: tuple
     worn: np.ndarray = field(repr=False)  # Worn depth at each point of `after`.
     # Offset of the trace after relative to the trace before: x on the surface minus x in the file.
@@ -128,34 +128,34 @@ def draw_pair(kind: str, seed: int) -> TracePair:
     def sample_trace(heights, place, spacing, gain=1.0, stretch=1.0):
         """Return points, heights and surface positions of a trace that starts at `place`."""
         points = np.arange(0, length, spacing)
-        inside = place + stretch * points
-        keep = inside < x[-1]
+        surface_positions = place + stretch * points
+        keep = surface_positions < x[-1]
         points = points[keep]
-        inside = inside[keep]
-        z = gain * np.interp(inside, x, heights) + noise * draw.normal(size=points.size)
+        surface_positions = surface_positions[keep]
+        z = gain * np.interp(surface_positions, x, heights) + noise * draw.normal(size=points.size)
         z += draw.uniform(-0.8e-3, 0.8e-3) * points + draw.uniform(-5e-6, 5e-6)
-        return points, np.round(z, 9), inside
+        return points, np.round(z, 9), surface_positions
 
-    second = draw.choice([0.5e-6, 1e-6, 2e-6]) if kind == "scale" else spacing
+    second_spacing = draw.choice([0.5e-6, 1e-6, 2e-6]) if kind == "scale" else spacing
     gain = draw.uniform(0.97, 1.03) if kind == "scale" else 1.0
     stretch = draw.uniform(0.99, 1.01) if kind == "scale" else 1.0
     xb, zb, _ = sample_trace(new, start, spacing)
-    xa, za, inside = sample_trace(old, begin, second, gain, stretch)
-    worn = np.interp(inside, x, wear)
+    xa, za, surface_positions = sample_trace(old, begin, second_spacing, gain, stretch)
+    worn = np.interp(surface_positions, x, wear)
     spoilt = [0, 0]
     if kind == "dust":
         which = draw.integers(1, 4)  # 1: before, 2: after, 3: both.
         for k, z in enumerate((zb, za)):
             if which & (k + 1):
-                for at in draw.integers(5, z.size - 5, draw.integers(1, 4)):
+                for centre in draw.integers(5, z.size - 5, draw.integers(1, 4)):
                     width = draw.integers(1, 5)
-                    z[at : at + width] += draw.uniform(8, 25) * rms
+                    z[centre : centre + width] += draw.uniform(8, 25) * rms
                     spoilt[k] += int(width)
     if kind == "dropouts":
         for k, z in enumerate((zb, za)):
-            for at in draw.integers(5, z.size - 5, draw.integers(1, 3)):
+            for centre in draw.integers(5, z.size - 5, draw.integers(1, 3)):
                 width = draw.integers(1, 4)
-                z[at : at + width] -= draw.uniform(10, 30) * rms
+                z[centre : centre + width] -= draw.uniform(10, 30) * rms
                 spoilt[k] += int(width)
     if kind == "bent":
         za += draw.choice([-1, 1]) * draw.uniform(2, 6) * rms * ((xa / xa[-1] - 0.5) ** 2 * 4)
@@ -166,7 +166,7 @@ def draw_pair(kind: str, seed: int) -> TracePair:
     before = (xb, zb)
     after = (xa, za)
     if kind == "exchanged":
-        before, after, worn = after, before, -np.interp(xb + start, inside, worn)
+        before, after, worn = after, before, -np.interp(xb + start, surface_positions, worn)
     return TracePair(kind, seed, before, after, worn, begin - start, tuple(spoilt))
 
 

@@ -149,7 +149,7 @@ def draw_law_keys(law: str, r, load: float, speed: float) -> dict:
     return {}
 
 
-def compare_answers(found, singles) -> list[list]:
+def compare_answers(sweep_answers, singles) -> list[list]:
     """Return the rows of each case of two Answers: values and errors of the first beside those of the second.
 
     A value that only one of them has is NaN in the other and does not hold. A ringing measure that
@@ -157,18 +157,18 @@ def compare_answers(found, singles) -> list[list]:
     the run has samples.
     """
     out = []
-    for case in range(len(found)):
-        names = {name for name in found.values if found.has(name, case)}
+    for case in range(len(sweep_answers)):
+        names = {name for name in sweep_answers.values if sweep_answers.has(name, case)}
         names |= {name for name in singles.values if singles.has(name, case)}
         case_rows = []
         for name in sorted(names):
             value, truth = (
                 float(answers.values[name][case]) if name in answers.values else np.nan
-                for answers in (found, singles)
+                for answers in (sweep_answers, singles)
             )
             error, doubt = (
                 float(answers.errors[name][case]) if name in answers.errors else np.nan
-                for answers in (found, singles)
+                for answers in (sweep_answers, singles)
             )
             if np.isnan(truth) and (np.isnan(value) or name in lane_ringing.RINGING_MEASURES):
                 continue
@@ -186,17 +186,20 @@ def compare_cases(seed: int, folder: Path, earlier: dict | None = None) -> dict:
         draw_points(group, seed, N_CASES) if group in LAWS else draw_patches(group, seed, N_PATCHES)
     )
     started = process_time()
-    found = pf.run_many(models)
+    sweep_answers = pf.run_many(models)
     seconds = process_time() - started
     singles = models if group in LAWS else meshes.with_shared_meshes(models)
     lane_cases = [
-        case for case in range(N_SINGLES) if found.numerics.get(case, {}).get("engine") == "lanes"
+        case
+        for case in range(N_SINGLES)
+        if sweep_answers.numerics.get(case, {}).get("engine") == "lanes"
     ]
     single_answers = one_by_one.solve([singles[case] for case in lane_cases])
     same_outcome = [
-        found.outcome[case] == outcome for case, outcome in zip(lane_cases, single_answers.outcome)
+        sweep_answers.outcome[case] == outcome
+        for case, outcome in zip(lane_cases, single_answers.outcome)
     ]
-    pairs = compare_answers(found.select(np.array(lane_cases)), single_answers)
+    pairs = compare_answers(sweep_answers.select(np.array(lane_cases)), single_answers)
     return {
         "group": group,
         "engine": "lanes",

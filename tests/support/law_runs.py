@@ -54,7 +54,7 @@ def run_bench_along_path(law: str, time, slide, *sets):
 
 def run_rig(law: str, *sets, cycles: int = 60, steps: int = 0):
     """Return the Result of one mode under a base sine at its resonance."""
-    more = f"[accuracy]\nsteps_per_cycle = {steps}\n" if steps else ""
+    accuracy = f"[accuracy]\nsteps_per_cycle = {steps}\n" if steps else ""
     mode = MODE.replace("damping = 0.003", "damping = 0.02")
     return run(
         loads(
@@ -62,7 +62,7 @@ def run_rig(law: str, *sets, cycles: int = 60, steps: int = 0):
             + friction_table(law)
             + mode
             + DRIVE.replace("cycles = 30", f"cycles = {cycles}")
-            + more,
+            + accuracy,
             sets=sets,
         )
     )
@@ -110,13 +110,13 @@ def run_two_masses_uncompiled(law: str):
     Returns displacements (2, t) with both interfaces, displacement (t,) with one, and the peak
     forces of both runs.
     """
-    where = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+    python_path = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
     done = subprocess.run(
         [sys.executable, "-c", PLAIN, law],
         capture_output=True,
         text=True,
         timeout=300,
-        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": where},
+        env=os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": python_path},
     )
     assert done.returncode == 0, done.stderr
     both, alone, pulls = json.loads(done.stdout)

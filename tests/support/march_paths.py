@@ -42,7 +42,7 @@ def follow_path(model, path, dt=0.3):
     contact = model.build()
     energies = np.zeros((path.size, 2))
     forces = np.zeros((path.size, 3))
-    bad = loops.follow_path(
+    n_unconverged = loops.follow_path(
         np.ascontiguousarray(path, float),
         dt,
         model.kind,
@@ -51,4 +51,4 @@ def follow_path(model, path, dt=0.3):
         energies,
         forces,
     )
-    return forces, energies, bad, contact
+    return forces, energies, n_unconverged, contact

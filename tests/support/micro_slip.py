@@ -33,8 +33,8 @@ def solve_missing_shear(compliance, right) -> np.ndarray:
         index = np.flatnonzero(active)
         force = np.zeros(right.size)
         force[index] = np.linalg.solve(compliance[np.ix_(index, index)], right[index])
-        apart = compliance @ force - right
-        following = np.where(active, force > 0, apart < -1e-14 * np.abs(right).max())
+        gap = compliance @ force - right
+        following = np.where(active, force > 0, gap < -1e-14 * np.abs(right).max())
         if (following == active).all():
             return force
         active = following
@@ -151,7 +151,7 @@ class PartialSlipReference:
             + loop_area(amplitude / 2) / 2
         )
         angle = (np.arange(4000) + 0.5) * np.pi / 4000
-        back = curve(amplitude) - 2 * curve(amplitude * (1 - np.cos(angle)) / 2)
+        return_force = curve(amplitude) - 2 * curve(amplitude * (1 - np.cos(angle)) / 2)
         end = float(curve(amplitude) - 2 * curve(amplitude / 2))
         return {
             "tangential_stiffness": self.stiffness,
@@ -165,7 +165,7 @@ class PartialSlipReference:
             "friction_ratio_peak": force / bench.load,
             "friction_ratio_end": end / bench.load,
             "equivalent_stiffness": self.stiffness
-            - float(2 / np.pi / amplitude * np.mean(back * np.cos(angle)) * np.pi),
+            - float(2 / np.pi / amplitude * np.mean(return_force * np.cos(angle)) * np.pi),
         }
 
 
@@ -178,9 +178,9 @@ def solve_bench(seed: int) -> tuple:
         edges = coarse.edges
     fine = PartialSlipReference(bench, edges, static.LAPS[2])
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
-    found = fine.measures()
-    other = coarse.measures()
-    return bench, found, {name: abs(value - other[name]) for name, value in found.items()}
+    values = fine.measures()
+    coarse_values = coarse.measures()
+    return bench, values, {name: abs(value - coarse_values[name]) for name, value in values.items()}
 
 
 def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:

@@ -151,17 +151,17 @@ class StretchLaw(Law):
 
     def rate(self, s, v, t):
         """Return the rates of the stretch and of the bond length."""
-        first = self.keys["bond_length"]
+        new_length = self.keys["bond_length"]
         k = self.keys
         speed = self.mode * v
         if not self.grows:
-            return np.array([v - speed * s[0] / first])
-        last = first * k["kinetic"] / k["static"]
+            return np.array([v - speed * s[0] / new_length])
+        final_length = new_length * k["kinetic"] / k["static"]
         ages = k["rest_growth"] / (speed if self.side > 0 else k["rest_speed"])
         return np.array(
             [
                 v - speed * s[0] / s[1],
-                ages * (first - s[1]) + speed * (last - s[1]) / k["slip_growth"],
+                ages * (new_length - s[1]) + speed * (final_length - s[1]) / k["slip_growth"],
             ]
         )
 
@@ -182,8 +182,10 @@ class StretchLaw(Law):
 
     def guards(self, s, v, t):
         """Return the slip velocity and the margin to the speed limit of ageing."""
-        rest = [self.side * (self.mode * v - self.keys["rest_speed"])] if self.grows else []
-        return [self.mode * v, *rest]
+        ageing_margins = (
+            [self.side * (self.mode * v - self.keys["rest_speed"])] if self.grows else []
+        )
+        return [self.mode * v, *ageing_margins]
 
     def apply_event(self, k, s, v, accel):
         """Reverse the direction, or cross the speed limit of ageing."""
@@ -305,26 +307,26 @@ class IwanLaw(Law):
         """Return the force of the initial loading at a displacement u >= 0."""
         chi = self.keys["chi"]
         u = min(u, self.top)
-        inside = u ** (chi + 2) / (chi + 2) + u * (self.top ** (chi + 1) - u ** (chi + 1)) / (
+        integral = u ** (chi + 2) / (chi + 2) + u * (self.top ** (chi + 1) - u ** (chi + 1)) / (
             chi + 1
         )
-        return self.density * inside + self.last * u
+        return self.density * integral + self.last * u
 
     def mean_stretch(self, u: float) -> float:
         """Return the mean stretch of the sliders on the initial loading at u, weighted by their limits."""
         chi = self.keys["chi"]
         u = min(u, self.top)
-        inside = u ** (chi + 3) / (chi + 3) + u * (self.top ** (chi + 2) - u ** (chi + 2)) / (
+        integral = u ** (chi + 3) / (chi + 3) + u * (self.top ** (chi + 2) - u ** (chi + 2)) / (
             chi + 2
         )
-        return (self.density * inside + self.last * self.top * u) / self.limit
+        return (self.density * integral + self.last * self.top * u) / self.limit
 
     def mean_stretch_rate(self, u: float) -> float:
         """Return the derivative of this mean stretch with respect to the displacement."""
         chi = self.keys["chi"]
         u = min(u, self.top)
-        inside = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
-        return (self.density * inside + self.last * self.top * (u < self.top)) / self.limit
+        integral = (self.top ** (chi + 2) - u ** (chi + 2)) / (chi + 2)
+        return (self.density * integral + self.last * self.top * (u < self.top)) / self.limit
 
     def apply_masing(self, s, function, index: int) -> float:
         """Return a function `function` of the initial loading, continued from the last reversal by Masing's rules.
@@ -406,12 +408,12 @@ class ReportLaw(Law):
         sums = gammainc(p + 1, np.maximum(rho, 0.0))
         # Age of the bond that formed at the present position, if the stroke passed it.
         crossing_age = rho[:-1] - np.abs(u[:-1]) / eps
-        inside = u[:-1] * u[1:] < 0
-        middle = np.where(inside, gammainc(p + 1, np.maximum(crossing_age, 0.0)), sums[1:])
+        is_crossed = u[:-1] * u[1:] < 0
+        middle = np.where(is_crossed, gammainc(p + 1, np.maximum(crossing_age, 0.0)), sums[1:])
         sign = np.where(u[:-1] != 0, np.sign(u[:-1]), np.sign(u[1:]))
         total = sign @ (sums[:-1] - middle) + np.sign(u[1:]) @ (middle - sums[1:])
-        first = (path / eps) ** p * np.exp(-path / eps) / gamma(p + 1) * np.sign(q)
-        return self.limit * (total + first)
+        initial_bonds = (path / eps) ** p * np.exp(-path / eps) / gamma(p + 1) * np.sign(q)
+        return self.limit * (total + initial_bonds)
 
     def rate(self, s, v, t):
         """Return the rates of displacement and path."""

@@ -22,16 +22,16 @@ class Window:
         columns = {name: [] for name in ("t", "w", "y", "f", "split", "back", "a", "kind")}
         self.modes = []
         self.parts = []
-        for one in stretches:
-            if one.times[-1] <= begin or one.times[-1] <= one.times[0]:
+        for piece in stretches:
+            if piece.times[-1] <= begin or piece.times[-1] <= piece.times[0]:
                 continue
-            self.restore_laws(one)
-            inside = borders[(borders > one.times[0]) & (borders < one.times[-1])]
-            cuts = np.unique(np.concatenate([np.clip(one.times, begin, end), inside]))
+            self.restore_laws(piece)
+            inner_borders = borders[(borders > piece.times[0]) & (borders < piece.times[-1])]
+            cuts = np.unique(np.concatenate([np.clip(piece.times, begin, end), inner_borders]))
             for low, high in pairwise(cuts):
                 t = (low + high) / 2 + (high - low) / 2 * np.concatenate([[-1.0], NODES, [1.0]])
                 w = (high - low) / 2 * np.concatenate([[0.0], WEIGHTS, [0.0]])
-                self._append_values(columns, one, t, w)
+                self._append_values(columns, piece, t, w)
         self.t, self.w, self.y = (np.concatenate(columns[name]) for name in ("t", "w", "y"))
         self.f, self.split, self.back, self.a = (
             np.concatenate(columns[name]) for name in ("f", "split", "back", "a")
@@ -76,8 +76,8 @@ class Window:
     def acceleration(self, t, y) -> float:
         """Return the absolute acceleration of the output [m s-2]."""
         m = self.motion
-        own = m.plant.output @ m.derivative(t, y)[m.n : 2 * m.n]
-        return own + m.drive(t) if m.moving else own
+        relative = m.plant.output @ m.derivative(t, y)[m.n : 2 * m.n]
+        return relative + m.drive(t) if m.moving else relative
 
     def find_maximum(self, values, function, mask=None) -> float:
         """Return the maximum over the window, refined in the steps in which it lies.
@@ -92,7 +92,7 @@ class Window:
             Nodes that count; by default all. A step lies completely inside or outside.
         """
         values = values if mask is None else np.where(mask, values, -np.inf)
-        each = NODES.size + 2
+        nodes_per_step = NODES.size + 2
         maximum = float(values.max())
         padded = np.concatenate([[-np.inf], values, [-np.inf]])
         peaks = np.flatnonzero(
@@ -102,19 +102,24 @@ class Window:
         )
         for k in peaks[np.argsort(-values[peaks])[:MOST]]:
             for part in {
-                k // each,
-                min((k + 1) // each, len(self.parts) - 1),
-                max((k - 1) // each, 0),
+                k // nodes_per_step,
+                min((k + 1) // nodes_per_step, len(self.parts) - 1),
+                max((k - 1) // nodes_per_step, 0),
             }:
                 piece, t = self.parts[part]
-                if mask is not None and not mask[part * each + 1 : part * each + each - 1].all():
+                if (
+                    mask is not None
+                    and not mask[
+                        part * nodes_per_step + 1 : part * nodes_per_step + nodes_per_step - 1
+                    ].all()
+                ):
                     continue  # The next cycle begins in this step and may have a larger maximum.
-                inside = min(max(k - part * each, 0), each - 1)
+                node = min(max(k - part * nodes_per_step, 0), nodes_per_step - 1)
                 self.restore_laws(piece)
                 optimum = minimize_scalar(
                     lambda x, one=piece: -function(x, one.solution(x)),
                     method="bounded",
-                    bounds=(t[max(inside - 1, 0)], t[min(inside + 1, each - 1)]),
+                    bounds=(t[max(node - 1, 0)], t[min(node + 1, nodes_per_step - 1)]),
                     options={"xatol": 1e-7 * (t[-1] - t[0])},
                 )
                 maximum = max(maximum, float(-optimum.fun))
@@ -198,20 +203,20 @@ def _last_cycle_amplitude(w: Window, motion: Motion, period: float) -> float | N
     """
     n = motion.n
     row = motion.plant.output
-    each = NODES.size + 2
+    nodes_per_step = NODES.size + 2
     extremes = []
     rate = w.y[:, n : 2 * n] @ row
     direction = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
     for a, b in pairwise(np.flatnonzero(direction)):
         if direction[a] == direction[b]:
             continue
-        piece, t = w.parts[a // each]
-        if b == a + 1 and b % each:
+        piece, t = w.parts[a // nodes_per_step]
+        if b == a + 1 and b % nodes_per_step:
             w.restore_laws(piece)
             zero = brentq(
                 lambda x, one=piece: row @ one.solution(x)[n : 2 * n],
-                t[a % each],
-                t[b % each],
+                t[a % nodes_per_step],
+                t[b % nodes_per_step],
                 xtol=1e-16,
             )
             extremes.append(float(row @ piece.solution(zero)[:n]))
@@ -333,19 +338,23 @@ def _mean_secant_stiffness(w: Window, motion: Motion, period: float, window: int
 
 def _find_reversal(w: Window, motion: Motion, k: int) -> tuple | None:
     """Return (displacement, force) at a reversal next to node k; None if there is none."""
-    each = NODES.size + 2
+    nodes_per_step = NODES.size + 2
     face = motion.plant.faces[0]
     if w.v[k, 0] == 0:
         return w.q[k, 0], w.f[k, 0]
     for low in (k - 1, k):
-        if low < 0 or low // each != (low + 1) // each or w.v[low, 0] * w.v[low + 1, 0] >= 0:
+        if (
+            low < 0
+            or low // nodes_per_step != (low + 1) // nodes_per_step
+            or w.v[low, 0] * w.v[low + 1, 0] >= 0
+        ):
             continue
-        piece, t = w.parts[low // each]
+        piece, t = w.parts[low // nodes_per_step]
         w.restore_laws(piece)
         time = brentq(
             lambda x, one=piece: face @ one.solution(x)[motion.n : 2 * motion.n],
-            t[low % each],
-            t[low % each + 1],
+            t[low % nodes_per_step],
+            t[low % nodes_per_step + 1],
             xtol=1e-16,
         )
         y = piece.solution(time)

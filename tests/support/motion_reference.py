@@ -134,9 +134,15 @@ def integrate_to_event(
     The event functions are evaluated LOOKS times in every step, on its dense output; a value that
     decreases and increases between two evaluations is not noticed.
     """
-    first, (rtol, atol) = motion.max_step(y, motion.derivative(t, y)), tolerances
+    first_max_step, (rtol, atol) = motion.max_step(y, motion.derivative(t, y)), tolerances
     solver = DOP853(
-        motion.derivative, t, y, stop, rtol=rtol, atol=atol, first_step=min(first / 50, stop - t)
+        motion.derivative,
+        t,
+        y,
+        stop,
+        rtol=rtol,
+        atol=atol,
+        first_step=min(first_max_step / 50, stop - t),
     )
     times = [t]
     parts = []
@@ -422,9 +428,11 @@ class Motion:
         face = self.plant.faces[k]
         if law.set_valued and law.mode == 0:
             law.mode = g
-            others = [j for j, other_law in enumerate(self.laws) if other_law.mode == 0 and j != k]
-            if others:
-                self.choose_modes(t, y, others)
+            stuck_interfaces = [
+                j for j, other_law in enumerate(self.laws) if other_law.mode == 0 and j != k
+            ]
+            if stuck_interfaces:
+                self.choose_modes(t, y, stuck_interfaces)
             return
         v = y[n : 2 * n]
         if law.set_valued:

@@ -346,7 +346,7 @@ def format_scene(s: dict, signal: str = "signal.csv") -> str:
             p["tilt"] > 0
         )
     else:
-        more = (
+        variation = (
             {
                 "amplitude": format_quantity(s["load_amplitude"], "N"),
                 "frequency": format_quantity(s["load_frequency"], "Hz"),
@@ -354,7 +354,7 @@ def format_scene(s: dict, signal: str = "signal.csv") -> str:
             if "load_amplitude" in s
             else {}
         )
-        parts.append(format_table("normal", {"load": format_quantity(s["load"], "N")} | more))
+        parts.append(format_table("normal", {"load": format_quantity(s["load"], "N")} | variation))
     parts += [
         format_table("friction", format_law_keys(s)),
         format_table("structure", {"moving_mass": format_quantity(s["mass"], "kg")}),

@@ -90,7 +90,7 @@ SWAPPED_NAMES |= {after: before for before, after in SWAPPED_NAMES.items()}
 class Fault(NamedTuple):
     """A change of the source text: the whole lines before and after, the first of them at `line`."""
 
-    file: str  # path below the root of the checkout
+    file: str  # Path relative to the root of the checkout.
     line: int
     kind: str
     before: str
@@ -167,10 +167,10 @@ def mutate_expression(node: ast.expr):
 
 def copy_with_fields(node: ast.AST, **fields):
     """Return a copy of a node in which some fields are replaced."""
-    other = copy.copy(node)
+    changed = copy.copy(node)
     for name, value in fields.items():
-        setattr(other, name, value)
-    return other
+        setattr(changed, name, value)
+    return changed
 
 
 def is_text(node: ast.expr) -> bool:
@@ -515,15 +515,15 @@ class SelectionPlugin:
         """Keep the chosen tests, or those that are not recorded yet."""
         if "tests" in self.order:
             places = {name: place for place, name in enumerate(self.order["tests"])}
-            kept = sorted(
+            selected = sorted(
                 (item for item in items if item.nodeid in places),
                 key=lambda item: places[item.nodeid],
             )
         else:
             done = set(self.order["done"])
-            kept = [item for item in items if item.nodeid not in done]
-        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
-        items[:] = kept
+            selected = [item for item in items if item.nodeid not in done]
+        config.hook.pytest_deselected(items=[item for item in items if item not in selected])
+        items[:] = selected
 
     def pytest_runtest_logstart(self, nodeid, location):
         """Start the record of a test."""
@@ -571,7 +571,7 @@ def pytest_configure(config):
         resource.setrlimit(resource.RLIMIT_CPU, (order["cpu_seconds"], order["cpu_seconds"] + 5))
     pytest.hookimpl(trylast=True)(
         SelectionPlugin.pytest_collection_modifyitems
-    )  # after the conftest has sorted the tests
+    )  # This hook must run after the conftest has sorted the tests.
     plugin = SelectionPlugin(order)
     config.pluginmanager.register(plugin)
     if plugin.reached:
@@ -874,10 +874,10 @@ def list_test_paths(root: Path, places: list[str], excluded: list[str]) -> list[
     paths = []
     for place in places:
         is_all = place.strip("/") == "tests"
-        inside = sorted((root / place).iterdir()) if is_all else [root / place]
+        candidates = sorted((root / place).iterdir()) if is_all else [root / place]
         paths += [
             str(path.relative_to(root))
-            for path in inside
+            for path in candidates
             if path.name not in excluded
             and (path.name.startswith("test_") or any(path.rglob("test_*.py")))
         ]

@@ -32,8 +32,8 @@ def make_surface(seed: int, sigma: float = 6 * UM):
     """Return the heights of a long trace as a function of x, a cubic spline through its fine samples."""
     from scipy.interpolate import CubicSpline
 
-    long = report_trace(LONG, FINE, seed, sigma)
-    return CubicSpline(long.x, long.z, bc_type="periodic")
+    trace = report_trace(LONG, FINE, seed, sigma)
+    return CubicSpline(trace.x, trace.z, bc_type="periodic")
 
 
 def make_worn_pair(
@@ -105,13 +105,13 @@ def make_track_pair(
     x = np.arange(float(count))
     positions = x - true_shift  # Positions of the samples of `after` in the trace before.
     t = (positions - middle) / (width / 2)
-    inside = abs(t) <= 1
+    is_in_track = abs(t) <= 1
     shape = {
         "band": np.ones(count),
         "parabola": 1 - t**2,
         "groove": np.sqrt(np.maximum(1 - t**2, 0.0)),
     }[kind]
-    worn = np.where(inside, depth * shape, 0.0)
+    worn = np.where(is_in_track, depth * shape, 0.0)
     jitter = noise * random.standard_normal((2, count))
     before = rough[margin : margin + count]
     after = rough[margin - true_shift : margin - true_shift + count] - worn

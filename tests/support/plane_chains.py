@@ -117,8 +117,8 @@ def format_scene(s: dict) -> str:
             LINK.format(kind=kind, pair=list(pair), key=key, value=value, unit=unit)
             for pair, value in links
         )
-    for pair, second, stiff, load in s["faces"]:
-        out += RUBS.format(pair, f"lateral = {second}\n" if second else "", stiff, load)
+    for pair, lateral, stiff, load in s["faces"]:
+        out += RUBS.format(pair, f"lateral = {lateral}\n" if lateral else "", stiff, load)
     size = (
         f'acceleration = "{s["push"]!r} m/s^2"'
         if s["drive"] == "base"
@@ -141,7 +141,7 @@ class ChainMotion:
         self.m = s["masses"]
         self.omega = 2 * np.pi * s["frequency"]
         self.rows = [
-            np.array([difference_row(one, n) for one in pairs if one])
+            np.array([difference_row(pair, n) for pair in pairs if pair])
             for *pairs, _, _ in s["faces"]
         ]
         self.k, self.most = zip(*((stiff, 0.4 * load / stiff) for *_, stiff, load in s["faces"]))
@@ -162,14 +162,14 @@ class ChainMotion:
         force = (
             self.push * np.sin(self.omega * t) - self.s["K"] @ y[:n] - self.s["C"] @ y[n : 2 * n]
         )
-        for i, (rows, at, k) in enumerate(zip(self.rows, self.at, self.k)):
-            stretch = y[at]
+        for i, (rows, part, k) in enumerate(zip(self.rows, self.at, self.k)):
+            stretch = y[part]
             speed = rows @ y[n : 2 * n]
             elastic_rate = (
                 speed - stretch * (stretch @ speed) / (stretch @ stretch) if slips[i] else speed
             )
             force -= k * rows.T @ stretch
-            out[at] = elastic_rate
+            out[part] = elastic_rate
             out[self.size - 2 * len(self.rows) + 2 * i :][:2] = (
                 k * stretch @ speed,
                 k * stretch @ (speed - elastic_rate),
@@ -219,7 +219,7 @@ class ChainMotion:
                 args=(slips,),
                 rtol=rtol,
                 atol=atol,
-                events=[self.make_event(i, on) for i, on in enumerate(slips)],
+                events=[self.make_event(i, is_slipping) for i, is_slipping in enumerate(slips)],
                 max_step=period / STEPS,
             )
             assert solution.success, solution.message
@@ -233,10 +233,10 @@ class ChainMotion:
                 if slips[i]:
                     y[self.at[i]] *= self.most[i] / np.linalg.norm(y[self.at[i]])
         # These checks show that no event was missed.
-        for i, (at, most) in enumerate(zip(self.at, self.most)):
-            assert np.linalg.norm(out[:, at], axis=1).max() <= most * (1 + 1e-8)
+        for i, (part, max_stretch) in enumerate(zip(self.at, self.most)):
+            assert np.linalg.norm(out[:, part], axis=1).max() <= max_stretch * (1 + 1e-8)
             lost = out[:, 2 * i + 1 - 2 * len(self.rows)]
-            assert np.diff(lost).min() >= -1e-9 * lost[-1] - 1e-12 * self.k[i] * most**2
+            assert np.diff(lost).min() >= -1e-9 * lost[-1] - 1e-12 * self.k[i] * max_stretch**2
         return times, out
 
 
@@ -269,9 +269,9 @@ def compute_measures(motion: ChainMotion, times, y, cycles: float) -> dict:
         "friction_work": works[-1, ::2].sum(),
         "energy_dissipated": works[-1, 1::2].sum(),
     }
-    for i, (rows, at, k) in enumerate(zip(motion.rows, motion.at, motion.k)):
+    for i, (rows, part, k) in enumerate(zip(motion.rows, motion.at, motion.k)):
         suffix = f"_{i + 1}" if i else ""
-        stretch = y[:, at]
+        stretch = y[:, part]
         force -= k * rows.T @ stretch.T
         slip = y[:, :n] @ rows.T - stretch
         out |= {

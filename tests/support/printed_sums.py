@@ -86,7 +86,7 @@ def draw_scene(kind: str, seed: int):
     Reading, order, initial bonds, growth, pressure, and amplitude or drive are random.
     """
     draw = np.random.default_rng(seed)
-    length = 10 ** draw.uniform(-0.7, 0.5)  # um
+    length = 10 ** draw.uniform(-0.7, 0.5)  # Bond length [um].
     reading = draw.choice(["report", "report", "report", "stretch"])
     sets = {
         "friction.static": f"{draw.uniform(0.15, 0.6):.3f}",
@@ -173,8 +173,8 @@ class NodeBonds:
         self.first = np.ones(size)
         self.forming = lambda places, part: np.ones_like(places)
 
-    def compute_lengths(self, moved, dt):
-        """Return bond lengths by 2.10 for points that move by `moved` (m,) [m] in a step dt [s].
+    def compute_lengths(self, displacement, dt):
+        """Return bond lengths by 2.10 for points that move by `displacement` (m,) [m] in a step dt [s].
 
         Returns
         -------
@@ -184,11 +184,11 @@ class NodeBonds:
         """
         f = self.f
         if f.rest_growth is None:
-            return self.eps, np.ones_like(moved), self.eps
+            return self.eps, np.ones_like(displacement), self.eps
         out = []
         for part in (1.0, 0.5):
-            rest_growth = f.rest_growth * part * dt / np.maximum(moved / dt, self.floor)
-            slip_growth = part * moved / f.slip_growth
+            rest_growth = f.rest_growth * part * dt / np.maximum(displacement / dt, self.floor)
+            slip_growth = part * displacement / f.slip_growth
             target = (
                 rest_growth * f.bond_length + slip_growth * f.bond_length * f.kinetic / f.static
             ) / (rest_growth + slip_growth)
@@ -204,49 +204,52 @@ class NodeBonds:
         f = self.f
         p = self.f.order
         e0 = self.f.bond_length
-        moved = np.abs(s - self.at)
+        distance = np.abs(s - self.at)
         norm = gamma(self.f.order + 1)
-        eps, decay, middle = self.compute_lengths(moved, dt)
-        path = self.path + moved
-        harm = self.harm + moved / middle
+        eps, decay, middle = self.compute_lengths(distance, dt)
+        path = self.path + distance
+        harm = self.harm + distance / middle
         parts = (
-            int(np.ceil(moved.max() / (self.finest * e0 * (f.kinetic or f.static) / f.static))) or 1
+            int(np.ceil(distance.max() / (self.finest * e0 * (f.kinetic or f.static) / f.static)))
+            or 1
         )
         parts = min(parts, MOST_PARTS)
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
         # Fraction of the step between the middle of a part and the end of the step.
-        back = 1 - (np.arange(parts)[:, None] + 0.5) / parts
+        remaining_fraction = 1 - (np.arange(parts)[:, None] + 0.5) / parts
         low = np.vstack([self.low, ends[:-1]])
         high = np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         position = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
         # Bonds formed behind the point minus bonds formed ahead of it.
         side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(position, 0, 1) - 1)
-        initial_path = np.vstack([self.when, path - back * moved])
-        initial_damage = np.vstack([self.hurt, harm - back * moved / middle])
+        initial_path = np.vstack([self.when, path - remaining_fraction * distance])
+        initial_damage = np.vstack([self.hurt, harm - remaining_fraction * distance / middle])
         initial_length = np.vstack([self.born, np.tile(middle, (parts, 1))])
-        gone = np.zeros_like(moved) + decay
+        gone = np.zeros_like(distance) + decay
         # Difference between the mature length and the length of a bond, which grows from 0 by 2.10.
-        lag = np.vstack([self.lag * gone, middle * gone**back])
-        dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
+        lag = np.vstack([self.lag * gone, middle * gone**remaining_fraction])
+        dense = np.vstack(
+            [self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - remaining_fraction)]
+        )
         age = path - initial_path
         if f.reading == "report":
             bond_length = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
             x = age / bond_length
             contributions = np.where(size > 0, x**p * np.exp(-x), 0.0) * size / (e0 * norm)
-            first = (
+            initial_bonds = (
                 f.initial_bonds
                 / norm
                 * np.where(path > 0, (path / e0) ** p, float(p == 0))
                 * np.exp(-path / e0)
             )
-            first = first * self.first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
+            initial_bonds = initial_bonds * self.first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
         else:
             u = np.abs(s - (low + high) / 2)
             contributions = (
                 (u / initial_length) ** p * np.exp(-(harm - initial_damage)) * size / (e0 * norm)
             )
-            first = (
+            initial_bonds = (
                 f.initial_bonds
                 / norm
                 * (np.abs(s) / e0) ** p
@@ -265,12 +268,12 @@ class NodeBonds:
             self.path = path
             self.harm = harm
             self.eps = eps
-        return (contributions * side).sum(axis=0) + first
+        return (contributions * side).sum(axis=0) + initial_bonds
 
-    def break_bonds(self, off):
+    def break_bonds(self, is_unloaded):
         """Break the bonds of points without pressure, off (m,) bool."""
-        self.dense[:, off] = 0.0
-        self.first[off] = 0.0
+        self.dense[:, is_unloaded] = 0.0
+        self.first[is_unloaded] = 0.0
 
 
 def solve_displacements(bonds: NodeBonds, limit, c, q: float, dt: float, guess):

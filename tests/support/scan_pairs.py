@@ -63,10 +63,10 @@ class Volumes(NamedTuple):
 class Depths(NamedTuple):
     """Noise-free depths [m] in the common region, positive for lost material."""
 
-    mean_worn: float  # worn volume / area; growth does not count
-    mean_net: float  # mean of all depths
-    maximum: float  # largest depth at a point of the scan after
-    maximum_median: float  # largest median of 3 x 3 depths
+    mean_worn: float  # Worn volume / area; growth does not count.
+    mean_net: float  # Mean of all depths.
+    maximum: float  # Largest depth at a point of the scan after.
+    maximum_median: float  # Largest median of 3 x 3 depths.
 
 
 class Pose(NamedTuple):
@@ -82,9 +82,9 @@ class Track(NamedTuple):
 
     middle: tuple
     direction: float  # [rad] of its axis from x, in [0, pi)
-    width: float  # between the positions at which the wear begins
-    length: float | None  # from tip to tip; None if the track leaves the common region
-    ends: tuple | None  # the two tips ((x, y), (x, y))
+    width: float  # Distance between the positions at which the wear begins.
+    length: float | None  # Distance between the tips; None if the track leaves the common region.
+    ends: tuple | None  # Positions of both tips ((x, y), (x, y)).
     # The flanks have zero slope at their ends (cosine), so no scan shows where they begin.
     is_flat_flanked: bool
 
@@ -154,7 +154,8 @@ def draw_pair(seed: int, kind: str | None = None) -> ScanPair:
     """Draw the pair of scans of a seed; without `kind`, consecutive seeds have consecutive kinds."""
     kind = KINDS[(seed - 1) % len(KINDS)] if kind is None else kind
     random = np.random.default_rng([seed, 311, KINDS.index(kind)])
-    shape = np.array([random.integers(120, 301), random.integers(150, 401)])  # ny, nx
+    # Numbers of points ny, nx.
+    shape = np.array([random.integers(120, 301), random.integers(150, 401)])
     spacing = float(np.exp(random.uniform(np.log(0.4e-6), np.log(5e-6))))
     size = (shape[::-1] - 1) * spacing
     pose = draw_pose(random, size)
