@@ -46,7 +46,7 @@ OPTIONAL_PACKAGES = {
 
 
 class Finding(NamedTuple):
-    """Result of one check: its name, whether it is fine, what was found, what to do or ""."""
+    """Result of a check: its name, whether it passed, the finding, and the remedy or ""."""
 
     name: str
     fine: bool

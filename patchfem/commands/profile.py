@@ -146,7 +146,7 @@ def _print_split(
 
 
 def _window(text: str) -> tuple:
-    """Read the positions of a window [m]; UsageError unless there are two or four."""
+    """Read the positions of a window [m]; raise UsageError unless there are two or four."""
     positions = text.split(",")
     if len(positions) not in (2, 4) or not all(map(str.strip, positions)):
         raise UsageError(

@@ -28,7 +28,7 @@ def repeated_option(text: str, name: str | None = None) -> type:
 
 
 def text_option(text: str, name: str | None = None) -> type:
-    """Return the type of an option that takes a text, "" by default; text: its help.
+    """Return the type of an option with a text value, "" by default; `text` is its help text.
 
     The value may begin with a hyphen, as a negative position does.
     """
@@ -38,7 +38,7 @@ def text_option(text: str, name: str | None = None) -> type:
 
 
 def out_option(text: str) -> type:
-    """Return the type of the option -o of a command; text: its help."""
+    """Return the type of the option -o of a command; `text` is its help text."""
     return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
 
 
@@ -127,7 +127,7 @@ def note(text: str) -> None:
 
 
 def load_scene(path: Path, sets, faults=None, prepare=None):
-    """Load the scene in a file with --set strings; SceneError names every mistake.
+    """Load the scene in a file with --set strings; raise SceneError with every mistake.
 
     Parameters
     ----------

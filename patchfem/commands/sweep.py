@@ -112,7 +112,7 @@ class CaseOptions:
 @Parameter(name="*")
 @dataclass
 class WorkerOptions:
-    """Who works, and on which part."""
+    """Options of the workers: number of processes, executor, and shard of the cases."""
 
     jobs: Annotated[
         int, Parameter(name=["-j", "--jobs"], help="number of processes on this machine, such as 4")
