@@ -1,4 +1,4 @@
-"""The shipped contact forms against quadrature of the half plane, many-digit transfer matrices and summed strips."""
+"""Closed forms of contact compared with quadrature on the half-plane, transfer matrices in many digits, and strips."""
 
 from itertools import pairwise
 
@@ -15,8 +15,11 @@ MODULUS = 6.74e10
 TITANIUM, CARBIDE, THICKNESS = (121e9, 0.32), (250e9, 0.24), 152.4e-6
 
 
-def _over(lo, hi, integrand, kinks=()):
-    """Integral over lo..hi of a function that may be infinite like 1/sqrt at its ends; `kinks` inside split it."""
+def _integrate(lo, hi, integrand, kinks=()):
+    """Return the integral over lo..hi of a function that may have inverse square-root singularities at its ends.
+
+    The interval is split at the `kinks`.
+    """
     middle = (lo + hi) / 2
     half = (hi - lo) / 2
     size = abs(integrand(middle + 0.3 * half)) * half
@@ -36,66 +39,83 @@ def _over(lo, hi, integrand, kinks=()):
     )
 
 
-def slope(pressure, lo, hi, x, kinks=()):
-    """d(inward displacement)/dx of two half planes at x: 2/(pi E*) PV int p(s)/(s - x) ds, x inside lo..hi or not."""
-    here = pressure(x) if lo < x < hi else 0.0
-    rest = _over(lo, hi, lambda s: (pressure(s) - here) / (s - x) if s != x else 0.0, (*kinks, x))
-    return 2 / (np.pi * MODULUS) * (rest + (here * np.log((hi - x) / (x - lo)) if here else 0.0))
+def surface_slope(pressure, lo, hi, x, kinks=()):
+    """Return d(inward displacement)/dx of two half-planes, 2/(pi E*) PV int p(s)/(s - x) ds, at any x."""
+    local_pressure = pressure(x) if lo < x < hi else 0.0
+    remainder = _integrate(
+        lo, hi, lambda s: (pressure(s) - local_pressure) / (s - x) if s != x else 0.0, (*kinks, x)
+    )
+    return (
+        2
+        / (np.pi * MODULUS)
+        * (remainder + (local_pressure * np.log((hi - x) / (x - lo)) if local_pressure else 0.0))
+    )
 
 
 # ---- punches
 
-HALF, LOAD = 2e-3, 3e4
+HALF_WIDTH, LOAD = 2e-3, 3e4
 OFFSETS = [0.0, 0.3e-3, -0.7e-3, 1.0e-3, 1.2e-3, -1.9e-3]
 
 
 @pytest.mark.parametrize("offset", OFFSETS)
-def test_exact_punch_carries_its_load_on_its_line(offset):
-    lo, hi = exact.punch_contact(HALF, offset)
-    assert _over(lo, hi, lambda x: exact.punch_pressure(x, LOAD, HALF, offset)) == pytest.approx(
-        LOAD, rel=1e-7
-    )
-    turn = _over(lo, hi, lambda x: x * exact.punch_pressure(x, LOAD, HALF, offset))
-    assert turn == pytest.approx(LOAD * offset, rel=1e-7, abs=1e-9 * LOAD * HALF)
+def test_exact_punch_pressure_balances_load_and_moment(offset):
+    """The pressure of an eccentrically loaded punch balances the load and its moment."""
+    lo, hi = exact.punch_contact(HALF_WIDTH, offset)
+    assert _integrate(
+        lo, hi, lambda x: exact.punch_pressure(x, LOAD, HALF_WIDTH, offset)
+    ) == pytest.approx(LOAD, rel=1e-7)
+    moment = _integrate(lo, hi, lambda x: x * exact.punch_pressure(x, LOAD, HALF_WIDTH, offset))
+    assert moment == pytest.approx(LOAD * offset, rel=1e-7, abs=1e-9 * LOAD * HALF_WIDTH)
 
 
 @pytest.mark.parametrize("offset", OFFSETS)
-@pytest.mark.parametrize("share", [0.1, 0.35, 0.8])
-def test_exact_punch_stays_flat(offset, share):
-    """Inside, opening = rotation x - delta + u is nothing, so the slope of the face is -rotation."""
-    lo, hi = exact.punch_contact(HALF, offset)
-    rotation = exact.punch_rotation(LOAD, HALF, MODULUS, offset)
-    found = slope(
-        lambda x: exact.punch_pressure(x, LOAD, HALF, offset), lo, hi, lo + share * (hi - lo)
+@pytest.mark.parametrize("fraction", [0.1, 0.35, 0.8])
+def test_exact_punch_surface_slope_equals_rotation(offset, fraction):
+    """The slope of the surface under a punch equals its rotation at every point of the contact."""
+    lo, hi = exact.punch_contact(HALF_WIDTH, offset)
+    rotation = exact.punch_rotation(LOAD, HALF_WIDTH, MODULUS, offset)
+    computed = surface_slope(
+        lambda x: exact.punch_pressure(x, LOAD, HALF_WIDTH, offset),
+        lo,
+        hi,
+        lo + fraction * (hi - lo),
     )
-    assert found == pytest.approx(-rotation, rel=1e-6, abs=1e-7 * LOAD / (MODULUS * HALF))
+    assert computed == pytest.approx(-rotation, rel=1e-6, abs=1e-7 * LOAD / (MODULUS * HALF_WIDTH))
 
 
 @pytest.mark.parametrize("offset", [1.2e-3, -1.9e-3])
-def test_always_the_unloaded_part_of_a_punch_stays_open(offset):
-    """From the end of the contact outwards the opening can only grow: rotation + u' > 0 to the right of it."""
-    lo, hi = exact.punch_contact(HALF, offset)
-    rotation = exact.punch_rotation(LOAD, HALF, MODULUS, offset)
-    end, way = (lo, -1) if offset > 0 else (hi, 1)
-    for far in (0.01, 0.3, 0.99):
-        x = end + way * far * (2 * HALF - (hi - lo))
+def test_always_separated_part_of_punch_stays_open(offset):
+    """The opening of the separated part of a tilted punch increases away from the contact."""
+    lo, hi = exact.punch_contact(HALF_WIDTH, offset)
+    rotation = exact.punch_rotation(LOAD, HALF_WIDTH, MODULUS, offset)
+    contact_end, direction = (lo, -1) if offset > 0 else (hi, 1)
+    for fraction in (0.01, 0.3, 0.99):
+        x = contact_end + direction * fraction * (2 * HALF_WIDTH - (hi - lo))
         assert (
-            way
-            * (rotation + slope(lambda s: exact.punch_pressure(s, LOAD, HALF, offset), lo, hi, x))
+            direction
+            * (
+                rotation
+                + surface_slope(
+                    lambda s: exact.punch_pressure(s, LOAD, HALF_WIDTH, offset), lo, hi, x
+                )
+            )
             > 0
         )
 
 
-def test_exact_punch_leaves_at_half_the_half_width_and_is_continuous_there():
+def test_exact_punch_solution_is_continuous_at_first_separation():
+    """The punch begins to separate at an offset of half the half-width, where its rotation is continuous."""
     below, above = (
-        exact.punch_rotation(LOAD, HALF, MODULUS, HALF / 2 * f) for f in (1 - 1e-9, 1 + 1e-9)
+        exact.punch_rotation(LOAD, HALF_WIDTH, MODULUS, HALF_WIDTH / 2 * f)
+        for f in (1 - 1e-9, 1 + 1e-9)
     )
-    assert below == pytest.approx(-2 * LOAD / (np.pi * MODULUS * HALF), rel=1e-8) == above
-    assert exact.punch_contact(HALF, 0.75 * HALF) == pytest.approx((0.0, HALF))
+    assert below == pytest.approx(-2 * LOAD / (np.pi * MODULUS * HALF_WIDTH), rel=1e-8) == above
+    assert exact.punch_contact(HALF_WIDTH, 0.75 * HALF_WIDTH) == pytest.approx((0.0, HALF_WIDTH))
     assert (
-        exact.punch_pressure(-HALF, LOAD, HALF, HALF / 2)
+        exact.punch_pressure(-HALF_WIDTH, LOAD, HALF_WIDTH, HALF_WIDTH / 2)
         == 0
-        == exact.punch_pressure(2 * HALF, LOAD, HALF)
+        == exact.punch_pressure(2 * HALF_WIDTH, LOAD, HALF_WIDTH)
     )
     rigid = exact.combined_modulus(*TITANIUM, np.inf, 0.0)
     assert rigid == pytest.approx(121e9 / (1 - 0.32**2), rel=1e-15)
@@ -103,41 +123,46 @@ def test_exact_punch_leaves_at_half_the_half_width_and_is_continuous_there():
 
 # ---- the punch with rounded edges
 
-FLAT, ROUND = 1e-3, 0.05
+FLAT_HALF_WIDTH, EDGE_RADIUS = 1e-3, 0.05
 LOADS = [2.0, 3e3, 3e5, 3e7]
 
 
 @pytest.mark.parametrize("load", LOADS)
-def test_exact_rounded_punch_carries_its_load(load):
-    half = exact.rounded_punch_half_width(load, FLAT, ROUND, MODULUS)
-    total = _over(
+def test_exact_rounded_punch_pressure_balances_load(load):
+    """The pressure of a punch with rounded edges integrates to the load."""
+    half = exact.rounded_punch_half_width(load, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS)
+    total = _integrate(
         -half,
         half,
-        lambda x: exact.rounded_punch_pressure(x, load, FLAT, ROUND, MODULUS),
-        (-FLAT, FLAT),
+        lambda x: exact.rounded_punch_pressure(x, load, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS),
+        (-FLAT_HALF_WIDTH, FLAT_HALF_WIDTH),
     )
-    assert half > FLAT and total == pytest.approx(load, rel=1e-8)
+    assert half > FLAT_HALF_WIDTH and total == pytest.approx(load, rel=1e-8)
 
 
 @pytest.mark.share(0, 4, 8, 12, 14)
 @pytest.mark.parametrize("load", LOADS[1:])
-@pytest.mark.parametrize("share", [-0.9, 0.0, 0.2, 0.6, 0.97])
-def test_exact_rounded_punch_follows_its_shape(load, share):
-    half = exact.rounded_punch_half_width(load, FLAT, ROUND, MODULUS)
-    x = share * half
-    found = slope(
-        lambda s: float(exact.rounded_punch_pressure(s, load, FLAT, ROUND, MODULUS)),
+@pytest.mark.parametrize("fraction", [-0.9, 0.0, 0.2, 0.6, 0.97])
+def test_exact_rounded_punch_surface_slope_equals_shape(load, fraction):
+    """The slope of the surface under a punch with rounded edges equals the slope of the punch."""
+    half = exact.rounded_punch_half_width(load, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS)
+    x = fraction * half
+    computed = surface_slope(
+        lambda s: float(
+            exact.rounded_punch_pressure(s, load, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS)
+        ),
         -half,
         half,
         x,
-        (-FLAT, FLAT),
+        (-FLAT_HALF_WIDTH, FLAT_HALF_WIDTH),
     )
-    want = -np.sign(x) * max(abs(x) - FLAT, 0) / ROUND
-    assert found == pytest.approx(want, abs=1e-6 * half / ROUND)
+    expected = -np.sign(x) * max(abs(x) - FLAT_HALF_WIDTH, 0) / EDGE_RADIUS
+    assert computed == pytest.approx(expected, abs=1e-6 * half / EDGE_RADIUS)
 
 
 @pytest.mark.parametrize("load, radius", [(1e4, 2e-4), (1e3, 1e-5)])
-def test_order_a_rounded_corner_is_the_limit_of_the_rounded_punch(load, radius):
+def test_order_rounded_corner_is_limit_of_rounded_punch(load, radius):
+    """Contact length and peak pressure of a rounded corner agree with a rounded punch of small radius within 1e-4."""
     flat = 4e-3
     modulus = 1e11
     reach, peak = exact.rounded_corner_contact(load / np.pi / np.sqrt(2 * flat), radius, modulus)
@@ -150,96 +175,122 @@ def test_order_a_rounded_corner_is_the_limit_of_the_rounded_punch(load, radius):
     )
 
 
-def test_exact_rounded_punch_between_hertz_and_the_flat_punch():
+def test_exact_rounded_punch_limits_are_hertz_and_flat_punch():
+    """The rounded punch tends to Hertz for a small flat and to the flat punch for a small radius."""
     load = 3e6
-    x = np.linspace(-0.9, 0.9, 7) * exact.hertz_half_width(load, ROUND, MODULUS)
-    crown = exact.hertz_pressure(x, load, ROUND, MODULUS)
+    x = np.linspace(-0.9, 0.9, 7) * exact.hertz_half_width(load, EDGE_RADIUS, MODULUS)
+    crown = exact.hertz_pressure(x, load, EDGE_RADIUS, MODULUS)
     assert np.allclose(
-        exact.rounded_punch_pressure(x, load, 1e-8, ROUND, MODULUS), crown, rtol=1e-4
+        exact.rounded_punch_pressure(x, load, 1e-8, EDGE_RADIUS, MODULUS), crown, rtol=1e-4
     )
-    x = np.linspace(-0.9, 0.9, 7) * FLAT
-    sharp = exact.rounded_punch_pressure(x, load, FLAT, 1e-12, MODULUS)
-    assert np.allclose(sharp, exact.punch_pressure(x, load, FLAT), rtol=1e-5)
-    ends = exact.rounded_punch_pressure(np.array([-FLAT, FLAT]), load, FLAT, ROUND, MODULUS)
+    x = np.linspace(-0.9, 0.9, 7) * FLAT_HALF_WIDTH
+    sharp = exact.rounded_punch_pressure(x, load, FLAT_HALF_WIDTH, 1e-12, MODULUS)
+    assert np.allclose(sharp, exact.punch_pressure(x, load, FLAT_HALF_WIDTH), rtol=1e-5)
+    ends = exact.rounded_punch_pressure(
+        np.array([-FLAT_HALF_WIDTH, FLAT_HALF_WIDTH]), load, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS
+    )
     assert np.isfinite(ends).all() and ends[0] == pytest.approx(ends[1], rel=1e-12)
 
 
 # ---- waves
 
-WAVE, HIGH = 80e-6, 1.5e-6
-FULL = np.pi * MODULUS * HIGH / WAVE
+WAVELENGTH, AMPLITUDE = 80e-6, 1.5e-6
+FULL_CONTACT_PRESSURE = np.pi * MODULUS * AMPLITUDE / WAVELENGTH
 
 
-def wave(x, share):
-    return exact.westergaard_pressure(x, share * FULL, WAVE, HIGH, MODULUS)
-
-
-@pytest.mark.parametrize("share", [1e-5, 0.05, 0.5, 0.99, 1.0, 1.2])
-def test_exact_westergaard_mean_pressure_and_approach(share):
-    """The face sinks by -2/(pi E*) int p ln|2 sin(pi s/lambda)| ds at the crest: that is the mean gap closed."""
-    args = share * FULL, WAVE, HIGH, MODULUS
-    end = exact.westergaard_half_width(*args)
-    assert exact.westergaard_full_pressure(WAVE, HIGH, MODULUS) == pytest.approx(FULL, rel=1e-15)
-    assert _over(-end, end, lambda x: wave(x, share)) == pytest.approx(
-        share * FULL * WAVE, rel=1e-8
+def westergaard(x, fraction):
+    """Return the pressure of a wavy surface under a fraction of the full-contact pressure."""
+    return exact.westergaard_pressure(
+        x, fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
     )
-    sunk = (
+
+
+@pytest.mark.parametrize("fraction", [1e-5, 0.05, 0.5, 0.99, 1.0, 1.2])
+def test_exact_wavy_surface_mean_pressure_and_approach(fraction):
+    """Mean pressure and approach of the wavy surface agree with integrals of its pressure."""
+    parameters = fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
+    half_width = exact.westergaard_half_width(*parameters)
+    assert exact.westergaard_full_pressure(WAVELENGTH, AMPLITUDE, MODULUS) == pytest.approx(
+        FULL_CONTACT_PRESSURE, rel=1e-15
+    )
+    assert _integrate(-half_width, half_width, lambda x: westergaard(x, fraction)) == pytest.approx(
+        fraction * FULL_CONTACT_PRESSURE * WAVELENGTH, rel=1e-8
+    )
+    expected = (
         -4
         / (np.pi * MODULUS)
-        * _over(0.0, end, lambda s: wave(s, share) * np.log(2 * np.sin(np.pi * s / WAVE)))
+        * _integrate(
+            0.0,
+            half_width,
+            lambda s: westergaard(s, fraction) * np.log(2 * np.sin(np.pi * s / WAVELENGTH)),
+        )
     )
-    assert exact.westergaard_approach(*args) == pytest.approx(sunk, rel=1e-8)
+    assert exact.westergaard_approach(*parameters) == pytest.approx(expected, rel=1e-8)
 
 
-@pytest.mark.parametrize("share", [0.05, 0.5, 0.99, 1.2])
-@pytest.mark.parametrize("place", [0.1, -0.5, 0.93])
-def test_exact_westergaard_flattens_the_wave(share, place):
-    """Slope by the periodic kernel cot: u' = 2/(lambda E*) PV int p(s) cot(pi (s - x)/lambda) ds = -gap'."""
-    end = exact.westergaard_half_width(share * FULL, WAVE, HIGH, MODULUS)
-    x = place * end
-    here = wave(x, share)
+@pytest.mark.parametrize("fraction", [0.05, 0.5, 0.99, 1.2])
+@pytest.mark.parametrize("position", [0.1, -0.5, 0.93])
+def test_exact_wavy_surface_pressure_flattens_wave(fraction, position):
+    """The slope of the surface under the periodic pressure equals that of the wave inside the contact."""
+    half_width = exact.westergaard_half_width(
+        fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
+    )
+    x = position * half_width
+    local_pressure = westergaard(x, fraction)
 
     def cot(s):
-        return 1 / np.tan(np.pi * (s - x) / WAVE)
+        return 1 / np.tan(np.pi * (s - x) / WAVELENGTH)
 
-    def pair(y):  # the two sides together: odd parts of the kernel cancel
-        return sum(w * (wave(x + w * y, share) - here) * cot(x + y) for w in (1, -1))
+    def pair(y):  # both sides are added, so that the odd parts of the kernel cancel
+        return sum(
+            w * (westergaard(x + w * y, fraction) - local_pressure) * cot(x + y) for w in (1, -1)
+        )
 
-    near = end - abs(x)
+    near = half_width - abs(x)
     far = x - np.sign(x) * near
-    rest = _over(0.0, near, pair) + _over(
-        min(-np.sign(x) * end, far),
-        max(-np.sign(x) * end, far),
-        lambda s: (wave(s, share) - here) * cot(s),
+    remainder = _integrate(0.0, near, pair) + _integrate(
+        min(-np.sign(x) * half_width, far),
+        max(-np.sign(x) * half_width, far),
+        lambda s: (westergaard(s, fraction) - local_pressure) * cot(s),
     )
     edge = (
-        here
-        * WAVE
+        local_pressure
+        * WAVELENGTH
         / np.pi
-        * np.log(np.sin(np.pi * (end - x) / WAVE) / np.sin(np.pi * (end + x) / WAVE))
+        * np.log(
+            np.sin(np.pi * (half_width - x) / WAVELENGTH)
+            / np.sin(np.pi * (half_width + x) / WAVELENGTH)
+        )
     )
-    found = 2 / (WAVE * MODULUS) * (rest + edge)
-    assert found == pytest.approx(-2 * np.pi * HIGH / WAVE * np.sin(2 * np.pi * x / WAVE), rel=1e-6)
+    computed = 2 / (WAVELENGTH * MODULUS) * (remainder + edge)
+    assert computed == pytest.approx(
+        -2 * np.pi * AMPLITUDE / WAVELENGTH * np.sin(2 * np.pi * x / WAVELENGTH), rel=1e-6
+    )
 
 
-@pytest.mark.parametrize("share", [1e-6, 0.05, 0.9])
-def test_exact_westergaard_stiffness_is_the_slope_of_the_approach(share):
+@pytest.mark.parametrize("fraction", [1e-6, 0.05, 0.9])
+def test_exact_wavy_surface_stiffness_is_derivative_of_approach(fraction):
+    """The stiffness of the wavy surface agrees with the central difference of its approach."""
     up, down = (
-        exact.westergaard_approach(share * f * FULL, WAVE, HIGH, MODULUS)
+        exact.westergaard_approach(
+            fraction * f * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
+        )
         for f in (1 + 1e-5, 1 - 1e-5)
     )
-    found = 2e-5 * share * FULL / (up - down)
-    assert exact.westergaard_stiffness(share * FULL, WAVE, HIGH, MODULUS) == pytest.approx(
-        found, rel=1e-7
+    expected = 2e-5 * fraction * FULL_CONTACT_PRESSURE / (up - down)
+    assert exact.westergaard_stiffness(
+        fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
+    ) == pytest.approx(expected, rel=1e-7)
+    assert (
+        exact.westergaard_stiffness(FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS) == np.inf
     )
-    assert exact.westergaard_stiffness(FULL, WAVE, HIGH, MODULUS) == np.inf
 
 
 # ---- the layered half plane
 
 
 def transfer_compliance(k, coating, substrate, thickness):
-    """C(k) from the 4 x 4 state (u, v, syy, sxy) carried through the layer and matched to decaying states below."""
+    """Return the compliance C(k) of a layer on a half-plane by a transfer matrix in 50 digits."""
 
     def state_matrix(young, poisson):
         young = mpmath.mpf(young)
@@ -258,17 +309,27 @@ def transfer_compliance(k, coating, substrate, thickness):
 
     with mpmath.workdps(50):
         k = mpmath.mpf(k)
-        below = state_matrix(*substrate)
-        grown = (below - k * mpmath.eye(4)) ** 2  # its columns span the decaying states
+        substrate_matrix = state_matrix(*substrate)
+        projector = (
+            substrate_matrix - k * mpmath.eye(4)
+        ) ** 2  # its columns span the states that decay with depth
         decaying = mpmath.matrix(4, 2)
         for row in range(4):
-            decaying[row, 0] = grown[row, 0]
-            decaying[row, 1] = grown[row, 1]
-        top = mpmath.expm(-state_matrix(*coating) * mpmath.mpf(thickness)) * decaying
-        share = mpmath.lu_solve(
-            mpmath.matrix([[top[2, 0], top[2, 1]], [top[3, 0], top[3, 1]]]), mpmath.matrix([-1, 0])
+            decaying[row, 0] = projector[row, 0]
+            decaying[row, 1] = projector[row, 1]
+        surface_states = mpmath.expm(-state_matrix(*coating) * mpmath.mpf(thickness)) * decaying
+        coefficients = mpmath.lu_solve(
+            mpmath.matrix(
+                [
+                    [surface_states[2, 0], surface_states[2, 1]],
+                    [surface_states[3, 0], surface_states[3, 1]],
+                ]
+            ),
+            mpmath.matrix([-1, 0]),
         )
-        return float(top[1, 0] * share[0] + top[1, 1] * share[1])
+        return float(
+            surface_states[1, 0] * coefficients[0] + surface_states[1, 1] * coefficients[1]
+        )
 
 
 @pytest.mark.parametrize(
@@ -283,17 +344,21 @@ def transfer_compliance(k, coating, substrate, thickness):
         ((1e9, 0.45), (200e9, 0.0)),
     ],
 )
-def test_exact_layered_compliance_by_the_transfer_matrix(wavelength, pair):
+def test_exact_layered_compliance_agrees_with_transfer_matrix(wavelength, pair):
+    """The compliance of a layered half-plane agrees with the transfer matrix within 1e-12."""
     k = 2 * np.pi / wavelength
-    want = transfer_compliance(k, *pair, THICKNESS)
-    assert exact.layered_compliance(k, *pair, THICKNESS) == pytest.approx(want, rel=1e-12)
+    expected = transfer_compliance(k, *pair, THICKNESS)
+    assert exact.layered_compliance(k, *pair, THICKNESS) == pytest.approx(expected, rel=1e-12)
 
 
-def test_exact_layered_compliance_limits():
+def test_exact_layered_compliance_limits_are_half_planes():
+    """Equal materials, a layer of zero thickness and a very thick layer have the compliance of a half-plane."""
     k = np.geomspace(1e2, 1e6, 9)
-    bare = 2 * (1 - 0.32**2) / (121e9 * k)
-    assert np.allclose(exact.layered_compliance(k, TITANIUM, TITANIUM, THICKNESS), bare, rtol=1e-14)
-    assert np.allclose(exact.layered_compliance(k, CARBIDE, TITANIUM, 0.0), bare, rtol=1e-13)
+    uncoated = 2 * (1 - 0.32**2) / (121e9 * k)
+    assert np.allclose(
+        exact.layered_compliance(k, TITANIUM, TITANIUM, THICKNESS), uncoated, rtol=1e-14
+    )
+    assert np.allclose(exact.layered_compliance(k, CARBIDE, TITANIUM, 0.0), uncoated, rtol=1e-13)
     thick = exact.layered_compliance(k, CARBIDE, TITANIUM, 1.0)
     assert np.allclose(thick, 2 * (1 - 0.24**2) / (250e9 * k), rtol=1e-13)
 
@@ -302,31 +367,35 @@ def test_exact_layered_compliance_limits():
 
 
 @pytest.mark.share(0, 4, 8)
-@pytest.mark.parametrize("share", [-0.9, 0.2, 0.6])
-@pytest.mark.parametrize("place", [-0.7, 0.2, 0.95])
-def test_exact_cattaneo_sticks_inside_and_slips_outside(share, place):
-    """The tangential kernel of half planes is the normal one: no slope of the slide within the stick zone."""
+@pytest.mark.parametrize("fraction", [-0.9, 0.2, 0.6])
+@pytest.mark.parametrize("position", [-0.7, 0.2, 0.95])
+def test_exact_cattaneo_shear_sticks_inside_and_slips_outside(fraction, position):
+    """The surface slope of Cattaneo's shear vanishes in the stick zone, and the slip zone has the friction limit."""
     line = 1e5
     radius = 1.0
     mu = 0.35
-    shear = share * mu * line
+    shear = fraction * mu * line
     half = exact.hertz_half_width(line, radius, MODULUS)
     stick = exact.cattaneo_stick_half_width(shear, line, radius, MODULUS, mu)
 
     def q(x):
         return float(exact.cattaneo_shear(x, shear, line, radius, MODULUS, mu))
 
-    assert _over(-half, half, q, (-stick, stick)) == pytest.approx(shear, rel=1e-8)
-    assert abs(slope(q, -half, half, place * stick, (-stick, stick))) <= 1e-7 * half / radius
-    outside = stick + abs(place) * (half - stick)
-    assert q(outside) == pytest.approx(
-        np.sign(share) * mu * exact.hertz_pressure(outside, line, radius, MODULUS)
+    assert _integrate(-half, half, q, (-stick, stick)) == pytest.approx(shear, rel=1e-8)
+    assert (
+        abs(surface_slope(q, -half, half, position * stick, (-stick, stick)))
+        <= 1e-7 * half / radius
     )
-    # lags behind: slips the way of Q
-    assert np.sign(share) * slope(q, -half, half, outside, (-stick, stick)) < 0
+    outside = stick + abs(position) * (half - stick)
+    assert q(outside) == pytest.approx(
+        np.sign(fraction) * mu * exact.hertz_pressure(outside, line, radius, MODULUS)
+    )
+    # the surface lags behind and slips in the direction of Q
+    assert np.sign(fraction) * surface_slope(q, -half, half, outside, (-stick, stick)) < 0
 
 
-def test_exact_cattaneo_limits():
+def test_exact_cattaneo_limits_of_full_slip_and_no_shear():
+    """At the friction limit the shear is mu times the pressure, and without force it vanishes."""
     x = np.linspace(-2e-3, 2e-3, 41)
     assert exact.cattaneo_stick_half_width(35.0, 100.0, 1.0, MODULUS, 0.35) == 0
     full = exact.cattaneo_shear(x, 35.0, 100.0, 1.0, MODULUS, 0.35)
@@ -336,71 +405,78 @@ def test_exact_cattaneo_limits():
 
 # ---- tilted pads
 
-PAD = {"load": 116.0, "length": 10e-3, "width": 10e-3, "stiffness": 1e13}
-DECAY = 2.5e-6
+PAD_PARAMETERS = {"load": 116.0, "length": 10e-3, "width": 10e-3, "stiffness": 1e13}
+DECAY_LENGTH = 2.5e-6
 
 
 @pytest.mark.parametrize("tilt", [1e-6, 2e-5, 2.32e-5, 1e-4, -3e-4, 3e-3])
-def test_exact_wedge_by_sinking_a_pad(tilt):
-    """The pad sinks until springs under it carry the load; fraction, centre and pressures are then read off."""
-    length = PAD["length"]
-    width = PAD["width"]
-    kn = PAD["stiffness"]
+def test_exact_wedge_on_springs_agrees_with_quadrature(tilt):
+    """Contact fraction, centre and pressures of a tilted pad agree with springs pressed until they carry the load."""
+    length = PAD_PARAMETERS["length"]
+    width = PAD_PARAMETERS["width"]
+    kn = PAD_PARAMETERS["stiffness"]
     zero = [0.0]
 
     def total(sink, arm=0.0):
         zero[0] = sink / tilt
-        return _over(
+        return _integrate(
             -length / 2, length / 2, lambda x: kn * width * max(sink - tilt * x, 0) * x**arm, zero
         )
 
-    sink = brentq(lambda d: total(d) - PAD["load"], -abs(tilt) * length / 2, 1e-3, xtol=1e-18)
-    fraction, centre, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
+    sink = brentq(
+        lambda d: total(d) - PAD_PARAMETERS["load"], -abs(tilt) * length / 2, 1e-3, xtol=1e-18
+    )
+    fraction, centre, min_pressure, max_pressure = exact.wedge_on_linear_foundation(
+        tilt, **PAD_PARAMETERS
+    )
     edge = np.clip(sink / abs(tilt), -length / 2, length / 2)
     assert fraction == pytest.approx((edge + length / 2) / length, rel=1e-8)
-    assert centre == pytest.approx(total(sink, 1) / PAD["load"], rel=1e-8)
-    assert largest == pytest.approx(kn * (sink + abs(tilt) * length / 2), rel=1e-8)
-    assert least == pytest.approx(kn * max(sink - abs(tilt) * length / 2, 0), rel=1e-8)
+    assert centre == pytest.approx(total(sink, 1) / PAD_PARAMETERS["load"], rel=1e-8)
+    assert max_pressure == pytest.approx(kn * (sink + abs(tilt) * length / 2), rel=1e-8)
+    assert min_pressure == pytest.approx(kn * max(sink - abs(tilt) * length / 2, 0), rel=1e-8)
 
 
-def test_exact_wedge_begins_to_open():
-    opening = exact.wedge_opening_tilt(**PAD)
-    below = exact.wedge_on_linear_foundation(opening * (1 - 1e-9), **PAD)
-    above = exact.wedge_on_linear_foundation(opening * (1 + 1e-9), **PAD)
+def test_exact_wedge_solution_is_continuous_at_opening_tilt():
+    """The solution of a tilted pad is continuous at the tilt at which it begins to open."""
+    opening = exact.wedge_opening_tilt(**PAD_PARAMETERS)
+    below = exact.wedge_on_linear_foundation(opening * (1 - 1e-9), **PAD_PARAMETERS)
+    above = exact.wedge_on_linear_foundation(opening * (1 + 1e-9), **PAD_PARAMETERS)
     assert opening == pytest.approx(2.32e-5, rel=1e-12)
     assert below[0] == 1 and above[0] < 1 and np.allclose(below, above, rtol=1e-8, atol=1)
     assert (
-        exact.wedge_on_linear_foundation(-2e-4, **PAD)[1]
-        == -exact.wedge_on_linear_foundation(2e-4, **PAD)[1]
+        exact.wedge_on_linear_foundation(-2e-4, **PAD_PARAMETERS)[1]
+        == -exact.wedge_on_linear_foundation(2e-4, **PAD_PARAMETERS)[1]
     )
 
 
-def test_exact_kern_and_wedge_agree_on_the_load_line():
+def test_exact_kern_fraction_equals_wedge_fraction():
+    """The contact fraction from the load line equals that of the tilted pad."""
     for tilt in (1e-5, 1e-4, 1e-3):
-        fraction, centre, *_ = exact.wedge_on_linear_foundation(tilt, **PAD)
-        assert exact.kern_contact_fraction(centre, PAD["length"]) == pytest.approx(
+        fraction, centre, *_ = exact.wedge_on_linear_foundation(tilt, **PAD_PARAMETERS)
+        assert exact.kern_contact_fraction(centre, PAD_PARAMETERS["length"]) == pytest.approx(
             fraction, rel=1e-12
         )
-    assert exact.kern_contact_fraction(PAD["length"] / 6, PAD["length"]) == pytest.approx(
-        1.0, rel=1e-12
-    )
+    assert exact.kern_contact_fraction(
+        PAD_PARAMETERS["length"] / 6, PAD_PARAMETERS["length"]
+    ) == pytest.approx(1.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("tilt", [0.0, 1e-9, 1.2e-5, 1.26e-5, 1e-4, -1e-3, 3e-3, 3e-2])
-def test_exact_skin_by_quadrature(tilt):
-    length = PAD["length"]
+def test_exact_wedge_on_asperities_agrees_with_quadrature(tilt):
+    """Contact fraction and centre of a tilted pad on exponential asperities agree with quadrature."""
+    length = PAD_PARAMETERS["length"]
     edge = -np.sign(tilt) * length / 2
     points = edge - np.sign(edge or 1) * np.geomspace(1e-5, 1, 40) * length
 
     def total(weight):
-        return _over(
+        return _integrate(
             -length / 2,
             length / 2,
-            lambda x: np.exp(-tilt * (x - edge) / DECAY) * weight(x),
+            lambda x: np.exp(-tilt * (x - edge) / DECAY_LENGTH) * weight(x),
             points,
         )
 
-    fraction, centre = exact.wedge_on_asperities(tilt, length, DECAY)
+    fraction, centre = exact.wedge_on_asperities(tilt, length, DECAY_LENGTH)
     assert fraction == pytest.approx(total(lambda x: 1) / length, rel=1e-9)
     from_edge = total(lambda x: x - edge) / total(lambda x: 1)
     assert centre - edge == pytest.approx(from_edge, rel=1e-9, abs=1e-11 * length)
@@ -408,24 +484,32 @@ def test_exact_skin_by_quadrature(tilt):
 
 @pytest.mark.parametrize("tilt", [1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 3.0, 30.0])
-def test_exact_wedge_loop_is_the_sum_of_its_strips(tilt, ratio):
+def test_exact_wedge_loop_area_equals_sum_of_strips(tilt, ratio):
+    """The loop area of a tilted pad equals the integral over its elastic-plastic strips."""
     mu = 0.4
     kt = 8e12
     area = 1e-4
-    fraction, _, least, largest = exact.wedge_on_linear_foundation(tilt, **PAD)
-    amplitude = ratio * mu * PAD["load"] / (kt * area)
+    fraction, _, min_pressure, max_pressure = exact.wedge_on_linear_foundation(
+        tilt, **PAD_PARAMETERS
+    )
+    amplitude = ratio * mu * PAD_PARAMETERS["load"] / (kt * area)
 
     def strip(p):
         return friction_forms.jenkins_loop(amplitude, mu * p / kt, mu * p)[0]
 
-    kink = min(max(amplitude * kt / mu, least), largest)
-    want = sum(quad(strip, a, b, epsabs=0)[0] for a, b in ((least, kink), (kink, largest)) if b > a)
-    want *= fraction * area / (largest - least)
-    found = exact.wedge_loop_area(amplitude, mu, kt, fraction * area, least, largest)
-    assert found == pytest.approx(want, rel=1e-10, abs=1e-18)
+    kink = min(max(amplitude * kt / mu, min_pressure), max_pressure)
+    expected = sum(
+        quad(strip, a, b, epsabs=0)[0]
+        for a, b in ((min_pressure, kink), (kink, max_pressure))
+        if b > a
+    )
+    expected *= fraction * area / (max_pressure - min_pressure)
+    computed = exact.wedge_loop_area(amplitude, mu, kt, fraction * area, min_pressure, max_pressure)
+    assert computed == pytest.approx(expected, rel=1e-10, abs=1e-18)
 
 
-def test_exact_wedge_loop_of_a_level_pad_is_that_of_one_strip():
+def test_exact_level_pad_loop_area_equals_single_strip():
+    """The loop area of a level pad equals that of a single elastic-plastic strip."""
     amplitudes = np.array([0.5, 3.0]) * 1e-6
     level = exact.wedge_loop_area(amplitudes, 0.4, 8e12, 1e-4, 1e6, 1e6)
     strip = friction_forms.jenkins_loop(amplitudes, 0.4e6 / 8e12, 0.4e6)[0]
@@ -458,6 +542,7 @@ def test_exact_wedge_loop_of_a_level_pad_is_that_of_one_strip():
         lambda: exact.kern_contact_fraction(0.5, 1.0),
     ],
 )
-def test_refuses_contact_arguments_without_a_meaning(call):
+def test_refuses_invalid_contact_arguments(call):
+    """Arguments outside the domain of a contact formula raise ValueError."""
     with pytest.raises(ValueError):
         call()

@@ -1,4 +1,4 @@
-"""The shipped exact answers against quadrature, many-digit arithmetic and integration that know nothing of them."""
+"""Closed forms compared with quadrature, arithmetic in many digits, and independent integration."""
 
 import mpmath
 import numpy as np
@@ -26,46 +26,49 @@ from vibration_forms import (
 
 from patchfem.closed_forms import contact as exact
 
-HERTZ = {"line_load": 1e5, "radius": 1.0, "modulus": 6.74e10}
+HERTZ_PARAMETERS = {"line_load": 1e5, "radius": 1.0, "modulus": 6.74e10}
 
 
 # ---- line contact
 
 
-def test_exact_hertz_pressure_carries_the_load():
-    half = exact.hertz_half_width(**HERTZ)
+def test_exact_hertz_pressure_integrates_to_load():
+    """Hertz's pressure integrates to the line load."""
+    half = exact.hertz_half_width(**HERTZ_PARAMETERS)
     total, _ = quad(
-        lambda t: half * np.cos(t) * exact.hertz_pressure(half * np.sin(t), **HERTZ),
+        lambda t: half * np.cos(t) * exact.hertz_pressure(half * np.sin(t), **HERTZ_PARAMETERS),
         -np.pi / 2,
         np.pi / 2,
     )
-    assert total == pytest.approx(HERTZ["line_load"], rel=1e-12)
+    assert total == pytest.approx(HERTZ_PARAMETERS["line_load"], rel=1e-12)
 
 
-@pytest.mark.parametrize("share", [-0.7, -0.2, 0.1, 0.5, 0.9])
-def test_exact_hertz_pressure_flattens_the_crown(share):
-    """Slope of two half planes under p: 2/(pi E*) PV int p(s)/(x - s) ds must equal the slope x/R of the gap."""
-    half = exact.hertz_half_width(**HERTZ)
-    x = share * half
+@pytest.mark.parametrize("fraction", [-0.7, -0.2, 0.1, 0.5, 0.9])
+def test_exact_hertz_surface_slope_equals_crown_slope(fraction):
+    """The surface slope of two half-planes under Hertz's pressure equals the slope x/R of the gap."""
+    half = exact.hertz_half_width(**HERTZ_PARAMETERS)
+    x = fraction * half
     principal, _ = quad(
-        lambda s: exact.hertz_pressure(s, **HERTZ), -half, half, weight="cauchy", wvar=x
+        lambda s: exact.hertz_pressure(s, **HERTZ_PARAMETERS), -half, half, weight="cauchy", wvar=x
     )
-    assert -2 / (np.pi * HERTZ["modulus"]) * principal == pytest.approx(
-        x / HERTZ["radius"], rel=1e-6
+    assert -2 / (np.pi * HERTZ_PARAMETERS["modulus"]) * principal == pytest.approx(
+        x / HERTZ_PARAMETERS["radius"], rel=1e-6
     )
 
 
-def test_exact_hertz_peak_and_outside():
-    half = exact.hertz_half_width(**HERTZ)
-    p = exact.hertz_pressure(np.array([0.0, half, 1.01 * half]), **HERTZ)
+def test_exact_hertz_pressure_at_centre_edge_and_outside():
+    """Hertz's pressure has its peak at the centre and vanishes at the edge and outside."""
+    half = exact.hertz_half_width(**HERTZ_PARAMETERS)
+    p = exact.hertz_pressure(np.array([0.0, half, 1.01 * half]), **HERTZ_PARAMETERS)
     assert (
-        p[0] == pytest.approx(exact.hertz_peak(**HERTZ), rel=1e-15)
+        p[0] == pytest.approx(exact.hertz_peak(**HERTZ_PARAMETERS), rel=1e-15)
         and p[1] < 1e-6 * p[0]
         and p[2] == 0
     )
 
 
-def test_exact_combined_modulus_is_two_compliances_in_series():
+def test_exact_combined_modulus_adds_compliances():
+    """The inverse of the combined modulus is the sum of the compliances of both materials."""
     e = exact.combined_modulus(121e9, 0.32, 250e9, 0.24)
     assert 1 / e == pytest.approx((1 - 0.32**2) / 121e9 + (1 - 0.24**2) / 250e9, rel=1e-15)
     assert exact.combined_modulus(121e9, 0.32) == pytest.approx(
@@ -76,44 +79,44 @@ def test_exact_combined_modulus_is_two_compliances_in_series():
 # ---- bonds
 
 
-def test_exact_steady_friction_of_2_18_and_2_11():
-    """mu = 0.6 (eps/eps_0) at 0.5, 5 and 50 mm/s: 0.58, 0.43333, 0.420144."""
+def test_exact_steady_friction_coefficient_at_three_speeds():
+    """The steady friction coefficient of equations 2.11 and 2.18 is 0.58, 0.43333 and 0.420144 at 0.5, 5 and 50 mm/s."""
     args = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
     for v, mu in ((5e-4, 0.58), (5e-3, 13 / 30), (5e-2, 0.420144)):
-        share = steady_bond_length(v, **args) / 2e-6
-        assert 0.6 * share == pytest.approx(mu, abs=1e-6)
+        ratio = steady_bond_length(v, **args) / 2e-6
+        assert 0.6 * ratio == pytest.approx(mu, abs=1e-6)
         # int phi_1(R/eps) dR/eps_0
-        bonds, _ = quad(lambda x, c=share: x / c * np.exp(-x / c), 0, 80 * share)
-        assert share == pytest.approx(bonds, rel=1e-9)
+        bonds, _ = quad(lambda x, c=ratio: x / c * np.exp(-x / c), 0, 80 * ratio)
+        assert ratio == pytest.approx(bonds, rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [-0.9, -0.5, 0.0, 0.4, 1.0, 2.0, 7.5])
-def test_figure_13_weight_along_the_path(order):
-    """2.14 by many-digit arithmetic; unit area; where p > 0 the largest value stands at R = p eps."""
+def test_figure_13_weight_along_path(order):
+    """The weight along the path (equation 2.14) agrees with many-digit arithmetic, has unit area, and peaks at R = p eps."""
     for x in (1e-12, 0.03, 1.0, 2.5, 40.0):
         with mpmath.workdps(30):
-            want = mpmath.mpf(x) ** order * mpmath.exp(-mpmath.mpf(x)) / mpmath.gamma(order + 1)
-        assert weight_along(x, order) == pytest.approx(float(want), rel=1e-13)
-    power = 1 / (order + 1)  # x = t^power takes the infinity at x = 0 away
+            expected = mpmath.mpf(x) ** order * mpmath.exp(-mpmath.mpf(x)) / mpmath.gamma(order + 1)
+        assert weight_along(x, order) == pytest.approx(float(expected), rel=1e-13)
+    power = 1 / (order + 1)  # the substitution x = t^power removes the singularity at x = 0
     area = quad(lambda t: weight_along(t**power, order) * power * t ** (power - 1), 0, 1)[0]
     area += quad(lambda x: weight_along(x, order), 1, np.inf)[0]
     assert area == pytest.approx(1, abs=1e-10)
     if order > 0:
-        top = weight_along(order, order)
-        assert top > weight_along(
+        peak = weight_along(order, order)
+        assert peak > weight_along(
             order * np.array([0.999, 1.001]), order
-        ).max() and top == pytest.approx(
+        ).max() and peak == pytest.approx(
             order**order * np.exp(-order) / gamma(order + 1), rel=1e-13
         )
     assert weight_along(0.0, order) == (np.inf if order < 0 else 1.0 if order == 0 else 0.0)
 
 
-def test_figure_14_weight_across_the_path():
-    """2.15 by many-digit arithmetic; unit area over eta/rho; 68.27 % of it within one rho."""
+def test_figure_14_weight_across_path():
+    """The weight across the path (equation 2.15) agrees with many-digit arithmetic and has unit area."""
     for y in (0.0, -0.3, 1.0, 4.0, 20.0):
         with mpmath.workdps(30):
-            want = mpmath.exp(-(mpmath.mpf(y) ** 2) / 2) / mpmath.sqrt(2 * mpmath.pi)
-        assert weight_across(y) == pytest.approx(float(want), rel=1e-13)
+            expected = mpmath.exp(-(mpmath.mpf(y) ** 2) / 2) / mpmath.sqrt(2 * mpmath.pi)
+        assert weight_across(y) == pytest.approx(float(expected), rel=1e-13)
     assert quad(weight_across, -np.inf, np.inf)[0] == pytest.approx(1, abs=1e-12)
     assert quad(weight_across, -1, 1)[0] == pytest.approx(
         float(mpmath.erf(1 / mpmath.sqrt(2))), abs=1e-14
@@ -121,35 +124,38 @@ def test_figure_14_weight_across_the_path():
     assert weight_across(0) == pytest.approx(0.39894228, abs=1e-8)
 
 
-def test_refuses_weights_that_do_not_exist():
-    for bad in ((0.5, -1.0), (-0.1, 1.0)):
+def test_refuses_invalid_weight_arguments():
+    """Orders of -1 and negative arguments of the weights raise ValueError."""
+    for arguments in ((0.5, -1.0), (-0.1, 1.0)):
         with pytest.raises(ValueError):
-            weight_along(*bad)
-    for bad in ((-0.1, 1.0), (0.5, -1.0)):
+            weight_along(*arguments)
+    for arguments in ((-0.1, 1.0), (0.5, -1.0)):
         with pytest.raises(ValueError):
-            growth_factor(*bad)
+            growth_factor(*arguments)
 
 
 @pytest.mark.share(0, 5, 10, 15, 20, 27)
-@pytest.mark.parametrize("share", [1e-6, 0.01, 0.1, 0.5, 1.0, 5.0, 10.0])
+@pytest.mark.parametrize("ratio", [1e-6, 0.01, 0.1, 0.5, 1.0, 5.0, 10.0])
 @pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
-def test_exact_growth_factor_by_many_digit_quadrature(share, order):
-    def phi(s):
-        y = s / -mpmath.expm1(-s / share)
+def test_exact_growth_factor_agrees_with_mpmath_quadrature(ratio, order):
+    """The growth factor agrees with quadrature in many digits within 1e-11."""
+
+    def integrand(s):
+        y = s / -mpmath.expm1(-s / ratio)
         return y**order * mpmath.exp(-y)
 
-    cuts = sorted(
-        {0, share / 4, *(share * 4**k for k in range(6)), 1, 4, 12, order + 40, order + 120}
+    breakpoints = sorted(
+        {0, ratio / 4, *(ratio * 4**k for k in range(6)), 1, 4, 12, order + 40, order + 120}
     )
-    want = float(mpmath.quad(phi, cuts) / mpmath.gamma(order + 1))
-    assert growth_factor(share, order) == pytest.approx(want, rel=1e-11)
+    expected = float(mpmath.quad(integrand, breakpoints) / mpmath.gamma(order + 1))
+    assert growth_factor(ratio, order) == pytest.approx(expected, rel=1e-11)
 
 
 # ---- Coulomb vibration
 
 
 @pytest.mark.parametrize(
-    "start, friction, omega, time, place",
+    "start, friction, omega, time, position",
     [
         (11.5, 1, 1, 6 * np.pi, -0.5),
         (11, 1, 1, 5 * np.pi, -1),
@@ -160,19 +166,21 @@ def test_exact_growth_factor_by_many_digit_quadrature(share, order):
         (1, 1, 1, 0, 1),
     ],
 )
-def test_exact_rest_of_3_11_with_the_count_rounded_up(start, friction, omega, time, place):
-    assert decay_rest(start, friction, omega) == pytest.approx((time, place), abs=1e-12)
+def test_exact_decay_rest_time_and_position(start, friction, omega, time, position):
+    """Time and position of rest of a Coulomb oscillator agree with equation 3.11, with rounded-up half cycles."""
+    assert decay_rest(start, friction, omega) == pytest.approx((time, position), abs=1e-12)
     assert decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx(
-        [place, place], abs=1e-12
+        [position, position], abs=1e-12
     )
 
 
-def test_exact_bounded_input_is_four_over_pi():
+def test_exact_bounded_input_is_four_over_pi_times_limit():
+    """The input with bounded response is 4/pi times the friction limit."""
     assert bounded_input(4.0) == pytest.approx(5.09295817894, rel=1e-11)
 
 
 @pytest.mark.parametrize(
-    "friction, want, within",
+    "friction, expected, tolerance",
     [
         (0.95, 0.006603, 1e-6),
         (0.9, 0.032368, 1e-6),
@@ -184,12 +192,14 @@ def test_exact_bounded_input_is_four_over_pi():
         (np.pi / 4 + 1e-6, 0.76259, 1e-5),
     ],
 )
-def test_exact_two_stop_amplitude(friction, want, within):
-    assert two_stop_amplitude(friction) == pytest.approx(want, abs=within)
+def test_exact_two_stop_amplitude_agrees_with_reference_values(friction, expected, tolerance):
+    """The amplitude of motion with two stops per cycle agrees with reference values."""
+    assert two_stop_amplitude(friction) == pytest.approx(expected, abs=tolerance)
 
 
-@pytest.mark.parametrize("miss", [1e-8, 1e-6, 0.99e-4, 1.01e-4, 1e-3])
-def test_exact_two_stop_amplitude_near_onset_in_60_digits(miss):
+@pytest.mark.parametrize("distance", [1e-8, 1e-6, 0.99e-4, 1.01e-4, 1e-3])
+def test_exact_two_stop_amplitude_near_onset(distance):
+    """The amplitude of motion with two stops near its onset agrees with a computation of 60 digits."""
     with mpmath.workdps(60):
 
         def ends(s):
@@ -201,13 +211,14 @@ def test_exact_two_stop_amplitude_near_onset_in_60_digits(miss):
             ) / 2
             return d, d - mpmath.sin(t)
 
-        friction = mpmath.mpf(1 - miss)
-        s = mpmath.findroot(lambda s: ends(s)[0] - friction, mpmath.sqrt(18 * miss))
-        want = float(ends(s)[1])
-    assert two_stop_amplitude(1 - miss) == pytest.approx(want, rel=2e-7)
+        friction = mpmath.mpf(1 - distance)
+        s = mpmath.findroot(lambda s: ends(s)[0] - friction, mpmath.sqrt(18 * distance))
+        expected = float(ends(s)[1])
+    assert two_stop_amplitude(1 - distance) == pytest.approx(expected, rel=2e-7)
 
 
-def test_exact_two_stop_limits():
+def test_exact_two_stop_amplitude_limits():
+    """The amplitude with two stops is zero at the onset, pi/4 at a friction of pi/4, and infinite below."""
     assert two_stop_amplitude(1.0) == 0 and two_stop_amplitude(0.785) == np.inf
     assert two_stop_amplitude(np.pi / 4) == pytest.approx(np.pi / 4, abs=1e-12)
     friction, top = two_stop_relation(np.pi - 1e-6)
@@ -241,6 +252,7 @@ def test_exact_two_stop_limits():
         lambda: two_stop_relation(np.pi),
     ],
 )
-def test_refuses_arguments_without_a_meaning(call):
+def test_refuses_invalid_arguments(call):
+    """Arguments outside the domain of a closed form raise ValueError."""
     with pytest.raises(ValueError):
         call()

@@ -1,4 +1,4 @@
-"""A folder has one writer: starts at one instant, killed owners, numbers given again, kills between renames."""
+"""A results folder has one writer: simultaneous starts, killed owners, reused process numbers, interrupted renames."""
 
 import os
 import signal
@@ -22,7 +22,7 @@ from patchfem.runs import CaseResults
 
 PYTHON = [sys.executable, "-c"]
 # each of several processes tries to own every file, all at the same instants
-RACE = """\
+RACE_CODE = """\
 import sys
 from pathlib import Path
 from patchfem.core import Missing
@@ -39,7 +39,7 @@ for k in range(count):
 print("done", flush=True)
 sys.stdin.readline()  # owners live on until all have tried
 """
-HOLD = """\
+HOLD_CODE = """\
 import sys
 from pathlib import Path
 from patchfem.disk.lock import FolderLock
@@ -47,7 +47,7 @@ FolderLock(Path(sys.argv[1]), "out", "run").acquire()
 print("taken", flush=True)
 sys.stdin.readline()
 """
-KILLED = """\
+KILLED_CODE = """\
 import os, sys
 from pathlib import Path
 from patchfem.disk import exchange
@@ -64,56 +64,63 @@ with Folder(Path(sys.argv[1])) as folder:
 """
 
 
-def process(code: str, *words):
+def start_process(code: str, *words):
+    """Start a Python process that runs code, with pipes to its input and output."""
     return subprocess.Popen(
         [*PYTHON, code, *map(str, words)], text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
 
 
-def names(place: Path) -> set:
-    return {one.name for one in place.iterdir()}
+def list_names(folder: Path) -> set:
+    """Return the names in a folder."""
+    return {path.name for path in folder.iterdir()}
 
 
-def test_always_one_of_many_that_start_at_one_instant_owns_a_folder(tmp_path):
+def test_always_simultaneous_processes_have_single_owner(tmp_path):
+    """Of several processes that start simultaneously exactly one owns each folder."""
     count = 100
-    for k in range(0, count, 2):  # every second one was left by a dead process
+    for k in range(0, count, 2):  # every second lock was left by a process that has ended
         (tmp_path / str(k)).write_text(f"4194305 17 {HOST_HASH}")
-    several = [process(RACE, tmp_path, count) for _ in range(3)]
-    for one in several:
-        assert one.stdout.readline() == "ready\n"
-    for one in several:
-        one.stdin.write("\n")
-        one.stdin.flush()
-    won = [int(line) for one in several for line in iter(one.stdout.readline, "done\n")]
-    for one in several:
-        one.communicate()
-    assert sorted(won) == list(range(count))
-    assert all(one.returncode == 0 for one in several)
+    processes = [start_process(RACE_CODE, tmp_path, count) for _ in range(3)]
+    for child in processes:
+        assert child.stdout.readline() == "ready\n"
+    for child in processes:
+        child.stdin.write("\n")
+        child.stdin.flush()
+    owned = [int(line) for child in processes for line in iter(child.stdout.readline, "done\n")]
+    for child in processes:
+        child.communicate()
+    assert sorted(owned) == list(range(count))
+    assert all(child.returncode == 0 for child in processes)
 
 
-def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
+def test_refuses_second_writer_until_first_ends(tmp_path):
+    """A second run into the same folder is refused until the process of the first has ended."""
     (tmp_path / "scene.toml").write_text(BENCH, "utf-8")
-    words = ("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "-q")
+    command = ("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "-q")
     lock = tmp_path / ".out.writer"
-    first = process(HOLD, lock)
+    first = start_process(HOLD_CODE, lock)
     assert first.stdout.readline() == "taken\n"
-    answer = run_cli(*words)
-    assert answer.code == 4
-    assert f"another run (process {first.pid}) is writing to this" in answer.err
-    assert names(tmp_path) == {"scene.toml", ".out.writer"}
+    result = run_cli(*command)
+    assert result.code == 4
+    assert f"another run (process {first.pid}) is writing to this" in result.err
+    assert list_names(tmp_path) == {"scene.toml", ".out.writer"}
     first.kill()
     while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
         pass
-    assert not is_running(first.pid)  # nobody has waited for it, but it works no more
-    assert run_cli(*words).code == 0 and names(tmp_path) == {"scene.toml", "out"}
+    assert not is_running(
+        first.pid
+    )  # a zombie process: its parent has not waited for it, but it has ended
+    assert run_cli(*command).code == 0 and list_names(tmp_path) == {"scene.toml", "out"}
     first.communicate()
 
 
-def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
+def test_exact_lock_owner_is_process_start_and_host(tmp_path):
+    """A lock is free if its process number, start time and host show that the owner has ended."""
     path = tmp_path / "lock"
     pid = os.getppid()
-    own = FolderLock(path, "out", "run")
-    for text, free in (
+    lock = FolderLock(path, "out", "run")
+    for text, is_free in (
         (f"{pid} {read_start_ticks(pid)} {HOST_HASH}", False),
         (f"{pid} 17 {HOST_HASH}", True),
         (f"{pid} - {HOST_HASH}", False),
@@ -125,103 +132,108 @@ def test_exact_an_owner_is_a_number_a_start_and_a_machine(tmp_path):
         (f"{pid} 17 01234567", False),
         (f"4194305 17 {HOST_HASH}", True),
         (f"{os.getpid()} {read_start_ticks(os.getpid())} {HOST_HASH}", True),
-    ):  # its own, which never ended
+    ):  # its own lock, which was not released
         path.write_text(text, errors="surrogateescape")
-        if free:
-            own.acquire()
-            assert path.read_text() == own.owner and path in OWN_LOCK_PATHS
+        if is_free:
+            lock.acquire()
+            assert path.read_text() == lock.owner and path in OWN_LOCK_PATHS
             with pytest.raises(Missing):  # another thread
                 FolderLock(path, "out", "run").acquire()
-            own.release()
+            lock.release()
             assert not path.exists() and path not in OWN_LOCK_PATHS
         else:
             with pytest.raises(
                 Missing, match="of another machine" if "01234567" in text else r"process \d+\)"
             ):
-                own.acquire()
+                lock.acquire()
             assert path.read_text() == text
     path.write_text("4194305")
-    own.release()  # what another one owns stays
+    lock.release()  # a lock of another owner is not removed
     assert path.read_text() == "4194305"
     assert read_start_ticks(os.getpid()).isdecimal()
     assert not is_running(4194305)
     assert is_running(os.getpid())
 
 
-def test_refuses_a_claim_through_a_link_or_in_the_way(tmp_path):
+def test_refuses_lock_through_link_or_over_folder(tmp_path):
+    """A lock is refused if its path is a link, a folder or in a missing folder."""
     (tmp_path / "mine.txt").write_text("mine")
     (tmp_path / "link").symlink_to(tmp_path / "mine.txt")
     (tmp_path / "folder").mkdir()
     for name in ("link", "folder", "none/lock"):
         with pytest.raises(Missing, match="out: cannot be written"):
             FolderLock(tmp_path / name, "out", "run").acquire()
-    assert (tmp_path / "mine.txt").read_text() == "mine" and names(tmp_path) == {
+    assert (tmp_path / "mine.txt").read_text() == "mine" and list_names(tmp_path) == {
         "mine.txt",
         "link",
         "folder",
     }
 
 
-def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path):
-    """Part of a name once stayed behind, which no process could own or remove."""
+def test_exact_failed_lock_leaves_no_file(tmp_path):
+    """A lock that cannot be written because the disk is full leaves no file.
+
+    An incomplete lock could be owned or removed by no process.
+    """
     with limit_file_size(5):
         with pytest.raises(Missing, match=r"out: cannot be written.* \((No space left|File too)"):
             FolderLock(tmp_path / "lock", "out", "run").acquire()
         with pytest.raises(Missing, match="out: cannot be written"):
             SweepFolder(tmp_path / "out", [1]).__enter__()
-    assert not names(tmp_path)
+    assert not list_names(tmp_path)
 
 
-def test_refuses_a_second_sweep_and_leaves_the_first_its_folder(tmp_path):
-    """It once removed the folder of the answers, which was empty still, and the first one failed at its first case."""
+def test_refuses_second_sweep_without_removing_folder(tmp_path):
+    """A second sweep into the same folder is refused and does not remove the still empty folder of the first."""
     with SweepFolder(tmp_path / "out", [1]) as first:
         with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", [1]):
             pass
         writer = Writer(tmp_path / "out", "out", first.chunks.names, "summaries", first.token)
         assert writer([0], CaseResults.blank(1), ["{}"])
-    assert names(tmp_path / "out" / "cases" / f"{1:016x}") == {"summary.json"}
-    assert len(names(tmp_path / "out" / "chunks")) == 1
+    assert list_names(tmp_path / "out" / "cases" / f"{1:016x}") == {"summary.json"}
+    assert len(list_names(tmp_path / "out" / "chunks")) == 1
 
 
-def test_exact_exchange_leaves_nothing_behind(tmp_path):
+def test_exact_folder_exchange_leaves_no_temporary_files(tmp_path):
+    """Replacing a results folder leaves only the new folder."""
     for text in ("first", "second"):
         with Folder(tmp_path / "out") as folder:
             (folder.path / "summary.json").write_text(text)
             (folder.path / "fields_frames").mkdir()
-        assert names(tmp_path) == {"out"}
+        assert list_names(tmp_path) == {"out"}
         assert (tmp_path / "out" / "summary.json").read_text() == text
 
 
-def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
-    """A reader in a thread never misses the folder: with two renames it would."""
-    place = tmp_path / "out"
-    new = tmp_path / "new"
-    for one in place, new:
-        one.mkdir()
-    if not exchange.exchange_folders(new, place):
+def test_always_folder_exists_during_exchange(tmp_path):
+    """A reader finds the folder at every instant of an exchange, which two renames would not ensure."""
+    target = tmp_path / "out"
+    replacement = tmp_path / "new"
+    for folder in target, replacement:
+        folder.mkdir()
+    if not exchange.exchange_folders(replacement, target):
         pytest.skip("this file system cannot exchange two folders")
-    missed = []
-    end = threading.Event()
+    failures = []
+    stop = threading.Event()
 
-    def look():
-        while not end.is_set():
+    def poll_folder():
+        while not stop.is_set():
             try:
-                os.stat(place)
+                os.stat(target)
             except FileNotFoundError:
-                missed.append(1)
+                failures.append(1)
 
-    reader = threading.Thread(target=look)
+    reader = threading.Thread(target=poll_folder)
     reader.start()
     for _ in range(300):
-        new.mkdir(exist_ok=True)
-        exchange.replace_folder(new, place)
-    end.set()
+        replacement.mkdir(exist_ok=True)
+        exchange.replace_folder(replacement, target)
+    stop.set()
     reader.join()
-    assert not missed
+    assert not failures
 
 
 @pytest.mark.parametrize(
-    "n_moved, left",
+    "n_moved, expected_names",
     [
         (0, {"out", "out.partial", ".out.writer"}),
         (1, {".out.old", "out.partial", ".out.writer"}),
@@ -230,48 +242,55 @@ def test_always_there_is_a_folder_at_every_instant_of_an_exchange(tmp_path):
     ],
     ids=["before", "between", "behind", "never"],
 )
-def test_exact_a_kill_between_two_renames_loses_nothing(tmp_path, n_moved, left):
+def test_exact_kill_between_renames_preserves_results(tmp_path, n_moved, expected_names):
+    """After a kill between two renames the next run restores the older or the newer results."""
     out = tmp_path / "out"
     out.mkdir()
     (out / "summary.json").write_text("older")
-    code = KILLED
+    code = KILLED_CODE
     if n_moved == 2:  # killed before the older folder is removed
-        code = KILLED.replace(
+        code = KILLED_CODE.replace(
             "moved = os.rename, []",
             "moved = os.rename, []\n"
             "exchange.shutil.rmtree = lambda path, **_: path.exists() and os._exit(9)",
         )
     done = subprocess.run([*PYTHON, code, out, str(n_moved)])
-    assert done.returncode == (0 if n_moved == 9 else 9) and names(tmp_path) == left
+    assert done.returncode == (0 if n_moved == 9 else 9) and list_names(tmp_path) == expected_names
     with pytest.raises(ZeroDivisionError), Folder(out) as folder:
         assert (out / "summary.json").read_text() == ("older" if n_moved < 2 else "new")
         raise ZeroDivisionError
-    assert folder.target == out and names(tmp_path) == {"out"}
+    assert folder.target == out and list_names(tmp_path) == {"out"}
 
 
-def test_refuses_to_remove_what_is_not_its_own(tmp_path):
+def test_refuses_to_remove_foreign_files(tmp_path):
+    """Folders with files that the program did not write are not removed."""
     for name in ("out", "out.partial", ".out.old"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "mine.txt").write_text("mine")
         with pytest.raises(Exception, match=r"mine\.txt"), Folder(tmp_path / "out"):
             pass
-        assert names(tmp_path) == {name}
+        assert list_names(tmp_path) == {name}
         (tmp_path / name / "mine.txt").unlink()
         (tmp_path / name).rmdir()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_exact_a_signal_in_the_exchange_waits_until_it_is_done(tmp_path, monkeypatch, number):
-    before = signal.signal(number, signal.default_int_handler)
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_exact_signal_during_exchange_is_deferred(tmp_path, monkeypatch, signal_number):
+    """A signal during the exchange of folders takes effect after the exchange."""
+    old_handler = signal.signal(signal_number, signal.default_int_handler)
     real = exchange.exchange_folders
     monkeypatch.setattr(
-        exchange, "exchange_folders", lambda *both: signal.raise_signal(number) or real(*both)
+        exchange,
+        "exchange_folders",
+        lambda *both: signal.raise_signal(signal_number) or real(*both),
     )
     try:
         (tmp_path / "out").mkdir()
         with pytest.raises(KeyboardInterrupt), Folder(tmp_path / "out") as folder:
             (folder.path / "summary.json").write_text("new")
-        assert signal.getsignal(number) is signal.default_int_handler
+        assert signal.getsignal(signal_number) is signal.default_int_handler
     finally:
-        signal.signal(number, before)
-    assert names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == "new"
+        signal.signal(signal_number, old_handler)
+    assert (
+        list_names(tmp_path) == {"out"} and (tmp_path / "out" / "summary.json").read_text() == "new"
+    )

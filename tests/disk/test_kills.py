@@ -1,5 +1,4 @@
-"""Killed at any step that touches the disk, and at random times: older or newer results are there, whole, and the next
-run leaves nothing else."""
+"""After a kill at any step or time the older or the newer results are complete, and the next run removes the rest."""
 
 import json
 import random
@@ -75,7 +74,8 @@ print(kills)
 
 
 @pytest.mark.parametrize("kind", ["in one", "in two"])
-def test_always_a_kill_at_any_step_leaves_older_or_newer_results_whole(tmp_path, kind):
+def test_always_kill_at_any_step_leaves_complete_results(tmp_path, kind):
+    """After a kill at any file operation the older or the newer results are complete."""
     done = subprocess.run(
         [sys.executable, "-c", STEPS, tmp_path, kind], text=True, capture_output=True, timeout=120
     )
@@ -84,39 +84,39 @@ def test_always_a_kill_at_any_step_leaves_older_or_newer_results_whole(tmp_path,
 
 
 @pytest.mark.slow
-def test_always_runs_killed_at_random_times_leave_whole_results(tmp_path):
-    """Fifty runs into a folder of older results, killed anywhere from their start to behind their end."""
+def test_always_kill_at_random_time_leaves_complete_results(tmp_path):
+    """Fifty runs that are killed at random times leave complete results."""
     scene = tmp_path / "scene.toml"
     out = tmp_path / "out"
-    chance = random.Random(17)
+    rng = random.Random(17)
     scene.write_text(BENCH, "utf-8")
     assert run_cli("run", scene, "-o", out).code == 0
-    words = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", out]
-    begin = time.perf_counter()
-    assert subprocess.run(words, check=True).returncode == 0
-    span = time.perf_counter() - begin
-    killed = 0
+    command = [sys.executable, "-m", "patchfem", "run", scene, "-q", "-o", out]
+    start = time.perf_counter()
+    assert subprocess.run(command, check=True).returncode == 0
+    duration = time.perf_counter() - start
+    n_killed = 0
     for _ in range(50):
-        run = subprocess.Popen(words)
-        time.sleep(chance.uniform(0.2, 1.1) * span)
+        run = subprocess.Popen(command)
+        time.sleep(rng.uniform(0.2, 1.1) * duration)
         run.kill()
-        killed += run.wait() == -9
-        assert {one.name for one in tmp_path.iterdir()} <= {
+        n_killed += run.wait() == -9
+        assert {path.name for path in tmp_path.iterdir()} <= {
             "scene.toml",
             "out",
             "out.partial",
             ".out.old",
             ".out.writer",
         }
-        whole(out)
-    assert killed > 20
+        check_complete(out)
+    assert n_killed > 20
     assert run_cli("run", scene, "-q", "-o", out).code == 0
-    assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
-    whole(out)
+    assert {path.name for path in tmp_path.iterdir()} == {"scene.toml", "out"}
+    check_complete(out)
 
 
-def whole(out) -> None:
-    """A results folder can be read, every file of it."""
+def check_complete(out) -> None:
+    """Check that every file of a results folder can be read."""
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with h5netcdf.File(out / "result.nc", "r") as file:
         assert file.dimensions["time"].size > 10

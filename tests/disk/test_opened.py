@@ -1,4 +1,4 @@
-"""Pipes as scenes: one that begins late is read, one that nobody writes to is refused."""
+"""Pipes as scenes: a pipe that begins late is read, and a pipe without a writer is refused."""
 
 import os
 import threading
@@ -14,18 +14,20 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system h
 
 
 @pytest.fixture
-def pipe(tmp_path):
+def named_pipe(tmp_path):
+    """Path of a named pipe."""
     os.mkfifo(tmp_path / "x.toml")
     return tmp_path / "x.toml"
 
 
-def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
-    # more than a pipe holds at once
+def test_exact_slow_pipe_is_read_completely(named_pipe):
+    # more than the capacity of a pipe
+    """A pipe whose writer starts late and pauses is read completely."""
     parts = ("[friction]\n", "# " + "x" * 200_000 + "\n", "static = 0.3\n")
 
     def write():
         time.sleep(0.1)
-        with open(pipe, "w", encoding="utf-8") as file:
+        with open(named_pipe, "w", encoding="utf-8") as file:
             for part in parts:
                 file.write(part)
                 file.flush()
@@ -33,36 +35,40 @@ def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
 
     writer = threading.Thread(target=write)
     writer.start()
-    assert toml_text.read_text(pipe) == "".join(parts)
+    assert toml_text.read_text(named_pipe) == "".join(parts)
     writer.join()
 
 
-def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
-    """It once held `check` and every other verb for ever."""
+def test_refuses_pipe_without_writer(named_pipe, monkeypatch):
+    """A pipe without a writer is refused after a timeout."""
     monkeypatch.setattr(open_with_timeout, "PIPE_TIMEOUT", 0.1)
     with pytest.raises(
         scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"
     ):
-        toml_text.read_text(pipe)
-    assert read_case_table(pipe)[1] == [
-        f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
+        toml_text.read_text(named_pipe)
+    assert read_case_table(named_pipe)[1] == [
+        f"{named_pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"
     ]
 
 
-def test_always_a_system_without_such_pipes_reads_its_files(tmp_path, monkeypatch):
-    """On Windows set_blocking, there from Python 3.12 on, refuses whatever is no pipe."""
+def test_always_files_are_read_without_nonblocking_mode(tmp_path, monkeypatch):
+    """Files are read on systems without non-blocking mode.
 
-    def refused(*given):
+    On Windows `os.set_blocking`, which exists since Python 3.12, fails for anything but a pipe.
+    """
+
+    def raise_error(*arguments):
         raise OSError(1, "not a pipe")
 
     monkeypatch.delattr(os, "O_NONBLOCK")
-    monkeypatch.setattr(os, "set_blocking", refused)
+    monkeypatch.setattr(os, "set_blocking", raise_error)
     (tmp_path / "x.toml").write_bytes(b"a = 1\r\n\x1a")
     with open_with_timeout.open_for_reading(tmp_path / "x.toml") as file:
         assert file.read() == b"a = 1\r\n\x1a"
 
 
-def test_exact_what_cannot_be_read_is_closed(tmp_path):
+def test_exact_unreadable_path_leaves_no_open_descriptor(tmp_path):
+    """A path that cannot be read leaves no open file descriptor."""
     before = len(os.listdir("/dev/fd"))
     for _ in range(3):
         with pytest.raises(IsADirectoryError):

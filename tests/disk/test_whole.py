@@ -1,4 +1,4 @@
-"""Files are whole or not there: every kind of file under limits on its size, devices, and what killed writers leave."""
+"""Files are complete or absent: file size limits, devices, interrupts, and remains of killed writers."""
 
 import errno
 import io
@@ -30,38 +30,40 @@ SIZES = [1 << 10, 1 << 14, 1 << 16]
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """(scene, results folder) of pressed pieces."""
-    place = tmp_path_factory.mktemp("results")
-    (place / "scene.toml").write_text(COATED, "utf-8")
-    assert run_cli("run", place / "scene.toml", "-o", place / "out", "--no-page").code == 0
-    return place / "scene.toml", place / "out"
+def results_folder(tmp_path_factory):
+    """Scene and results folder of two pressed pieces."""
+    folder = tmp_path_factory.mktemp("results")
+    (folder / "scene.toml").write_text(COATED, "utf-8")
+    assert run_cli("run", folder / "scene.toml", "-o", folder / "out", "--no-page").code == 0
+    return folder / "scene.toml", folder / "out"
 
 
 @pytest.mark.parametrize("size", SIZES)
-def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_results(
-    results, tmp_path, size
-):
+def test_always_run_without_space_preserves_older_results(results_folder, tmp_path, size):
+    """A run without enough space preserves the older results and reports the path, the space needed and the limit."""
     scene = tmp_path / "scene.toml"
     out = tmp_path / "out"
     scene.write_text(COATED, "utf-8")
     out.mkdir()
     (out / "summary.json").write_text("older")
     with limit_file_size(size):
-        answer = run_cli("run", scene, "-o", out)
+        result = run_cli("run", scene, "-o", out)
     assert (
-        answer.code == 4 and len(answer.err.splitlines()) == 1 and "out.partial/" in answer.err
-    ), answer.err
-    assert "needed" in answer.err
-    assert f"{size / 1e3:.3g} kB is the limit on the size of a file" in answer.err
-    assert [one.name for one in out.iterdir()] == ["summary.json"] and (
+        result.code == 4 and len(result.err.splitlines()) == 1 and "out.partial/" in result.err
+    ), result.err
+    assert "needed" in result.err
+    assert f"{size / 1e3:.3g} kB is the limit on the size of a file" in result.err
+    assert [path.name for path in out.iterdir()] == ["summary.json"] and (
         out / "summary.json"
     ).read_text() == "older"
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["out", "scene.toml"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
 
 
-def test_exact_a_process_without_room_ends_with_4_and_not_by_a_signal(tmp_path):
-    """HDF5 once wrote again what had not enough space when the process ended with a thread at work, and died of it."""
+def test_exact_process_without_space_exits_with_code_4(tmp_path):
+    """A process without enough space exits with code 4 and not by a signal.
+
+    HDF5 repeats failed writes when the process ends while a thread runs, which crashed the process.
+    """
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     code = (
         "import resource, threading; resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536)); "
@@ -96,33 +98,38 @@ def test_exact_a_process_without_room_ends_with_4_and_not_by_a_signal(tmp_path):
     ],
     ids=" ".join,
 )
-def test_always_every_file_is_the_older_one_where_there_is_no_room(
-    results, tmp_path, monkeypatch, words
+def test_always_output_file_is_unchanged_without_space(
+    results_folder, tmp_path, monkeypatch, words
 ):
+    """Every kind of output file is unchanged if there is not enough space for the new file."""
     monkeypatch.chdir(tmp_path)
     name = words[-1]
     Path(name).write_text("older")
     with limit_file_size(2048):
-        answer = run_cli(
-            *({"SCENE": results[0], "OUT": results[1]}.get(word, word) for word in words)
+        result = run_cli(
+            *(
+                {"SCENE": results_folder[0], "OUT": results_folder[1]}.get(word, word)
+                for word in words
+            )
         )
     assert (
-        answer.code == 4
-        and "not enough space" in answer.err
-        and "2.05 kB is the limit" in answer.err
-    ), answer.err
-    assert len(answer.err.splitlines()) == 1
+        result.code == 4
+        and "not enough space" in result.err
+        and "2.05 kB is the limit" in result.err
+    ), result.err
+    assert len(result.err.splitlines()) == 1
     assert Path(name).read_text() == "older"
     assert [
-        one for one in tmp_path.rglob("*") if one.is_file() and one.stat().st_size == 2048
+        path for path in tmp_path.rglob("*") if path.is_file() and path.stat().st_size == 2048
     ] == []
-    assert {one.name for one in tmp_path.iterdir()} <= {name, "a_frames"}
+    assert {path.name for path in tmp_path.iterdir()} <= {name, "a_frames"}
 
 
 @pytest.mark.skipif(
     not Path("/dev/full").exists(), reason="a device that is always full is Linux's"
 )
-def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
+def test_exact_device_is_written_and_preserved(tmp_path):
+    """Output to a device is written to the device, which is not replaced by a file."""
     for device, code in ("/dev/full", 4), ("/dev/null", 0):
         answer = run_cli("schema", "-o", device)
         assert answer.code == code and stat.S_ISCHR(os.stat(device).st_mode)
@@ -130,7 +137,8 @@ def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
 
 
 @pytest.mark.parametrize("size", [0, 100, 2048, 5000, 40_000, 81_000])
-def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, size):
+def test_exact_hdf5_file_closes_cleanly_without_space(tmp_path, size):
+    """An HDF5 file closes cleanly with an OSError for any limit on the file size."""
     data = np.arange(10_000.0)
     with (
         limit_file_size(size),
@@ -145,40 +153,45 @@ def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, 
 
 
 @pytest.mark.parametrize("raised", [ValueError, KeyboardInterrupt, OSError])
-def test_exact_what_is_not_whole_replaces_nothing(tmp_path, raised):
+def test_exact_interrupted_write_preserves_older_file(tmp_path, raised):
+    """An exception during writing preserves the older file and leaves no partial file."""
     path = tmp_path / "a.txt"
     path.write_text("older")
     with pytest.raises(Missing if raised is OSError else raised), write_atomically(path) as partial:
         partial.write_text("new")
         raise raised("an end")
-    assert [one.name for one in tmp_path.iterdir()] == ["a.txt"] and path.read_text() == "older"
-    write_text(path, "größer")
-    assert path.read_bytes() == "größer".encode() and [one.name for one in tmp_path.iterdir()] == [
+    assert [other_path.name for other_path in tmp_path.iterdir()] == [
         "a.txt"
-    ]
+    ] and path.read_text() == "older"
+    write_text(path, "größer")
+    assert path.read_bytes() == "größer".encode() and [
+        other_path.name for other_path in tmp_path.iterdir()
+    ] == ["a.txt"]
     assert PLACED_PATHS[-1] == path
 
 
-def test_exact_what_a_killed_writer_left_goes_with_the_next_one_of_the_name(tmp_path):
+def test_exact_partial_file_of_killed_writer_is_removed(tmp_path):
+    """The next write of a file removes the partial file of a writer that has ended, and no other file."""
     path = tmp_path / "a.vtu"
     name = make_partial_path(tmp_path / "a.vtu").name
-    # beyond the largest number of a process
-    dead = tmp_path / name.replace(str(os.getpid()), "4194305")
-    living = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
-    other = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
-    for one in dead, living, other, tmp_path / ".a.mine.vtu":
-        one.write_text("half")
-        assert is_partial_name(one.name) == (one.name != ".a.mine.vtu")
+    # larger than any process number
+    ended = tmp_path / name.replace(str(os.getpid()), "4194305")
+    running = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
+    of_other_file = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
+    for partial_path in ended, running, of_other_file, tmp_path / ".a.mine.vtu":
+        partial_path.write_text("half")
+        assert is_partial_name(partial_path.name) == (partial_path.name != ".a.mine.vtu")
     write_text(path, "new")
-    assert {one.name for one in tmp_path.iterdir()} == {
-        living.name,
-        other.name,
+    assert {partial_path.name for partial_path in tmp_path.iterdir()} == {
+        running.name,
+        of_other_file.name,
         ".a.mine.vtu",
         "a.vtu",
     }
 
 
-def test_refuses_before_it_writes_what_has_no_room(tmp_path):
+def test_refuses_oversized_write_in_advance(tmp_path):
+    """A write larger than the free space or the size limit is refused before it begins."""
     space = find_free_space(tmp_path / "not" / "yet" / "a")
     assert space.size > 0 and ("free" in space.limit or "limit" in space.limit)
     with limit_file_size(100):
@@ -195,26 +208,28 @@ def test_refuses_before_it_writes_what_has_no_room(tmp_path):
     assert (tmp_path / "a").stat().st_size == 100
 
 
-def test_refuses_a_place_that_cannot_be_written(tmp_path):
+def test_refuses_unwritable_path(tmp_path):
+    """A path that is a folder, in a missing folder or too long is refused."""
     (tmp_path / "folder").mkdir()
-    for place in tmp_path / "folder", tmp_path / "none" / "a", tmp_path / ("a" * 300):
+    for path in tmp_path / "folder", tmp_path / "none" / "a", tmp_path / ("a" * 300):
         with pytest.raises(Missing, match="cannot be written"):
-            write_text(place, "text")
+            write_text(path, "text")
     assert [one.name for one in tmp_path.iterdir()] == ["folder"] and not list(
         (tmp_path / "folder").iterdir()
     )
 
 
-def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
+def test_exact_sweep_without_space_preserves_cases(tmp_path):
+    """A sweep without space for its table preserves its finished cases, and `--resume` completes it."""
     scene = tmp_path / "scene.toml"
     scene.write_text(BENCH, "utf-8")
-    words = ("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "out", "-q")
-    with limit_file_size(8192):  # a summary has room, the table with the page has not
-        answer = run_cli(*words)
-    assert answer.code == 4 and "not enough space" in answer.err and "out/" in answer.err
+    command = ("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "out", "-q")
+    with limit_file_size(8192):  # there is space for a summary, but not for the table with the page
+        result = run_cli(*command)
+    assert result.code == 4 and "not enough space" in result.err and "out/" in result.err
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2
-    assert not [one for one in (tmp_path / "out").rglob("*") if one.name.startswith(".")]
-    assert run_cli(*words, "--resume").code == 0
+    assert not [path for path in (tmp_path / "out").rglob("*") if path.name.startswith(".")]
+    assert run_cli(*command, "--resume").code == 0
 
 
 class InterruptedStream(io.StringIO):
@@ -225,7 +240,8 @@ class InterruptedStream(io.StringIO):
         raise KeyboardInterrupt
 
 
-def test_exact_an_interrupt_after_a_file_is_in_place_names_the_file(tmp_path, monkeypatch):
+def test_exact_interrupt_after_write_reports_file(tmp_path, monkeypatch):
+    """An interrupt after a file is in place reports the file as complete."""
     monkeypatch.chdir(tmp_path)
     Path("a.json").write_text("older")
     answer = run_cli("schema", "-o", "a.json", stdout=InterruptedStream())
@@ -234,7 +250,8 @@ def test_exact_an_interrupt_after_a_file_is_in_place_names_the_file(tmp_path, mo
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
 
 
-def test_exact_an_interrupt_before_a_file_is_replaced_says_that(tmp_path, monkeypatch):
+def test_exact_interrupt_before_write_reports_no_file(tmp_path, monkeypatch):
+    """An interrupt before a file is in place reports that no file was replaced."""
     monkeypatch.chdir(tmp_path)
     Path("a.json").write_text("older")
 
@@ -248,7 +265,8 @@ def test_exact_an_interrupt_before_a_file_is_replaced_says_that(tmp_path, monkey
     assert [path.name for path in tmp_path.iterdir()] == ["a.json"]
 
 
-def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):
+def test_always_partial_folder_file_reports_missing_space(tmp_path):
+    """A file in a partial folder without enough space reports the space needed and the limit."""
     with (
         limit_file_size(1000),
         pytest.raises(
@@ -260,24 +278,28 @@ def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path)
     assert (tmp_path / "a.json").read_text() == "? is no letter"
 
 
-def test_exact_a_full_table_of_files_is_told_as_that(tmp_path, monkeypatch):
-    """It said how many bytes were free, beside the few that were wanted."""
-    place = os.statvfs(tmp_path)
-    for found, said in (
+def test_exact_exhausted_inodes_are_reported(tmp_path, monkeypatch):
+    """A file system without free inodes is reported as such and not as lack of bytes."""
+    real_system = os.statvfs(tmp_path)
+    for counts, message in (
         ((9, 0), "inodes"),
         ((9, 5), "needed"),
         ((0, 0), "needed"),
-    ):  # the last has no such table
-        full = SimpleNamespace(
-            f_files=found[0], f_favail=found[1], f_bavail=place.f_bavail, f_frsize=place.f_frsize
+    ):  # a file system without an inode table
+        file_system = SimpleNamespace(
+            f_files=counts[0],
+            f_favail=counts[1],
+            f_bavail=real_system.f_bavail,
+            f_frsize=real_system.f_frsize,
         )
-        monkeypatch.setattr(os, "statvfs", lambda path, full=full: full)
-        with pytest.raises(Missing, match=said), write_atomically(tmp_path / "a"):
+        monkeypatch.setattr(os, "statvfs", lambda path, full=file_system: full)
+        with pytest.raises(Missing, match=message), write_atomically(tmp_path / "a"):
             raise OSError(errno.ENOSPC, "No space left on device")
 
 
 @pytest.mark.parametrize("words", [("run",), ("sweep", "--over", "friction.static=0.2,0.3")])
-def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
+def test_always_output_folder_below_file_is_refused(tmp_path, words):
+    """An output folder below a file is refused with the name of the file."""
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "FILE").write_text("")
     answer = run_cli(words[0], tmp_path / "bench.toml", *words[1:], "-o", tmp_path / "FILE" / "x")
@@ -285,13 +307,15 @@ def test_always_a_folder_under_a_file_names_the_file(tmp_path, words):
     assert f"{tmp_path / 'FILE'} is a file; choose another folder" in answer.err
 
 
-def test_always_a_name_that_is_too_long_wants_a_shorter_one(tmp_path):
+def test_always_too_long_name_is_refused_with_advice(tmp_path):
+    """A folder name that is too long is refused with advice to use a shorter name."""
     (tmp_path / "bench.toml").write_text(BENCH)
     answer = run_cli("run", tmp_path / "bench.toml", "-o", tmp_path / ("a" * 250))
     assert answer.code == 4 and answer.err.rstrip().endswith("use a shorter name")
 
 
-def test_always_a_working_folder_that_is_gone_is_named(tmp_path, monkeypatch):
+def test_always_missing_working_folder_is_reported(tmp_path, monkeypatch):
+    """A working folder that no longer exists is reported."""
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")

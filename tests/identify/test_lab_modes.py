@@ -1,4 +1,4 @@
-"""Modes from records: closed-form responses give back their numbers, a window its bias, friction its sentence."""
+"""Modes from records: closed-form responses give the exact modes, and notes report window bias and friction."""
 
 import numpy as np
 import pytest
@@ -15,128 +15,142 @@ HERTZ = OMEGA / (2 * np.pi)
 
 @pytest.mark.share(0, 2)
 @pytest.mark.parametrize("quantity", ["displacement", "velocity", "acceleration"])
-def test_exact_a_record_gives_its_modes_back_where_the_windowed_estimate_does_not(quantity):
-    """Segments of 0.26 s blur the 143 Hz peak, 1.1 Hz wide; the record itself has no window."""
+def test_exact_modes_from_record_without_window_bias(quantity):
+    """The modes fitted to a record are exact, while the windowed estimate overestimates the damping.
+
+    Segments of 0.26 s widen the peak at 143 Hz, which is 1.1 Hz wide.
+    """
     force, response = driven_response(quantity)
     estimate = estimate_response(STEP, force, response)
-    found = fit_driven_modes(STEP, force, response, quantity, estimate)
-    np.testing.assert_allclose(found.frequency, HERTZ, rtol=1e-9)
-    np.testing.assert_allclose(found.damping, ZETA, rtol=1e-7)
-    np.testing.assert_allclose(found.residue, RESIDUE, rtol=1e-7)
-    assert estimate.segments == 15 and estimate.window == "hann" and found.misfit < 1e-8
-    assert found.estimate_damping[0] > 1.5 * ZETA[0]
-    assert 0.2 < found.coherence[0] < found.coherence[1] < 1
+    modes = fit_driven_modes(STEP, force, response, quantity, estimate)
+    np.testing.assert_allclose(modes.frequency, HERTZ, rtol=1e-9)
+    np.testing.assert_allclose(modes.damping, ZETA, rtol=1e-7)
+    np.testing.assert_allclose(modes.residue, RESIDUE, rtol=1e-7)
+    assert estimate.segments == 15 and estimate.window == "hann" and modes.misfit < 1e-8
+    assert modes.estimate_damping[0] > 1.5 * ZETA[0]
+    assert 0.2 < modes.coherence[0] < modes.coherence[1] < 1
 
 
-def test_exact_a_blow_that_rings_out_within_the_record_needs_no_window():
-    """A bell-shaped blow and modes that lose e^-9 and more: one segment, whose H1 is H wherever the blow has power."""
-    lines = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
+def test_exact_modes_from_impact_without_window():
+    """An impact whose response decays within the record is analysed in one segment without window, exactly."""
+    s = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
     force = 50 * np.exp(-(((TIME - 0.4) / 1e-3) ** 2))
-    H = sum(a / (w * w + lines**2 + 0.04 * w * lines) for w, a in zip(OMEGA, RESIDUE))
-    response = np.fft.irfft(lines**2 * H * np.fft.rfft(force), SAMPLES)
-    found = estimate_response(STEP, force, response)
-    assert found.window == "none" and found.segments == 1 and found.coherence is None
-    truth = (lines**2 * H)[np.searchsorted(lines.imag / (2 * np.pi), found.frequency - 1e-6)]
-    np.testing.assert_allclose(found.value, truth, rtol=1e-8)
-    modes = fit_driven_modes(STEP, force, response, "acceleration", found)
+    H = sum(a / (w * w + s**2 + 0.04 * w * s) for w, a in zip(OMEGA, RESIDUE))
+    response = np.fft.irfft(s**2 * H * np.fft.rfft(force), SAMPLES)
+    impact_estimate = estimate_response(STEP, force, response)
+    assert (
+        impact_estimate.window == "none"
+        and impact_estimate.segments == 1
+        and impact_estimate.coherence is None
+    )
+    expected = (s**2 * H)[np.searchsorted(s.imag / (2 * np.pi), impact_estimate.frequency - 1e-6)]
+    np.testing.assert_allclose(impact_estimate.value, expected, rtol=1e-8)
+    modes = fit_driven_modes(STEP, force, response, "acceleration", impact_estimate)
     np.testing.assert_allclose(modes.damping, 0.02, rtol=1e-7)
     np.testing.assert_allclose(modes.estimate_damping, 0.02, rtol=1e-6)
-    listed = identify_driven_modes(
+    identified = identify_driven_modes(
         {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
     )
-    assert not listed.notes and listed.mass == pytest.approx(1 / 1.2, rel=1e-7)
+    assert not identified.notes and identified.mass == pytest.approx(1 / 1.2, rel=1e-7)
 
 
-def test_order_coherence_is_the_share_of_the_response_that_follows_the_input():
-    """White noise of variance r beside a unit response: 1/(1 + r), within the scatter of 127 segments."""
+def test_order_coherence_with_white_noise():
+    """The coherence with white noise of variance r on a unit response is 1/(1 + r) within the scatter."""
     rng = np.random.default_rng(2)
     force = rng.normal(size=2**15)
     for r in (0.25, 1.0):
-        found = estimate_response(
+        modes = estimate_response(
             STEP, force, force + np.sqrt(r) * rng.normal(size=force.size), 512, "hann"
         )
-        assert np.mean(found.coherence) == pytest.approx(1 / (1 + r), abs=0.02)
-        assert abs(np.mean(found.value) - 1) < 0.02
+        assert np.mean(modes.coherence) == pytest.approx(1 / (1 + r), abs=0.02)
+        assert abs(np.mean(modes.value) - 1) < 0.02
 
 
-def test_always_noise_leaves_the_damping_within_its_error():
+def test_always_noisy_damping_is_within_stated_error():
+    """The damping from a record with 10 % noise is within 1.5 times its stated error."""
     force, response = driven_response("acceleration")
     noisy = response + 0.1 * np.std(response) * np.random.default_rng(3).normal(size=SAMPLES)
-    found = fit_driven_modes(
+    modes = fit_driven_modes(
         STEP, force, noisy, "acceleration", estimate_response(STEP, force, noisy)
     )
-    assert found.frequency.size == 2 and found.misfit == pytest.approx(0.1, rel=0.05)
-    assert (np.abs(found.damping - ZETA) < 1.5 * found.damping_error).all()  # 1.5 of 95 %: 3 sigma
-    np.testing.assert_allclose(found.damping, ZETA, rtol=0.02)
+    assert modes.frequency.size == 2 and modes.misfit == pytest.approx(0.1, rel=0.05)
+    assert (
+        np.abs(modes.damping - ZETA) < 1.5 * modes.damping_error
+    ).all()  # 1.5 times the 95 % error is about three standard deviations
+    np.testing.assert_allclose(modes.damping, ZETA, rtol=0.02)
 
 
 @pytest.mark.parametrize("amplitudes", [(0.3, 0.2), (0.3, 0.0)])
-def test_exact_a_free_decay_gives_frequency_damping_and_decrement(amplitudes):
-    found = fit_decay(*free_decay(amplitudes))
+def test_exact_free_decay_frequency_damping_and_decrement(amplitudes):
+    """Frequency, damping, amplitude and decrement of a free decay of one or two modes are exact."""
+    modes = fit_decay(*free_decay(amplitudes))
     n = int(np.count_nonzero(amplitudes))
-    np.testing.assert_allclose(found.frequency, HERTZ[:n], rtol=1e-10)
-    np.testing.assert_allclose(found.damping, ZETA[:n], rtol=1e-8)
-    np.testing.assert_allclose(found.amplitude, amplitudes[:n], rtol=1e-8)
+    np.testing.assert_allclose(modes.frequency, HERTZ[:n], rtol=1e-10)
+    np.testing.assert_allclose(modes.damping, ZETA[:n], rtol=1e-8)
+    np.testing.assert_allclose(modes.amplitude, amplitudes[:n], rtol=1e-8)
     np.testing.assert_allclose(
-        found.decrement(), 2 * np.pi * ZETA[:n] / np.sqrt(1 - ZETA[:n] ** 2), rtol=1e-8
+        modes.decrement(), 2 * np.pi * ZETA[:n] / np.sqrt(1 - ZETA[:n] ** 2), rtol=1e-8
     )
 
 
-def test_always_a_noisy_decay_lies_within_its_error():
+def test_always_noisy_decay_is_within_stated_error():
+    """The damping from a decay with noise is within 1.6 times its stated error."""
     time, value = free_decay()
     rng = np.random.default_rng(4)
     for _ in range(2):
-        found = fit_decay(time, value + 0.01 * rng.normal(size=time.size))
-        assert (np.abs(found.damping - ZETA) < 1.6 * found.damping_error).all()
+        modes = fit_decay(time, value + 0.01 * rng.normal(size=time.size))
+        assert (np.abs(modes.damping - ZETA) < 1.6 * modes.damping_error).all()
 
 
-def test_always_a_decay_by_dry_friction_is_said_not_to_be_exponential():
-    """Coulomb friction takes the same from every cycle: a straight line, then rest."""
+def test_always_friction_decay_is_reported_as_not_exponential():
+    """A decay by dry friction is reported as not exponential, and is fitted by a single mode."""
     time = TIME[:2000]
     value = np.maximum(1 - time / 0.6, 0) * np.cos(OMEGA[0] * time)
-    found = identify_decay_modes({"time": time, "displacement": value}, 0.0)
-    assert any("exponential, as with friction damping" in note for note in found.notes)
-    # one mode, not the several that would make the line
-    assert found.frequency == pytest.approx(HERTZ[:1], rel=1e-3)
-    clean = identify_decay_modes(dict(zip(("time", "displacement"), free_decay())), 0.0)
-    assert len(clean.notes) == 1 and "logarithmic decrement" in clean.descriptions[0]
+    modes = identify_decay_modes({"time": time, "displacement": value}, 0.0)
+    assert any("exponential, as with friction damping" in note for note in modes.notes)
+    # a single mode, not several modes that approximate the straight line
+    assert modes.frequency == pytest.approx(HERTZ[:1], rel=1e-3)
+    exponential = identify_decay_modes(dict(zip(("time", "displacement"), free_decay())), 0.0)
+    assert len(exponential.notes) == 1 and "logarithmic decrement" in exponential.descriptions[0]
 
 
-def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
+def test_exact_modal_mass_from_driven_point_response():
+    """A response at the driven point gives the modal mass and the output rows, with a note on the window."""
     force, response = driven_response("acceleration")
-    found = identify_driven_modes(
+    modes = identify_driven_modes(
         {"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf)
     )
-    assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
-    np.testing.assert_allclose(found.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
-    assert "widen the peak at 143 Hz" in found.notes[0]
-    assert "0.004, and the value from the whole" in found.notes[0]
+    assert modes.mass == pytest.approx(1 / 1.2, rel=1e-6)
+    np.testing.assert_allclose(modes.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
+    assert "widen the peak at 143 Hz" in modes.notes[0]
+    assert "0.004, and the value from the whole" in modes.notes[0]
 
 
-def test_exact_base_motion_determines_participations_but_no_mass():
-    """Absolute acceleration of a block that holds 0.9 of its mass in two modes: A = -base * output each."""
+def test_exact_participation_from_base_motion():
+    """A record of base motion gives the participation factors of the modes but no modal mass."""
     base, relative = driven_response("acceleration")
-    found = identify_driven_modes(
+    modes = identify_driven_modes(
         {"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2},
         None,
         None,
         (0, np.inf),
     )
-    np.testing.assert_allclose(found.rows["base"] ** 2, RESIDUE / 2, rtol=1e-6)
-    np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE / 2, rtol=1e-6)
-    assert found.mass is None and "gives no modal mass" in found.notes[-1]
-    found = identify_driven_modes(
+    np.testing.assert_allclose(modes.rows["base"] ** 2, RESIDUE / 2, rtol=1e-6)
+    np.testing.assert_allclose(modes.rows["output"] * modes.rows["base"], RESIDUE / 2, rtol=1e-6)
+    assert modes.mass is None and "gives no modal mass" in modes.notes[-1]
+    modes = identify_driven_modes(
         {"time": TIME, "base_acceleration": base, "acceleration": base - relative},
         None,
         None,
         (0, np.inf),
     )
-    # more is not possible, the output grows
-    assert np.sum(found.rows["base"] ** 2) == pytest.approx(1, rel=1e-9)
-    np.testing.assert_allclose(found.rows["output"] * found.rows["base"], RESIDUE, rtol=1e-6)
+    # the participation cannot exceed one, so the output row is larger
+    assert np.sum(modes.rows["base"] ** 2) == pytest.approx(1, rel=1e-9)
+    np.testing.assert_allclose(modes.rows["output"] * modes.rows["base"], RESIDUE, rtol=1e-6)
 
 
-def test_refuses_records_by_name():
+def test_refuses_invalid_records_with_reason():
+    """Records with a wrong sign, without input, without modes in the band or unsuitable sampling are refused."""
     force, response = driven_response("acceleration")
     with pytest.raises(PatchfemError, match="moves against the force"):
         identify_driven_modes(

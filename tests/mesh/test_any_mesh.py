@@ -1,4 +1,4 @@
-"""Any tagged mesh of two pieces: triangles, quads or both, in four formats, and every unusable one refused by name."""
+"""Tagged meshes of two pieces, of triangles, quads or both, in four formats, and refusals of unusable meshes."""
 
 from __future__ import annotations
 
@@ -25,12 +25,13 @@ from patchfem.mesh import graded_grid, read_pieces, write_mesh
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 from patchfem.mesh.pairs import as_piece
 
-KINDS = ("quads", "triangles", "mixed")
+ELEMENT_KINDS = ("quads", "triangles", "mixed")
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ELEMENT_KINDS)
 @pytest.mark.parametrize("form", FORMATS)
-def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
+def test_exact_all_formats_give_same_pair(form, kind, tmp_path):
+    """Every format gives the same pair of pieces, with nodes, lengths, heights and coatings."""
     pair = write_and_read_pair(make_pair(kind), tmp_path, form)
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-12 * GRID.length
@@ -52,11 +53,12 @@ def test_exact_every_format_gives_the_same_pair(form, kind, tmp_path):
         )
 
 
-def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
-    m = make_pair("mixed")
-    lift = np.maximum(np.abs(m.points[:, 0]) - 0.5e-3, 0) ** 2 / 0.02
-    m.points[:, 1] += np.where(np.arange(len(lift)) < len(lift) // 2, -1, 1) * lift
-    pair = write_and_read_pair(m, tmp_path)
+def test_exact_rounded_ends_are_read_with_depths(tmp_path):
+    """The depths of gently rounded interface ends are read, and refinement interpolates them."""
+    mesh = make_pair("mixed")
+    heights = np.maximum(np.abs(mesh.points[:, 0]) - 0.5e-3, 0) ** 2 / 0.02
+    mesh.points[:, 1] += np.where(np.arange(len(heights)) < len(heights) // 2, -1, 1) * heights
+    pair = write_and_read_pair(mesh, tmp_path)
     for piece in (pair.lower, pair.upper):
         assert piece.interface_depths == pytest.approx(
             np.maximum(np.abs(GRID.x) - 0.5e-3, 0) ** 2 / 0.02, abs=1e-15
@@ -69,23 +71,25 @@ def test_exact_gently_rounded_edges_are_read_with_their_rise(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["pair.msh", "pair.vtu"])
-@pytest.mark.parametrize("kind", KINDS)
-def test_exact_any_pair_is_written_and_read_back_bit_by_bit(kind, name, tmp_path):
-    m = make_pair(kind)
-    m.points[m.points[:, 1] > 0] *= [1.0, 1.7]  # unlike pieces
-    pair = write_and_read_pair(m, tmp_path)
+@pytest.mark.parametrize("kind", ELEMENT_KINDS)
+def test_exact_mesh_pair_round_trip(kind, name, tmp_path):
+    """A pair of different pieces is written and read back bit for bit."""
+    mesh = make_pair(kind)
+    mesh.points[mesh.points[:, 1] > 0] *= [1.0, 1.7]  # unlike pieces
+    pair = write_and_read_pair(mesh, tmp_path)
     write_mesh(pair.lower, tmp_path / name, pair.upper)
-    back = read_pieces(tmp_path / name)
-    for mine, theirs in ((back.lower, pair.lower), (back.upper, pair.upper)):
+    read_pair = read_pieces(tmp_path / name)
+    for piece, expected in ((read_pair.lower, pair.lower), (read_pair.upper, pair.upper)):
         for part in ("points", "triangles", "quads", "is_coating", "interface", "far"):
-            assert np.array_equal(getattr(mine, part), getattr(theirs, part)), part
+            assert np.array_equal(getattr(piece, part), getattr(expected, part)), part
 
 
-def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
-    other = graded_grid(2e-3, 3e-3, 2.5e-4)
-    write_mesh(GRID, tmp_path / "pair.msh", other)
-    back = read_pieces(tmp_path / "pair.msh")
-    for piece, grid in ((back.lower, GRID), (back.upper, other)):
+def test_exact_different_grids_round_trip(tmp_path):
+    """Two different grids are written as one pair and read back with their nodes, elements and coatings."""
+    taller_grid = graded_grid(2e-3, 3e-3, 2.5e-4)
+    write_mesh(GRID, tmp_path / "pair.msh", taller_grid)
+    pair = read_pieces(tmp_path / "pair.msh")
+    for piece, grid in ((pair.lower, GRID), (pair.upper, taller_grid)):
         assert np.array_equal(piece.x, grid.x) and piece.height == grid.height
         assert piece.coating_thickness == pytest.approx(grid.coating_thickness, rel=1e-12)
         assert np.array_equal(
@@ -97,27 +101,30 @@ def test_exact_unlike_grids_are_written_as_the_pieces_they_are(tmp_path):
 
 
 @given(
-    order=st.randoms(use_true_random=False), shift=st.floats(-1.0, 1.0), kind=st.sampled_from(KINDS)
+    order=st.randoms(use_true_random=False),
+    shift=st.floats(-1.0, 1.0),
+    kind=st.sampled_from(ELEMENT_KINDS),
 )
-def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
+def test_always_numbering_orientation_and_shift_have_no_effect(
     order, shift, kind, tmp_path_factory
 ):
-    m = make_pair(kind)
-    new = list(range(len(m.points)))
-    order.shuffle(new)
-    new = np.array(new)
-    points = np.empty_like(m.points)
-    points[new] = m.points + np.array([shift, 0.0])
-    m.points, m.triangles, m.quads, m.edges = (
+    """The numbering, the orientation of elements and a shift along x have no effect on the pair that is read."""
+    mesh = make_pair(kind)
+    new_numbers = list(range(len(mesh.points)))
+    order.shuffle(new_numbers)
+    new_numbers = np.array(new_numbers)
+    points = np.empty_like(mesh.points)
+    points[new_numbers] = mesh.points + np.array([shift, 0.0])
+    mesh.points, mesh.triangles, mesh.quads, mesh.edges = (
         points,
-        new[m.triangles],
-        new[m.quads],
-        new[m.edges][:, ::-1],
+        new_numbers[mesh.triangles],
+        new_numbers[mesh.quads],
+        new_numbers[mesh.edges][:, ::-1],
     )
-    for cells in (m.triangles, m.quads):
+    for cells in (mesh.triangles, mesh.quads):
         for k in range(len(cells)):
             cells[k] = np.roll(cells[k][:: order.choice((-1, 1))], order.randrange(4))
-    pair = write_and_read_pair(m, tmp_path_factory.mktemp("any"))
+    pair = write_and_read_pair(mesh, tmp_path_factory.mktemp("any"))
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-14
         assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(
@@ -125,76 +132,82 @@ def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(
         )
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_exact_halved_piece_fills_the_same_place_with_four_times_the_cells(kind, tmp_path):
+@pytest.mark.parametrize("kind", ELEMENT_KINDS)
+def test_exact_refined_piece_has_same_outline(kind, tmp_path):
+    """A refined piece has the same outline and coating and four times the elements."""
     piece = write_and_read_pair(make_pair(kind), tmp_path).upper
-    fine = piece.refine()
-    assert fine.is_coating.size == 4 * piece.is_coating.size
-    assert fine.areas().min() > 0
-    assert fine.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)
-    assert np.all(np.diff(fine.x) > 0) and np.array_equal(fine.x[::2], piece.x)
-    assert fine.coating_thickness == pytest.approx(piece.coating_thickness)
-    assert fine.far.size == 2 * piece.far.size - 1 and np.all(
-        fine.points[fine.far, 1] == piece.height
+    refined = piece.refine()
+    assert refined.is_coating.size == 4 * piece.is_coating.size
+    assert refined.areas().min() > 0
+    assert refined.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)
+    assert np.all(np.diff(refined.x) > 0) and np.array_equal(refined.x[::2], piece.x)
+    assert refined.coating_thickness == pytest.approx(piece.coating_thickness)
+    assert refined.far.size == 2 * piece.far.size - 1 and np.all(
+        refined.points[refined.far, 1] == piece.height
     )
-    assert np.unique(fine.points.round(12), axis=0).shape == fine.points.shape
+    assert np.unique(refined.points.round(12), axis=0).shape == refined.points.shape
 
 
-def bend(m):
-    """Both ends of the upper interface chamfered by a slope of 0.2."""
-    upper = m.points[len(m.points) // 2 :]
-    upper[:, 1] += 0.2 * np.maximum(np.abs(upper[:, 0]) - 0.75e-3, 0)
+def chamfer_upper_ends(mesh):
+    """Move both ends of the upper interface away by a slope of 0.2."""
+    upper_points = mesh.points[len(mesh.points) // 2 :]
+    upper_points[:, 1] += 0.2 * np.maximum(np.abs(upper_points[:, 0]) - 0.75e-3, 0)
 
 
-def double(m, node, cell):
-    """A second node at the same place, used by one cell only."""
-    m.points = np.append(m.points, m.points[node : node + 1], axis=0)
-    m.quads[cell][m.quads[cell] == node] = len(m.points) - 1
+def duplicate_node(mesh, node, cell):
+    """Add a node at the position of another node and use it in one element."""
+    mesh.points = np.append(mesh.points, mesh.points[node : node + 1], axis=0)
+    mesh.quads[cell][mesh.quads[cell] == node] = len(mesh.points) - 1
 
 
-def twin(m, node):
-    """The interface edge on one side of a node ends in a second node at the same place, and so do its cells."""
-    m.points = np.append(m.points, m.points[node : node + 1], axis=0)
-    for cells in (m.quads, m.edges):
-        beyond = m.points[cells][:, :, 0].mean(axis=1) > m.points[node, 0]
-        cells[beyond[:, None] & (cells == node)] = len(m.points) - 1
+def split_interface_node(mesh, node):
+    """Add a node at the position of an interface node and use it on one side."""
+    mesh.points = np.append(mesh.points, mesh.points[node : node + 1], axis=0)
+    for cells in (mesh.quads, mesh.edges):
+        is_beyond = mesh.points[cells][:, :, 0].mean(axis=1) > mesh.points[node, 0]
+        cells[is_beyond[:, None] & (cells == node)] = len(mesh.points) - 1
 
 
-def loosen(m):
-    """The upper coating gets nodes of its own, as a drawing whose faces were not glued gives them."""
-    mine = m.quad_tags == CELL_TAGS["upper_coating"]
-    top = m.edge_tags == EDGE_TAGS["upper_interface"]
-    own = np.unique(m.quads[mine])
-    m.quads[mine] = np.searchsorted(own, m.quads[mine]) + len(m.points)
-    m.edges[top] = np.searchsorted(own, m.edges[top]) + len(m.points)
-    m.points = np.concatenate([m.points, m.points[own]])
+def separate_coating(mesh):
+    """Give the upper coating nodes of its own, as in a drawing whose faces were not joined."""
+    is_coating = mesh.quad_tags == CELL_TAGS["upper_coating"]
+    is_interface = mesh.edge_tags == EDGE_TAGS["upper_interface"]
+    nodes = np.unique(mesh.quads[is_coating])
+    mesh.quads[is_coating] = np.searchsorted(nodes, mesh.quads[is_coating]) + len(mesh.points)
+    mesh.edges[is_interface] = np.searchsorted(nodes, mesh.edges[is_interface]) + len(mesh.points)
+    mesh.points = np.concatenate([mesh.points, mesh.points[nodes]])
 
 
-def hang(m):
-    """One quad cut in two by a node in the middle of an edge that its neighbour does not have."""
-    k = int(np.flatnonzero(m.quad_tags == CELL_TAGS["upper_substrate"])[-2])
-    a, b, c, d = m.quads[k]
-    m.points = np.append(m.points, [(m.points[a] + m.points[b]) / 2], axis=0)
-    new = len(m.points) - 1
-    m.triangles = np.array([[a, new, d], [new, b, c], [new, c, d]])
-    m.triangle_tags = np.full(3, m.quad_tags[k])
-    m.quads, m.quad_tags = np.delete(m.quads, k, 0), np.delete(m.quad_tags, k)
+def add_hanging_node(mesh):
+    """Split a quad by a node in the middle of an edge that its neighbour does not have."""
+    k = int(np.flatnonzero(mesh.quad_tags == CELL_TAGS["upper_substrate"])[-2])
+    a, b, c, d = mesh.quads[k]
+    mesh.points = np.append(mesh.points, [(mesh.points[a] + mesh.points[b]) / 2], axis=0)
+    new_node = len(mesh.points) - 1
+    mesh.triangles = np.array([[a, new_node, d], [new_node, b, c], [new_node, c, d]])
+    mesh.triangle_tags = np.full(3, mesh.quad_tags[k])
+    mesh.quads, mesh.quad_tags = np.delete(mesh.quads, k, 0), np.delete(mesh.quad_tags, k)
 
 
-def drop_edge(m, name, count=0):
-    mine = np.flatnonzero(m.edge_tags == EDGE_TAGS[name])
-    mine = mine[count : mine.size - count]
-    m.edges, m.edge_tags = np.delete(m.edges, mine, 0), np.delete(m.edge_tags, mine)
+def remove_edges(mesh, name, count=0):
+    """Remove the tagged edges of a name, except `count` at either end."""
+    edge_numbers = np.flatnonzero(mesh.edge_tags == EDGE_TAGS[name])
+    edge_numbers = edge_numbers[count : edge_numbers.size - count]
+    mesh.edges, mesh.edge_tags = (
+        np.delete(mesh.edges, edge_numbers, 0),
+        np.delete(mesh.edge_tags, edge_numbers),
+    )
 
 
-def share(m):
-    half = len(m.points) // 2
-    for cells in (m.quads, m.edges):
-        for k in np.flatnonzero(m.points[:half, 1] == 0):
+def share_interface_nodes(mesh):
+    """Let both pieces use the same nodes on the interface."""
+    half = len(mesh.points) // 2
+    for cells in (mesh.quads, mesh.edges):
+        for k in np.flatnonzero(mesh.points[:half, 1] == 0):
             cells[cells == k + half] = k
 
 
-SPOILT = {
+INVALID_CHANGES = {
     "off the line": (
         lambda m: shift_points(m, find_interface_node(m), (0, 2e-5)),
         "upper_interface is not the straight line y = 0",
@@ -207,29 +220,32 @@ SPOILT = {
         lambda m: shift_points(m, find_interface_node(m, k=-1), (1e-7, 0)),
         "do not match .* 1e-07 m apart",
     ),
-    "double node": (lambda m: double(m, m.quads[20, 0], 20), "coincide, the first at .*merge"),
+    "double node": (
+        lambda m: duplicate_node(m, m.quads[20, 0], 20),
+        "coincide, the first at .*merge",
+    ),
     "double interface node": (
-        lambda m: twin(m, find_interface_node(m)),
+        lambda m: split_interface_node(m, find_interface_node(m)),
         "upper_interface has two nodes at x = .*; merge",
     ),
-    "loose coating": (loosen, "9 pairs of nodes of the upper piece coincide"),
-    "hanging node": (hang, "do not meet edge to edge: a node lies"),
-    "shared nodes": (share, "the two pieces share 9 nodes"),
-    "steep edge": (bend, "rounded edges may reach a slope of 0.1\\): the node"),
+    "loose coating": (separate_coating, "9 pairs of nodes of the upper piece coincide"),
+    "hanging node": (add_hanging_node, "do not meet edge to edge: a node lies"),
+    "shared nodes": (share_interface_nodes, "the two pieces share 9 nodes"),
+    "steep edge": (chamfer_upper_ends, "rounded edges may reach a slope of 0.1\\): the node"),
     "across": (
         lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]),
         "piece reaches 0.001 m across y = 0",
     ),
     "no far face": (
-        lambda m: drop_edge(m, "upper_far"),
+        lambda m: remove_edges(m, "upper_far"),
         r"no cells or nodes are tagged upper_far \(",
     ),
     "no interface": (
-        lambda m: drop_edge(m, "lower_interface"),
+        lambda m: remove_edges(m, "lower_interface"),
         r"no cells or nodes are tagged lower_interface \(",
     ),
     "hole in the interface": (
-        lambda m: drop_edge(m, "lower_interface", 2),
+        lambda m: remove_edges(m, "lower_interface", 2),
         "lower_interface has a hole .* make the interface",
     ),
     "far at the interface": (
@@ -279,53 +295,61 @@ SPOILT = {
 
 
 @pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines"])
-@pytest.mark.parametrize("name", SPOILT)
-def test_refuses_a_spoilt_mesh_by_name(name, form, tmp_path):
-    spoil, message = SPOILT[name]
-    m = make_pair("quads")
-    spoil(m)
-    begin = time.process_time()
+@pytest.mark.parametrize("name", INVALID_CHANGES)
+def test_refuses_invalid_mesh_with_reason(name, form, tmp_path):
+    """An invalid mesh is refused within 2 s, with the file and the reason."""
+    change, message = INVALID_CHANGES[name]
+    mesh = make_pair("quads")
+    change(mesh)
+    start_time = time.process_time()
     with pytest.raises(PatchfemError, match=message) as caught:
-        write_and_read_pair(m, tmp_path, form)
+        write_and_read_pair(mesh, tmp_path, form)
     assert str(caught.value).startswith(str(tmp_path)) and "\n" not in str(caught.value)
-    assert time.process_time() - begin < 2
+    assert time.process_time() - start_time < 2
 
 
-def test_refuses_parts_joined_at_one_node_only(tmp_path):
-    m = make_pair("quads")
-    last = m.quads[np.flatnonzero(m.quad_tags == CELL_TAGS["upper_substrate"])[-1]]
-    m.points = np.concatenate([m.points, m.points[last[2]] + [[1e-3, 0], [1e-3, 1e-3], [0, 1e-3]]])
-    count = len(m.points)
-    m.quads = np.append(m.quads, [[last[2], count - 3, count - 2, count - 1]], axis=0)
-    m.quad_tags = np.append(m.quad_tags, CELL_TAGS["upper_substrate"])
+def test_refuses_parts_joined_at_single_node(tmp_path):
+    """A piece whose parts are joined only at a node is refused."""
+    mesh = make_pair("quads")
+    last_quad = mesh.quads[np.flatnonzero(mesh.quad_tags == CELL_TAGS["upper_substrate"])[-1]]
+    mesh.points = np.concatenate(
+        [mesh.points, mesh.points[last_quad[2]] + [[1e-3, 0], [1e-3, 1e-3], [0, 1e-3]]]
+    )
+    n_points = len(mesh.points)
+    mesh.quads = np.append(
+        mesh.quads, [[last_quad[2], n_points - 3, n_points - 2, n_points - 1]], axis=0
+    )
+    mesh.quad_tags = np.append(mesh.quad_tags, CELL_TAGS["upper_substrate"])
     with pytest.raises(PatchfemError, match="the upper piece falls into 2 parts"):
-        write_and_read_pair(m, tmp_path)
+        write_and_read_pair(mesh, tmp_path)
 
 
-def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
-    m = make_pair("quads")
+def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
+    """Quadratic elements, meshes that are not plane and unknown tags are refused."""
+    pair = make_pair("quads")
     path = tmp_path / "pair.vtu"
     mesh = meshio.Mesh(
-        np.column_stack([m.points, m.points[:, 0]]),
-        [(k, c) for k, c, _ in find_cell_blocks(m)],
-        cell_data={"tag": [t for _, _, t in find_cell_blocks(m)]},
+        np.column_stack([pair.points, pair.points[:, 0]]),
+        [(k, c) for k, c, _ in find_cell_blocks(pair)],
+        cell_data={"tag": [t for _, _, t in find_cell_blocks(pair)]},
     )
     meshio.write(path, mesh)
     with pytest.raises(PatchfemError, match=r"not plane: its z values span 0\.002 m"):
         read_pieces(path)
-    mesh.cell_data = {"tag": [t + 100 for _, _, t in find_cell_blocks(m)]}
+    mesh.cell_data = {"tag": [t + 100 for _, _, t in find_cell_blocks(pair)]}
     meshio.write(path, mesh)
     with pytest.raises(
         PatchfemError, match=r"no cells or nodes are tagged .*cell array `tag`: 1 upper_substrate"
     ):
         read_pieces(path)
     meshio.write(
-        path, meshio.Mesh(m.points @ np.eye(2, 3), [("triangle6", m.quads[:, [0, 1, 2, 3, 0, 1]])])
+        path,
+        meshio.Mesh(pair.points @ np.eye(2, 3), [("triangle6", pair.quads[:, [0, 1, 2, 3, 0, 1]])]),
     )
     with pytest.raises(PatchfemError, match="triangle6 cells; only linear"):
         read_pieces(path)
     path = tmp_path / "pair.inp"
-    write_inp(m, path)
+    write_inp(pair, path)
     path.write_text(path.read_text().replace("ELSET=UPPER_COATING", "ELSET=GLUE"))
     with pytest.raises(PatchfemError, match=r"some cells have an unknown tag \(no tag\);"):
         read_pieces(path)
@@ -353,44 +377,46 @@ def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
         ("\x00\ufffd*", "no cells or nodes are tagged"),
     ],
 )
-def test_refuses_decks_it_cannot_use(text, message, tmp_path):
+def test_refuses_unsupported_abaqus_decks(text, message, tmp_path):
+    """An invalid or unsupported Abaqus deck is refused with the reason."""
     (tmp_path / "pair.inp").write_text(text, encoding="utf-8")
     with pytest.raises(PatchfemError, match=message):
         read_pieces(tmp_path / "pair.inp")
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_refuses_truncations_in_bounded_time(form, tmp_path):
+def test_refuses_truncated_mesh_files_quickly(form, tmp_path):
+    """A truncated mesh file of any format is refused within 2 s."""
     ending, write = FORMATS[form]
     path = tmp_path / f"pair{ending}"
     write(make_pair("mixed"), path)
-    whole = path.read_bytes()
-    for cut in range(0, int(0.9 * len(whole)), max(1, len(whole) // 40)):
-        path.write_bytes(whole[:cut])
-        begin = time.process_time()
+    content = path.read_bytes()
+    for n_bytes in range(0, int(0.9 * len(content)), max(1, len(content) // 40)):
+        path.write_bytes(content[:n_bytes])
+        start_time = time.process_time()
         with pytest.raises(PatchfemError, match="pair"):
             read_pieces(path)
-        assert time.process_time() - begin < 2
+        assert time.process_time() - start_time < 2
 
 
-CHANGES = st.lists(
+BYTE_CHANGES = st.lists(
     st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), min_size=1, max_size=4
 )
 
 
 @pytest.mark.share(0, 3, 4, 6)
 @pytest.mark.parametrize("form", FORMATS)
-@given(changes=CHANGES)
-def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
-    """Bytes of a file of this form changed at shares of its length: read to a mesh without faults, or refused."""
+@given(changes=BYTE_CHANGES)
+def test_always_changed_mesh_file_is_read_or_refused(form, changes, tmp_path):
+    """A mesh file with changed bytes is read to a valid mesh or refused, within 2 s."""
     ending, write = FORMATS[form]
     path = tmp_path / f"pair{ending}"
     write(make_pair("mixed"), path)
-    raw = bytearray(path.read_bytes())
-    for place, byte in changes:
-        raw[int(place * len(raw))] = byte
-    path.write_bytes(raw)
-    begin = time.process_time()
+    content = bytearray(path.read_bytes())
+    for fraction, byte in changes:
+        content[int(fraction * len(content))] = byte
+    path.write_bytes(content)
+    start_time = time.process_time()
     try:
         pair = read_pieces(path)
     except PatchfemError:
@@ -402,4 +428,4 @@ def test_always_a_spoilt_file_is_read_or_refused(form, changes, tmp_path):
                 and np.isfinite(piece.points).all()
                 and piece.points.min(axis=0)[1] >= 0
             )
-    assert time.process_time() - begin < 2
+    assert time.process_time() - start_time < 2

@@ -1,4 +1,4 @@
-"""Graded columns, and grids split and merged cell by cell."""
+"""Graded columns, and grids that are refined and coarsened."""
 
 import numpy as np
 import pytest
@@ -10,15 +10,23 @@ from patchfem.mesh.tensor import graded_depth
 
 
 @given(
-    place=st.floats(-0.5, 0.5),
-    least=st.floats(1e-5, 1e-2),
+    position=st.floats(-0.5, 0.5),
+    min_size=st.floats(1e-5, 1e-2),
     slope=st.floats(0.05, 0.6),
-    wide=st.floats(0.01, 0.9),
+    span=st.floats(0.01, 0.9),
 )
-def test_always_cells_follow_the_layout(place, least, slope, wide):
-    """Cells add up to the length, none is longer than wanted at its farther end, neighbours differ by the slope."""
-    low = max(-0.5, place - wide)
-    layout = Layout(-0.5, 0.5, ((place, place, least),), (low, place), max(least, 0.05), 0.1, slope)
+def test_always_column_widths_follow_layout(position, min_size, slope, span):
+    """Columns add up to the length, are no wider than the layout allows, and grow by at most its slope."""
+    low = max(-0.5, position - span)
+    layout = Layout(
+        -0.5,
+        0.5,
+        ((position, position, min_size),),
+        (low, position),
+        max(min_size, 0.05),
+        0.1,
+        slope,
+    )
     x = divide_into_columns(layout)
     cells = np.diff(x)
     assert x[0] == -0.5 and x[-1] == 0.5 and cells.min() > 0 and cells.size % 2 == 0
@@ -26,11 +34,11 @@ def test_always_cells_follow_the_layout(place, least, slope, wide):
     assert (cells <= 1.02 * np.maximum(ends[1:], ends[:-1]) + 1e-12).all()
     inner = cells[1:] / cells[:-1]
     assert np.abs(np.log(inner)).max() <= 1.6 * slope + 0.05
-    assert cells[np.argmin(np.abs((x[1:] + x[:-1]) / 2 - place))] <= 2.5 * least * (1 + slope)
+    assert cells[np.argmin(np.abs((x[1:] + x[:-1]) / 2 - position))] <= 2.5 * min_size * (1 + slope)
 
 
-def test_exact_columns_of_a_linear_size_are_a_geometric_series():
-    """At equal steps of the integral of dx/(least + slope x) the places grow by one factor."""
+def test_exact_linear_size_gives_geometric_columns():
+    """For a size that grows linearly the distances of the columns form a geometric series."""
     layout = Layout(-0.5, 0.5, ((-0.5, -0.5, 1e-3),), (-0.5, 0.5), 1.0, 1.0, 0.25)
     x = divide_into_columns(layout) + 0.5 + 1e-3 / 0.25
     ratio = x[1:] / x[:-1]
@@ -38,26 +46,30 @@ def test_exact_columns_of_a_linear_size_are_a_geometric_series():
     assert x.size == 25 and np.log(ratio[0]) == pytest.approx(np.log(251) / 24, rel=2e-4)
 
 
-def test_exact_symmetric_layouts_give_symmetric_columns():
+def test_exact_symmetric_layout_gives_symmetric_columns():
+    """A symmetric layout gives symmetric columns."""
     x = divide_into_columns(
         Layout(-1.0, 1.0, ((-0.3, -0.3, 1e-4), (0.3, 0.3, 1e-4)), (-0.3, 0.3), 0.04, 0.1, 0.5)
     )
     assert np.abs(x + x[::-1]).max() <= 1e-12
 
 
-def test_exact_a_band_and_places_to_go_through_are_kept():
-    """Cells within a band are as long as asked; a column stands at each place, and there is an even number of cells."""
+def test_exact_columns_respect_band_and_fixed_positions():
+    """Columns in a band have the prescribed width, a column is at each fixed position, and their number is even."""
     layout = Layout(-1.0, 1.0, ((-0.2, 0.1, 0.01),), (-1.0, 1.0), 0.1, 0.1, 0.5)
     x = divide_into_columns(layout, (0.37,))
     cells = np.diff(x)
     middle = (x[1:] + x[:-1]) / 2
     inside = (middle > -0.19) & (middle < 0.09)
     assert 0.37 in x and cells.size % 2 == 0
-    assert cells[inside] == pytest.approx(np.full(inside.sum(), 0.01), rel=0.06)  # whole cells
+    assert cells[inside] == pytest.approx(
+        np.full(inside.sum(), 0.01), rel=0.06
+    )  # the band contains a whole number of columns
 
 
 @pytest.mark.parametrize("coating", [0.0, 0.2])
-def test_exact_rows_end_at_the_coating(coating):
+def test_exact_row_boundary_at_coating(coating):
+    """A boundary of rows is exactly at the coating thickness."""
     layout = Layout(
         0.0, 1.0, ((0.0, 0.0, 0.02), (coating, coating, 0.03)), (0.0, 1.0), 0.2, 0.2, 0.5
     )
@@ -69,18 +81,21 @@ def test_exact_rows_end_at_the_coating(coating):
 
 
 @pytest.mark.parametrize("coating", [0.0, 152.4e-6])
-def test_exact_splitting_and_merging_undo_one_another(coating):
+def test_exact_coarsening_reverses_refinement(coating):
+    """Coarsening a refined grid twice gives the original grid exactly."""
     grid = graded_grid(12.7e-3, 6.35e-3, 0.2e-3, coating)
-    twice = grid.refine().refine()
-    back = twice.coarsen().coarsen()
-    assert twice.coating_rows == 4 * grid.coating_rows and twice.coating_thickness == pytest.approx(
-        coating, abs=1e-18
+    refined = grid.refine().refine()
+    coarsened = refined.coarsen().coarsen()
+    assert (
+        refined.coating_rows == 4 * grid.coating_rows
+        and refined.coating_thickness == pytest.approx(coating, abs=1e-18)
     )
-    assert np.array_equal(back.x, grid.x) and np.array_equal(back.depth, grid.depth)
-    assert back.coating_rows == grid.coating_rows
+    assert np.array_equal(coarsened.x, grid.x) and np.array_equal(coarsened.depth, grid.depth)
+    assert coarsened.coating_rows == grid.coating_rows
 
 
-def test_exact_a_geometric_series_of_rows_stays_one_when_split():
+def test_exact_refined_rows_remain_geometric():
+    """Refining rows in a geometric series gives a geometric series with the square root of the ratio."""
     depth = np.concatenate([[0.0], np.cumsum(1.3 ** np.arange(12))])
     heights = np.diff(TensorGrid(np.linspace(-1, 1, 5), depth, 0).refine().depth)
     assert heights[1:] / heights[:-1] == pytest.approx(
@@ -88,7 +103,8 @@ def test_exact_a_geometric_series_of_rows_stays_one_when_split():
     )
 
 
-def test_exact_merging_keeps_what_is_left_over():
+def test_exact_coarsening_preserves_dimensions():
+    """Coarsening preserves length, height and coating if the number of columns is odd."""
     grid = graded_grid(10.0, 4.0, 10 / 7, 1.0)
     half = grid.coarsen()
     assert (
@@ -99,14 +115,16 @@ def test_exact_merging_keeps_what_is_left_over():
     )
 
 
-def test_exact_depths_reach_the_coating_and_the_far_face():
+def test_exact_depths_include_coating_and_far_face():
+    """The depths include the coating thickness and the far face, and grow by at most the given ratio."""
     depth, rows = graded_depth(5.0, 0.01, 0.3, 1.2, 2)
     assert depth[0] == 0 and depth[rows] == 0.3 and depth[-1] == 5.0 and np.diff(depth).min() > 0
     assert (np.diff(depth)[1:] <= 1.2 * np.diff(depth)[:-1] * (1 + 1e-6)).all()
 
 
 @pytest.mark.parametrize("rows", [9, 10, 33, 34])
-def test_exact_merged_rows_go_on_growing_whether_even_or_odd(rows):
+def test_exact_coarsened_rows_grow_uniformly(rows):
+    """Coarsened rows grow uniformly for even and odd numbers of rows."""
     depth = np.concatenate([[0.0], np.cumsum(1.1 ** np.arange(rows))])
     half = np.diff(TensorGrid(np.linspace(-1, 1, 5), depth, 0).coarsen().depth)
     assert half.size == (rows + 1) // 2 and half.sum() == pytest.approx(depth[-1])

@@ -1,4 +1,4 @@
-"""The tagged mesh of a pair: geometry, a round trip through a file, and every unusable file refused by name."""
+"""The tagged mesh of a pair: geometry, round trips through files, and refusals of unusable files."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ SMALL = graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
 each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
 
 
-def store(path, pair, names=None, extra=(), edges=None):
-    """Write points, quads and tags as they stand, so that a broken pair can be made."""
+def store_pair(path, pair, names=None, extra=(), edges=None):
+    """Write points, quads and tags without checks, so that an invalid pair can be made."""
     points = np.column_stack([pair["points"], np.zeros(len(pair["points"]))])
     pair = make_pair_mesh(SMALL) | pair if "edges" not in pair else pair
     blocks = [("quad", pair["quads"]), ("line", pair["edges"]), *extra]
@@ -49,14 +49,15 @@ def store(path, pair, names=None, extra=(), edges=None):
 
 
 def read_grid(path):
-    """The grid of a file whose pieces are alike and tensor grids."""
+    """Return the grid of a file whose pieces are equal tensor grids."""
     low, high = read_bodies(path)
     assert isinstance(low, TensorGrid) and high is None
     return low
 
 
 @each_grid
-def test_exact_round_trip_through_msh(grid, tmp_path):
+def test_exact_grid_round_trip_through_msh(grid, tmp_path):
+    """A grid is written to an .msh file and read back with its nodes and coating."""
     write_mesh(grid, tmp_path / "pair.msh")
     back = read_grid(tmp_path / "pair.msh")
     assert back.coating_rows == grid.coating_rows
@@ -64,7 +65,8 @@ def test_exact_round_trip_through_msh(grid, tmp_path):
     assert np.abs(back.depth - grid.depth).max() <= 1e-12 * grid.height
 
 
-def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
+def test_refuses_missing_mesh_file_and_unknown_suffix(tmp_path):
+    """A missing mesh file, an unknown suffix and a missing folder are refused."""
     with pytest.raises(PatchfemError, match="no such mesh file"):
         read_grid(tmp_path / "nowhere.msh")
     (tmp_path / "pair.stl").write_text("solid")
@@ -76,84 +78,102 @@ def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
         write_mesh(SMALL, tmp_path / "nowhere" / "pair.msh")
 
 
-def test_refuses_counts_the_file_cannot_hold_and_keeps_stdout_clean(tmp_path, capsys):
+def test_refuses_impossible_node_count_quickly(tmp_path, capsys):
+    """A node count larger than the file is refused within 1 s, and reading prints nothing to stdout."""
     path = tmp_path / "pair.msh"
     write_mesh(SMALL, path)
     read_grid(path)
     assert capsys.readouterr().out == ""
     content = path.read_bytes()
-    at = content.index(b"$Nodes") + 7
-    path.write_bytes(content[:at] + b"100000000" + content[content.index(b"\n", at) :])
-    start = time.process_time()
+    offset = content.index(b"$Nodes") + 7
+    path.write_bytes(content[:offset] + b"100000000" + content[content.index(b"\n", offset) :])
+    start_time = time.process_time()
     with pytest.raises(PatchfemError, match="announces 100000000"):
         read_grid(path)
-    assert time.process_time() - start < 1.0
+    assert time.process_time() - start_time < 1.0
 
 
-def test_always_a_coating_that_is_no_layer_leaves_no_tensor_grid(tmp_path):
+def test_always_irregular_coating_is_read_as_mesh(tmp_path):
+    """A coating that is not a uniform layer is read as a general mesh and not as a tensor grid."""
     pair = make_pair_mesh(SMALL)
     tags = pair["tags"].copy()
     tags[np.flatnonzero(tags == CELL_TAGS["upper_coating"])[2]] = CELL_TAGS["upper_substrate"]
-    low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+    low, high = read_bodies(store_pair(tmp_path / "pair.msh", {**pair, "tags": tags}))
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
 
 
-def together(lower, upper):
-    """The lower piece of one grid and the upper piece of another as one pair."""
+def combine_pieces(lower, upper):
+    """Return the lower piece of one grid and the upper piece of another as one pair."""
     lower = make_pair_mesh(lower)
     upper = make_pair_mesh(upper)
-    out = {}
+    combined = {}
     for part, tags, codes in (("quads", "tags", CELL_TAGS), ("edges", "edge_tags", EDGE_TAGS)):
-        kept = [
+        is_side = [
             np.isin(pair[tags], [code for name, code in codes.items() if name.startswith(side)])
             for side, pair in (("lower", lower), ("upper", upper))
         ]
-        out[part] = np.concatenate(
-            [lower[part][kept[0]], upper[part][kept[1]] + len(lower["points"])]
+        combined[part] = np.concatenate(
+            [lower[part][is_side[0]], upper[part][is_side[1]] + len(lower["points"])]
         )
-        out[tags] = np.concatenate([lower[tags][kept[0]], upper[tags][kept[1]]])
-    return out | {"points": np.concatenate([lower["points"], upper["points"]])}
+        combined[tags] = np.concatenate([lower[tags][is_side[0]], upper[tags][is_side[1]]])
+    return combined | {"points": np.concatenate([lower["points"], upper["points"]])}
 
 
 @pytest.mark.parametrize(
-    "other",
+    "upper_grid",
     [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
     ids=["taller", "uncoated"],
 )
-def test_exact_unlike_pieces_on_the_same_columns_are_two_grids(other, tmp_path):
-    low, high = read_bodies(store(tmp_path / "pair.msh", together(SMALL, other)))
-    for back, grid in ((low, SMALL), (high, other)):
-        assert back.coating_rows == grid.coating_rows and back.depth == pytest.approx(
+def test_exact_different_pieces_on_same_columns_are_two_grids(upper_grid, tmp_path):
+    """Pieces of different height or coating on the same columns are read as two grids."""
+    low, high = read_bodies(store_pair(tmp_path / "pair.msh", combine_pieces(SMALL, upper_grid)))
+    for read_piece, grid in ((low, SMALL), (high, upper_grid)):
+        assert read_piece.coating_rows == grid.coating_rows and read_piece.depth == pytest.approx(
             grid.depth, rel=1e-12
         )
-        assert back.x == pytest.approx(SMALL.x, rel=1e-12)
+        assert read_piece.x == pytest.approx(SMALL.x, rel=1e-12)
 
 
-def test_exact_coatings_of_unlike_thickness_on_the_same_grid_are_two_grids(tmp_path):
+def test_exact_different_coating_thicknesses_are_two_grids(tmp_path):
+    """Coatings of different thickness on the same grid are read as two grids."""
     pair = make_pair_mesh(SMALL)
     deepest = np.abs(pair["points"][pair["quads"], 1]).max(axis=1) > SMALL.depth[
         SMALL.coating_rows - 1
     ] * (1 + 1e-9)
     tags = pair["tags"].copy()
     tags[deepest & (tags == CELL_TAGS["upper_coating"])] = CELL_TAGS["upper_substrate"]
-    low, high = read_bodies(store(tmp_path / "pair.msh", {**pair, "tags": tags}))
+    low, high = read_bodies(store_pair(tmp_path / "pair.msh", {**pair, "tags": tags}))
     assert (low.coating_rows, high.coating_rows) == (SMALL.coating_rows, SMALL.coating_rows - 1)
 
 
-@pytest.mark.parametrize("wrong", ["0", "-1"])
-def test_refuses_a_text_whose_cell_names_a_node_below_one(wrong, tmp_path):
-    """A reader that counts back from the end takes node 0 for the last one, which lies in the upper piece."""
+@pytest.mark.parametrize("node_number", ["0", "-1"])
+def test_refuses_node_number_below_one(node_number, tmp_path):
+    """An element or edge with a node number below 1 is refused with its number.
+
+    Negative indices of Python would take node 0 as the last node, which is in the upper piece.
+    """
     path = tmp_path / "pair.msh"
     mesh = make_pair("quads")
     write_msh22(mesh, path, binary=False)
     assert read_grid(path)
     lines = path.read_text().split("\n")
     first = lines.index("$Elements") + 2
-    for at in (first, first + len(mesh.quads) + len(mesh.edges) - 1):  # a quad, an edge
-        words = lines[at].split()
-        path.write_text("\n".join([*lines[:at], " ".join([*words[:-1], wrong]), *lines[at + 1 :]]))
+    for line_number in (
+        first,
+        first + len(mesh.quads) + len(mesh.edges) - 1,
+    ):  # the first quad and the last edge
+        words = lines[line_number].split()
+        path.write_text(
+            "\n".join(
+                [
+                    *lines[:line_number],
+                    " ".join([*words[:-1], node_number]),
+                    *lines[line_number + 1 :],
+                ]
+            )
+        )
         with pytest.raises(
             PatchfemError,
-            match=rf"pair.msh: cell {words[0]} names node {wrong}; nodes count from 1",
+            match=rf"pair.msh: cell {words[0]} names node {node_number}; nodes count from 1",
         ):
             read_bodies(path)

@@ -1,4 +1,4 @@
-"""Tensor grids found behind any mesh, and the held share of a far face, against shapes with lengths in closed form."""
+"""Tensor grids recognised in any mesh, and the fixed fraction of a far face, compared with lengths in closed form."""
 
 from dataclasses import replace
 
@@ -11,38 +11,44 @@ from patchfem.mesh.files import EDGE_TAGS
 from patchfem.mesh.recognise import recognise_grid
 
 
-def bodies(m, folder, form):
+def write_and_read(mesh, folder, form):
+    """Write a mesh in a format and return the two pieces that are read."""
     ending, write = FORMATS[form]
-    write(m, folder / f"pair{ending}")
+    write(mesh, folder / f"pair{ending}")
     return read_bodies(folder / f"pair{ending}")
 
 
-def far_edges(m, side="lower"):
-    """Numbers of the far edges of one piece, by rising x."""
-    mine = np.flatnonzero(m.edge_tags == EDGE_TAGS[f"{side}_far"])
-    return mine[np.argsort(m.points[m.edges[mine], 0].mean(axis=1))]
+def far_edges(mesh, side="lower"):
+    """Return the numbers of the far edges of one piece, by increasing x."""
+    edge_numbers = np.flatnonzero(mesh.edge_tags == EDGE_TAGS[f"{side}_far"])
+    return edge_numbers[np.argsort(mesh.points[mesh.edges[edge_numbers], 0].mean(axis=1))]
 
 
-def without(m, edges):
-    kept = np.delete(np.arange(len(m.edges)), edges)
-    m.edges, m.edge_tags = m.edges[kept], m.edge_tags[kept]
-    return m
+def remove_edges(mesh, edges):
+    """Remove edges of a mesh in place and return it."""
+    remaining = np.delete(np.arange(len(mesh.edges)), edges)
+    mesh.edges, mesh.edge_tags = mesh.edges[remaining], mesh.edge_tags[remaining]
+    return mesh
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_exact_the_same_grid_comes_from_every_format(form, tmp_path):
-    low, high = bodies(make_pair("quads"), tmp_path, form)
+def test_exact_all_formats_give_same_grid(form, tmp_path):
+    """Every format gives the same tensor grid, and a mesh with triangles is read as a general mesh."""
+    low, high = write_and_read(make_pair("quads"), tmp_path, form)
     assert high is None and low.coating_rows == GRID.coating_rows
     assert low.x == pytest.approx(GRID.x, abs=1e-15) and low.depth == pytest.approx(
         GRID.depth, abs=1e-15
     )
-    assert all(isinstance(body, PieceMesh) for body in bodies(make_pair("mixed"), tmp_path, form))
+    assert all(
+        isinstance(body, PieceMesh) for body in write_and_read(make_pair("mixed"), tmp_path, form)
+    )
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
-    m = make_pair("quads")
-    low, high = bodies(without(m, far_edges(m)[2:]), tmp_path, form)
+def test_exact_partly_fixed_far_face_is_read_as_mesh(form, tmp_path):
+    """A far face that is fixed in part is read as a mesh with its fixed length, in every format."""
+    mesh = make_pair("quads")
+    low, high = write_and_read(remove_edges(mesh, far_edges(mesh)[2:]), tmp_path, form)
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
     assert measure_fixed_length(low) == pytest.approx(
         (5e-4, 2e-3), rel=1e-12
@@ -50,30 +56,34 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
     assert measure_fixed_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
 
 
-def test_exact_the_fixed_length_follows_a_far_face_up_to_its_corners():
+def test_exact_fixed_length_of_bottom_side_and_inclined_face():
+    """The fixed length of a bottom, a side and an inclined far face agrees with the closed form."""
     piece = mesh_of_grid(GRID, 0.5, 3)
     assert measure_fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
     bottom = piece.points[:, 1] == 1e-3
     left = piece.points[:, 0] == -1e-3
     sides = replace(piece, far=np.flatnonzero(left & (piece.points[:, 1] > 0)))
     first = piece.points[left, 1]
-    first = np.sort(first)[1]  # the edge that touches the interface is held at one end alone
+    first = np.sort(first)[1]  # the edge at the interface has only one fixed node
     assert measure_fixed_length(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
     points = piece.points.copy()
-    points[:, 1] *= 1 + 40 * np.abs(points[:, 0]) / 2  # two slopes of 0.02, no corner between them
+    points[:, 1] *= (
+        1 + 40 * np.abs(points[:, 0]) / 2
+    )  # two slopes of 0.02 without a corner between them
     slanted = replace(piece, points=points, far=np.flatnonzero(bottom & (points[:, 0] <= 0)))
     side = np.hypot(1e-3, 2e-5)
     assert measure_fixed_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
 
 
-def test_always_a_grid_is_recognised_whatever_its_numbers_are():
+def test_always_grid_is_recognised_for_any_numbering():
+    """A tensor grid is recognised for any numbering, and a mesh with triangles is not."""
     assert recognise_grid(mesh_of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
     assert recognise_grid(mesh_of_grid(GRID, 0.2)) is None
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
-def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_none(split):
-    """Two cells apart from one another inside the piece, then one more at its side."""
+def test_exact_hole_count_and_area(split):
+    """Elements removed inside a piece are counted as holes with their area; a notch at the side is not."""
     piece = mesh_of_grid(GRID, split, 3)
     assert find_holes(piece) == (0, 0.0)
     middle = np.concatenate(
@@ -81,34 +91,39 @@ def test_exact_holes_are_the_area_of_the_cells_left_out_inside_and_a_notch_is_no
     )
     x = GRID.x
     depth = GRID.depth
-    turn = len(piece.triangles)
+    n_triangles = len(piece.triangles)
 
     def inside(column, row):
         there = (middle[:, 0] > x[column]) & (middle[:, 0] < x[column + 1])
         return there & (middle[:, 1] > depth[row]) & (middle[:, 1] < depth[row + 1])
 
-    def left_out(gone):
+    def remove_elements(gone):
         return replace(
             piece,
-            triangles=piece.triangles[~gone[:turn]],
-            quads=piece.quads[~gone[turn:]],
+            triangles=piece.triangles[~gone[:n_triangles]],
+            quads=piece.quads[~gone[n_triangles:]],
             is_coating=piece.is_coating[~gone],
         )
 
-    gone = inside(2, 2) | inside(5, 1)
+    is_removed = inside(2, 2) | inside(5, 1)
     area = (x[3] - x[2]) * (depth[3] - depth[2]) + (x[6] - x[5]) * (depth[2] - depth[1])
-    assert find_holes(left_out(gone)) == (2, pytest.approx(area, rel=1e-12))
-    assert find_holes(left_out(gone | inside(0, 2))) == (2, pytest.approx(area, rel=1e-12))
+    assert find_holes(remove_elements(is_removed)) == (2, pytest.approx(area, rel=1e-12))
+    assert find_holes(remove_elements(is_removed | inside(0, 2))) == (
+        2,
+        pytest.approx(area, rel=1e-12),
+    )
 
 
-@pytest.mark.parametrize(("turn", "right_half"), [(28.0, 1e-3), (32.0, 0.0)])
-def test_exact_a_far_face_ends_where_its_border_turns_by_thirty_degrees(turn, right_half):
-    """The left half of a far face is inclined and fixed; the right half is free, and part of it or another face."""
+@pytest.mark.parametrize(("angle", "free_length"), [(28.0, 1e-3), (32.0, 0.0)])
+def test_exact_far_face_ends_at_corner_of_thirty_degrees(angle, free_length):
+    """A far face ends where its boundary changes direction by more than 30 degrees."""
     piece = mesh_of_grid(GRID, 0.5, 3)
     is_fixed = (piece.points[:, 1] == 1e-3) & (piece.points[:, 0] <= 0)
-    slope = np.tan(np.radians(turn))
+    slope = np.tan(np.radians(angle))
     points = piece.points.copy()
     points[:, 1] *= 1 + slope * np.maximum(-points[:, 0], 0) / 1e-3
     inclined = replace(piece, points=points, far=np.flatnonzero(is_fixed))
-    fixed = 1e-3 * np.hypot(1, slope)
-    assert measure_fixed_length(inclined) == pytest.approx((fixed, fixed + right_half), rel=1e-12)
+    fixed_length = 1e-3 * np.hypot(1, slope)
+    assert measure_fixed_length(inclined) == pytest.approx(
+        (fixed_length, fixed_length + free_length), rel=1e-12
+    )

@@ -1,4 +1,4 @@
-"""Pieces that reach beyond the interface, chamfered and rounded ends: their outline, their cells, finer and coarser."""
+"""Pieces that extend beyond the interface, with chamfered or rounded ends: outline, elements, refinement."""
 
 from __future__ import annotations
 
@@ -15,32 +15,40 @@ LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
 ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}
 
 
-def made(end, shorter=0.0, cell=0.31e-3, coating=COATING):
-    """A piece LENGTH long on an interface as long as its face, less `shorter` at either end."""
+def make_shaped_piece(end, overhang=0.0, element_size=0.31e-3, coating=COATING):
+    """Return a piece of the given length whose grid is `overhang` than its contact face at either end."""
     return shaped_grid(
-        graded_grid(2 * (end.half_contact_length(LENGTH) - shorter), HEIGHT, cell, coating),
+        graded_grid(
+            2 * (end.half_contact_length(LENGTH) - overhang), HEIGHT, element_size, coating
+        ),
         LENGTH,
         end,
     )
 
 
-def test_exact_a_rounded_end_is_a_circle_to_sixty_degrees_then_its_tangent():
+def test_exact_rounded_end_is_circle_then_tangent():
+    """A rounded end is a circle up to 60 degrees and then its tangent."""
     end = ENDS["radius"]
     start = LENGTH / 2 - ENDS["radius"].size
     s = np.linspace(0, 1, 200) * end.size
-    drop = end.face_depth(start + s, LENGTH)
-    last = np.sqrt(3) / 2 * end.size
-    on = s <= last
-    assert np.allclose(s[on] ** 2 + (end.size - drop[on]) ** 2, end.size**2, rtol=1e-12)
-    assert np.allclose(drop[~on], end.size / 2 + np.sqrt(3) * (s[~on] - last), rtol=1e-12)
+    depth = end.face_depth(start + s, LENGTH)
+    tangent_point = np.sqrt(3) / 2 * end.size
+    on_circle = s <= tangent_point
+    assert np.allclose(
+        s[on_circle] ** 2 + (end.size - depth[on_circle]) ** 2, end.size**2, rtol=1e-12
+    )
+    assert np.allclose(
+        depth[~on_circle], end.size / 2 + np.sqrt(3) * (s[~on_circle] - tangent_point), rtol=1e-12
+    )
     assert (
-        np.array_equal(drop, end.face_depth(-start - s, LENGTH))
+        np.array_equal(depth, end.face_depth(-start - s, LENGTH))
         and end.face_depth(start, LENGTH) == 0.0
     )
 
 
 @pytest.mark.parametrize("kind", ENDS)
-def test_exact_the_face_that_can_touch_ends_at_the_corner_or_where_it_is_steep(kind):
+def test_exact_contact_face_ends_at_corner_or_max_slope(kind):
+    """The contact face ends at the corner of a sharp or chamfered end, or where a rounded end has the largest slope."""
     end = ENDS[kind]
     half = end.half_contact_length(LENGTH)
     step = 1e-9
@@ -54,41 +62,48 @@ def test_exact_the_face_that_can_touch_ends_at_the_corner_or_where_it_is_steep(k
 
 
 @pytest.mark.parametrize("kind", ENDS)
-@pytest.mark.parametrize("shorter", [0.0, 1.9e-3])
-def test_exact_cells_fill_the_outline_and_a_sprayed_coating_is_as_thick_everywhere(kind, shorter):
-    body = made(ENDS[kind], shorter)
+@pytest.mark.parametrize("overhang", [0.0, 1.9e-3])
+def test_exact_elements_fill_outline_with_uniform_coating(kind, overhang):
+    """The elements fill the outline exactly, and the coating has the same thickness everywhere."""
+    body = make_shaped_piece(ENDS[kind], overhang)
     x = np.unique(body.points[:, 0])
-    drop = ENDS[kind].face_depth(x, LENGTH)
-    lost = ((drop[1:] + drop[:-1]) / 2 * np.diff(x)).sum()
+    depth = ENDS[kind].face_depth(x, LENGTH)
+    removed_area = ((depth[1:] + depth[:-1]) / 2 * np.diff(x)).sum()
     assert body.areas().min() > 0
-    assert body.areas().sum() == pytest.approx(LENGTH * HEIGHT - lost, rel=1e-12)
+    assert body.areas().sum() == pytest.approx(LENGTH * HEIGHT - removed_area, rel=1e-12)
     assert body.areas()[body.is_coating].sum() == pytest.approx(LENGTH * COATING, rel=1e-12)
     assert body.coating_thickness == pytest.approx(COATING, rel=1e-12) and body.height == HEIGHT
     if kind == "chamfer":
-        assert lost == pytest.approx(ENDS[kind].size ** 2, rel=1e-12)
+        assert removed_area == pytest.approx(ENDS[kind].size ** 2, rel=1e-12)
 
 
-def test_exact_a_piece_without_ends_or_overhang_is_its_tensor_grid():
+def test_exact_sharp_piece_without_overhang_equals_grid():
+    """A sharp piece without overhang equals the mesh of its tensor grid."""
     grid = graded_grid(LENGTH, HEIGHT, 0.31e-3, COATING)
     body = shaped_grid(grid, LENGTH, SHARP_END)
-    wanted = as_piece(grid)
+    expected = as_piece(grid)
     for name in ("points", "quads", "is_coating", "interface", "far"):
-        assert np.array_equal(getattr(body, name), getattr(wanted, name)), name
-    assert body.base_grid is grid and wanted.base_grid is None
+        assert np.array_equal(getattr(body, name), getattr(expected, name)), name
+    assert body.base_grid is grid and expected.base_grid is None
 
 
 @pytest.mark.parametrize("kind", ENDS)
-def test_exact_finer_and_coarser_keep_the_outline_and_the_interface_of_the_plan(kind):
-    body = made(ENDS[kind], 1.9e-3, 0.3e-3)
-    for other, inner in (
+def test_exact_refinement_and_coarsening_preserve_outline(kind):
+    """Refinement and coarsening preserve the outline and the interface nodes of the inner grid."""
+    body = make_shaped_piece(ENDS[kind], 1.9e-3, 0.3e-3)
+    for changed, inner in (
         (body.refine(), body.inner.refine()),
         (body.coarsen(), body.inner.coarsen()),
     ):
-        assert np.array_equal(other.x, inner.x) and np.array_equal(other.inner.depth, inner.depth)
-        assert np.abs(other.points).max() == np.abs(body.points).max()
-        assert other.areas().min() > 0
-    again = body.refine().coarsen()
-    assert np.array_equal(again.points, body.points) and np.array_equal(again.quads, body.quads)
+        assert np.array_equal(changed.x, inner.x) and np.array_equal(
+            changed.inner.depth, inner.depth
+        )
+        assert np.abs(changed.points).max() == np.abs(body.points).max()
+        assert changed.areas().min() > 0
+    restored = body.refine().coarsen()
+    assert np.array_equal(restored.points, body.points) and np.array_equal(
+        restored.quads, body.quads
+    )
 
 
 @given(
@@ -97,7 +112,8 @@ def test_exact_finer_and_coarser_keep_the_outline_and_the_interface_of_the_plan(
     cell=st.floats(1e-6, 1),
     kind=st.sampled_from(["chamfer", "radius"]),
 )
-def test_always_cells_are_convex_and_columns_grow_gently(size, shorter, cell, kind):
+def test_always_elements_are_convex_and_columns_grow_slowly(size, shorter, cell, kind):
+    """All elements are convex, and columns outside the interface grow by at most 11 %."""
     end = End(kind, size * min(LENGTH / 2, HEIGHT - COATING))
     half = end.half_contact_length(LENGTH) * (1 - shorter)
     body = shaped_grid(
@@ -109,11 +125,11 @@ def test_always_cells_are_convex_and_columns_grow_gently(size, shorter, cell, ki
     )
     corner = body.points[body.quads]
     side = np.roll(corner, -1, axis=1) - corner
-    turn = (
+    cross_products = (
         side[..., 0] * np.roll(side, -1, axis=1)[..., 1]
         - side[..., 1] * np.roll(side, -1, axis=1)[..., 0]
     )
-    assert turn.min() > 0
-    cells = np.diff(np.concatenate([body.inner.x[-2:], body.inner.x[-1] + body.outer[1:]]))
-    assert (cells[1:] <= 1.11 * np.maximum.accumulate(cells[:-1])).all()
+    assert cross_products.min() > 0
+    widths = np.diff(np.concatenate([body.inner.x[-2:], body.inner.x[-1] + body.outer[1:]]))
+    assert (widths[1:] <= 1.11 * np.maximum.accumulate(widths[:-1])).all()
     assert np.abs(body.points[:, 0]).max() == LENGTH / 2

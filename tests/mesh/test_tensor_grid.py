@@ -1,4 +1,4 @@
-"""The graded grid of one piece: exact sums, bounded growth, rows in the coating."""
+"""The graded grid of one piece: exact sums, bounded growth, and rows in the coating."""
 
 from __future__ import annotations
 
@@ -13,15 +13,17 @@ from patchfem.mesh.tensor import MIN_COATING_ROWS
 
 
 @st.composite
-def pieces(draw):
+def piece_dimensions(draw):
+    """Draw length, height, element size and coating thickness of a piece."""
     length = draw(st.floats(1e-3, 5e-2))
     height = draw(st.floats(1e-3, 2e-2))
-    share = draw(st.one_of(st.just(0.0), st.floats(1e-3, 0.95)))
-    return length, height, length / draw(st.floats(1.0, 150.0)), share * height
+    fraction = draw(st.one_of(st.just(0.0), st.floats(1e-3, 0.95)))
+    return length, height, length / draw(st.floats(1.0, 150.0)), fraction * height
 
 
-@given(pieces())
-def test_always_grid_has_the_asked_size_and_four_rows_in_the_coating(piece):
+@given(piece_dimensions())
+def test_always_grid_has_given_dimensions_and_coating_rows(piece):
+    """The grid has the given dimensions, at least four rows in the coating, and bounded growth of rows."""
     length, height, size, coating = piece
     grid = graded_grid(*piece)
     assert grid.length == pytest.approx(length, rel=1e-14)
@@ -40,14 +42,15 @@ def test_always_grid_has_the_asked_size_and_four_rows_in_the_coating(piece):
     assert np.all(grid.is_coating_cell() @ rows == pytest.approx(coating, rel=1e-12))
 
 
-@given(pieces())
-def test_exact_tributary_lengths_add_up_to_the_length(piece):
+@given(piece_dimensions())
+def test_exact_tributary_lengths_integrate_linear_functions(piece):
+    """The tributary lengths are positive, add up to the length, and integrate a linear function exactly."""
     grid = graded_grid(*piece)
-    share = grid.tributary_lengths()
-    assert share.sum() == pytest.approx(piece[0], rel=1e-13)
-    assert share.min() > 0
+    lengths = grid.tributary_lengths()
+    assert lengths.sum() == pytest.approx(piece[0], rel=1e-13)
+    assert lengths.min() > 0
     # the nodal areas integrate a straight line exactly
-    assert share @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)
+    assert lengths @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -58,6 +61,7 @@ def test_exact_tributary_lengths_add_up_to_the_length(piece):
         (1e-3, 6e-3, "contact.coating.thickness"),
     ],
 )
-def test_refuses_a_cell_or_a_coating_larger_than_the_piece(size, coating, name):
+def test_refuses_element_or_coating_larger_than_piece(size, coating, name):
+    """An element or a coating larger than the piece is refused with the key."""
     with pytest.raises(PatchfemError, match=name):
         graded_grid(10e-3, 5e-3, size, coating)

@@ -1,4 +1,4 @@
-"""Two pieces whose interface nodes lie at other x: read from every format, refused only where their ends differ."""
+"""Two pieces with different interface nodes, read from every format; only different ends are refused."""
 
 from __future__ import annotations
 
@@ -21,39 +21,42 @@ from patchfem.core import PatchfemError
 from patchfem.mesh import TensorGrid, graded_grid
 
 
-def unlike(lower, upper):
-    """The lower piece of one drawn pair with the upper piece of another one."""
+def combine_pieces(lower, upper):
+    """Return the lower piece of one mesh pair with the upper piece of another."""
     count = len(lower.points)
-    kept = [np.isin(tags, (3, 4)) for tags in (lower.triangle_tags, lower.quad_tags)] + [
+    lower_cells = [np.isin(tags, (3, 4)) for tags in (lower.triangle_tags, lower.quad_tags)] + [
         np.isin(lower.edge_tags, (12, 14))
     ]
-    brought = [np.isin(tags, (1, 2)) for tags in (upper.triangle_tags, upper.quad_tags)] + [
+    upper_cells = [np.isin(tags, (1, 2)) for tags in (upper.triangle_tags, upper.quad_tags)] + [
         np.isin(upper.edge_tags, (11, 13))
     ]
     names = (("triangles", "triangle_tags"), ("quads", "quad_tags"), ("edges", "edge_tags"))
-    out = SimpleNamespace(points=np.concatenate([lower.points, upper.points]))
-    for (cells, tags), mine, theirs in zip(names, kept, brought):
+    combined = SimpleNamespace(points=np.concatenate([lower.points, upper.points]))
+    for (cells, tags), mine, theirs in zip(names, lower_cells, upper_cells):
         setattr(
-            out,
+            combined,
             cells,
             np.concatenate([getattr(lower, cells)[mine], getattr(upper, cells)[theirs] + count]),
         )
         setattr(
-            out, tags, np.concatenate([getattr(lower, tags)[mine], getattr(upper, tags)[theirs]])
+            combined,
+            tags,
+            np.concatenate([getattr(lower, tags)[mine], getattr(upper, tags)[theirs]]),
         )
-    return out
+    return combined
 
 
-FINER = graded_grid(2e-3, 1.5e-3, 1e-4, 1e-4)
+FINE_GRID = graded_grid(2e-3, 1.5e-3, 1e-4, 1e-4)
 
 
 @pytest.mark.parametrize("form", FORMATS)
-def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
+def test_exact_pieces_preserve_different_nodes(form, tmp_path):
+    """Pieces with different interface nodes are read with their own nodes, in every format."""
     pair = write_and_read_pair(
-        unlike(make_pair("quads"), make_pair("triangles", FINER)), tmp_path, form
+        combine_pieces(make_pair("quads"), make_pair("triangles", FINE_GRID)), tmp_path, form
     )
     assert not pair.has_matching_nodes
-    for piece, grid in ((pair.lower, GRID), (pair.upper, FINER)):
+    for piece, grid in ((pair.lower, GRID), (pair.upper, FINE_GRID)):
         assert np.abs(piece.x - grid.x).max() <= 1e-12 * grid.length
         assert piece.areas().sum() == pytest.approx(grid.length * grid.height, rel=1e-12)
         assert piece.tributary_lengths().sum() == pytest.approx(grid.length, rel=1e-12)
@@ -61,42 +64,45 @@ def test_exact_both_pieces_keep_their_own_nodes(form, tmp_path):
     assert abs(pair.upper.refine().x[0] - pair.lower.refine().x[0]) <= 1e-12 * GRID.length
 
 
-def test_exact_alike_pieces_match_and_one_node_aside_does_not(tmp_path):
+def test_exact_matching_nodes_are_recognised(tmp_path):
+    """Nodes that differ by rounding match; a node shifted by 1e-7 m does not."""
     assert write_and_read_pair(make_pair("mixed"), tmp_path).has_matching_nodes
-    near = make_pair("quads")
-    aside = make_pair("quads")
-    shift_points(near, find_interface_node(near), (1e-13, 0))
-    shift_points(aside, find_interface_node(aside), (1e-7, 0))
-    assert write_and_read_pair(near, tmp_path).has_matching_nodes
-    pair = write_and_read_pair(aside, tmp_path)
+    rounded = make_pair("quads")
+    shifted = make_pair("quads")
+    shift_points(rounded, find_interface_node(rounded), (1e-13, 0))
+    shift_points(shifted, find_interface_node(shifted), (1e-7, 0))
+    assert write_and_read_pair(rounded, tmp_path).has_matching_nodes
+    pair = write_and_read_pair(shifted, tmp_path)
     assert not pair.has_matching_nodes and np.abs(
         pair.upper.x - pair.lower.x
     ).max() == pytest.approx(1e-7, rel=1e-6)
 
 
 @given(cells=st.lists(st.floats(0.1, 1.0), min_size=2, max_size=20), shift=st.floats(-1.0, 1.0))
-def test_always_any_nodes_between_the_same_ends_are_read(cells, shift, tmp_path_factory):
+def test_always_any_nodes_between_equal_ends_are_read(cells, shift, tmp_path_factory):
+    """Any interface nodes between equal ends are read exactly."""
     x = np.concatenate([[0.0], np.cumsum(cells)]) / np.sum(cells)
     x = (x - 0.5) * 2e-3
     x[-1] = 1e-3
-    m = unlike(make_pair("quads"), make_pair("mixed", TensorGrid(x, GRID.depth, 0)))
-    m.points = np.add(m.points, [shift, 0.0])
-    pair = write_and_read_pair(m, tmp_path_factory.mktemp("unlike"))
+    mesh = combine_pieces(make_pair("quads"), make_pair("mixed", TensorGrid(x, GRID.depth, 0)))
+    mesh.points = np.add(mesh.points, [shift, 0.0])
+    pair = write_and_read_pair(mesh, tmp_path_factory.mktemp("unlike"))
     assert np.abs(pair.upper.x - x).max() <= 1e-15 and np.abs(pair.lower.x - GRID.x).max() <= 1e-15
 
 
 @pytest.mark.parametrize("factor", [1 + 1e-6, 1.05, 0.95, 1 - 1e-8])
-def test_refuses_interfaces_of_other_lengths(factor, tmp_path):
-    grid = TensorGrid(FINER.x * factor, FINER.depth, FINER.coating_rows)
+def test_refuses_interfaces_of_different_length(factor, tmp_path):
+    """Interfaces of different length are refused unless they differ only by rounding."""
+    grid = TensorGrid(FINE_GRID.x * factor, FINE_GRID.depth, FINE_GRID.coating_rows)
     with pytest.raises(
         PatchfemError,
         match=r"do not match \(lengths 0\.002 and .*let both interfaces begin and end",
     ):
-        write_and_read_pair(unlike(make_pair("quads"), make_pair("quads", grid)), tmp_path)
-    grid = TensorGrid(FINER.x * (1 + 1e-10), FINER.depth, FINER.coating_rows)
+        write_and_read_pair(combine_pieces(make_pair("quads"), make_pair("quads", grid)), tmp_path)
+    grid = TensorGrid(FINE_GRID.x * (1 + 1e-10), FINE_GRID.depth, FINE_GRID.coating_rows)
     assert (
         write_and_read_pair(
-            unlike(make_pair("quads"), make_pair("quads", grid)), tmp_path
+            combine_pieces(make_pair("quads"), make_pair("quads", grid)), tmp_path
         ).upper.x.size
-        == FINER.x.size
+        == FINE_GRID.x.size
     )
