@@ -17,8 +17,8 @@ from patchfem.scene.keys.types import attributes_by_key, find_inner_table, find_
 PAGE = text()
 
 
-def plain_keys() -> list:
-    """Return (model, key) of all keys that contain no table."""
+def value_keys() -> list:
+    """Return (model, key) of all keys that hold a value instead of a table."""
     return [
         (model, key)
         for _, model in iterate_tables()
@@ -43,7 +43,7 @@ def test_exact_committed_pages_agree_with_records():
 
 def test_always_every_key_has_description():
     """Every key has a description without a full stop; a required key has no condition."""
-    for model, key in plain_keys():
+    for model, key in value_keys():
         description = find_meaning(model, key)
         assert (
             description and not description.endswith(".") and description == description.strip()

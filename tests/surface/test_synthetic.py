@@ -70,7 +70,10 @@ def test_exact_rms_and_mean_of_report_surface():
 
 
 def test_exact_spectrum_of_report_surface():
-    """The spectrum of the surface agrees with the density of the report, and that of a trace with its rows."""
+    """The spectrum of a surface agrees with the density of the report.
+
+    That of a trace agrees with the mean over the rows of a surface.
+    """
     x, y, z = report_area((200, 300), STEP, 0)
     assert (x.size, y.size, z.shape) == (300, 200, (200, 300)) and x[1] == y[1] == STEP
     power = np.abs(np.fft.fft2(z)) ** 2

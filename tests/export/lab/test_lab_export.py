@@ -52,7 +52,9 @@ def read_uff_functions(path):
 
 
 def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
-    """A loop in a file of pyuff is imported and fitted; the parameters agree with those of the loop within 1e-6.
+    """A loop that pyuff wrote is imported and fitted; the parameters agree with those of the loop within 1e-6.
+
+    The exported file has the same numbers as the imported one, to the last bit.
 
     The exported file has the same numbers as the imported one, to the last bit.
 

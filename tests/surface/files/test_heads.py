@@ -143,7 +143,9 @@ def test_exact_headers_of_other_programs(tmp_path, header, steps, unit):
     reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography",
 )
 def test_exact_headers_agree_with_surface_topography(tmp_path, use_interpreter):
-    """The scans agree with those of SurfaceTopography within 1e-12.
+    """Text files of other programs give the same scans as SurfaceTopography within 1e-12.
+
+    Headers with features that it does not support are left out.
 
     Headers with features that it does not support are left out.
     """

@@ -318,7 +318,9 @@ def test_exact_report_states_effect_of_resampling():
 
 
 def test_exact_suggested_cutoff_ignores_roundoff():
-    """For a trace of six cut-offs, less round-off, the cut-off of 250 um is suggested.
+    """For a trace whose length is six cut-offs except for round-off, the cut-off of 250 um is suggested.
+
+    Earlier 80 um were.
 
     Earlier 80 um were.
     """
