@@ -115,14 +115,33 @@ def estimate_measures(fine: Patch, *coarse: Patch | None, tolerance: float | Non
     out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
     if coarse and fine.averaging is not None:
         out |= _include_corner_pressure(out, fine, coarse[0])
-    for name, found in ({} if fine.points is None else fine.points.measures).items():
-        if found.error < out[name].error:
-            out[name] = replace(
-                out[name], value=found.value, error=found.error, engine=patch_rows.HALF_SPACE_SOURCE
-            )
+    if fine.points is not None:
+        out |= _replace_by_point_measures(out, fine.points.measures)
     reason = _reason_for_unbounded_pressure(fine)
     for name in PEAK_MEASURES if reason else ():
         out[name] = replace(out[name], value=None, error=None, reason=reason)
+    return out
+
+
+def _replace_by_point_measures(measures_by_name: dict, estimates: dict) -> dict:
+    """Return the measures that points of a profile give with smaller errors than the mesh.
+
+    The relative errors of the peak measures are compared, because a mesh that smooths the profile has
+    a small peak pressure and therefore a small error of it.
+    """
+    out = {}
+    for name, estimate in estimates.items():
+        measure = measures_by_name[name]
+        ratio = 1.0
+        if name in PEAK_MEASURES and measure.value and estimate.value:
+            ratio = measure.value / float(estimate.value)
+        if ratio * estimate.error < measure.error:
+            out[name] = replace(
+                measure,
+                value=float(estimate.value),
+                error=float(estimate.error),
+                engine=patch_rows.HALF_SPACE_SOURCE,
+            )
     return out
 
 

@@ -284,7 +284,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     if patch.points is not None:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
-            "the value with the smaller error is given; on these points short waves are treated as in infinite "
+            "the more accurate value is given; on these points short waves are treated as in infinite "
             f"layers; {_mesh_clause(model, patch)}"
         )
     elif patch.averaging is not None and not patch_model.gap.is_rough:

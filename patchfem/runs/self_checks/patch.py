@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from ...core import Outcome
 from ..patch import values
+from ..results.patch_rows import HALF_SPACE_SOURCE
 from .evidence import Evidence
 from .finding import (
     CONTACT_RESIDUAL_TOL,
@@ -163,11 +164,15 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         (EVALUATION_TOL + relative) * mean,
         "Pa",
     )
-    force = patch.pressure.sigma_n * weight
+    if run.result.measures["moment"].engine == HALF_SPACE_SOURCE:
+        surface = patch.points.surface
+        moment_of_pressure = float(surface.x @ (surface.sigma_n * surface.weight))
+    else:
+        moment_of_pressure = float(patch.x @ (patch.pressure.sigma_n * weight))
     yield Finding(
         "the moment of the pressure",
         moment,
-        float(force @ patch.x),
+        moment_of_pressure,
         EVALUATION_TOL * load * run.model.patch.pieces.length / 2
         + STATED_ERROR_FACTOR * run.error("moment"),
         "N m",

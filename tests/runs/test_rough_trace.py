@@ -1,0 +1,55 @@
+"""Pressure of a rough trace whose short waves only the points of the profile resolve."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+
+LENGTH = 1.0  # mm
+WAVELENGTHS = (5, 10, 20, 50, 100, 200)  # um
+SCENE = """\
+[contact]
+length = "1 mm"
+width = "10 mm"
+height = "2 mm"
+load = "7 N"
+substrate = "Ti-6Al-4V"
+[contact.profile]
+file = "trace.csv"
+heights = "surface"
+"""
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory):
+    """Return the run of a patch under a sum of sines of 5 to 200 um and noise."""
+    folder = tmp_path_factory.mktemp("rough")
+    random = np.random.default_rng(1)
+    x = np.arange(0, 1000 * LENGTH + 0.25, 0.5)
+    z = random.normal(0, 0.005, x.size)
+    for wavelength in WAVELENGTHS:
+        z += 0.002 * wavelength**0.8 * np.sin(2 * np.pi * x / wavelength + random.uniform(0, 6.28))
+    np.savetxt(
+        folder / "trace.csv", np.c_[x, z], delimiter=",", header="x [um],z [um]", comments=""
+    )
+    (folder / "scene.toml").write_text(SCENE)
+    return pf.run(pf.load(folder / "scene.toml"))
+
+
+def test_exact_peak_pressure_of_rough_trace_is_that_of_its_pressure_field(result):
+    """The interval of the peak pressure contains the largest pressure of the field on the points."""
+    peak = result.measures["pressure_peak"]
+    assert abs(result.fields["normal_stress"].max() - peak.value) < peak.error < peak.value
+
+
+def test_exact_loaded_fraction_is_mean_over_peak_pressure(result):
+    """The loaded fraction times the peak pressure is the mean pressure within both errors."""
+    peak, fraction = (result.measures[name] for name in ("pressure_peak", "loaded_fraction"))
+    mean = 7 / (10e-3 * 1e-3 * LENGTH)
+    relative_error = peak.error / peak.value + fraction.error / fraction.value
+    assert peak.value * fraction.value == pytest.approx(mean, rel=relative_error)
+
+
+def test_always_moment_of_rough_trace_passes_self_check(result):
+    """The moment agrees with the pressure that it was computed from."""
+    assert not [text for text in result.warnings if "self-check" in text]
