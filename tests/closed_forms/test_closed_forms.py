@@ -167,7 +167,10 @@ def test_exact_growth_factor_agrees_with_mpmath_quadrature(ratio, order):
     ],
 )
 def test_exact_decay_rest_time_and_position(start, friction, omega, time, position):
-    """Time and position of rest of a Coulomb oscillator agree with equation 3.11, with rounded-up half cycles."""
+    """Time and position at which a Coulomb oscillator comes to rest agree with equation 3.11.
+
+    The number of half cycles is rounded up.
+    """
     assert decay_rest(start, friction, omega) == pytest.approx((time, position), abs=1e-12)
     assert decay(np.array([time, time + 50]), start, friction, omega) == pytest.approx(
         [position, position], abs=1e-12

@@ -146,7 +146,7 @@ def test_exact_coated_elements_agree_with_half_plane_transform(
     assert np.abs(state.gap[is_outside] - reference_gap).max() <= 1e-2 * reference_gap.max()
 
 
-# ---- any gap
+# ---- random gaps
 
 
 @example(
@@ -177,6 +177,3 @@ def test_always_dense_active_set_gives_same_pressure(n_points, seed, load, heigh
     assert state.closing == pytest.approx(
         motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step)
     )
-
-
-# ---- wrong answers are seen, wrong questions refused

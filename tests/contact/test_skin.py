@@ -58,7 +58,7 @@ def test_exact_reference_pressure_shifts_approach_only():
     )
 
 
-# ------------------------------------------------------------------------------------------ against the bare unilateral
+# ---- limit of bare contact
 GAPS = {
     "flat": lambda x: 0 * x,
     "tilt": lambda x: 1e-4 * x,
@@ -135,7 +135,7 @@ def test_exact_layer_forces_minimise_energy():
         assert np.abs(residual).max() <= 1e-10 * (np.ptp(gap) + np.ptp(compliance @ state.force))
 
 
-# ----------------------------------------------------------------------------------------------------- the law of peaks
+# ---- integral over Gaussian peaks
 @pytest.mark.parametrize("h", [-200.0, -8.001, -7.999, -3.0, 0.0, 0.7, 3.0, 12.0, 30.0])
 def test_exact_peak_integral_agrees_with_quadrature(h):
     """The logarithm and the decay of the integral over Gaussian peaks agree with adaptive quadrature."""
@@ -186,7 +186,7 @@ def test_exact_separation_inverts_pressure(layer):
     assert np.abs(slope / layer.stiffness(separations) - 1).max() <= 1e-5
 
 
-# ------------------------------------------------------------------------------------------- scales and whole stiffness
+# ---- scaling and stiffness
 @each_layer
 def test_exact_doubled_problem_doubles_pressure(layer):
     """Doubling the gap, the layer thickness and the load doubles forces and approach."""
@@ -246,7 +246,7 @@ def test_exact_tangential_stiffness_of_layer_and_bodies():
     assert layer_stiffness(compliance, weight, 0 * k) == 0.0
 
 
-# ------------------------------------------------------------------------------------------------------- never failing
+# ---- convergence for random input
 @each_layer
 @pytest.mark.parametrize("spring", [1e2, 1e4, 1e7])
 def test_exact_holder_spring_equals_applied_moment(layer, spring):
@@ -396,7 +396,7 @@ def test_exact_dual_descent_gives_newton_forces(monkeypatch):
             assert np.abs(without_newton.force - with_newton.force).max() <= 1e-9 * LOAD
 
 
-# ------------------------------------------------------------------------------------------------------------- refusals
+# ---- refusals
 
 
 def test_refuses_unsolvable_layer_controls():

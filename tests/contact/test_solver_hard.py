@@ -70,7 +70,7 @@ def solve_by_enumeration(c, x, gap, load=None, moment=None, spring=0.0):
     return np.array(best[1]), *best[2:]
 
 
-# ---- few nodes, against all subsets
+# ---- enumeration of contact sets
 
 
 @given(
@@ -102,7 +102,7 @@ def test_exact_solution_equals_enumeration_of_contact_sets(n_nodes, seed, contro
     assert np.abs(nodal_forces(pair, state) - expected).max() <= 1e-9 * expected.sum()
 
 
-# ---- one node touching
+# ---- single contact node
 
 
 @pytest.mark.parametrize("node", [1, 37, 50, 88])
@@ -127,7 +127,7 @@ def test_exact_single_contact_node_carries_load(node):
     )
 
 
-# ---- sizes
+# ---- extreme loads
 
 
 @pytest.mark.parametrize("fraction", [1e-9, 1e-30, 1e-100, 1e-190])
@@ -242,7 +242,7 @@ def test_exact_large_gap_offset_adds_to_approach(offset, moment):
     )
 
 
-# ---- the edge of tipping
+# ---- limit of tipping
 
 
 @pytest.mark.parametrize("fraction", [0.499, 0.4999, 0.499999, 0.499999999])
@@ -296,7 +296,7 @@ def test_exact_spring_supports_load_line_beyond_end():
     assert state.rotation == pytest.approx((LOAD * x[-1] - LOAD * LENGTH) / 1e4, rel=1e-12)
 
 
-# ---- ties
+# ---- equal heights
 
 
 @pytest.mark.parametrize("moment", [None, 0.0])
@@ -317,7 +317,7 @@ def test_exact_plateau_forces_follow_compliance(moment):
     assert state.approach == pytest.approx(LOAD / forces_per_unit.sum(), rel=1e-12)
 
 
-# ---- what stands behind the active set
+# ---- fallbacks of the active-set method
 
 # compliance whose active sets cycle from both starting sets
 CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])
@@ -405,11 +405,11 @@ def test_refuses_solution_with_large_residual(monkeypatch):
     solution = solve(
         StripCompliance(pair.normal), patch_problem(pair.interface.x, np.zeros(101), LOAD)
     )
-    for bad in (
+    for wrong in (
         solution._replace(motion=solution.motion * (1 + 1e-9)),
         solution._replace(force=solution.force * (1 + 1e-9)),
     ):
-        monkeypatch.setattr(unilateral, "solve", lambda *_, bad=bad: bad)
+        monkeypatch.setattr(unilateral, "solve", lambda *_, bad=wrong: bad)
         with pytest.raises(NotConverged, match="exceeds 1e-12"):
             press(pair, np.zeros(101), LOAD)
 
@@ -429,7 +429,7 @@ def test_exact_projected_forces_satisfy_optimality(seed, size):
         assert np.abs(forces - np.maximum(y + rigid @ multipliers, 0)).max() <= 1e-9 * size
 
 
-# ---- random gaps on random operators, every control
+# ---- random gaps on random compliances
 
 
 @cache

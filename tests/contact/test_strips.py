@@ -88,7 +88,7 @@ def random_gaps(rng, x, n_strips, amplitude):
     return np.array([draw_gap(rng, x, amplitude) for _ in range(n_strips)])
 
 
-# ------------------------------------------------------------------------------------------------- against one patch
+# ---- undivided patch
 @each_layer
 @each_control
 @pytest.mark.parametrize("angle", [0.0, 1e-4])
@@ -107,7 +107,7 @@ def test_exact_strips_without_roll_equal_undivided_patch(layer, control, angle):
     assert state.fraction == pytest.approx(weight[force > 0].sum() * 8 / AREA, rel=1e-12)
 
 
-# ------------------------------------------------------------------------------- against one dense problem of all nodes
+# ---- dense problem of all strips
 def random_cases(n_cases):
     """Yield random strips, gaps, rolls and loads."""
     rng = np.random.default_rng(20)
@@ -199,7 +199,7 @@ def test_exact_strips_equal_block_diagonal_problem(layer, has_diagonals):
         )
 
 
-# ------------------------------------------------------------------------------------------------ wedges in closed form
+# ---- wedges in closed form
 @pytest.mark.parametrize("n_strips", [2, 3, 8, 64])
 def test_exact_centre_of_pressure_of_rigid_wedge_in_full_contact(
     n_strips,
@@ -270,8 +270,7 @@ def test_exact_yaw_moment_of_rolled_pad(roll, yaw):
     assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
 
 
-# ------------------------------------------------------------------------------------------------------------- mirrors
-# ------------------------------------------------------------------------------------------- the definitions themselves
+# ---- check from the definitions
 def layer_force(layer, weight, opening, load, n_strips):
     """Return the nodal force of a layer at a separation."""
     if isinstance(layer, ExponentialAsperities) and layer.reference is None:
@@ -355,7 +354,7 @@ def test_always_random_strips_satisfy_contact_conditions(
     check_strips_state(state, layer, c, x, weight, gap, roll, load, moment, spring)
 
 
-# ---------------------------------------------------------------------------------------------------------- hard cases
+# ---- hard cases
 @pytest.mark.parametrize("layer", [None, LinearAsperities(1e13)])
 def test_exact_large_roll_loads_only_edge_strip(layer):
     """Under a large roll only the strip at the edge carries the load, as a patch of its own."""
@@ -431,7 +430,7 @@ def test_always_test_piece_needs_few_iterations(layer, roll):
     assert state.iterations <= 12
 
 
-# ---------------------------------------------------------------------------------------------------------- stiffnesses
+# ---- stiffnesses
 @each_layer
 def test_order_two_stiffness_equals_load_difference(layer):
     """The normal stiffness of the strips equals the central difference of the load."""
@@ -479,7 +478,7 @@ def test_exact_strip_stiffnesses_equal_undivided_patch():
     )
 
 
-# ------------------------------------------------------------------------------------------------------------- refusals
+# ---- refusals
 def test_refuses_invalid_strip_controls():
     """Inconsistent controls, invalid loads, a load line that tips the piece over and zero strips are refused."""
     c, x, weight, y = pair_strips(4, 30)
@@ -514,7 +513,7 @@ def test_refuses_undetermined_strip_rotation():
     assert (state.force > 0).sum() == 4 and abs(state.theta) <= 1e-15
 
 
-# ----------------------------------------------------------------------------------------------------- the roll is free
+# ---- free roll
 @each_layer
 @each_control
 def test_exact_free_roll_reproduces_prescribed_roll(layer, control):

@@ -137,7 +137,7 @@ def test_exact_lock_owner_is_process_start_and_host(tmp_path):
         if is_free:
             lock.acquire()
             assert path.read_text() == lock.owner and path in OWN_LOCK_PATHS
-            with pytest.raises(Missing):  # another thread
+            with pytest.raises(Missing):  # a second lock of the same process
                 FolderLock(path, "out", "run").acquire()
             lock.release()
             assert not path.exists() and path not in OWN_LOCK_PATHS

@@ -12,7 +12,7 @@ from scene_texts import BENCH
 
 from patchfem.export.netcdf import h5netcdf
 
-# a child per number of steps: it is killed at that step of putting new results in the place of older ones
+# each child process is killed at one step of the replacement of older results by new results
 STEPS = """\
 import os, signal, sys
 from pathlib import Path

@@ -143,8 +143,8 @@ def test_exact_hdf5_file_closes_cleanly_without_space(tmp_path, size):
     with (
         limit_file_size(size),
         pytest.raises(OSError) as caught,
-        open_lossy(tmp_path / "a.h5") as kept,
-        h5py.File(kept, "w") as file,
+        open_lossy(tmp_path / "a.h5") as target,
+        h5py.File(target, "w") as file,
     ):
         file["a"] = data
         file.flush()
@@ -175,15 +175,20 @@ def test_exact_partial_file_of_killed_writer_is_removed(tmp_path):
     path = tmp_path / "a.vtu"
     name = make_partial_path(tmp_path / "a.vtu").name
     # larger than any process number
-    ended = tmp_path / name.replace(str(os.getpid()), "4194305")
-    running = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
+    of_ended_process = tmp_path / name.replace(str(os.getpid()), "4194305")
+    of_running_process = tmp_path / name.replace(str(os.getpid()), str(os.getppid()))
     of_other_file = tmp_path / name.replace(str(os.getpid()), "4194305").replace(".a.", ".b.")
-    for partial_path in ended, running, of_other_file, tmp_path / ".a.mine.vtu":
+    for partial_path in (
+        of_ended_process,
+        of_running_process,
+        of_other_file,
+        tmp_path / ".a.mine.vtu",
+    ):
         partial_path.write_text("half")
         assert is_partial_name(partial_path.name) == (partial_path.name != ".a.mine.vtu")
     write_text(path, "new")
     assert {partial_path.name for partial_path in tmp_path.iterdir()} == {
-        running.name,
+        of_running_process.name,
         of_other_file.name,
         ".a.mine.vtu",
         "a.vtu",
@@ -214,7 +219,7 @@ def test_refuses_unwritable_path(tmp_path):
     for path in tmp_path / "folder", tmp_path / "none" / "a", tmp_path / ("a" * 300):
         with pytest.raises(Missing, match="cannot be written"):
             write_text(path, "text")
-    assert [one.name for one in tmp_path.iterdir()] == ["folder"] and not list(
+    assert [entry.name for entry in tmp_path.iterdir()] == ["folder"] and not list(
         (tmp_path / "folder").iterdir()
     )
 

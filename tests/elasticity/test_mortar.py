@@ -234,6 +234,7 @@ def test_exact_matching_nodes_add_compliances():
 
 @cache
 def _compute_hertz_block(per_half_width):
+    """Return (x, compliance) of a Hertz block of titanium."""
     grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, LENGTH, 6e-3, 1.1)
     return grid.x, elasticity.interface_compliance(
         elasticity.make_piece(grid.x, grid.depth, 0, make_bare_layers(TITANIUM))
@@ -341,7 +342,7 @@ def test_always_overhanging_pieces_join_on_common_interval(lower_sizes, upper_si
             transfer = transfer_matrix(x, body)
             assert np.abs(transfer.sum(axis=1) - 1).max() <= 1e-12
             assert np.abs(transfer @ body - x).max() <= 1e-12 * LENGTH
-            # a uniform pressure on the common stretch loads every node with the integral of its hat over it
+            # a uniform pressure on the common interval loads each node with the integral of its hat function
             positions, weight = quadrature_rule(x, body)
             expected = np.array(
                 [weight @ hat_function(body, j, positions) for j in range(body.size)]

@@ -8,12 +8,6 @@ import pytest
 from patchfem.friction import parallel_element
 from patchfem.friction.laws import elastic_plastic_kernels
 
-# ---- bond points
-
-
-# ---- growth
-
-
 # ---- parallel elements
 
 

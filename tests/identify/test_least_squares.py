@@ -59,7 +59,7 @@ def test_always_fit_is_invariant_to_scaling(seed, shift, power):
     design = rng.normal(size=(12, 2))
     data = rng.normal(size=12)
     values, half, *_ = solve_linear(design, data)
-    # bounds on both sides of zero, so that no value is searched in logarithms
+    # the bounds have different signs, so that no value is searched by its logarithm
     low = -np.abs(values) - (20 + shift) * half
     high = np.abs(values) + (20 - shift) * half
     fit = Problem(

@@ -35,20 +35,21 @@ def test_exact_two_models_reach_expensive_minimum():
 
     A correction by ratios alone, without slopes, ends 1 % higher.
     """
-    best = Problem(lambda values: residuals(expensive_model(values)), BOX.low, BOX.high).solve(
+    best_fit = Problem(lambda values: residuals(expensive_model(values)), BOX.low, BOX.high).solve(
         max_descents=4, interval_kind=""
     )
     models = TwoModels(cheap_model, expensive_model, residuals, BOX)
     model, values = models.search([4.0, 0.2], 4)
     assert np.square(residuals(expensive_model(values))).sum() == pytest.approx(
-        best.rms**2 * DATA.size, rel=2e-4
+        best_fit.rms**2 * DATA.size, rel=2e-4
     )
     np.testing.assert_allclose(model(values), expensive_model(values), rtol=1e-12)
-    u = BOX.unit(best.values)
+    u = BOX.unit(best_fit.values)
     for _ in range(8):
         u = models._descend(models.correct_cheap_model(u, expensive_model(BOX.values(u))), u)
     assert (
-        np.square(residuals(expensive_model(BOX.values(u)))).sum() > 1.01 * best.rms**2 * DATA.size
+        np.square(residuals(expensive_model(BOX.values(u)))).sum()
+        > 1.01 * best_fit.rms**2 * DATA.size
     )
 
 

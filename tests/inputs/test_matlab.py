@@ -20,10 +20,10 @@ ARRAYS = {
 }  # fmt: skip
 
 
-def matlab5_bytes(packed: bool, only=tuple(ARRAYS)) -> bytes:
+def matlab5_bytes(packed: bool, names=tuple(ARRAYS)) -> bytes:
     """Return the arrays as the content of a MATLAB file of version 5."""
     out = io.BytesIO()
-    savemat(out, {name: ARRAYS[name] for name in only}, do_compression=packed)
+    savemat(out, {name: ARRAYS[name] for name in names}, do_compression=packed)
     return out.getvalue()
 
 

@@ -75,7 +75,7 @@ def test_exact_rounded_ends_are_read_with_depths(tmp_path):
 def test_exact_mesh_pair_round_trip(kind, name, tmp_path):
     """A pair of different pieces is written and read back bit for bit."""
     mesh = make_pair(kind)
-    mesh.points[mesh.points[:, 1] > 0] *= [1.0, 1.7]  # unlike pieces
+    mesh.points[mesh.points[:, 1] > 0] *= [1.0, 1.7]  # makes the two pieces different
     pair = write_and_read_pair(mesh, tmp_path)
     write_mesh(pair.lower, tmp_path / name, pair.upper)
     read_pair = read_pieces(tmp_path / name)

@@ -59,10 +59,10 @@ def read_grid(path):
 def test_exact_grid_round_trip_through_msh(grid, tmp_path):
     """A grid is written to an .msh file and read back with its nodes and coating."""
     write_mesh(grid, tmp_path / "pair.msh")
-    back = read_grid(tmp_path / "pair.msh")
-    assert back.coating_rows == grid.coating_rows
-    assert np.abs(back.x - grid.x).max() <= 1e-12 * grid.length
-    assert np.abs(back.depth - grid.depth).max() <= 1e-12 * grid.height
+    read_back = read_grid(tmp_path / "pair.msh")
+    assert read_back.coating_rows == grid.coating_rows
+    assert np.abs(read_back.x - grid.x).max() <= 1e-12 * grid.length
+    assert np.abs(read_back.depth - grid.depth).max() <= 1e-12 * grid.height
 
 
 def test_refuses_missing_mesh_file_and_unknown_suffix(tmp_path):

@@ -30,7 +30,7 @@ def make_engines(order, reading, initial):
     return [*engines, FirstOrderBonds(law)] if reading == "stretch" and order == 1 else engines
 
 
-# ---- from rest
+# ---- first loading
 
 
 @pytest.mark.parametrize(

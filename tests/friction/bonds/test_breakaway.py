@@ -64,8 +64,8 @@ def test_exact_compiled_breakaway_points_equal_recursion(growth):
     """The compiled contact elements with breakaway have the forces and energies of the NumPy recursion within 1e-12."""
     law = breakaway_bonds(0.35, initial=0.6, **growth)
     path = random_walk(7, 80, 0.4)
-    forces, energies, bad, _ = follow_path(points_model(law, [1.0], [1.0]), path, 1.0)
-    assert bad == 0
+    forces, energies, n_failures, _ = follow_path(points_model(law, [1.0], [1.0]), path, 1.0)
+    assert n_failures == 0
     run = march_path(FirstOrderBonds(law), path, UNIT_PRESSURE)
     assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
     assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)

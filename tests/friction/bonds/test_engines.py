@@ -51,7 +51,7 @@ def load_rig_scene(tmp_path, engine="auto", reading="report", order=1, growth=""
     return scene.load(file)
 
 
-# ---- choice
+# ---- choice of the engine
 
 
 def test_exact_recursion_is_chosen_where_exact():
@@ -115,7 +115,7 @@ def test_refuses_recursion_for_unsupported_law():
     )
 
 
-# ---- the loop along a given slide
+# ---- the compiled loop along a prescribed path
 
 
 def test_exact_printed_law_creates_energy_per_cycle():

@@ -68,7 +68,8 @@ def check_energy_balance(seed, count, reading, order, engine):
 def test_always_stretch_list_energy_balance_closes(reading, order, engine):
     """No step of the stretch law creates energy, and the energy balance closes.
 
-    Before the means were taken from the stored energy, 5e-5 of the work was created on such paths.
+    With step means that were not derived from the stored energy, 5e-5 of the work was created on
+    such paths.
     """
     check_energy_balance(1, 6, reading, order, engine)
 

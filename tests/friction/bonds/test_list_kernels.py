@@ -20,7 +20,7 @@ UNIT_PRESSURE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e-2}
 
 
-# ---- direct: every bond
+# ---- direct lists
 
 
 @pytest.mark.parametrize("order", [0.0, 1.0, 2.0, -0.5, 1.7])
@@ -221,7 +221,7 @@ def test_exact_strips_of_tiny_growing_bonds_are_limited():
     )
 
 
-# ---- truncated
+# ---- truncated lists
 
 
 @pytest.mark.parametrize(
@@ -241,7 +241,7 @@ def test_always_truncation_error_is_below_tail(reading, order, growth):
         )
 
 
-# ---- merged
+# ---- merged lists
 
 
 @pytest.mark.parametrize(

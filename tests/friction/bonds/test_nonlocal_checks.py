@@ -153,7 +153,7 @@ def test_exact_march_converges_beyond_contraction_limit():
         assert marched.outcome is None
 
 
-# ---- the same numbers through a scene
+# ---- bench scenes
 
 
 def run_bench(friction, motion, steps):
@@ -208,7 +208,7 @@ def test_exact_bench_steady_friction_of_printed_law(speed, order, expected):
     assert measures["friction_ratio_end"] == pytest.approx(expected, abs=1e-4)
 
 
-# ---- far ends
+# ---- extreme values
 
 GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}
 

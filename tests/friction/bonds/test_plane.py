@@ -70,7 +70,7 @@ def test_exact_traction_on_circle_agrees_with_closed_form(radius, magnitude, lag
     assert -np.angle(traction) == pytest.approx(np.arctan(1 / radius), abs=1e-5)
 
 
-# ---- one direction is the scalar law
+# ---- straight paths
 
 
 @pytest.mark.share(0, 3, 4)
@@ -100,7 +100,7 @@ def test_exact_straight_path_equals_scalar_law(law, tolerance):
     assert np.abs(plane_run[3] - scalar.stored).max() < tolerance
 
 
-# ---- any direction
+# ---- rotations and polygons
 
 
 def draw_polygon(rng, n_legs):
@@ -280,8 +280,8 @@ def test_exact_energies_are_independent_of_substeps(law):
     coarse_run = follow_polygon(Quadrature(law, 0.0), path)
     fine_run = follow_polygon(Quadrature(law, 0.0), fine_path)
     work = [
-        np.einsum("kcm,kc->k", part[0], np.diff(way, axis=0))
-        for part, way in ((coarse_run, path), (fine_run, fine_path))
+        np.einsum("kcm,kc->k", part[0], np.diff(polygon, axis=0))
+        for part, polygon in ((coarse_run, path), (fine_run, fine_path))
     ]
     tolerance = 2e-5 if law.order == 0 else 1e-7
     assert work[0] == pytest.approx(work[1].reshape(6, 20).sum(axis=1), abs=tolerance)

@@ -192,7 +192,7 @@ def test_always_cut_off_error_is_below_bound(reading, order, growth):
             assert error > 0
 
 
-# ---- far ends
+# ---- extreme values
 
 
 @pytest.mark.share(0, 3, 4, 6, 9)

@@ -33,7 +33,7 @@ def growth_parameters(draw):
     }
 
 
-# ---- recursion = sum
+# ---- recursion and sum over bonds
 
 
 @pytest.mark.share(0, 4, 8, 9, 13, 17)
@@ -133,7 +133,7 @@ def test_always_stretch_law_of_any_order_is_passive(order, growth):
         assert work.min() >= 0
 
 
-# ---- far ends
+# ---- extreme values
 
 
 @pytest.mark.parametrize("growth", GROWTH)

@@ -66,7 +66,7 @@ def test_refuses_growth_rates_out_of_range(surface, key):
         growth_at_temperature(10.0, 2e-7, 2.0, 293.15, None, 1500.0)
 
 
-# ---- a temperature per point
+# ---- temperature of each point
 
 
 @pytest.mark.parametrize("breakaway", [0.0, 0.3])
@@ -96,24 +96,24 @@ def test_exact_points_at_different_temperatures_are_independent(breakaway):
         for t in temperatures
     ]
     state = engine.start(sigma)
-    states = [one.start(sigma[i : i + 1]) for i, one in enumerate(separate_engines)]
+    states = [point_step.start(sigma[i : i + 1]) for i, point_step in enumerate(separate_engines)]
     rng = np.random.default_rng(1)
     for dq in np.append(rng.normal(0, 1e-6, 60), [0.0, 2e-6]):
         new_sigma = sigma * rng.uniform(0.5, 1.5)
         step = engine.step(state, dq, sigma, new_sigma, 1e-3)
         separate_steps = [
-            one.step(s, dq, sigma[i : i + 1], new_sigma[i : i + 1], 1e-3)
-            for i, (one, s) in enumerate(zip(separate_engines, states))
+            point_step.step(s, dq, sigma[i : i + 1], new_sigma[i : i + 1], 1e-3)
+            for i, (point_step, s) in enumerate(zip(separate_engines, states))
         ]
         state = step.state
-        states = [one.state for one in separate_steps]
+        states = [point_step.state for point_step in separate_steps]
         assert step.mean == pytest.approx(
-            [one.mean[0] for one in separate_steps], rel=1e-12, abs=1e-14
+            [point_step.mean[0] for point_step in separate_steps], rel=1e-12, abs=1e-14
         )
         assert step.dissipated == pytest.approx(
-            [one.dissipated[0] for one in separate_steps], rel=1e-10, abs=1e-20
+            [point_step.dissipated[0] for point_step in separate_steps], rel=1e-10, abs=1e-20
         )
-        assert state.eps == pytest.approx([one.eps for one in states], rel=1e-13)
+        assert state.eps == pytest.approx([point_step.eps for point_step in states], rel=1e-13)
         assert (step.dissipated >= 0).all()
     assert np.ptp(state.eps) > 1e-8
 

@@ -18,7 +18,7 @@ def law_keys(exponent, shape):
     return LAW + f"exponent = {exponent}\nshape = {shape}\n"
 
 
-def integrate_law(slide, exponent, shape):
+def integrate_rate_equation(slide, exponent, shape):
     """Return the variable z along straight legs of the displacement, integrated from the rate equation."""
     z = [0.0]
     for dq in np.diff(slide):
@@ -56,7 +56,7 @@ def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape):
     """Force and stored energy on the bench agree with the integrated rate equation, and the energy balance closes."""
     time, slide = shrinking_sine(60)
     result = run_bench_along_path(law_keys(exponent, shape), time, slide)
-    z = integrate_law(slide, exponent, shape)
+    z = integrate_rate_equation(slide, exponent, shape)
     assert np.abs(result.force - LIMIT * z).max() <= 1e-6 * LIMIT
     work, stored, dissipated, created = result.ledger
     assert stored == pytest.approx(LIMIT * EPS * z**2 / 2, abs=1e-9 * LIMIT * EPS)

@@ -114,12 +114,12 @@ def test_exact_alternating_load_causes_no_drift(law, load_amplitude):
         state = after.state
     tractions = []
     for _ in range(6):
-        for before, now in (
+        for load_before, load_after in (
             (unit, (1 - load_amplitude) * unit),
             ((1 - load_amplitude) * unit, (1 + load_amplitude) * unit),
             ((1 + load_amplitude) * unit, unit),
         ):
-            state = law.press(state, before, now).state
+            state = law.press(state, load_before, load_after).state
         tractions.append(law.traction(state)[0])
     assert tractions[-1] == pytest.approx(
         tractions[1], abs=1e-15

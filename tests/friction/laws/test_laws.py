@@ -74,7 +74,7 @@ def test_exact_rising_pressure_adds_unstressed_springs():
     assert law.traction(state)[0] == 0.8 and law.stored_energy(state)[0] == pytest.approx(
         0.8**2 / 4
     )
-    # stiffness 2
+    # the added springs double the stiffness
     assert law.step(state, 0.1, 2 * unit, 2 * unit, 1.0).mean[0] == pytest.approx(0.8 + 0.1)
     state = law.press(state, 2 * unit, unit).state
     # elastic over 0.1 up to the limit, then slip over three lengths

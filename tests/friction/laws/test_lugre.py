@@ -46,7 +46,7 @@ def test_exact_dahl_law_equals_bond_law():
     max_ratio = np.abs(dahl.slide).max() * STIFFNESS / STATIC
     assert dahl.force.max() == pytest.approx(
         STATIC * -np.expm1(-max_ratio), rel=2e-2
-    )  # first loading
+    )  # force of a first loading
 
 
 def test_exact_bench_steps_agree_with_rate_equation():

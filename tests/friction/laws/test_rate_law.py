@@ -100,8 +100,8 @@ def reference_amplitude(speed, level, cycles, tolerance=1e-10):
         ]
 
     end = cycles * 2 * np.pi / OMEGA
-    at = np.linspace(end - 4 * np.pi / OMEGA, end, 8001)
-    y = solve_ivp(rate, (0, end), [0, 0], "LSODA", at, rtol=tolerance, atol=1e-16).y[0]
+    times = np.linspace(end - 4 * np.pi / OMEGA, end, 8001)
+    y = solve_ivp(rate, (0, end), [0, 0], "LSODA", times, rtol=tolerance, atol=1e-16).y[0]
     return np.ptp(y) / 2
 
 
