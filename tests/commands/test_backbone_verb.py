@@ -1,4 +1,4 @@
-"""patchfem backbone: what it prints, the files it writes, what it refuses."""
+"""`patchfem backbone`: printed answer, files and error messages."""
 
 import csv
 import json
@@ -26,21 +26,24 @@ COLUMNS = [
 
 
 @pytest.fixture
-def scene(tmp_path, monkeypatch):
+def scene_folder(tmp_path, monkeypatch):
+    """Return the working folder with the scene of a joint."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "joint.toml").write_text(make_shaken_block(IWAN), "utf-8")
     return tmp_path
 
 
-def run(*words) -> int:
+def run_command(*words) -> int:
+    """Run the command line and return its exit code."""
     with pytest.raises(SystemExit) as ended:
         main([str(word) for word in words])
     return ended.value.code or 0
 
 
-def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
+def test_exact_backbone_files_agree_with_answer(scene_folder, capsys):
+    """JSON, CSV, netCDF and report of a backbone contain the same frequencies and damping ratios."""
     assert (
-        run(
+        run_command(
             "backbone",
             "joint.toml",
             "--amplitudes",
@@ -63,7 +66,7 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
     curve = answer["curves"]["quasi-static"]
     assert set(curve) == {"amplitude", "frequency", "frequency_error", "damping", "damping_error"}
     assert curve["amplitude"] == pytest.approx([1e-5, 1e-4, 1e-3], rel=1e-9)
-    folder = scene / "out" / "joint-backbone"
+    folder = scene_folder / "out" / "joint-backbone"
     head, *rows = csv.reader((folder / "backbone.csv").read_text("utf-8").splitlines())
     assert head == COLUMNS and [float(row[2]) for row in rows] == curve["frequency"]
     with xr.open_dataset(folder / "backbone.nc") as data:
@@ -82,62 +85,68 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
     assert (folder / "backbone.svg").read_text("utf-8").startswith("<svg")
 
 
-def test_the_screen_answers_in_sentences_and_names_what_is_not_known(scene, capsys):
+def test_always_screen_names_unknown_results(scene_folder, capsys):
+    """The screen gives the natural frequency in a sentence, and the reason why the quasi-static curve is unknown."""
     rigid = (
         make_shaken_block(IWAN)
         .replace('"iwan"', '"coulomb"')
         .replace("chi = -0.5\nbeta = 0.5\n", "")
     )
-    (scene / "joint.toml").write_text(rigid.replace('stiffness = "20 kN/m"\n', ""), "utf-8")
-    assert run("backbone", "joint.toml", "--amplitudes", "2 mm,5 mm", "--no-page", "-q") == 0
+    (scene_folder / "joint.toml").write_text(rigid.replace('stiffness = "20 kN/m"\n', ""), "utf-8")
+    assert (
+        run_command("backbone", "joint.toml", "--amplitudes", "2 mm,5 mm", "--no-page", "-q") == 0
+    )
     shown = capsys.readouterr().out
     assert "\nThe natural frequency of mode axial is 100 Hz without the contact.\n" in shown
     assert "quasi-static: not known: " in shown
-    assert not (scene / "out" / "joint-backbone" / "report.html").exists()
+    assert not (scene_folder / "out" / "joint-backbone" / "report.html").exists()
 
 
-def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene, capsys):
-    for asked, told in (
+def test_always_largest_damping_names_computed_amplitudes(scene_folder, capsys):
+    """The largest damping ratio is printed with the number of computed amplitudes, and omitted for a single one."""
+    for amplitudes, expected in (
         ("10 um..1 mm:3", "Among these 3 amplitudes the damping ratio is largest at "),
         ("10 um", ""),
     ):
         assert (
-            run(
+            run_command(
                 "backbone",
                 "joint.toml",
                 "--amplitudes",
-                asked,
+                amplitudes,
                 "--method",
                 "quasi-static",
                 "--no-page",
                 "-q",
                 "-o",
-                f"out{len(told)}",
+                f"out{len(expected)}",
             )
             == 0
         )
         shown = capsys.readouterr().out
-        assert told in shown and ("largest" in shown) == bool(told)
+        assert expected in shown and ("largest" in shown) == bool(expected)
 
 
-def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
-    """One of 3.6 +- 9.8 kHz beside others of 100 Hz stretched the axis of the picture."""
+def test_exact_uncertain_frequency_is_omitted_from_chart():
+    """A frequency of 3.6 +- 9.8 kHz appears in the table and not in the chart, whose axis it would stretch."""
     a = np.array([1e-6, 2e-6, 3e-6])
-    none = np.full(3, np.nan)
-    one = Curve(
+    unknown = np.full(3, np.nan)
+    curve = Curve(
         a,
         np.array([100.0, 90.0, 3.6e3]),
         np.array([1.0, 1.0, 9.8e3]),
         np.array([1e-4, 2e-3, 0.28]),
         np.array([2e-4, 1e-4, 0.34]),
-        none,
+        unknown,
     )
-    found = Backbone(
-        "first", ModeFrequencies(50.0, 100.0), {"decay": one}, {}, LossExponents(), None, ()
+    backbone = Backbone(
+        "first", ModeFrequencies(50.0, 100.0), {"decay": curve}, {}, LossExponents(), None, ()
     )
-    frequency, damping = backbone_charts(found.curves)
+    frequency, damping = backbone_charts(backbone.curves)
     assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
     assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2
-    assert "9.8 kHz" in page_html(found, "") and "left out of the picture" in page_html(found, "")
-    sure = page_html(found._replace(curves={"decay": one.at(slice(2))}), "")
-    assert "left out of the picture" not in sure
+    assert "9.8 kHz" in page_html(backbone, "") and "left out of the picture" in page_html(
+        backbone, ""
+    )
+    page_without_frequency = page_html(backbone._replace(curves={"decay": curve.at(slice(2))}), "")
+    assert "left out of the picture" not in page_without_frequency

@@ -1,4 +1,4 @@
-"""The first screen and the page of what is shipped: no warning but what is meant, numbers for people."""
+"""Screens and reports of the templates and of the shipped scenes: only expected warnings, and readable numbers."""
 
 import json
 import re
@@ -12,10 +12,13 @@ from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
 
 ROOT = Path(__file__).parents[2]
 SCENES = sorted(str(path.relative_to(ROOT)) for path in (ROOT / "studies").glob("*/*.toml"))
-STEADY = ("rig", "linear")  # templates whose motion settles; the runs of all others have an end
-# always; the others are slow
+STEADY = (
+    "rig",
+    "linear",
+)  # templates whose motion becomes steady; all other runs are done at their end
+# scenes of a normal run; the others are slow
 CHEAP = ("studies/bench/loop.toml", "studies/report/block.toml", "studies/rig/rig.toml")
-MEANT = {  # warnings that are true of a scene, each with what would cure it and why it stays
+MEANT = {  # expected warnings of a scene, each with its remedy and the reason to keep it
     "studies/rig/report.toml": (
         "the shape of the patch does not",
         "the law as printed in the report created",
@@ -34,18 +37,18 @@ UGLY = re.compile(
 )
 
 
-def texts_of(page: str) -> str:
-    """What a page says, without its scripts, its scene and what hides in tags."""
+def visible_text(page: str) -> str:
+    """Return the visible text of a page, without scripts, scene and tags."""
     page = re.sub(r"<(script|style|pre|details)\b.*?</\1>", " ", page, flags=re.S)
     return unescape(re.sub(r"<[^>]+>", " ", page))
 
 
-def ran(path: Path, out: Path, *words) -> list:
-    """Warnings of a run, on the screen and on its page alike; nothing ugly stands on either."""
+def run_and_list_warnings(path: Path, out: Path, *words) -> list:
+    """Run a scene, assert that screen and report have readable numbers, and return the warnings."""
     answer = run_cli(*words, path, "-o", out)
     assert answer.code == 0, answer.err
     page = (out / "report.html").read_text("utf-8")
-    for text in (answer.out, answer.err, texts_of(page)):
+    for text in (answer.out, answer.err, visible_text(page)):
         assert [
             text[max(0, one.start() - 40) : one.end() + 20] for one in UGLY.finditer(text)
         ] == []
@@ -65,10 +68,11 @@ def ran(path: Path, out: Path, *words) -> list:
         for one in TEMPLATE_DESCRIPTIONS
     ],
 )
-def test_always_a_template_says_no_warning(kind, tmp_path):
+def test_always_templates_run_without_warnings(kind, tmp_path):
+    """Every template runs without a warning and ends with the expected outcome."""
     path = tmp_path / f"{kind}.toml"
     path.write_text(read_template(kind), "utf-8")
-    assert ran(path, tmp_path / "out", NEXT_VERBS.get(kind, "run")) == []
+    assert run_and_list_warnings(path, tmp_path / "out", NEXT_VERBS.get(kind, "run")) == []
     if kind not in NEXT_VERBS:
         summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
         assert summary["outcome"] == ("steady" if kind in STEADY else "done")
@@ -77,16 +81,17 @@ def test_always_a_template_says_no_warning(kind, tmp_path):
 @pytest.mark.parametrize(
     "scene", [one if one in CHEAP else pytest.param(one, marks=pytest.mark.slow) for one in SCENES]
 )
-def test_always_a_shipped_scene_says_what_is_meant(scene, tmp_path):
-    found = ran(ROOT / scene, tmp_path / "out", "run")
-    meant = MEANT.get(scene, ())
-    assert len(found) == len(meant) and all(
-        text.startswith(start) for text, start in zip(found, meant, strict=True)
+def test_always_shipped_scenes_give_expected_warnings(scene, tmp_path):
+    """Every shipped scene gives exactly the warnings listed for it."""
+    found = run_and_list_warnings(ROOT / scene, tmp_path / "out", "run")
+    expected = MEANT.get(scene, ())
+    assert len(found) == len(expected) and all(
+        text.startswith(start) for text, start in zip(found, expected, strict=True)
     )
 
 
-def test_exact_the_pattern_finds_what_was_printed():
-    """Strings of 0.4 that people stumbled on; those of today pass."""
+def test_exact_pattern_finds_unreadable_numbers():
+    """The pattern finds unreadable numbers that version 0.4 printed, and accepts those of today."""
     for text in (
         "drift_per_cycle 0 ± 0 nm",
         "contact 100 ± 1e-07 %",

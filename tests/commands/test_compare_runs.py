@@ -1,4 +1,4 @@
-"""patchfem compare of two results folders: what wore off between them, by the names that traces have, refusals."""
+"""`patchfem compare` of two results folders: wear between them, in the measures of compared traces, and error messages."""
 
 import json
 import re
@@ -32,7 +32,9 @@ angle = "0.1 mrad"
 ROLLED = TILTED.replace("0.2 mm", "0.5 mm") + '[contact.strips]\ncount = 4\nroll = "0.05 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 WEAR = '[wear]\ncoefficient = "1e-14 m^2/N"\njumps = 8\ncycles = '
-PER_CYCLE = 1e-14 * 100.0 * 40e-6  # m^3: coefficient, load, path
+PER_CYCLE = (
+    1e-14 * 100.0 * 40e-6
+)  # worn volume per cycle [m^3]: coefficient, load and sliding distance
 MANY = 4e6
 SCENES = {
     "new": TILTED + COULOMB + SINE,
@@ -47,8 +49,8 @@ SCENES = {
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory):
-    """Results folders of SCENES by name."""
+def result_folders(tmp_path_factory):
+    """Return the folder with the results of SCENES by name."""
     place = tmp_path_factory.mktemp("runs")
     for name, text in SCENES.items():
         pf.run(pf.load(text)).save(place / name)
@@ -56,17 +58,21 @@ def runs(tmp_path_factory):
 
 
 @pytest.mark.parametrize("before", ["new", "pressed", "half"])
-def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
-    found = pf.compare(runs / before, runs / "worn")
+def test_exact_wear_measures_agree_with_archard(result_folders, before):
+    """Worn volume, mean depth and area agree with Archard's law within 1e-11.
+
+    The measures of the track are consistent with each other.
+    """
+    found = pf.compare(result_folders / before, result_folders / "worn")
     volume = PER_CYCLE * (MANY - (1e5 if before == "half" else 0.0))
     for name, truth in (
         ("worn_volume", volume),
         ("worn_depth_mean", volume / 12.7e-3 / 10e-3),
         ("worn_area", volume / 10e-3),
     ):
-        one = found[name]
-        assert one["value"] == pytest.approx(truth, rel=1e-11)
-        assert one["low"] <= truth <= one["high"]
+        quantity = found[name]
+        assert quantity["value"] == pytest.approx(truth, rel=1e-11)
+        assert quantity["low"] <= truth <= quantity["high"]
     assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(
         found
     )
@@ -93,16 +99,19 @@ def test_exact_volume_mean_and_area_are_those_of_the_whole_patch(runs, before):
     assert ("loop_area" in measures[0]) == (before != "pressed")
 
 
-def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
-    """Between two states in full contact all points wear nearly alike; from the new one on, a stretch is unworn."""
-    found = pf.compare(runs / "new", runs / "worn")
+def test_exact_hidden_wear_of_tilted_patch(result_folders):
+    """Between two states in full contact, most of the wear is a wedge that a trace could not show.
+
+    From the new state on, a stretch stays unworn, and the hidden wear is zero.
+    """
+    found = pf.compare(result_folders / "new", result_folders / "worn")
     mean = found["worn_depth_mean"]["value"]
     hidden = found["hidden_wear"]["value"]
     assert 0.8 * mean < hidden < mean and "a trace alone could not show" in found["verdict"]
-    found = pf.compare(runs / "new", runs / "half")
+    found = pf.compare(result_folders / "new", result_folders / "half")
     assert found["hidden_wear"]["value"] == 0
     track = found["track"]
-    end = pf.compare(runs / "new", runs / "half")["track"]["to"]["value"]
+    end = pf.compare(result_folders / "new", result_folders / "half")["track"]["to"]["value"]
     assert (
         0.5 * track["depth_mean"]["value"]
         < track["hidden_wear"]["value"]
@@ -112,8 +121,11 @@ def test_exact_a_wedge_is_told_apart_from_what_a_trace_shows(runs):
     assert "is a wedge that a trace within this part alone could not show" in found["verdict"]
 
 
-def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
-    """Against the best of many lines."""
+def test_exact_hidden_line_is_highest_line_below_depth():
+    """The hidden line lies below the depth and has the largest mean of all such lines.
+
+    The largest mean is found by a search over a grid of lines.
+    """
     x = np.linspace(-1, 2, 41)
     rng = np.random.default_rng(3)
     for k in range(12):
@@ -123,28 +135,38 @@ def test_exact_hidden_wear_is_the_highest_line_below_the_depth():
         line = np.interp(x, x[[0, -1]], ends)
         assert min(ends) >= 0 and (line <= depth + 1e-12).all()
         low, high = np.meshgrid(*[np.linspace(0, one, 100) for one in (depth[0], depth[-1])])
-        share = (x - x[0]) / (x[-1] - x[0])
-        under = ((low[..., None] * (1 - share) + high[..., None] * share) <= depth).all(axis=-1)
-        best = float(((low + high) / 2)[under].max())
+        fraction = (x - x[0]) / (x[-1] - x[0])
+        is_below = ((low[..., None] * (1 - fraction) + high[..., None] * fraction) <= depth).all(
+            axis=-1
+        )
+        best = float(((low + high) / 2)[is_below].max())
         assert best <= sum(ends) / 2 + 1e-12
         assert sum(ends) / 2 - best < 0.04 * max(depth[0], depth[-1]) + 1e-12
     assert hidden_line(x, 3.0 + x) == pytest.approx((2.0, 5.0), rel=1e-12)
     assert hidden_line(x, np.maximum(x, 0.0)) == (0.0, 0.0)
 
 
-def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
-    answer = run_cli("compare", runs / "half", runs / "worn", "--json", "-o", tmp_path / "out")
+def test_exact_compare_command_agrees_with_python(result_folders, tmp_path):
+    """The command prints and stores the results of `pf.compare`, and writes a report with the verdict."""
+    answer = run_cli(
+        "compare",
+        result_folders / "half",
+        result_folders / "worn",
+        "--json",
+        "-o",
+        tmp_path / "out",
+    )
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
     assert (
         found
-        == pf.compare(runs / "half", runs / "worn")
+        == pf.compare(result_folders / "half", result_folders / "worn")
         == json.loads((tmp_path / "out/compare.json").read_text())
     )
     page = (tmp_path / "out" / "report.html").read_text()
     assert found["verdict"][1:] in page and "Friction loop before" in page and "<script" not in page
-    lost = compare_runs(runs / "half", runs / "worn")
-    table = "\n".join(worn.format_wear(lost, worn.wear_verdict(lost)))
+    wear = compare_runs(result_folders / "half", result_folders / "worn")
+    table = "\n".join(worn.format_wear(wear, worn.wear_verdict(wear)))
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
 
 
@@ -164,8 +186,8 @@ QUICK = [
 @pytest.mark.parametrize(
     "more", [QUICK, pytest.param([], marks=pytest.mark.slow)], ids=["quick", "whole"]
 )
-def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monkeypatch, more):
-    """Of a few cycles on a coarse mesh it ends in a verdict of the same form; the whole story prints the guide's."""
+def test_always_guide_example_prints_its_verdict(tmp_path, monkeypatch, more):
+    """The three commands of the guide print its verdict; a quick version prints a verdict of the same form."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "studies").symlink_to(ROOT / "studies")
     for line in STORY[1].splitlines():
@@ -173,9 +195,9 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
         sets = more if "wear.cycles" in line else more[:4]
         answer = run_cli(*words[1:], *(sets if words[1] == "run" else ()), "-q")
         assert words[0] == "patchfem" and answer.code == 0, answer.err
-    told = " ".join(STORY[2].replace("> ", "").split())
+    verdict = " ".join(STORY[2].replace("> ", "").split())
     head = answer.out.splitlines()[0]
-    assert "that a trace within this part alone could not show" in head if more else head == told
+    assert "that a trace within this part alone could not show" in head if more else head == verdict
 
 
 @pytest.mark.parametrize(
@@ -194,53 +216,71 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
         (("file.csv", "worn"), "file.csv: a file, while"),
     ],
 )
-def test_refuses_bad_folders_by_name(runs, tmp_path, names, told):
-    (runs / "empty").mkdir(exist_ok=True)
-    (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
-    answer = run_cli("compare", *(runs / name for name in names), "-o", tmp_path / "out")
+def test_refuses_invalid_result_folders(result_folders, tmp_path, names, told):
+    """A missing folder, a folder without wear and a damaged folder are refused by name."""
+    (result_folders / "empty").mkdir(exist_ok=True)
+    (result_folders / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
+    answer = run_cli("compare", *(result_folders / name for name in names), "-o", tmp_path / "out")
     assert answer.code == (4 if "nowhere" in names else 2)
     assert told in answer.err
     assert "Traceback" not in answer.err
     assert not (tmp_path / "out").exists()
 
 
-def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
+def test_refuses_trace_options_and_damaged_results(result_folders, tmp_path):
+    """Options for traces, a mixture of file and folder, and a damaged result.nc are refused for results folders."""
     for words in (
         ("--shift", "1 mm"),
         ("--direction", "x"),
         ("--keep-spikes",),
         ("--units", "um,um"),
     ):
-        answer = run_cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
+        answer = run_cli(
+            "compare",
+            result_folders / "new",
+            result_folders / "worn",
+            *words,
+            "-o",
+            tmp_path / "out",
+        )
         assert answer.code == 2
         assert f"{words[0]} can only be used for measured surfaces" in answer.err
         assert "leave it out" in answer.err
-    (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
+    (result_folders / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
     answer = run_cli(
-        "compare", runs / "file.csv", runs / "worn", "--direction", "x", "-o", tmp_path / "out"
+        "compare",
+        result_folders / "file.csv",
+        result_folders / "worn",
+        "--direction",
+        "x",
+        "-o",
+        tmp_path / "out",
     )
     assert answer.code == 2 and "file.csv: a file, while" in answer.err
     (tmp_path / "bad").mkdir()
     for name in ("summary.json", "scene.resolved.toml", "result.nc"):
-        (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
+        (tmp_path / "bad" / name).write_bytes((result_folders / "worn" / name).read_bytes())
     (tmp_path / "bad" / "result.nc").write_bytes(b"no netCDF")
-    answer = run_cli("compare", runs / "new", tmp_path / "bad", "-o", tmp_path / "out")
+    answer = run_cli("compare", result_folders / "new", tmp_path / "bad", "-o", tmp_path / "out")
     assert answer.code == 2
     assert "bad/result.nc: cannot be read" in answer.err
     assert "Traceback" not in answer.err
 
 
-def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
-    """Each pair of folders as `compare` gives it alone, means of their own, and reasons for what cannot be compared."""
+def test_exact_pairs_table_accepts_result_folders(result_folders, tmp_path):
+    """Each pair of folders in a table gives the results of `pf.compare`.
+
+    Pairs that cannot be compared give a reason, and the mean covers the others.
+    """
     (tmp_path / "a.csv").write_text(
         "x [um],z [um]\n" + "".join(f"{k},{np.sin(k):.3f}\n" for k in range(400))
     )
     names = [("new", "half"), ("new", "worn"), ("worn", "new")]
     rows = [
         "before,after,direction",
-        *(f"{runs / one},{runs / other}," for one, other in names),
-        f"{runs / 'new'},{runs / 'pressed'},x",
-        f"{runs / 'new'},a.csv,",
+        *(f"{result_folders / one},{result_folders / other}," for one, other in names),
+        f"{result_folders / 'new'},{result_folders / 'pressed'},x",
+        f"{result_folders / 'new'},a.csv,",
         f"a.csv,{tmp_path / 'a.csv'},",
     ]
     (tmp_path / "pairs.csv").write_text("\n".join(rows) + "\n")
@@ -250,7 +290,7 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
         "failed"
     ] * 3 + ["done"]
     for (before, after), row in zip(names, found[:2]):
-        alone = json.loads(json.dumps(pf.compare(runs / before, runs / after)))
+        alone = json.loads(json.dumps(pf.compare(result_folders / before, result_folders / after)))
         assert {name: row[name] for name in alone if name not in ("before", "after")} == {
             name: one for name, one in alone.items() if name not in ("before", "after")
         }
@@ -263,23 +303,25 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
     assert "Results folders: mean of 2 pairs" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
-    found = pf.compare(runs / "rolled", runs / "rolled_worn")
-    one = compare_runs(runs / "rolled", runs / "rolled_worn")
+def test_exact_strips_are_compared_over_area(result_folders):
+    """The worn volume of a patch in strips agrees with Archard's law within 1e-11 and with the sum over the area."""
+    found = pf.compare(result_folders / "rolled", result_folders / "rolled_worn")
+    wear = compare_runs(result_folders / "rolled", result_folders / "rolled_worn")
     volume = found["worn_volume"]
     assert volume["value"] == pytest.approx(PER_CYCLE * MANY, rel=1e-11)
-    assert float((one.depth * one.after.surface.area).sum()) == pytest.approx(
+    assert float((wear.depth * wear.after.surface.area).sum()) == pytest.approx(
         volume["value"], rel=1e-11
     )
-    assert one.depth.shape == (4, one.after.surface.x.size)
-    assert one.depth.max() == found["worn_depth_max"]["value"]
+    assert wear.depth.shape == (4, wear.after.surface.x.size)
+    assert wear.depth.max() == found["worn_depth_max"]["value"]
     assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
     hidden = found["hidden_wear"]["value"]
     assert "that a scan alone could not show" in found["verdict"]
     assert 0 < hidden < found["worn_depth_mean"]["value"]
 
 
-def test_exact_the_hidden_plane_lies_below_every_depth_and_is_the_highest():
+def test_exact_hidden_plane_is_highest_plane_below_depth():
+    """The hidden plane touches the depth from below: its corners equal those of the plane inserted into the depths."""
     x = np.array([-3.0, -2.0, 0.0, 1.0, 3.0])
     y = np.array([-1.0, 0.0, 1.0])
     plane = 5 + 0.5 * x + 2 * y[:, None]

@@ -1,4 +1,4 @@
-"""patchfem compare: verdict, table, JSON of the contract, page, a scene pressed with both, refusals."""
+"""`patchfem compare`: verdict, table, JSON, report, a scene solved with both surfaces, and error messages."""
 
 import json
 import re
@@ -38,8 +38,8 @@ normal_stiffness = "1e13 Pa/m"
 """
 
 
-def written(path: Path, trace: Profile) -> Path:
-    """A trace as an instrument exports it, rounded to what it prints."""
+def write_trace(path: Path, trace: Profile) -> Path:
+    """Write a trace with the digits of an instrument and return its path."""
     path.write_text(
         "x [um],z [um]\n"
         + "".join(f"{x / UM:.3f},{z / UM:.4f}\n" for x, z in zip(trace.x, trace.z))
@@ -48,22 +48,23 @@ def written(path: Path, trace: Profile) -> Path:
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory) -> tuple:
-    """Before, after with half of it worn, and the pair."""
+def trace_pair(tmp_path_factory) -> tuple:
+    """Return the paths of a trace before and after wear of half the depth, and the pair."""
     p = make_worn_pair(30077, worn_fraction=0.5)
     place = tmp_path_factory.mktemp("traces")
-    return written(place / "before.csv", p.before), written(place / "after.csv", p.after), p
+    return write_trace(place / "before.csv", p.before), write_trace(place / "after.csv", p.after), p
 
 
 @pytest.fixture(scope="module")
-def compared(files, tmp_path_factory) -> tuple:
-    """(Answer, folder) of the comparison of both along y."""
+def comparison(trace_pair, tmp_path_factory) -> tuple:
+    """Return the answer and the folder of a comparison of both traces along y."""
     out = tmp_path_factory.mktemp("compared") / "out"
-    return run_cli("compare", *files[:2], "--direction", "y", "-o", out), out
+    return run_cli("compare", *trace_pair[:2], "--direction", "y", "-o", out), out
 
 
-def test_exact_the_answer_in_one_command(files, compared):
-    p, (answer, out) = files[2], compared
+def test_exact_compare_reports_shift_and_worn_depth(trace_pair, comparison):
+    """The command finds the shift within 0.02 um and the worn depth within 0.1 um, with intervals, units and a report."""
+    p, (answer, out) = trace_pair[2], comparison
     assert answer.code == 0 and answer.out.splitlines()[0] == "worn, waves reduced"
     assert answer.out.splitlines()[-1] == f"results: {out}"
     found = json.loads((out / "compare.json").read_text())
@@ -84,34 +85,42 @@ def test_exact_the_answer_in_one_command(files, compared):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_exact_json_says_why_there_is_no_depth(files, tmp_path):
-    other = written(tmp_path / "elsewhere.csv", make_worn_pair(50001, worn_fraction=0.3).after)
-    found = json.loads(run_cli("compare", files[0], other, "--json").out)
+def test_exact_traces_without_overlap_give_reason(trace_pair, tmp_path):
+    """Traces without a common part give no worn depth but a reason, and an amplitude ratio."""
+    other = write_trace(tmp_path / "elsewhere.csv", make_worn_pair(50001, worn_fraction=0.3).after)
+    found = json.loads(run_cli("compare", trace_pair[0], other, "--json").out)
     for name in NAMES[:4]:
         assert found[name]["value"] is None and "no common part" in found[name]["reason"]
     assert found["amplitude_ratio"]["value"] > 0
 
 
-def test_exact_identical_traces_show_no_change(files):
-    found = json.loads(run_cli("compare", files[0], files[0], "--json").out)
+def test_exact_identical_traces_show_no_change(trace_pair):
+    """Two identical traces give the verdict "no change shown" and a shift of zero."""
+    found = json.loads(run_cli("compare", trace_pair[0], trace_pair[0], "--json").out)
     assert found["verdict"] == "no change shown" and found["worn_depth_mean"]["value"] is None
     assert found["hidden_wear"]["high"] is None and found["hidden_wear"]["value"] < 1e-9
     assert found["shift"]["value"] == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.slow
-def test_always_a_scene_is_pressed_with_both(files, tmp_path):
-    (tmp_path / "patch.toml").write_text(SCENE.replace("before.csv", str(files[0])))
+def test_always_scene_is_solved_with_both_surfaces(trace_pair, tmp_path):
+    """A scene solved with both surfaces has a lower peak pressure and a larger contact fraction after wear.
+
+    A run with the stored surface gives the same peak within 1e-12.
+    """
+    (tmp_path / "patch.toml").write_text(SCENE.replace("before.csv", str(trace_pair[0])))
     out = tmp_path / "out"
-    answer = run_cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", out)
+    answer = run_cli(
+        "compare", trace_pair[0], trace_pair[1], "--scene", tmp_path / "patch.toml", "-o", out
+    )
     assert answer.code == 0, answer.err
     found = json.loads((out / "compare.json").read_text())["pressed"]
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness"):
         assert {"value", "error", "unit"} == set(found["measures"][name]["before"])
-    peak, share = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
-    # worn plateaus carry more of the load
+    peak, fraction = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
+    # worn plateaus carry a larger part of the load
     assert peak["after"]["value"] < 0.6 * peak["before"]["value"]
-    assert share["after"]["value"] > share["before"]["value"]
+    assert fraction["after"]["value"] > fraction["before"]["value"]
     assert any(
         text.startswith("energy dissipated by friction per cycle: not computed")
         for text in found["lacking"]
@@ -119,20 +128,21 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
     profile = f"contact.profile.file={out / 'surface_after.csv'}"
-    alone = run_cli(
+    single_run = run_cli(
         "run", tmp_path / "patch.toml", "--set", profile, "--json", "-o", tmp_path / "alone"
     )
-    assert json.loads(alone.out)["measures"]["pressure_peak"]["value"] == pytest.approx(
+    assert json.loads(single_run.out)["measures"]["pressure_peak"]["value"] == pytest.approx(
         peak["after"]["value"], rel=1e-12
     )
 
 
 @pytest.mark.slow
-def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
+def test_always_four_traces_and_scans_give_two_directions(trace_pair, tmp_path):
+    """Four traces give a verdict for each direction and the anisotropy, and two equal scans show no change."""
     p = make_worn_pair(30078, worn_fraction=0.0)
-    across = written(tmp_path / "by.csv", p.before), written(tmp_path / "ay.csv", p.after)
+    across = write_trace(tmp_path / "by.csv", p.before), write_trace(tmp_path / "ay.csv", p.after)
     found = json.loads(
-        run_cli("compare", *files[:2], *across, "--json", "-o", tmp_path / "out").out
+        run_cli("compare", *trace_pair[:2], *across, "--json", "-o", tmp_path / "out").out
     )
     assert found["verdict"] == "worn, waves reduced along x, no change shown along y"
     assert set(found["directions"]) == {"x", "y"} and set(found["anisotropy"]) == {
@@ -158,29 +168,32 @@ def test_always_four_files_and_scans_have_two_directions(files, tmp_path):
     assert "agree up to a plane" in found["worn_depth_max"]["reason"]
 
 
-def test_exact_python_gives_what_the_command_writes(files, compared):
-    said = json.loads((compared[1] / "compare.json").read_text("utf-8"))
-    found = pf.compare(str(files[0]), files[1], direction="y")
-    assert json.loads(json.dumps(found)) == said and found["direction"] == "y"
+def test_exact_python_equals_compare_command(trace_pair, comparison):
+    """`pf.compare` returns the data that the command writes."""
+    written_data = json.loads((comparison[1] / "compare.json").read_text("utf-8"))
+    found = pf.compare(str(trace_pair[0]), trace_pair[1], direction="y")
+    assert json.loads(json.dumps(found)) == written_data and found["direction"] == "y"
     assert found["verdict"] == "worn, waves reduced"
 
 
 @pytest.mark.parametrize(
     "count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is needed")]
 )
-def test_refuses_from_python_what_the_command_refuses(files, count, direction, says):
+def test_refuses_invalid_arguments_from_python(trace_pair, count, direction, says):
+    """`pf.compare` refuses three files and an unknown direction."""
     with pytest.raises(pf.PatchfemError, match=says):
-        pf.compare(*(files[0],) * count, direction=direction)
+        pf.compare(*(trace_pair[0],) * count, direction=direction)
 
 
-def test_exact_neither_meshes_nor_compiled_code_are_imported(files, tmp_path):
-    modules = modules_after(FROM_SHELL, "compare", *files[:2], "-o", tmp_path / "out")
+def test_exact_compare_loads_no_mesh_or_compiler(trace_pair, tmp_path):
+    """`patchfem compare` imports neither scikit-fem nor numba."""
+    modules = modules_after(FROM_SHELL, "compare", *trace_pair[:2], "-o", tmp_path / "out")
     assert not modules & {*ALWAYS, "skfem"}
 
 
 @pytest.mark.parametrize("verb", ["compare", "profile"])
-def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
-    """Not even the measured files that lie there are touched."""
+def test_refuses_output_folder_with_foreign_files(tmp_path, verb):
+    """An output folder with the measured files is refused, and the files stay unchanged."""
     rows = "x [um],z [um]\n" + "".join(f"{k},{np.sin(k / 9):.4f}\n" for k in range(2000))
     for name in ("before.csv", "after.csv"):
         (tmp_path / "data" / name).parent.mkdir(exist_ok=True)
@@ -192,11 +205,12 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
     assert len(list((tmp_path / "data").iterdir())) == 2
 
 
-def test_exact_a_told_shift_is_a_length(files):
-    shift = files[2].shift
-    answer = run_cli("compare", *files[:2], "--shift", f"{shift / UM:.1f} um", "--json")
+def test_exact_given_shift_is_used(trace_pair):
+    """A given shift in um is used, and a shift that does not fit is reported as not available."""
+    shift = trace_pair[2].shift
+    answer = run_cli("compare", *trace_pair[:2], "--shift", f"{shift / UM:.1f} um", "--json")
     found = json.loads(answer.out)
     assert found["reference"] == "place"
     assert found["shift"]["value"] == pytest.approx(shift, abs=0.02 * UM)
-    answer = run_cli("compare", *files[:2], "--shift", f"{shift / UM + 300:.1f} um")
+    answer = run_cli("compare", *trace_pair[:2], "--shift", f"{shift / UM + 300:.1f} um")
     assert "not available; at the given shift of" in answer.out

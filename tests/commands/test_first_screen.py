@@ -1,4 +1,4 @@
-"""What a run says: the verdict first, numbers as people read them, nothing where it is to be quiet."""
+"""Output of a run: the verdict first, rounded numbers in readable units, and no output with -q."""
 
 import json
 import re
@@ -31,17 +31,18 @@ from patchfem.scene import UNIT_FACTORS, read_template
 UNIT = {"g": 9.80665, "%": 0.01, "deg": UNIT_FACTORS["angle"]["deg"]}
 
 
-def entry(value, error=None, unit="1", **more) -> dict:
-    """Return a measure as the summary of a run has it."""
+def make_entry(value, error=None, unit="1", **more) -> dict:
+    """Return a measure as the summary of a run stores it."""
     return {"value": value, "error": error, "unit": unit, **more}
 
 
-def summary_of(kind="bench", outcome="done", measures=(), **more) -> dict:
-    """Return the parts of a summary that a verdict speaks of."""
+def make_summary(kind="bench", outcome="done", measures=(), **more) -> dict:
+    """Return the parts of a summary that a verdict uses."""
     return {"kind": kind, "outcome": outcome, "measures": dict(measures), **more}
 
 
-def run(tmp_path, kind, *words, **keys):
+def run_template(tmp_path, kind, *words, **keys):
+    """Run the template of a kind of scene with settings, and return the answer."""
     path = tmp_path / f"{kind}.toml"
     path.write_text(read_template(kind), "utf-8")
     sets = [
@@ -52,8 +53,8 @@ def run(tmp_path, kind, *words, **keys):
     return run_cli("run", path, "-o", tmp_path / "out", "--no-page", *sets, *words)
 
 
-def in_si(text: str) -> float:
-    """The value of a text such as 14.80 ± 0.05 um."""
+def parse_quantity(text: str) -> float:
+    """Return the value [SI] of a text such as "14.80 ± 0.05 um"."""
     number, _, unit = re.fullmatch(r"(\S+)( ± \S+)?(?: (\S.*))?", text.split(", ")[0]).groups()
     known = {
         name: scale
@@ -66,9 +67,9 @@ def in_si(text: str) -> float:
     )
 
 
-def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
-    """Each within what its last digit hides; the title, the outcome and the headline stand above the groups."""
-    answer = run(tmp_path, "rig")
+def test_exact_printed_measures_equal_summary(tmp_path):
+    """The printed measures equal those of the summary within their last digit, below title, outcome and headline."""
+    answer = run_template(tmp_path, "rig")
     lines = answer.out.splitlines()
     measures = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["measures"]
     assert lines[0] == "A rubbing block on flexures, shaken at one frequency"
@@ -85,17 +86,18 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
     shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
     assert set(shown) == set(measures)
     for name, text in shown.items():
-        one = measures[name]
-        if one["value"] is None:
-            assert text == f"- ({one['reason']})"
+        measure = measures[name]
+        if measure["value"] is None:
+            assert text == f"- ({measure['reason']})"
             continue
-        assert in_si(text) == pytest.approx(
-            one["value"], rel=1e-5, abs=max((one["error"] or 0) / 10, format_zero(name))
+        assert parse_quantity(text) == pytest.approx(
+            measure["value"], rel=1e-5, abs=max((measure["error"] or 0) / 10, format_zero(name))
         )
     assert [line for line in lines if line in GROUPS] == ["motion", "friction", "energy"]
 
 
-def test_always_every_measure_has_its_group():
+def test_always_measures_are_grouped():
+    """Every measure belongs to a group of the printed table."""
     assert {row.group for row in (*MOTION, *STATIC)} == set(GROUPS)
     groups = {
         "normal_load": "patch",
@@ -107,7 +109,7 @@ def test_always_every_measure_has_its_group():
     }
     assert {name: measure_group(name) for name in groups} == groups
     assert measure_group("normal_load", has_patch=False) == "friction"
-    measures = {"loop_area": entry(1.0, reason="stuck"), "pressure_peak": entry(1.0)}
+    measures = {"loop_area": make_entry(1.0, reason="stuck"), "pressure_peak": make_entry(1.0)}
     assert format_measures(measures) == [
         "energy",
         "  loop_area      - (stuck)",
@@ -116,34 +118,40 @@ def test_always_every_measure_has_its_group():
     ]
 
 
-def test_always_what_misses_the_tolerance_is_said_before_the_table(tmp_path):
-    answer = run(tmp_path, "bench", accuracy__steps_per_cycle=100)
-    # empty caches
-    said = [
+def test_always_missed_tolerance_gives_warning(tmp_path):
+    """A measure that misses the tolerance gives a warning with the setting to change."""
+    answer = run_template(tmp_path, "bench", accuracy__steps_per_cycle=100)
+    # with an empty cache, a line on compilation comes first
+    messages = [
         line for line in answer.err.splitlines() if not line.startswith("compiling the code of")
     ]
-    assert said[0].startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
+    assert messages[0].startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
     assert "meets the tolerance" not in answer.out
 
 
 @pytest.mark.parametrize("words, out", [(("-q",), ""), (("-q", "--json"), "{")])
-def test_exact_a_quiet_run_says_nothing(tmp_path, words, out):
-    answer = run(tmp_path, "bench", *words)
+def test_exact_quiet_run_prints_nothing(tmp_path, words, out):
+    """A run with -q prints nothing, or only its JSON, and writes its files."""
+    answer = run_template(tmp_path, "bench", *words)
     assert answer.code == 0 and answer.err == "" and answer.out[:1] == out
     assert (tmp_path / "out" / "summary.json").is_file()
 
 
-def test_exact_progress_as_lines(capsys):
-    """One line in ten seconds at most, with what is left at the pace since the first share: 15 % in 3 s. The 8 s
-    before it, in which something compiles, would make 33 s of the 15 that are left."""
+def test_exact_progress_lines_estimate_remaining_time(capsys):
+    """Progress lines are at least ten seconds apart and estimate the remaining time.
+
+    The rate is measured from the first reported fraction: 15 % in 3 s, without the 8 s of
+    compilation before.
+    """
     times = iter([0.0, 8.0, 11.0, 15.0, 40.0])
     lines = shared.ProgressLines(lambda: next(times))
-    for share in (0.1, 0.25, 0.3, 1.0):
-        lines(share)
+    for fraction in (0.1, 0.25, 0.3, 1.0):
+        lines(fraction)
     assert capsys.readouterr().err == "25% done, about 15 s left\n100% done, about 0 s left\n"
 
 
-def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
+def test_always_help_has_valid_example_of_every_command():
+    """The help lists every command with an example that can be parsed, in lines of at most 80 characters."""
     screen = run_cli().out
     assert screen == run_cli("--help").out and max(map(len, screen.splitlines())) <= 80
     assert [line for line in screen.splitlines() if line in VERB_GROUPS] == [
@@ -164,7 +172,8 @@ def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
         assert read.__name__.rstrip("_") == verb
 
 
-def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
+def test_always_verbose_plan_lists_absent_effects(tmp_path):
+    """`plan -v` also lists the effects that are absent."""
     path = tmp_path / "rig.toml"
     path.write_text(read_template("rig"), "utf-8")
     short = run_cli("plan", path).out
@@ -176,34 +185,37 @@ def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     assert "N/mm -> " in short and "the largest force of the drive" in short and "e+0" not in short
 
 
-LOOP = {"loop_area": entry(2e-3, 1e-4, "J")}
-RATIO = {"friction_ratio_peak": entry(0.3)}
-DEPTH = {"worn_depth_max": entry(2.58e-7, 1e-9, "m"), "worn_volume": entry(1e-12, 1e-14, "m3")}
-HEADLINES = [  # summary, cycles, headline
+LOOP = {"loop_area": make_entry(2e-3, 1e-4, "J")}
+RATIO = {"friction_ratio_peak": make_entry(0.3)}
+DEPTH = {
+    "worn_depth_max": make_entry(2.58e-7, 1e-9, "m"),
+    "worn_volume": make_entry(1e-12, 1e-14, "m3"),
+}
+HEADLINES = [  # summary of a run, number of cycles, expected headline
     (
-        summary_of(measures=RATIO | LOOP),
+        make_summary(measures=RATIO | LOOP),
         None,
         "Friction ratio peaks at 0.3; 2.00 ± 0.10 mJ dissipated per cycle.",
     ),
-    (summary_of(measures=RATIO | LOOP), 0.4, "In 0.4 of a cycle friction ratio peaks at 0.3."),
+    (make_summary(measures=RATIO | LOOP), 0.4, "In 0.4 of a cycle friction ratio peaks at 0.3."),
     (
-        summary_of(measures=LOOP | DEPTH),
+        make_summary(measures=LOOP | DEPTH),
         2.0,
         "258.0 ± 1.0 nm worn off at the deepest place; 2.00 ± 0.10 mJ dissipated per cycle.",
     ),
     (
-        summary_of(measures=LOOP | {"worn_volume": entry(2.0, 0.1, "kg")}),
+        make_summary(measures=LOOP | {"worn_volume": make_entry(2.0, 0.1, "kg")}),
         2.0,
         "2.00 ± 0.10 kg worn off; 2.00 ± 0.10 mJ dissipated per cycle.",
     ),
-    (summary_of("rig", "steady", LOOP), 10.0, "2.00 ± 0.10 mJ dissipated per cycle."),
+    (make_summary("rig", "steady", LOOP), 10.0, "2.00 ± 0.10 mJ dissipated per cycle."),
     (
-        summary_of("rig", "transient", LOOP),
+        make_summary("rig", "transient", LOOP),
         10.0,
         "2.00 ± 0.10 mJ dissipated per cycle (mean of the last cycles).",
     ),
     (
-        summary_of(measures=LOOP, warnings=[f"{OPEN_LOOP}: it misses"]),
+        make_summary(measures=LOOP, warnings=[f"{OPEN_LOOP}: it misses"]),
         10.0,
         "Friction work of the last cycle 2.00 ± 0.10 mJ.",
     ),
@@ -211,12 +223,13 @@ HEADLINES = [  # summary, cycles, headline
 
 
 @pytest.mark.parametrize("summary, cycles, headline", HEADLINES)
-def test_exact_a_headline(summary, cycles, headline):
+def test_exact_headline_of_summary(summary, cycles, headline):
+    """The headline sentence of each summary is the expected one."""
     assert headline_sentence({"warnings": [], "effects": []} | summary, cycles) == headline
 
 
-def tolerance_said(tolerance=1e-2, outcome=Outcome.STEADY, **measures):
-    """Return the sentence of a run of 2 s with these measures."""
+def tolerance_text(tolerance=1e-2, outcome=Outcome.STEADY, **measures):
+    """Return the sentence on the tolerance for a run of 2 s with these measures."""
     plan = SimpleNamespace(model=SimpleNamespace(accuracy=SimpleNamespace(tolerance=tolerance)))
     response = SimpleNamespace(time=[0.0, 2.0])
     return tolerance_sentence(
@@ -224,56 +237,59 @@ def tolerance_said(tolerance=1e-2, outcome=Outcome.STEADY, **measures):
     )
 
 
-def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
-    """A jump at 5 g between levels 2 g apart; all that the tolerance steers is known to it."""
+def test_exact_jump_level_is_excluded_from_tolerance():
+    """The level of a jump, known to one step between drive levels, is excluded from the sentence on the tolerance."""
     jump = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665)
     fine = Measure(2.0, "J", 1e-2)
-    between = " (jump_level: one step between the drive levels of the scene)"
-    least = "0.005 of the value (loop_area, 2.000 ± 0.010 J)."
-    meets = "Every measure with an error estimate meets the tolerance 0.01"
+    reason = " (jump_level: one step between the drive levels of the scene)"
+    largest = "0.005 of the value (loop_area, 2.000 ± 0.010 J)."
+    claim = "Every measure with an error estimate meets the tolerance 0.01"
     assert (
-        tolerance_said(jump_level=jump, loop_area=fine)
-        == f"{meets}{between}; the largest of the other errors is {least}"
+        tolerance_text(jump_level=jump, loop_area=fine)
+        == f"{claim}{reason}; the largest of the other errors is {largest}"
     )
-    assert tolerance_said(jump_level=jump) == f"{meets}{between}."
-    assert tolerance_said(loop_area=fine) == f"{meets}; the largest error is {least}"
-    assert tolerance_said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
+    assert tolerance_text(jump_level=jump) == f"{claim}{reason}."
+    assert tolerance_text(loop_area=fine) == f"{claim}; the largest error is {largest}"
+    assert tolerance_text(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
 
 
-def test_exact_a_limit_that_is_no_part_of_the_value_is_said_with_its_measure():
-    """A phase of 4.2 deg is known to 2.1 % of itself and to .05 % of the 180 deg that it may take."""
+def test_exact_absolute_error_limits_are_printed():
+    """Measures whose error limit refers to a range or a floor are printed with this limit.
+
+    A phase of 4.2 deg with an error of 2.1 % is judged by its range of 180 deg.
+    """
     phase = Measure(0.0729, "rad", 0.0015, 0.0324)
     stick = Measure(0.06977, "1", 0.00070, 0.011)
     drift = Measure(2e-6, "m", 5e-7, 1e-6)
     loaded = Measure(0.0862, "1", 0.00075)
-    said = tolerance_said(slip_start_phase=phase, stick_fraction=stick, loaded_fraction=loaded)
+    said = tolerance_text(slip_start_phase=phase, stick_fraction=stick, loaded_fraction=loaded)
     assert said == (
         "Every measure with an error estimate meets the tolerance 0.01 (slip_start_phase: 0.01 of its range of "
         "180 deg; stick_fraction: 0.01 of its range of 100 %); the largest of the other errors is 0.0087 of the value "
         "(loaded_fraction, 8.620 ± 0.075 %)."
     )
     assert (
-        "(" not in tolerance_said(0.05, slip_start_phase=phase, stick_fraction=stick).split(";")[0]
+        "(" not in tolerance_text(0.05, slip_start_phase=phase, stick_fraction=stick).split(";")[0]
     )
-    assert "(drift_per_cycle: 1.02 um)" in tolerance_said(drift_per_cycle=drift)
-    # a floor of 1e-3 in radians is more than 1e-4 of the range: the limit itself is printed
-    assert "(slip_start_phase: 0.0578 deg)" in tolerance_said(
+    assert "(drift_per_cycle: 1.02 um)" in tolerance_text(drift_per_cycle=drift)
+    # a floor of 1e-3 rad exceeds 1e-4 of the range, so that the limit itself is printed
+    assert "(slip_start_phase: 0.0578 deg)" in tolerance_text(
         1e-4, slip_start_phase=Measure(0.0729, "rad", 9e-4, 1.001e-3)
     )
 
 
-def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
-    """Not the one that a floor holds, nor one that reads 0."""
+def test_exact_largest_error_belongs_to_visible_value():
+    """The largest relative error in the sentence belongs to a measure above its floor."""
     small = Measure(1.0, "J", 2e-3, 0.0)
     large = Measure(1.0, "N", 8e-3, 1.0)
-    said = tolerance_said(
+    said = tolerance_text(
         loop_area=small, friction_force_peak=large, moment=Measure(1e-12, "N m", 5e-3, 1e-2)
     )
     assert (
         "; the largest error is 0.008 of the value (friction_force_peak, 1.0000 ± 0.0080 N)" in said
     )
     assert "moment" not in said and EXACT_NOTE not in said.split(";")[0]
-    unknown = tolerance_said(
+    unknown = tolerance_text(
         loop_area=Measure(1.0, "J", 0.0), friction_work=Measure(1.0, "J", None)
     )
     assert unknown.endswith(f"; {EXACT_NOTE}, except where the error is unknown.")
@@ -284,7 +300,7 @@ def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
     [
         ({}, "it", "."),
         (
-            {"contact_fraction": entry(1.0, 0.0)},
+            {"contact_fraction": make_entry(1.0, 0.0)},
             "the patch",
             " beyond the error of this mesh; a slip zone smaller than an element cannot be detected.",
         ),
@@ -301,23 +317,26 @@ def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
         ((-3e-12, 1e-12), (None, None), ""),
     ],
 )
-def test_always_slip_while_the_interface_sticks_is_said(loop, slip, said, more, part, limit):
-    """By its work per cycle beyond its error and beyond round-off, else by its slip."""
+def test_always_partial_slip_is_reported(loop, slip, said, more, part, limit):
+    """Partial slip of a sticking interface is reported by its work per cycle or its slip.
+
+    Each counts if it exceeds its error estimate.
+    """
     measures = {
-        "loop_area": entry(*loop, "J", floor=1e-10),
-        "slip_amplitude": entry(*slip, "m", floor=1e-10),
-        "friction_force_peak": entry(100.0, 0.0, "N", floor=1e-10),
-        "relative_displacement_amplitude": entry(4e-7, 0.0, "m", floor=1e-10),
+        "loop_area": make_entry(*loop, "J", floor=1e-10),
+        "slip_amplitude": make_entry(*slip, "m", floor=1e-10),
+        "friction_force_peak": make_entry(100.0, 0.0, "N", floor=1e-10),
+        "relative_displacement_amplitude": make_entry(4e-7, 0.0, "m", floor=1e-10),
         **more,
     }
     sentence = f"The interface as a whole sticks, but part of {part} slips ({said})."
     if not said:
         sentence = f"The interface sticks: no slip in the last cycles{limit}"
-    assert verdict_sentence(summary_of("rig", "stuck", measures)) == sentence
+    assert verdict_sentence(make_summary("rig", "stuck", measures)) == sentence
 
 
-def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
-    """A tilted joint bears on a hundredth of its length, and slips in a part of that."""
+def test_always_tilted_joint_reports_partial_slip(tmp_path):
+    """A tilted joint that touches over a hundredth of its length is reported as stuck with partial slip."""
     scene = tmp_path / "joint.toml"
     scene.write_text(JOINT_SHAKEN + '[contact.tilt]\nangle = "10 mrad"\n', "utf-8")
     answer = run_cli(
@@ -336,7 +355,7 @@ def test_always_a_joint_that_slips_in_part_does_not_say_that_it_holds(tmp_path):
     assert "the whole interface sticks" in shown["slip_start_phase"]
 
 
-STIFFNESS = {"equivalent_stiffness": entry(2e6, 2e3, "N m-1", floor=1.0)}
+STIFFNESS = {"equivalent_stiffness": make_entry(2e6, 2e3, "N m-1", floor=1.0)}
 STICKS = f"{Outcome.DONE.sentence} The interface sticks: no slip in the last cycle."
 
 
@@ -354,10 +373,10 @@ STICKS = f"{Outcome.DONE.sentence} The interface sticks: no slip in the last cyc
         (None, Outcome.DONE.sentence),
     ],
 )
-def test_always_a_bench_says_whether_it_slipped(slip, sentence):
-    """By its mean slip, beyond its error and the last digits of a slide."""
-    measures = {"slip_amplitude": entry(*slip, "m", floor=1e-10)} if slip else {}
-    assert verdict_sentence(summary_of(measures=measures)) == sentence
+def test_always_bench_reports_stick_or_slip(slip, sentence):
+    """A bench is reported as sticking if its mean slip is below its error or the round-off of the slide."""
+    measures = {"slip_amplitude": make_entry(*slip, "m", floor=1e-10)} if slip else {}
+    assert verdict_sentence(make_summary(measures=measures)) == sentence
 
 
 @pytest.mark.parametrize(
@@ -367,17 +386,22 @@ def test_always_a_bench_says_whether_it_slipped(slip, sentence):
         (0.01, 0.02, "of at most 0.03 (equivalent damping ratio at most 0.015)."),
     ],
 )
-def test_exact_a_bench_with_a_stiffness_says_its_loss_factor(factor, error, said):
+def test_exact_bench_verdict_gives_loss_factor(factor, error, said):
+    """The verdict on a bench with a stiffness gives amplitude, equivalent stiffness and loss factor."""
     loop = {"slide_amplitude": 2e-6, "loss_factor": factor, "error": error}
-    assert verdict_sentence(summary_of(measures=STIFFNESS, loop=loop)) == (
+    assert verdict_sentence(make_summary(measures=STIFFNESS, loop=loop)) == (
         "At a slide amplitude of 2 um the interface has an equivalent stiffness of 2.0000 ± 0.0020 N/um and a loss "
         f"factor {said}"
     )
 
 
-def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
-    """Of a parallelogram of force mu N, stiffness k and slide A: W = 4 mu N (A - mu N/k), and the first harmonic of the
-    force in phase with the slide is k A (a - sin(a) cos(a))/pi with cos(a) = 1 - 2 mu N/(k A)."""
+def test_exact_loss_factor_agrees_with_parallelogram_loop():
+    """The loss factor of an elastic-plastic bench agrees with the closed form of its loop within its error.
+
+    For a parallelogram of force mu N, stiffness k and slide A, the work is W = 4 mu N (A - mu N/k);
+    the first harmonic of the force in phase with the slide is k A (a - sin(a) cos(a))/pi with
+    cos(a) = 1 - 2 mu N/(k A).
+    """
     law = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nstiffness = "10 N/um"\n'
     result = pf.run(
         POINT
@@ -385,47 +409,52 @@ def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
         + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\ncycles = 2\n'
     )
     slide = result.plan.model.slide.amplitude
-    pull = result.plan.model.friction.static * result.measures["normal_load"].value
+    friction_limit = result.plan.model.friction.static * result.measures["normal_load"].value
     k = 1e7
-    a = np.arccos(1 - 2 * pull / (k * slide))
-    work = 4 * pull * (slide - pull / k)
+    a = np.arccos(1 - 2 * friction_limit / (k * slide))
+    work = 4 * friction_limit * (slide - friction_limit / k)
     stiffness = k * (a - np.sin(a) * np.cos(a)) / np.pi
     found = loop_entry(result)["loop"]
     truth = work / (np.pi * stiffness * slide**2)
     assert abs(found["loss_factor"] - truth) <= found["error"] + 1e-9 * truth
     assert found["error"] < 1e-2 * truth
-    assert loop_entry(pf.run(BENCH)) == {}  # rigid: no stiffness to refer to
+    assert (
+        loop_entry(pf.run(BENCH)) == {}
+    )  # a rigid bench has no stiffness to which a loss factor could refer
 
 
-def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
-    """Half of critical and more: a mode that hardly swings."""
+def test_always_large_damping_ratio_gives_note(tmp_path):
+    """A damping ratio of 0.5 or more gives a note that 1 means critical damping."""
     path = tmp_path / "rig.toml"
     path.write_text(read_template("rig"), "utf-8")
-    said = [
+    checks = [
         run_cli("check", path, "--set", f"structure.mode.axial.damping={value}")
         for value in ("0.49", "0.5", "1")
     ]
-    assert [one.code for one in said] == [0, 0, 0] and said[0].err == ""
-    assert said[1].err.endswith(
+    assert [check.code for check in checks] == [0, 0, 0] and checks[0].err == ""
+    assert checks[1].err.endswith(
         "structure.mode.axial.damping = 0.5 is a damping ratio: 1 means critical damping, and "
         "1 % is written 0.01\n"
     )
-    assert "damping = 1 is a damping ratio: 1 means critical" in said[2].err
+    assert "damping = 1 is a damping ratio: 1 means critical" in checks[2].err
 
 
-def test_exact_a_second_interface_reads_in_the_units_of_the_first():
+def test_exact_second_interface_has_same_units():
+    """A measure of the second interface is printed in the unit of the first."""
     for name in ("stick_fraction", "stick_fraction_2"):
-        assert format_with_error(name, entry(1.0, 0.0)) == "100 %"
+        assert format_with_error(name, make_entry(1.0, 0.0)) == "100 %"
 
 
-def test_exact_a_motion_that_grows_claims_no_tolerance():
+def test_exact_growing_motion_is_not_within_tolerance():
+    """The sentence for a growing motion does not mention the tolerance."""
     load = Measure(1.0, "N", 0.0, 0.0)
-    assert "meets the tolerance" in tolerance_said(normal_load=load)
-    grows = tolerance_said(outcome=Outcome.GROWS, normal_load=load)
-    assert "after 2 s: the measures describe its last cycles" in grows and "tolerance" not in grows
+    assert "meets the tolerance" in tolerance_text(normal_load=load)
+    text = tolerance_text(outcome=Outcome.GROWS, normal_load=load)
+    assert "after 2 s: the measures describe its last cycles" in text and "tolerance" not in text
 
 
-def test_exact_a_release_is_not_told_of_a_drive():
-    summary = summary_of("rig", "transient", effects=[{"effect": "drive.kind=free"}])
+def test_exact_free_decay_verdict_mentions_no_drive():
+    """The verdict on a free decay does not speak of a periodic drive."""
+    summary = make_summary("rig", "transient", effects=[{"effect": "drive.kind=free"}])
     verdict = verdict_sentence(summary)
     assert "drive is periodic" not in verdict and "came to rest" in verdict

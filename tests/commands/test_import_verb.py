@@ -1,4 +1,4 @@
-"""The verb `import` with modes: a record, a decay or shapes become a [structure] that a scene runs with."""
+"""`patchfem import` of modes: a measured record, decay or set of mode shapes becomes a [structure] of a scene."""
 
 import json
 import tomllib
@@ -22,8 +22,8 @@ SHAKEN = AROUND + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = 
 
 
 @pytest.fixture(scope="module")
-def shaken(tmp_path_factory):
-    """A force in N and the acceleration beside it in g."""
+def measured_file(tmp_path_factory):
+    """Return the path of a universal file with a force [N] and an acceleration [g]."""
     force, response = driven_response("acceleration")
     return write_universal(
         tmp_path_factory.mktemp("lab") / "shaker.uff",
@@ -35,8 +35,8 @@ def shaken(tmp_path_factory):
     )
 
 
-def test_always_a_note_shows_what_a_file_wrote_as_text(tmp_path):
-    """A unit with a NUL byte once came to the screen as it stood, as would any sign that moves the cursor."""
+def test_always_notes_mask_control_characters(tmp_path):
+    """Control characters of a unit in a file are masked in the note on the screen."""
     tip = make_record(
         TIME, driven_response("acceleration")[1], 12, id1="tip", ordinate_axis_units_lab="NO"
     )
@@ -48,8 +48,15 @@ def test_always_a_note_shows_what_a_file_wrote_as_text(tmp_path):
     assert "\x1b" not in answer.err
 
 
-def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
-    """Every channel that import knows may stand in it; each reader takes its own and passes over the others."""
+def test_exact_imported_table_is_read_by_all_readers(tmp_path):
+    """One imported table is read by the readers of slide, drive and loop.
+
+    Every reader takes the channels that it needs.
+
+    Every reader takes the channels that it needs.
+
+    Each reader takes its own channels.
+    """
     time = np.arange(9) / 100
     slide = 1e-5 * np.sin(70 * time + 0.4)
     table = {
@@ -65,8 +72,8 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
     np.savetxt(
         source, np.transpose([*table.values()]), delimiter=",", header=",".join(table), comments=""
     )
-    asked = [word for name in table for word in ("--map", f"{name.split()[0]}={name.split()[0]}")]
-    plain = run_cli("import", source, "-o", out, *asked)
+    options = [word for name in table for word in ("--map", f"{name.split()[0]}={name.split()[0]}")]
+    plain = run_cli("import", source, "-o", out, *options)
     assert plain.code == 0
     assert "time starts at 2 s, displacement starts at 3.89" in plain.err
     assert "--zero" in plain.err
@@ -74,7 +81,7 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
         PatchfemError, match=r"table\.csv:2: time starts at 2: .*patchfem import --zero"
     ):
         read_slide(out)
-    answer = run_cli("import", source, "-o", out, "--zero", *asked)
+    answer = run_cli("import", source, "-o", out, "--zero", *options)
     assert answer.code == 0 and answer.err == ""
     assert read_slide(out) == (
         pytest.approx(time, abs=1e-12),
@@ -85,8 +92,12 @@ def test_exact_one_table_of_all_channels_serves_slide_drive_and_fit(tmp_path):
     assert read_loop(out).reading == pytest.approx(4.4482216152605 * (time + 1), rel=1e-12)
 
 
-def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
-    answer = run_cli("import", shaken, "-o", tmp_path / "modes.toml", "--json")
+def test_exact_imported_modes_agree_with_driven_oscillators(measured_file, tmp_path):
+    """The modes of a record agree with those of the simulated oscillators.
+
+    Frequencies agree within 1e-8, damping ratios and residues within 1e-6.
+    """
+    answer = run_cli("import", measured_file, "-o", tmp_path / "modes.toml", "--json")
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
     assert [one["frequency"] for one in found["modes"]] == pytest.approx(HERTZ, rel=1e-8)
@@ -101,10 +112,11 @@ def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
     assert "# modes of shaker.uff" in text and "the estimate from windowed segments gives" in text
 
 
-def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):
+def test_exact_frequency_band_selects_mode(measured_file, tmp_path):
+    """A frequency band selects the mode inside, with the same damping ratio within 1e-6."""
     answer = run_cli(
         "import",
-        shaken,
+        measured_file,
         "-o",
         tmp_path / "modes.toml",
         "--band",
@@ -113,13 +125,13 @@ def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):
         "0.5 s",
     )
     assert answer.code == 0 and answer.out.count("Hz with a damping") == 1, answer.err
-    (one,) = tomllib.loads((tmp_path / "modes.toml").read_text())["structure"]["mode"]
-    assert one["damping"] == pytest.approx(ZETA[1], rel=1e-6)
+    (mode,) = tomllib.loads((tmp_path / "modes.toml").read_text())["structure"]["mode"]
+    assert mode["damping"] == pytest.approx(ZETA[1], rel=1e-6)
 
 
-def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
-    """Its modes carry the window's damping, which the record does not."""
-    answer = run_cli("import", shaken, "-o", tmp_path / "response.uff", "--segment", "1 s")
+def test_exact_written_response_is_read_back(measured_file, tmp_path):
+    """The written frequency response is read back with its peak at the natural frequency within 1e-3."""
+    answer = run_cli("import", measured_file, "-o", tmp_path / "response.uff", "--segment", "1 s")
     assert answer.code == 0 and "window hann" in answer.out, answer.err
     kinds = [
         one["func_type"]
@@ -135,7 +147,8 @@ def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
     build(FORCED + (tmp_path / "modes.toml").read_text())
 
 
-def test_exact_a_free_decay_of_a_table(tmp_path):
+def test_exact_modes_of_free_decay(tmp_path):
+    """Two modes from a free decay in a table agree with the true damping ratios within 1e-7."""
     time, place = free_decay()
     rows = [f"{t!r},{1e3 * p!r}" for t, p in zip(time.tolist(), place.tolist())]
     (tmp_path / "ring.csv").write_text("Time [s],LVDT [mm]\n" + "\n".join(rows) + "\n")
@@ -158,9 +171,12 @@ def test_exact_a_free_decay_of_a_table(tmp_path):
     assert modes.zeta == pytest.approx(ZETA, rel=1e-7)
 
 
-def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
-    """Two masses of 1 and 3 kg: where both modes are known, a place holds its own mass whole, 1 / sum phi^2."""
-    # (place, mode), orthonormal to the masses
+def test_exact_mode_shapes_are_scaled_to_local_mass(tmp_path):
+    """The mode shapes of two masses (dataset 55) are scaled to the local mass of 3 kg.
+
+    This mass is 1 / sum phi^2; the file has six digits.
+    """
+    # rows are places, columns are modes, orthonormal with respect to the masses
     phi = np.array([[0.6, 0.8], [0.8, -0.6]]) / np.sqrt([[1.0], [3.0]])
     sets = [
         {
@@ -190,7 +206,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
     )
     assert answer.code == 0, answer.err
     modes = build(SHAKEN + (tmp_path / "modes.toml").read_text()).rig.modes
-    assert modes.mass == pytest.approx(3, rel=1e-5)  # dataset 55 holds six digits
+    assert modes.mass == pytest.approx(3, rel=1e-5)  # dataset 55 has six digits
     assert modes.slide == pytest.approx(phi[1] * np.sqrt(3), rel=1e-5)
     assert modes.output == pytest.approx(phi[0] * np.sqrt(3), rel=1e-5)
 
@@ -210,9 +226,10 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
         (["-o", "a.toml", "--map", "slide=12:+x"], "--map slide: unknown; use"),
     ],
 )
-def test_refuses_by_name(shaken, tmp_path, monkeypatch, words, says):
+def test_refuses_invalid_import_options(measured_file, tmp_path, monkeypatch, words, says):
+    """Invalid options are refused with a message that names them, and no file is written."""
     monkeypatch.chdir(tmp_path)
-    answer = run_cli("import", shaken, *words)
+    answer = run_cli("import", measured_file, *words)
     assert answer.code == 2 and says in answer.err and "internal fault" not in answer.err, (
         answer.err
     )

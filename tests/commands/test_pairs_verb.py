@@ -1,4 +1,4 @@
-"""patchfem compare --pairs: each pair as compare gives it alone, means over them, failures, refusals."""
+"""`patchfem compare --pairs`: a table of pairs, their means, failed pairs and error messages."""
 
 import csv
 import json
@@ -18,8 +18,8 @@ COUNT = 1201
 
 
 @pytest.fixture(scope="module")
-def table(tmp_path_factory):
-    """A table of three pairs with a track, the last of which has no file after."""
+def pairs_table(tmp_path_factory):
+    """Return a table of three pairs with a wear track; the last pair has no file after wear."""
     place = tmp_path_factory.mktemp("pairs")
     for k in range(2):
         made = make_track_pair("band", 7100 + k, COUNT)
@@ -37,17 +37,21 @@ def table(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def answered(table, tmp_path_factory):
+def pairs_answer(pairs_table, tmp_path_factory):
+    """Return the answer and the folder of the comparison of the table."""
     out = tmp_path_factory.mktemp("answered") / "out"
-    return run_cli("compare", "--pairs", table, "-o", out, "--json"), out
+    return run_cli("compare", "--pairs", pairs_table, "-o", out, "--json"), out
 
 
-def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
-    answer, out = answered
+def test_exact_pair_equals_single_comparison(pairs_table, pairs_answer):
+    """A pair of the table has the results of a single comparison, and a pair without a file fails with a message."""
+    answer, out = pairs_answer
     rows = json.loads(answer.out)
     assert answer.code == 3 and [row["line"] for row in rows] == [2, 4, 5]
-    alone = pf.compare(table.parent / "before1.csv", table.parent / "after1.csv", direction="y")
-    own = {
+    alone = pf.compare(
+        pairs_table.parent / "before1.csv", pairs_table.parent / "after1.csv", direction="y"
+    )
+    table_fields = {
         "line": 4,
         "before": "before1.csv",
         "after": "after1.csv",
@@ -55,16 +59,17 @@ def test_exact_each_pair_is_what_compare_gives_alone(table, answered):
         "outcome": "done",
         "message": "",
     }
-    assert rows[1] == json.loads(json.dumps(alone)) | own
+    assert rows[1] == json.loads(json.dumps(alone)) | table_fields
     assert rows[2]["outcome"] == "failed"
     assert "nowhere.csv: there is no such file" in rows[2]["message"]
     assert [row["direction"] for row in rows] == ["y", "y", "x"]
-    assert f"{table}:5: " in answer.err
+    assert f"{pairs_table}:5: " in answer.err
     assert "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in (out / "report.html").read_text()
 
 
-def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):
-    out = answered[1]
+def test_exact_mean_of_pairs_uses_student_t(pairs_table, pairs_answer):
+    """Mean, scatter and interval over the pairs agree with Student's t distribution."""
+    out = pairs_answer[1]
     lines = list(csv.DictReader((out / "pairs.csv").read_text().splitlines()))
     values = np.array([float(one["worn_depth_mean [m]"]) for one in lines[:2]])
     assert lines[2]["worn_depth_mean [m]"] == "" and [one["specimen"] for one in lines] == [
@@ -72,17 +77,17 @@ def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):
         "B",
         "C",
     ]
-    said = json.loads((out / "pairs.json").read_text())
-    assert len(said["means"]) == 1
-    found = said["means"][0]["worn_depth_mean"]
-    side = t.ppf(0.975, 1) * values.std(ddof=1) / np.sqrt(2)
+    stored = json.loads((out / "pairs.json").read_text())
+    assert len(stored["means"]) == 1
+    found = stored["means"][0]["worn_depth_mean"]
+    half_width = t.ppf(0.975, 1) * values.std(ddof=1) / np.sqrt(2)
     assert found["value"] == pytest.approx(values.mean()) and found["scatter"] == pytest.approx(
         values.std(ddof=1)
     )
     assert (found["low"], found["high"]) == pytest.approx(
-        (max(values.mean() - side, 0.0), values.mean() + side)
+        (max(values.mean() - half_width, 0.0), values.mean() + half_width)
     )
-    assert json.loads(json.dumps(pf.compare(pairs=table))) == said
+    assert json.loads(json.dumps(pf.compare(pairs=pairs_table))) == stored
     picture = (out / "report.html").read_text()
     bars = re.findall(
         r'd="M ([\d.]+) ([\d.]+) \nL \1 ([\d.]+) \n" [^>]*stroke: var.--accent', picture
@@ -93,18 +98,21 @@ def test_exact_the_mean_over_the_pairs_and_the_table(table, answered):
         assert any(at == x and float(high) < float(y) < float(low) for at, y in dots)
 
 
-def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
-    """Pairs that scatter, and pairs whose own errors are all there is: 400 means of four each."""
+def test_always_interval_of_mean_covers_true_value():
+    """The 95 % interval of a mean of four pairs covers the true value in more than 92 % of 400 samples.
+
+    The pairs differ by scatter or by their measurement errors.
+    """
     random = np.random.default_rng(11)
-    for scatter, own in ((3.0, 0.3), (0.0, 1.0)):
-        held = []
+    for scatter, error in ((3.0, 0.3), (0.0, 1.0)):
+        covers = []
         for _ in range(400):
-            values = 50 + random.normal(0, np.hypot(scatter, own), 4)
+            values = 50 + random.normal(0, np.hypot(scatter, error), 4)
             one = average_quantities(
-                [Quantity(v, v - 1.96 * own, v + 1.96 * own, "m", "") for v in values], ""
+                [Quantity(v, v - 1.96 * error, v + 1.96 * error, "m", "") for v in values], ""
             )
-            held.append(one.mean.low <= 50 <= one.mean.high)
-        assert np.mean(held) > 0.92
+            covers.append(one.mean.low <= 50 <= one.mean.high)
+        assert np.mean(covers) > 0.92
 
 
 @pytest.mark.parametrize(
@@ -125,7 +133,8 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
         ("", ":1: a header like `before,after` is needed"),
     ],
 )
-def test_refuses_a_table_that_is_none(tmp_path, text, says):
+def test_refuses_invalid_pairs_table(tmp_path, text, says):
+    """A table without the required columns or rows is refused with file and line."""
     path = tmp_path / "pairs.csv"
     path.write_text(text)
     answer = run_cli("compare", "--pairs", path, "-o", tmp_path / "out")
@@ -134,7 +143,8 @@ def test_refuses_a_table_that_is_none(tmp_path, text, says):
         read_pairs(path)
 
 
-def test_refuses_a_table_of_which_no_pair_can_be_compared(tmp_path):
+def test_refuses_table_without_comparable_pair(tmp_path):
+    """A table without a comparable pair ends with exit code 2."""
     (tmp_path / "pairs.csv").write_text("before,after\na.csv,b.csv\n")
     answer = run_cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")
     assert answer.code == 2 and (tmp_path / "out" / "pairs.csv").is_file()

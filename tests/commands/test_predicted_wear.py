@@ -1,4 +1,4 @@
-"""patchfem compare --predicted: wear coefficient from traces and a run with wear, refusals, roughness by region."""
+"""`patchfem compare --predicted`: wear coefficient from traces and a run with wear, and roughness by region."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from scene_texts import SMALL_PATCH
 
 import patchfem as pf
 
-SEED = 5  # a tilted patch; the traces show all of the track
+SEED = 5  # seed of a tilted patch whose traces contain the whole wear track
 PIECE_SHARE = 0.5
 RUN = """
 [contact]
@@ -38,6 +38,7 @@ cycles = 300000
 
 
 def write_trace(path: Path, x, z) -> Path:
+    """Write a trace (x, z [m]) as a table in um and return its path."""
     rows = [f"{a * 1e6!r},{b * 1e6!r}" for a, b in zip(x.tolist(), z.tolist())]
     path.write_text("\n".join(["x [um],z [um]", *rows, ""]), "utf-8")
     return path
@@ -52,8 +53,8 @@ def draw_surface(x) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory) -> tuple:
-    """Folder with the traces and the run of a made pair, and the pair."""
+def artificial_pair(tmp_path_factory) -> tuple:
+    """Return the folder with traces and run of an artificial pair, and the pair."""
     folder = tmp_path_factory.mktemp("made")
     pair = predicted_pairs.draw_pair(SEED)
     predicted_pairs.write_pair(pair, folder)
@@ -62,16 +63,16 @@ def made(tmp_path_factory) -> tuple:
 
 
 @pytest.fixture(scope="module")
-def crowned(tmp_path_factory) -> Path:
-    """Folder of a run in which the contact of a crown grows by wear."""
+def crowned_run(tmp_path_factory) -> Path:
+    """Return the folder of a run in which the contact of a crown grows by wear."""
     folder = tmp_path_factory.mktemp("crowned") / "wear"
     pf.run(RUN).save(folder)
     return folder
 
 
-def test_always_the_interval_of_the_coefficient_contains_the_truth(made, tmp_path):
-    """Traces whose x runs against that of the patch."""
-    folder, pair = made
+def test_always_wear_coefficient_interval_covers_true_value(artificial_pair, tmp_path):
+    """The intervals of the wear coefficient and of the patch centre cover the true values."""
+    folder, pair = artificial_pair
     out = folder / "out"
     files = []
     for name in ("before.csv", "after.csv"):
@@ -101,9 +102,12 @@ def test_always_the_interval_of_the_coefficient_contains_the_truth(made, tmp_pat
     assert "Computed wear over the measured wear" in page
 
 
-def test_exact_the_coefficient_is_read_from_the_history_of_the_run(crowned, tmp_path):
-    """A wear that the run passed through: the depth is not proportional to the coefficient there."""
-    with xarray.open_dataset(crowned / "result.nc") as result:
+def test_exact_wear_coefficient_follows_run_history(crowned_run, tmp_path):
+    """The coefficient for a wear state inside the history of the run agrees within 2e-3.
+
+    The depth is not proportional to the coefficient there.
+    """
+    with xarray.open_dataset(crowned_run / "result.nc") as result:
         frame = 8
         place = result.x.values
         depth = result.worn_depth.values[frame]
@@ -117,18 +121,18 @@ def test_exact_the_coefficient_is_read_from_the_history_of_the_run(crowned, tmp_
         write_trace(tmp_path / "before.csv", x, before),
         write_trace(tmp_path / "after.csv", x, before - worn + noise),
     )
-    predicted = pf.compare(*files, predicted=crowned)["predicted"]
+    predicted = pf.compare(*files, predicted=crowned_run)["predicted"]
     assert predicted["coefficient"]["value"] / 1e-14 == pytest.approx(ratio, rel=2e-3)
     assert predicted["proportional_coefficient"] / 1e-14 > 1.05 * ratio
     assert predicted["largest_difference"] is None or predicted["difference_rms"] < 2e-9
     assert any("not proportional" in note for note in predicted["notes"])
-    deep = write_trace(tmp_path / "deep.csv", x, before - 1e3 * worn)
+    deep_trace = write_trace(tmp_path / "deep.csv", x, before - 1e3 * worn)
     with pytest.raises(pf.PatchfemError, match="check the units of z"):
-        pf.compare(files[0], deep, shift=0.0, predicted=crowned)
+        pf.compare(files[0], deep_trace, shift=0.0, predicted=crowned_run)
 
 
-def _stretch(folder: Path, tmp_path: Path, factor: float) -> list:
-    """Write the traces of a made pair with another scale of x."""
+def stretch_traces(folder: Path, tmp_path: Path, factor: float) -> list:
+    """Write the traces of a pair with another scale of x and return their paths."""
     files = []
     for name in ("before.csv", "after.csv"):
         x, z = np.loadtxt(folder / name, delimiter=",", skiprows=1, unpack=True)
@@ -136,8 +140,9 @@ def _stretch(folder: Path, tmp_path: Path, factor: float) -> list:
     return files
 
 
-def test_always_bad_input_is_named(made, tmp_path):
-    folder, pair = made
+def test_refuses_invalid_predicted_input(artificial_pair, tmp_path):
+    """Invalid folders, pieces and traces are refused with the cause."""
+    folder, pair = artificial_pair
     files = [folder / "before.csv", folder / "after.csv"]
     pf.run(SMALL_PATCH).save(tmp_path / "unworn")
     (tmp_path / "empty").mkdir()
@@ -151,19 +156,19 @@ def test_always_bad_input_is_named(made, tmp_path):
         (files, {"piece": "upper"}, "piece needs predicted"),
         (files, {"predicted": wear, "piece": "upper", "direction": "y"}, "along y"),
         (files[:1] * 2, {"predicted": wear, "piece": "upper"}, "no worn depth was measured"),
-        (_stretch(folder, tmp_path, 3.0), {"predicted": wear, "piece": "upper"}, "wide"),
+        (stretch_traces(folder, tmp_path, 3.0), {"predicted": wear, "piece": "upper"}, "wide"),
     ]
     for paths, options, message in cases:
         with pytest.raises(pf.PatchfemError, match=message):
             pf.compare(*paths, **options)
-    small = _stretch(folder, tmp_path, 0.1)
+    small = stretch_traces(folder, tmp_path, 0.1)
     with pytest.raises(pf.PatchfemError, match="within the traces"):
         pf.compare(*small, predicted=wear, piece="upper")
-    assert pair.share != 0.5  # so that the piece has to be named
+    assert pair.share != 0.5  # the pieces wear unequally, so that --piece is required
 
 
-def test_always_roughness_is_that_of_each_region(tmp_path):
-    """Inside the track a third of the heights remain; outside nothing changes."""
+def test_always_roughness_is_computed_by_region(tmp_path):
+    """Inside the wear track the roughness falls to a third within 2 %; outside it stays the same within 1e-3."""
     x = np.arange(0.0, 12e-3, 1e-6)
     before = draw_surface(x)
     inside = (x > 4e-3) & (x < 8e-3)

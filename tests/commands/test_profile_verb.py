@@ -1,4 +1,4 @@
-"""patchfem profile: table, definitions, JSON, page, several files, refusals with exit code 2."""
+"""`patchfem profile`: table, definitions, JSON, report, several files, and error messages."""
 
 import json
 import os
@@ -17,8 +17,8 @@ UM = 1e-6
 
 
 @pytest.fixture
-def trace(tmp_path) -> Path:
-    """A sine of 5 um and 80 um with a little noise, 4 mm long."""
+def trace_file(tmp_path) -> Path:
+    """Return the path of a trace of 4 mm: a sine of 5 um and 80 um wavelength with noise."""
     x = np.arange(4001.0)
     z = 5 * np.sin(2 * np.pi * x / 80) + np.random.default_rng(0).normal(0, 0.05, x.size)
     path = tmp_path / "before.csv"
@@ -27,7 +27,8 @@ def trace(tmp_path) -> Path:
 
 
 @pytest.fixture
-def scan(tmp_path) -> Path:
+def scan_file(tmp_path) -> Path:
+    """Return the path of an areal scan of 12 x 16 random heights."""
     rows = np.random.default_rng(1).normal(0, 1, (12, 16))
     path = tmp_path / "scan.csv"
     path.write_text(
@@ -41,12 +42,13 @@ def scan(tmp_path) -> Path:
     return path
 
 
-def test_exact_the_table(trace):
-    answer = run_cli("profile", trace, "--cutoff", "0.25 mm")
+def test_exact_profile_table_of_sine(trace_file):
+    """The table lists all parameters; Ra and RSm of a sine agree with 2 A/pi and the wavelength within 1 %."""
+    answer = run_cli("profile", trace_file, "--cutoff", "0.25 mm")
     assert answer.code == 0 and answer.err == ""
     lines = answer.out.splitlines()
     assert lines[0] == (
-        f"{trace}: 4001 heights, 4 mm long, every 1 um, about the least-squares line; Gaussian filter "
+        f"{trace_file}: 4001 heights, 4 mm long, every 1 um, about the least-squares line; Gaussian filter "
         "at 250 um, half this length trimmed at each end, no filter for short waves"
     )
     rows = {line.split()[0]: line.split()[1:] for line in lines[2:]}
@@ -79,39 +81,46 @@ def test_exact_the_table(trace):
     assert float(rows["RSm"][0]) == pytest.approx(80, rel=0.01) and rows["RSm"][2] == ".."
 
 
-def test_exact_definitions_where_asked(trace):
-    plain = run_cli("profile", trace).out
-    long = run_cli("profile", trace, "-v").out
-    assert "mean of the absolute heights" not in plain and "mean of the absolute heights" in long
-    assert "no cut-off, so no roughness profile" in plain and "  Ra " not in plain
+def test_exact_verbose_table_has_definitions(trace_file):
+    """`-v` adds the definitions of the parameters."""
+    short = run_cli("profile", trace_file).out
+    long = run_cli("profile", trace_file, "-v").out
+    assert "mean of the absolute heights" not in short and "mean of the absolute heights" in long
+    assert "no cut-off, so no roughness profile" in short and "  Ra " not in short
 
 
-def test_exact_json_in_si(trace, scan):
-    answer = json.loads(run_cli("profile", trace, scan, "--json").out)
+def test_exact_profile_json_is_in_si_units(trace_file, scan_file):
+    """The JSON gives parameters in SI units; Sq of a scan agrees with the rms about a least-squares plane within 1e-9."""
+    answer = json.loads(run_cli("profile", trace_file, scan_file, "--json").out)
     first, second = answer["profiles"]
-    assert first["file"] == str(trace) and first["kind"] == "profile" and second["kind"] == "areal"
+    assert (
+        first["file"] == str(trace_file)
+        and first["kind"] == "profile"
+        and second["kind"] == "areal"
+    )
     assert first["measures"]["Pq"]["value"] == pytest.approx(5 * UM / np.sqrt(2), rel=0.01)
     assert set(first["measures"]["Pq"]) == {"value", "low", "high", "unit"}
     assert first["measures"]["Pq"]["unit"] == "m"
     assert first["cutoff"] is None and first["length"] == pytest.approx(4e-3)
-    rows = np.random.default_rng(1).normal(0, 1, (12, 16))  # those of `scan`
+    rows = np.random.default_rng(1).normal(0, 1, (12, 16))  # the heights of `scan_file`
     across, down = np.meshgrid(np.arange(16.0), np.arange(12.0))
     plane = np.column_stack([np.ones(rows.size), across.ravel(), down.ravel()])
-    rest = rows.ravel() - plane @ np.linalg.lstsq(plane, rows.ravel(), rcond=None)[0]
+    residual = rows.ravel() - plane @ np.linalg.lstsq(plane, rows.ravel(), rcond=None)[0]
     assert second["measures"]["Sq"]["value"] == pytest.approx(
-        1e-9 * np.sqrt((rest**2).mean()), rel=1e-9
+        1e-9 * np.sqrt((residual**2).mean()), rel=1e-9
     )
     assert second["shape"] == [12, 16]
-    window = json.loads(run_cli("profile", trace, "--window", "1 mm,1.8 mm", "--json").out)[
+    window = json.loads(run_cli("profile", trace_file, "--window", "1 mm,1.8 mm", "--json").out)[
         "profiles"
     ][0]
     assert window["window"] == [1e-3, 1.8e-3] and window["shape"] == [801]
     assert {"RzDin", "MaxDev", "ASH"} <= set(window["measures"])
 
 
-def test_exact_the_page_and_its_numbers(trace, tmp_path):
+def test_exact_profile_report_lists_all_parameters(trace_file, tmp_path):
+    """The report has three figures and lists all parameters of the JSON."""
     out = tmp_path / "out"
-    answer = run_cli("profile", trace, "--cutoff", "0.25 mm", "-o", out)
+    answer = run_cli("profile", trace_file, "--cutoff", "0.25 mm", "-o", out)
     assert answer.out.splitlines()[-1] == f"results: {out}"
     page = (out / "report.html").read_text()
     data = json.loads((out / "profile.json").read_text())
@@ -120,32 +129,35 @@ def test_exact_the_page_and_its_numbers(trace, tmp_path):
     assert "http" not in page.replace("http://www.w3.org", "")
 
 
-def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_path, scan):
-    """Three sines of other heights and a scan: Student's t by the table of 4.302653 for two degrees of freedom."""
+def test_exact_profile_means_and_stored_surfaces(tmp_path, scan_file):
+    """The mean of three traces has the 95 % interval of Student's t (4.302653 for two degrees of freedom).
+
+    The stored levelled surfaces give the same parameters within 1e-7.
+    """
     heights = (4.0, 5.0, 6.5)
     names = []
     out = tmp_path / "out"
-    for k, high in enumerate(heights):
+    for k, height in enumerate(heights):
         names.append(tmp_path / f"{k}.csv")
-        z = high * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
+        z = height * np.sin(2 * np.pi * np.arange(800) / 8) + 0.01 * np.arange(800)
         names[-1].write_text(
             "x [um],z [um]\n" + "".join(f"{a},{b:.17g}\n" for a, b in enumerate(z))
         )
-    assert run_cli("profile", *names, scan, "-o", out).code == 0
+    assert run_cli("profile", *names, scan_file, "-o", out).code == 0
     data = json.loads((out / "profile.json").read_text())
     rows = (out / "profile.csv").read_text().splitlines()
     assert [(one["kind"], one["files"], one["notes"]) for one in data["means"]] == [
         ("profile", 3, [])
     ]
     found = data["means"][0]["measures"]["Pq"]
-    off = 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
+    half_width = 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
     assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
-    assert found["high"] - found["value"] == pytest.approx(off * UM, rel=5e-3)
+    assert found["high"] - found["value"] == pytest.approx(half_width * UM, rel=5e-3)
     assert "<h2>Mean of 3 traces</h2>" in (out / "report.html").read_text()
     assert len(rows) == 5
     assert rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")
     assert rows[1].endswith(",,")
-    # so that the next run may replace them
+    # only files that the next run may replace
     assert {one.name for one in out.iterdir()} <= set(FILES)
     for k, name, parameter in (
         (1, "primary-2.csv", "Pq"),
@@ -157,7 +169,8 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
     assert "counts twice" in run_cli("profile", names[0], names[0]).out
 
 
-def test_refuses_a_text_without_units(tmp_path):
+def test_refuses_trace_without_units(tmp_path):
+    """A trace without units is refused, and read with --units."""
     path = tmp_path / "bare.csv"
     path.write_text("".join(f"{k},{k % 7}\n" for k in range(50)))
     answer = run_cli("profile", path)
@@ -166,16 +179,17 @@ def test_refuses_a_text_without_units(tmp_path):
 
 
 @pytest.mark.slow
-def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
-    modules = modules_after(FROM_SHELL, "profile", trace, "--cutoff", "0.25 mm")
+def test_exact_profile_loads_no_mesh_or_compiler(trace_file):
+    """`patchfem profile` imports neither scikit-fem, numba nor Matplotlib."""
+    modules = modules_after(FROM_SHELL, "profile", trace_file, "--cutoff", "0.25 mm")
     assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
 
 
 @pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
 )
-def test_exact_the_dektak_file_as_it_is():
-    """The file as the instrument exports it: the results that it printed between its cursors, by --window."""
+def test_exact_dektak_parameters_agree_with_instrument():
+    """The parameters of a Dektak file between its cursors agree with those printed by the instrument."""
     path = Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv"
     answer = json.loads(run_cli("profile", path, "--window", "468 um,733 um", "--json").out)[
         "profiles"
@@ -189,8 +203,8 @@ def test_exact_the_dektak_file_as_it_is():
         "WMaxDev": ("MaxDev", 128.61e-9, 5e-12),
         "ASH": ("ASH", 2.89171e-6, 1.5e-11),
     }
-    for name, (ours, printed, near) in known.items():
-        assert answer["measures"][ours]["value"] == pytest.approx(printed, abs=near), name
+    for name, (parameter, printed, tolerance) in known.items():
+        assert answer["measures"][parameter]["value"] == pytest.approx(printed, abs=tolerance), name
 
 
 @pytest.mark.skipif(
@@ -199,7 +213,8 @@ def test_exact_the_dektak_file_as_it_is():
 @pytest.mark.parametrize(
     "name, units", [("nanovea-test1.txt.gz", "mm,um"), ("nanovea-test2.txt.gz", "mm,um")]
 )
-def test_exact_areal_files_as_they_are(name, units):
+def test_exact_nanovea_parameters_agree_with_reference(name, units):
+    """Sa, Sq, Sz, Ssk and Sku of two Nanovea scans agree with the reference values within 1e-6."""
     folder = Path(os.environ["PATCHFEM_DATA"])
     known = json.loads((folder / "truth.json").read_text())[name]
     found = json.loads(run_cli("profile", folder / name, "--units", units, "--json").out)[
@@ -212,7 +227,8 @@ def test_exact_areal_files_as_they_are(name, units):
 @pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
 )
-def test_exact_the_flatness_of_the_brake_reuss_beam():
+def test_exact_brake_reuss_flatness_agrees_with_reference():
+    """The flatness Sz of the Brake-Reuss beam agrees with the published value within 1e-6."""
     folder = Path(os.environ["PATCHFEM_DATA"])
     known = json.loads((folder / "truth.json").read_text())["brb_surface_data.mat"]
     answer = json.loads(

@@ -1,4 +1,4 @@
-"""Command lines that are refused: the exit code, one line for each mistake, and no file in the folder is changed."""
+"""Refused command lines: exit code, one line per mistake, and unchanged files."""
 
 import pytest
 from command_line import run_cli
@@ -28,7 +28,7 @@ LOADS = ("--over", "normal.load=10 N,20 N")
 MODE = "--over=structure.mode.0.frequency=100 Hz,110 Hz"
 MODE_NAMED = "--over=structure.mode.axial.frequency=100 Hz,110 Hz"
 FREQUENCY = "structure.mode[1].frequency=90 Hz"
-REFUSED = {  # verb -> [(words, what each line of the refusal says)]; exit code 2
+REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit code 2
     "sweep rig.toml": [
         (
             ("--over", "normal.load=1 lb", "--over", "friction.statc=1"),
@@ -158,7 +158,7 @@ REFUSED = {  # verb -> [(words, what each line of the refusal says)]; exit code 
     "help": [((), ("`patchfem run --help`",))],
     "--foo": [((), ("unknown option '--foo'; see `patchfem --help`",))],
 }
-NOT_THERE = [  # words, file that is not there; exit code 4
+NOT_THERE = [  # arguments, message on a missing file; exit code 4
     (("compare", "trace.csv", "none.csv"), "none.csv: there is no such file"),
     (("compare", "--pairs", "none.csv"), "none.csv: no such table"),
     (("profile", "none.csv"), "none.csv: there is no such file"),
@@ -173,7 +173,8 @@ CASES += [(words, (says,), 4) for words, says in NOT_THERE]
 
 
 @pytest.mark.parametrize("words, says, code", CASES, ids=[" ".join(words) for words, _, _ in CASES])
-def test_refuses_a_command_line(tmp_path, monkeypatch, words, says, code):
+def test_refuses_invalid_command_line(tmp_path, monkeypatch, words, says, code):
+    """Each invalid command line ends with its exit code and one line per mistake, and changes no file."""
     monkeypatch.chdir(tmp_path)
     for name, text in FILES.items():
         (tmp_path / name).write_text(text, "utf-8")

@@ -1,4 +1,4 @@
-"""patchfem report, and the page that a sweep writes: the numbers of the files, whatever folders they came from."""
+"""`patchfem report` and the report of a sweep: the numbers of the files, from one or several folders."""
 
 import csv
 
@@ -12,8 +12,8 @@ LOADS = ("10 N", "26 lbf")
 
 
 @pytest.fixture(scope="module")
-def swept(tmp_path_factory):
-    """Two sweeps of one scene over three levels and two loads, the second with less friction."""
+def sweep_folders(tmp_path_factory):
+    """Return the folder of two sweeps over three levels and two loads; the second has less friction."""
     base = tmp_path_factory.mktemp("report")
     scene = base / "rig.toml"
     scene.write_text(POINT + COULOMB + SHORT, encoding="utf-8")
@@ -29,22 +29,26 @@ def swept(tmp_path_factory):
     return base
 
 
-def rows(folder) -> list:
+def read_rows(folder) -> list:
+    """Return the rows of the table of a sweep."""
     with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
         return list(csv.DictReader(file))
 
 
-def amplitudes(data: dict) -> np.ndarray:
-    """Displacement amplitudes [m] of the page's cases."""
+def page_amplitudes(data: dict) -> np.ndarray:
+    """Return the displacement amplitudes [m] of the cases of a page."""
     found = next(
-        one for one in data["measures"] if one["name"] == "relative_displacement_amplitude"
+        measure
+        for measure in data["measures"]
+        if measure["name"] == "relative_displacement_amplitude"
     )
     return np.array(found["values"]) / {"mm": 1e3, "um": 1e6}[found["unit"]]
 
 
-def test_exact_the_page_of_a_sweep_holds_its_table(swept):
-    data = read_page_data((swept / "first" / "report.html").read_text())
-    table = rows(swept / "first")
+def test_exact_sweep_report_equals_table(sweep_folders):
+    """The report of a sweep has the keys, values, outcomes and amplitudes of its table within 1e-8."""
+    data = read_page_data((sweep_folders / "first" / "report.html").read_text())
+    table = read_rows(sweep_folders / "first")
     assert [one["name"] for one in data["keys"]] == ["normal.load", "drive.acceleration"] and data[
         "grid"
     ]
@@ -52,51 +56,56 @@ def test_exact_the_page_of_a_sweep_holds_its_table(swept):
     assert data["keys"][1]["unit"] == "g" and data["keys"][1]["values"] == [1, 3, 5] * 2
     assert data["outcome"] == [row["outcome"] for row in table]
     np.testing.assert_allclose(
-        amplitudes(data),
+        page_amplitudes(data),
         [float(row["relative_displacement_amplitude"]) for row in table],
         rtol=1e-8,
     )
-    assert all((swept / "first" / link).is_file() for link in data["links"])
+    assert all((sweep_folders / "first" / link).is_file() for link in data["links"])
 
 
-def test_exact_a_page_made_again_from_the_files_is_the_same(swept):
-    page = swept / "first" / "report.html"
+def test_exact_report_is_reproduced_from_files(sweep_folders):
+    """`patchfem report` writes the same page from the files of a sweep."""
+    page = sweep_folders / "first" / "report.html"
     before = read_page_data(page.read_text())
-    assert run_cli("report", swept / "first").out.strip() == str(page)
+    assert run_cli("report", sweep_folders / "first").out.strip() == str(page)
     assert read_page_data(page.read_text()) == before
 
 
-def test_exact_sweeps_side_by_side_are_one_table(swept):
-    page = swept / "both.html"
-    assert run_cli("report", swept / "first", swept / "second", "-o", page).code == 0
+def test_exact_report_joins_two_sweeps(sweep_folders):
+    """The report of two sweeps has one table with a column for the sweep."""
+    page = sweep_folders / "both.html"
+    assert (
+        run_cli("report", sweep_folders / "first", sweep_folders / "second", "-o", page).code == 0
+    )
     data = read_page_data(page.read_text())
-    table = rows(swept / "first") + rows(swept / "second")
+    table = read_rows(sweep_folders / "first") + read_rows(sweep_folders / "second")
     assert data["keys"][0]["name"] == "sweep"
     assert data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
     np.testing.assert_allclose(
-        amplitudes(data),
+        page_amplitudes(data),
         [float(row["relative_displacement_amplitude"]) for row in table],
         rtol=1e-8,
     )
-    assert all((swept / link).is_file() for link in data["links"])
+    assert all((sweep_folders / link).is_file() for link in data["links"])
 
 
-def test_refuses_what_cannot_stand_side_by_side(swept, tmp_path):
+def test_refuses_incompatible_report_folders(sweep_folders, tmp_path):
+    """Folders without results, a sweep with a run, and sweeps over different keys are refused."""
     assert run_cli("report").code == 2
     (tmp_path / "empty").mkdir()
     answer = run_cli("report", tmp_path / "empty")
     assert answer.code == 2 and "not a results folder: it has no summary.json" in answer.err
-    case = next((swept / "first" / "cases").iterdir())
-    answer = run_cli("report", swept / "first", case)
+    case = next((sweep_folders / "first" / "cases").iterdir())
+    answer = run_cli("report", sweep_folders / "first", case)
     assert answer.code == 2 and "first is a sweep" in answer.err
-    (swept / "first" / "sweep.nc").rename(swept / "first" / "kept.nc")
-    answer = run_cli("report", swept / "first")
-    (swept / "first" / "kept.nc").rename(swept / "first" / "sweep.nc")
+    (sweep_folders / "first" / "sweep.nc").rename(sweep_folders / "first" / "kept.nc")
+    answer = run_cli("report", sweep_folders / "first")
+    (sweep_folders / "first" / "kept.nc").rename(sweep_folders / "first" / "sweep.nc")
     assert answer.code == 2 and "it has no sweep.nc" in answer.err
-    other = swept / "other"
+    other = sweep_folders / "other"
     answer = run_cli(
-        "sweep", swept / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q"
+        "sweep", sweep_folders / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q"
     )
     assert (answer.code, answer.out, answer.err) == (0, "", ""), "quiet, it says nothing but faults"
-    answer = run_cli("report", swept / "first", other)
+    answer = run_cli("report", sweep_folders / "first", other)
     assert answer.code == 2 and "over different keys" in answer.err

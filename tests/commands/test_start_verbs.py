@@ -1,4 +1,4 @@
-"""The verbs of the first hour: a scene to start from, the shipped run, the schema, the doctor, what to cite."""
+"""The commands for beginners: `new`, `demo`, `schema`, `doctor`, `cite`, help and completion."""
 
 import json
 import re
@@ -23,7 +23,8 @@ from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, find_shipped_scene
 register_verbs([])  # all verbs
 
 
-def test_exact_new_writes_what_it_prints(tmp_path):
+def test_exact_new_writes_template(tmp_path):
+    """`patchfem new` writes the template that it prints, names the next command, and does not overwrite a file."""
     path = tmp_path / "mine.toml"
     assert run_cli("new", "joint").out == read_template("joint") == pf.new("joint")
     answer = run_cli("new", "joint", "-o", path)
@@ -38,32 +39,35 @@ def test_exact_new_writes_what_it_prints(tmp_path):
     assert answer.code == 2 and "already exists" in answer.err and path.read_text("utf-8") == "mine"
 
 
-def test_exact_new_names_its_kinds():
+def test_exact_new_lists_kinds_of_scenes():
+    """`patchfem new` lists the kinds of scenes, and suggests one for a misspelt kind."""
     assert [line.split()[0] for line in run_cli("new").out.splitlines()] == list(
         TEMPLATE_DESCRIPTIONS
     )
-    said = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(TEMPLATE_DESCRIPTIONS)}\n"
-    assert run_cli("new", "joitn")[::2] == (2, said)
+    message = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(TEMPLATE_DESCRIPTIONS)}\n"
+    assert run_cli("new", "joitn")[::2] == (2, message)
     with pytest.raises(pf.PatchfemError, match="did you mean 'joint'"):
         pf.new("joitn")
 
 
-def test_exact_the_demo_is_the_rig_of_the_report(tmp_path):
+def test_exact_demo_runs_shipped_rig(tmp_path):
+    """`patchfem demo` runs the rig of the report: its amplitude agrees with 14.8028 um within the error."""
     answer = run_cli("demo", "-o", tmp_path / "out", "--no-page")
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     amplitude = summary["measures"]["relative_displacement_amplitude"]
     assert answer.code == 0 and amplitude["value"] == pytest.approx(
         14.8028e-6, abs=amplitude["error"]
     )
-    few = {"drive.cycles": 3}
+    settings = {"drive.cycles": 3}
     assert (
-        pf.demo(**few).measures["loop_area"].value
-        == pf.run(find_shipped_scene(), **few).measures["loop_area"].value
+        pf.demo(**settings).measures["loop_area"].value
+        == pf.run(find_shipped_scene(), **settings).measures["loop_area"].value
         > 0
     )
 
 
-def test_exact_the_schema_is_written_as_it_is_printed(tmp_path):
+def test_exact_schema_file_equals_printed_schema(tmp_path):
+    """`patchfem schema` writes the same JSON to a file as to the screen, with examples."""
     assert run_cli("schema", "-o", tmp_path / "a.json").code == 0
     assert (tmp_path / "a.json").read_text("utf-8") == run_cli("schema").out
     assert json.loads(run_cli("schema").out)["$defs"]["Contact"]["properties"]["length"][
@@ -72,7 +76,7 @@ def test_exact_the_schema_is_written_as_it_is_printed(tmp_path):
 
 
 def replace_versions(monkeypatch, version_of) -> None:
-    """Let the doctor find the versions of packages that a function returns."""
+    """Let the doctor find the versions that a function returns."""
     monkeypatch.setattr(examine, "version", version_of)
 
 
@@ -82,10 +86,11 @@ def examine_with(monkeypatch, version_of) -> dict:
     return {finding["name"]: finding for finding in json.loads(run_cli("doctor", "--json").out)}
 
 
-def only(*installed: str):
-    """Return a stand-in for `importlib.metadata.version` in an environment that has only these packages."""
+def versions_of_only(*installed: str):
+    """Return a replacement of `importlib.metadata.version` for an environment with only these packages."""
 
     def version_of(name: str) -> str:
+        """Return version 1.0 of an installed package."""
         if name not in installed:
             raise PackageNotFoundError(name)
         return "1.0"
@@ -95,7 +100,7 @@ def only(*installed: str):
 
 @pytest.fixture
 def broken_opengl(tmp_path, monkeypatch):
-    """A pyvista that ends as with a driver that cannot draw, with VTK's clock before the sentence."""
+    """Provide a pyvista that fails like a driver that cannot draw, with a time stamp of VTK."""
     clock = (
         "2026-11-24 11:39:48.555 (   2.046s) [    7FA06DECE780]    vtkX11Functions.cxx:126   WARN| "
     )
@@ -105,12 +110,13 @@ def broken_opengl(tmp_path, monkeypatch):
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
 
 
-def test_always_the_doctor_tells_what_is_missing(monkeypatch, broken_opengl):
+def test_always_doctor_reports_missing_packages(monkeypatch, broken_opengl):
+    """The doctor reports missing packages and a failing OpenGL with the command that installs them."""
     packages = {"imageio-ffmpeg"} | {*examine.REQUIRED_PACKAGES, *examine.OPTIONAL_PACKAGES} - {
         "scipy",
         "trame",
     }
-    found = examine_with(monkeypatch, only(*packages))
+    found = examine_with(monkeypatch, versions_of_only(*packages))
     assert found["numpy"]["fine"] and not found["scipy"]["fine"]
     assert found["scipy"]["cure"] == "pip install scipy"
     assert found["trame (fields in a browser)"]["cure"] == 'pip install "patchfem[web]"'
@@ -121,13 +127,12 @@ def test_always_the_doctor_tells_what_is_missing(monkeypatch, broken_opengl):
     assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "the", "trame"]
 
 
-def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_films(
-    tmp_path, monkeypatch, broken_opengl
-):
+def test_always_doctor_checks_all_dependencies(tmp_path, monkeypatch, broken_opengl):
+    """The doctor checks every dependency and extra of pyproject.toml, and the programs that write films."""
     monkeypatch.setenv("PATH", str(tmp_path))
     text = (Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8")
     project = tomllib.loads(text)["project"]
-    found = examine_with(monkeypatch, only())
+    found = examine_with(monkeypatch, versions_of_only())
     dependencies = {re.match(r"[\w-]+", line)[0] for line in project["dependencies"]}
     assert {finding for finding in found if found[finding]["cure"] == f"pip install {finding}"} == (
         dependencies
@@ -138,11 +143,12 @@ def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_fi
     assert {match[1] for match in extras} == {*project["optional-dependencies"]} - {"test", "docs"}
     film = found["films (.mp4)"]
     assert not film["fine"] and "pip install imageio-ffmpeg" in film["cure"]
-    film = examine_with(monkeypatch, only("imageio-ffmpeg"))["films (.mp4)"]
+    film = examine_with(monkeypatch, versions_of_only("imageio-ffmpeg"))["films (.mp4)"]
     assert film["fine"] and film["found"] == "imageio-ffmpeg 1.0" and not film["cure"]
 
 
-def test_always_a_fault_of_the_program_says_what_to_send(monkeypatch):
+def test_always_internal_error_asks_for_report(monkeypatch):
+    """An internal error ends with code 1 and asks for a report with the output of `patchfem doctor`."""
     replace_versions(monkeypatch, lambda name: 1 / 0)
     answer = run_cli("doctor")
     assert answer.code == 1
@@ -150,16 +156,16 @@ def test_always_a_fault_of_the_program_says_what_to_send(monkeypatch):
     assert "what `patchfem doctor` says to the project's issue tracker" in answer.err
 
 
-def test_always_the_doctor_says_where_compiled_code_cannot_be_kept(
-    monkeypatch, tmp_path, broken_opengl
-):
+def test_always_doctor_reports_unusable_cache(monkeypatch, tmp_path, broken_opengl):
+    """The doctor reports a cache folder that cannot be created."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "file" / "below"))
     found = {finding["name"]: finding for finding in json.loads(run_cli("doctor", "--json").out)}
     assert not found["compiled code"]["fine"] and "PATCHFEM_CACHE" in found["compiled code"]["cure"]
 
 
-def test_exact_a_scene_cites_what_its_effects_stand_on(tmp_path):
+def test_exact_cite_lists_sources_of_effects(tmp_path):
+    """`patchfem cite` lists the sources of the effects in a scene."""
     keys = lambda text: re.findall(r"^@\w+\{(\w+),", text, re.M)  # noqa: E731
     assert keys(run_cli("cite").out) == ["srinivasan1985", "patchfem"]
     path = tmp_path / "a.toml"
@@ -174,7 +180,8 @@ def test_exact_a_scene_cites_what_its_effects_stand_on(tmp_path):
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_always_every_verb_completes(shell):
+def test_always_shell_completion_covers_commands(shell):
+    """The completion script of each shell contains the commands and options; bash completes `sw` to `sweep`."""
     script = app.generate_completion(shell=shell)
     assert all(verb in script for verb in ("sweep", "doctor", "no-page"))
     if shell == "bash":
@@ -194,8 +201,8 @@ def test_always_every_verb_completes(shell):
         assert "sweep" in done.stdout.split()
 
 
-def test_always_help_imports_nothing_of_them():
-    """`patchfem --help` names the verbs without the modules behind them; of a verb its own module is loaded alone."""
+def test_always_help_imports_no_command_internals():
+    """Registering the commands imports only their definitions, and for one command only its own module."""
     code = (
         "import sys; from patchfem.__main__ import register_verbs; register_verbs([{}]); "
         "print([m for m in sys.modules if m.startswith('patchfem.')])"
@@ -213,7 +220,8 @@ def test_always_help_imports_nothing_of_them():
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_always_help_says_what_each_option_does_by_an_example(verb):
+def test_always_help_describes_options_with_examples(verb):
+    """The help of each command describes every option, and its example can be parsed."""
     about = app[verb].help.partition("Example: ")
     assert about[0].strip() and all(
         one.parameter.help

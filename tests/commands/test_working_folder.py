@@ -1,4 +1,4 @@
-"""A file that lies in the working folder is never run as code, whatever module it has the name of."""
+"""Files in the working folder are never executed, whatever module they are named after."""
 
 import ast
 import subprocess
@@ -47,9 +47,8 @@ WORDS = {
 
 
 @pytest.fixture
-def planted(tmp_path, monkeypatch):
-    """A working folder with scenes, files of measurements and results, and modules that leave RAN-name behind and end
-    who runs them."""
+def hostile_folder(tmp_path, monkeypatch):
+    """Return a working folder with scenes, measurements, results, and modules that write RAN-name and end the process."""
     monkeypatch.chdir(tmp_path)
     Path("bench.toml").write_text(BENCH)
     Path("patch.toml").write_text(COATED)
@@ -67,49 +66,58 @@ def planted(tmp_path, monkeypatch):
     return tmp_path
 
 
-def ran(folder: Path) -> list:
+def executed_modules(folder: Path) -> list:
+    """Return the names of the modules that were executed."""
     return sorted(one.name for one in folder.glob("RAN-*"))
 
 
 @pytest.mark.parametrize(
     "every", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["always", "slow"]
 )
-def test_always_no_verb_runs_what_lies_in_the_working_folder(planted, every):
+def test_always_commands_execute_no_local_modules(hostile_folder, every):
+    """No command executes a module of the working folder."""
     for name in VERBS if every else ("sweep",):
         answer = run_cli(name, *WORDS.get(name, ()))
         assert answer.code in (0, 2, 3), (name, answer)
-        assert not ran(planted), name
-    assert (planted / "swept" / "sweep.csv").is_file() and (planted / "seen.png").is_file() is every
+        assert not executed_modules(hostile_folder), name
+    assert (hostile_folder / "swept" / "sweep.csv").is_file() and (
+        hostile_folder / "seen.png"
+    ).is_file() is every
 
 
 @pytest.mark.slow
-def test_always_a_cluster_runs_nothing_of_the_working_folder(planted):
+def test_always_cluster_executes_no_local_modules(hostile_folder):
+    """A sweep on a Dask cluster executes no module of the working folder."""
     pytest.importorskip("distributed")
     answer = run_cli(*SWEPT, "swept", "--executor", "dask", "-j", "1")
     assert answer.code == 0, answer.err
-    assert not ran(planted)
+    assert not executed_modules(hostile_folder)
 
 
-def test_always_python_m_runs_nothing_of_the_working_folder(planted):
+def test_always_python_m_executes_no_local_modules(hostile_folder):
+    """`python -m patchfem` executes no module of the working folder."""
     done = subprocess.run(
         [sys.executable, "-m", "patchfem", "plan", "bench.toml"], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    assert not ran(planted)
+    assert not executed_modules(hostile_folder)
 
 
-def test_exact_the_planted_modules_run_where_python_looks_for_them(planted):
+def test_exact_hostile_modules_are_found_by_python(hostile_folder):
+    """Plain Python executes the module of the working folder, so that the other tests can fail."""
     done = subprocess.run([sys.executable, "-c", "import random"], env={})
-    assert done.returncode == 9 and ran(planted) == ["RAN-random"]
+    assert done.returncode == 9 and executed_modules(hostile_folder) == ["RAN-random"]
 
 
-def test_always_every_interpreter_that_is_started_leaves_out_the_working_folder():
-    """Lists of words that begin with the interpreter name -P next."""
-    seen = 0
+def test_always_child_interpreters_use_safe_path():
+    """Every interpreter that the package starts gets the option -P, which excludes the working folder."""
+    n_commands = 0
     for name, text in read_sources(Path(__file__).parents[2]).items():
         for node in syntax_nodes(text) if "sys.executable" in text else ():
-            words = [ast.unparse(one) for one in node.elts] if isinstance(node, ast.List) else []
-            if words[:1] in (["sys.executable"], ["PYTHON"]):
-                assert words[1] == "'-P'", name
-                seen += 1
-    assert seen >= 4
+            arguments = (
+                [ast.unparse(one) for one in node.elts] if isinstance(node, ast.List) else []
+            )
+            if arguments[:1] in (["sys.executable"], ["PYTHON"]):
+                assert arguments[1] == "'-P'", name
+                n_commands += 1
+    assert n_commands >= 4

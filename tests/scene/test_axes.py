@@ -1,4 +1,4 @@
-"""Values of a key from case to case: lists and ranges as --over and [sweep] write them."""
+"""Axes of a sweep: lists and ranges of values in --over and [sweep]."""
 
 import re
 
@@ -22,7 +22,8 @@ RIG = KILOGRAM + DRIVE
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
 
 
-def axis(text, **how):
+def read_axis(text, **how):
+    """Return the axis of a text that has no mistakes."""
     (found,), wrong = read_axes([text], **how)
     assert wrong == []
     return found
@@ -58,30 +59,34 @@ def axis(text, **how):
         ("friction.static=-1,2", [-1, 2], "1"),  # beyond the limits of the key: its case says so
     ],
 )
-def test_exact_values_in_si(text, values, unit):
-    found = axis(text)
+def test_exact_axis_values_in_si(text, values, unit):
+    """The values of an axis agree with those in SI units within 1e-14."""
+    found = read_axis(text)
     np.testing.assert_allclose(found.values, values, rtol=1e-14, atol=0)
     assert found.unit == unit and len(found.texts) == len(found.values)
 
 
-def test_exact_texts_stand_as_a_scene_holds_them():
-    assert axis("contact.load=26 lbf, 100 N").texts == ("26 lbf", "100 N")
-    assert axis("contact.length=1 mm..3 mm:3").texts == ("1 mm", "2 mm", "3 mm")
-    assert axis("friction.static=0.1..0.3:3").texts == ("0.1", "0.2", "0.3")
-    assert axis("friction.law=coulomb,tanh").values == ("coulomb", "tanh")
-    assert axis('drive.levels=["3 g", "4 g"],["5 g"]').texts == ('["3 g", "4 g"]', '["5 g"]')
-    assert axis("slide.file=../a.csv,../b.csv").texts == ("../a.csv", "../b.csv")
+def test_exact_axis_texts_are_valid_in_scene():
+    """Each value of an axis has the text that a scene would contain."""
+    assert read_axis("contact.load=26 lbf, 100 N").texts == ("26 lbf", "100 N")
+    assert read_axis("contact.length=1 mm..3 mm:3").texts == ("1 mm", "2 mm", "3 mm")
+    assert read_axis("friction.static=0.1..0.3:3").texts == ("0.1", "0.2", "0.3")
+    assert read_axis("friction.law=coulomb,tanh").values == ("coulomb", "tanh")
+    assert read_axis('drive.levels=["3 g", "4 g"],["5 g"]').texts == ('["3 g", "4 g"]', '["5 g"]')
+    assert read_axis("slide.file=../a.csv,../b.csv").texts == ("../a.csv", "../b.csv")
 
 
-def test_exact_a_text_gives_the_value_beside_it():
-    """Whatever the range, a case that reads the text has the very float of the table."""
+def test_exact_axis_text_gives_same_float():
+    """The text of each value in a range is read as exactly the same floating-point number."""
     for text in (
         "contact.tilt.angle=1 mrad..1 deg:7",
         "contact.load=1 lbf..1 kN:11",
         "friction.static=0.1..0.7:13",
     ):
-        found = axis(text)
-        assert [axis(f"{found.key}={one}").values[0] for one in found.texts] == list(found.values)
+        found = read_axis(text)
+        assert [read_axis(f"{found.key}={one}").values[0] for one in found.texts] == list(
+            found.values
+        )
 
 
 @pytest.mark.parametrize(
@@ -109,12 +114,14 @@ def test_exact_a_text_gives_the_value_beside_it():
         ("contact.tilt.angle", "table.key=v1,v2"),
     ],
 )
-def test_refuses_what_is_no_list_of_values(text, says):
+def test_refuses_invalid_axis(text, says):
+    """An invalid list or range is refused with its key and the mistake."""
     found, wrong = read_axes([text])
     assert not found and len(wrong) == 1 and says in wrong[0] and text.partition("=")[0] in wrong[0]
 
 
-def test_refuses_all_at_once():
+def test_refuses_axes_with_all_mistakes():
+    """All mistakes in several axes are reported at once."""
     _, wrong = read_axes(
         ["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"]
     )
@@ -126,8 +133,9 @@ def test_refuses_all_at_once():
     ]
 
 
-def test_exact_a_draw_holds_16_bytes_a_value_and_reads_what_it_writes():
-    span = axis("contact.length=1 mm..9 mm", sampled=True)
+def test_exact_sampled_axis_uses_16_bytes_per_value():
+    """A sampled axis stores 16 bytes per value, and its texts are read as the same values."""
+    span = read_axis("contact.length=1 mm..9 mm", sampled=True)
     drawn = span.make_axis(np.linspace(0, 1, 1001))
     assert drawn.texts[0] == "1 mm" and drawn.texts[-1] == "9 mm" and len(drawn.texts) == 1001
     assert drawn.texts[1:3] == [drawn.texts[1], drawn.texts[2]] == ["1.008 mm", "1.016 mm"]
@@ -135,14 +143,17 @@ def test_exact_a_draw_holds_16_bytes_a_value_and_reads_what_it_writes():
     assert drawn.texts.numbers.itemsize + drawn.values.itemsize == 16
 
 
-def test_exact_drawn_values_lie_between_the_ends():
-    span = axis("contact.tilt.angle=1 mrad..100 mrad", sampled=True)
-    assert isinstance(span, SampledRange) and span.log
+def test_exact_sampled_values_lie_within_range():
+    """Sampled values lie between the ends of a range, on a logarithmic or a linear scale."""
+    log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", sampled=True)
+    assert isinstance(log_range, SampledRange) and log_range.log
     np.testing.assert_allclose(
-        span.make_axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
+        log_range.make_axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
     )
-    even = axis("friction.static=0.2..0.6:lin", sampled=True)
-    np.testing.assert_allclose(even.make_axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
+    linear_range = read_axis("friction.static=0.2..0.6:lin", sampled=True)
+    np.testing.assert_allclose(
+        linear_range.make_axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14
+    )
     assert (
         "takes whole numbers takes no range"
         in read_axes(["contact.pairs=1..4"], sampled=True)[1][0]
@@ -150,22 +161,25 @@ def test_exact_drawn_values_lie_between_the_ends():
     assert "leave out :9" in read_axes(["friction.static=0.2..0.6:9"], sampled=True)[1][0]
 
 
-def test_exact_values_from_python():
+def test_exact_python_values_become_axis_texts():
+    """Python and NumPy values, and texts with commas or quotes, become texts that are read back unchanged."""
     assert format_values("contact.load", [26.0, "26 lbf"]) == ["26.0 N", "26 lbf"]
     assert format_values("friction.static", np.array([0.1, 0.2])) == ["0.1", "0.2"]
     assert format_values("friction.law", ["tanh"]) == ["tanh"]
     for one in (26.0, np.float64(26), np.array(26.0)):
         assert format_values("contact.load", one) == ["26.0 N"]
     names = ["plain", "a,b.csv", 'an "inch"', "it's,", "back\\slash,"]
-    found = axis(f"title={','.join(format_values('title', names))}")
+    found = read_axis(f"title={','.join(format_values('title', names))}")
     assert [loads(BENCH, "a.toml", [f"title={one}"]).title for one in found.texts] == names
 
 
-def test_exact_a_quote_within_a_value_is_a_sign():
-    assert axis("title=it's,that's,'a,b'").texts == ("it's", "that's", "'a,b'")
+def test_exact_quote_inside_value_is_kept():
+    """A quote inside a value is part of the value."""
+    assert read_axis("title=it's,that's,'a,b'").texts == ("it's", "that's", "'a,b'")
 
 
-def test_exact_a_table_of_a_scene_says_the_same():
+def test_exact_sweep_table_equals_options():
+    """The table [sweep] gives the same axes as --over."""
     scene = loads(SWEPT, "a.toml")
     assert (
         list(scene.sweep)
@@ -174,25 +188,27 @@ def test_exact_a_table_of_a_scene_says_the_same():
     assert scene.effect_names()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
 
 
-def test_exact_a_key_that_only_the_table_holds_has_its_first_value():
+def test_exact_key_only_in_sweep_table_has_first_value():
+    """A key that stands only in the table [sweep] has the first value of its axis in the scene."""
     scene = loads(SWEPT.replace("static = 0.3\n", ""), "a.toml")
     assert scene.friction.static == 0.1
 
 
-def test_exact_a_key_of_an_item_that_the_scene_gives_keeps_its_value():
-    """By number or name; before, only keys without items were found, and others took the first value of the table."""
+def test_exact_swept_key_of_mode_keeps_scene_value():
+    """A swept key of a mode, given by number or name, keeps its value in the scene, or else the first of its axis."""
     swept = (
         RIG + '[sweep]\n"structure.mode.axial.frequency" = "100 Hz, 120 Hz"\n'
         '"structure.mode[1].damping" = "0.1,0.2"\n'
     )
     (mode,) = loads(swept, "a.toml").structure.mode
-    (own,) = loads(RIG, "a.toml").structure.mode
-    assert (mode.frequency, mode.damping) == (own.frequency, own.damping)
-    (first,) = loads(re.sub(r"\ndamping = .*", "", swept, count=1), "a.toml").structure.mode
-    assert first.frequency == own.frequency and first.damping == 0.1
+    (scene_mode,) = loads(RIG, "a.toml").structure.mode
+    assert (mode.frequency, mode.damping) == (scene_mode.frequency, scene_mode.damping)
+    (swept_mode,) = loads(re.sub(r"\ndamping = .*", "", swept, count=1), "a.toml").structure.mode
+    assert swept_mode.frequency == scene_mode.frequency and swept_mode.damping == 0.1
 
 
-def test_refuses_mistakes_of_the_table_with_their_lines():
+def test_refuses_sweep_table_with_lines_of_mistakes():
+    """Mistakes in the table [sweep] are reported with their lines."""
     text = (
         BENCH + '[sweep]\n"friction.static" = "0.1, a"\n"normal.lod" = "1 N"\n"normal.load" = 3\n'
     )
@@ -208,24 +224,25 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
     assert "a.toml:10: sweep: keys with their values" in list_mistakes(BENCH + "[sweep]\n")[0]
 
 
-def test_refuses_one_run_of_many_cases():
+def test_refuses_single_run_of_sweep():
+    """A single run of a scene with 12 cases is refused."""
     with pytest.raises(
         PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"
     ):
         pf.run(SWEPT)
 
 
-def test_always_values_of_all_swept_keys_choose_one_case():
-    """As the refusal of the sweep proposes; a key that is still swept is refused alone."""
-    with pytest.raises(PatchfemError) as refused:
+def test_always_values_of_all_axes_select_one_case():
+    """The settings proposed by the refusal select one case; with an axis left, the refusal names only that axis."""
+    with pytest.raises(PatchfemError) as error:
         pf.run(SWEPT)
-    sets = re.findall(r'--set "([^"]*)"', str(refused.value))
-    whole = loads(SWEPT, "a.toml", sets)
-    assert len(sets) == 2 and not whole.sweep
-    assert build(whole).kind == "bench"
-    with pytest.raises(PatchfemError) as still:
+    sets = re.findall(r'--set "([^"]*)"', str(error.value))
+    scene = loads(SWEPT, "a.toml", sets)
+    assert len(sets) == 2 and not scene.sweep
+    assert build(scene).kind == "bench"
+    with pytest.raises(PatchfemError) as second_error:
         build(loads(SWEPT, "a.toml", sets[:1]))
-    assert sets[0] not in str(still.value) and sets[1] in str(still.value)
+    assert sets[0] not in str(second_error.value) and sets[1] in str(second_error.value)
 
 
 @pytest.mark.parametrize(
@@ -238,12 +255,12 @@ def test_always_values_of_all_swept_keys_choose_one_case():
         ("contact.length=5 mm +- 95 %", 0.25, 9.75, "mm"),
     ],
 )
-def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
-    """0.3 +- 15 %, as scatter is written everywhere, was refused with "a plain number is needed"."""
-    (one,), wrong = read_axes([text], sampled=True)
-    assert not wrong and (one.low, one.high, one.unit, one.log) == (low, high, unit, False)
-    (said,) = describe_ranges([text])
-    ends = said.partition(" is drawn evenly from ")[2].split("..")
+def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):
+    """A value with a tolerance, such as 0.3 +- 15 %, is a uniform range, which is described in a note."""
+    (axis,), wrong = read_axes([text], sampled=True)
+    assert not wrong and (axis.low, axis.high, axis.unit, axis.log) == (low, high, unit, False)
+    (note,) = describe_ranges([text])
+    ends = note.partition(" is drawn evenly from ")[2].split("..")
     assert [float(end.removesuffix(unit)) for end in ends] == [low, high]
     assert describe_ranges(["friction.static=0.2..0.3"]) == []
 
@@ -263,6 +280,7 @@ def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
         ),
     ],
 )
-def test_refuses_a_width_with_what_helps(text, sampled, says):
+def test_refuses_invalid_tolerance_of_value(text, sampled, says):
+    """An invalid tolerance of a value is refused with its remedy."""
     found, (wrong,) = read_axes([text], sampled=sampled)
     assert not found and says in wrong

@@ -1,4 +1,4 @@
-"""A scene with keys replaced, beside the same scene read from its text with the same strings."""
+"""A scene with replaced keys equals the scene read from its text with the same settings."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from patchfem.scene import BaseScene, loads, require_files
 from patchfem.scene.scene import SceneError
 
 RIG = POINT + COULOMB + MODE + SECOND + DRIVE
-CHANGES = [  # scene, strings as --set takes them
+CHANGES = [  # scene, arguments of --set
     (RIG, ["normal.load=101 N"]),
     (RIG, ["normal.load=0 N", "normal.load=3 lbf"]),
     (RIG, []),
@@ -47,8 +47,8 @@ CHANGES = [  # scene, strings as --set takes them
 ]
 
 
-def told(make) -> tuple:
-    """What a scene says of itself, or its mistakes."""
+def describe_scene(make) -> tuple:
+    """Return all properties of a scene, or its mistakes."""
     try:
         found = make()
     except SceneError as error:
@@ -64,49 +64,61 @@ def told(make) -> tuple:
 
 
 @pytest.mark.parametrize(("text", "sets"), CHANGES)
-def test_exact_changed_scene_is_the_one_read_with_its_sets(text, sets):
-    own = told(lambda: require_files(loads(text, "scene.toml", sets)))
+def test_exact_changed_scene_equals_scene_read_with_settings(text, sets):
+    """A changed scene equals the scene read from its text with the same settings, also when tables are reused."""
+    expected = describe_scene(lambda: require_files(loads(text, "scene.toml", sets)))
     base = BaseScene(loads(text, "scene.toml"))
-    assert told(lambda: base.override(sets)) == own
-    assert told(lambda: base.override(sets)) == own  # with the tables of the first
+    assert describe_scene(lambda: base.override(sets)) == expected
+    assert (
+        describe_scene(lambda: base.override(sets)) == expected
+    )  # reuses the tables of the first call
 
 
-def test_exact_changed_scene_of_one_that_has_sets_already():
+def test_exact_changed_scene_keeps_earlier_settings():
+    """A scene read with settings can be changed again, and mistakes at keys set before are reported equally."""
     first = loads(RIG, "scene.toml", ["normal.load=7 N", "structure.mode.axial.damping=0.1"])
     base = BaseScene(first)
-    own = told(lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2")))
-    assert told(lambda: base.override(["structure.mode.second.damping=0.2"])) == own
+    expected = describe_scene(
+        lambda: loads(RIG, "scene.toml", (*first.sets, "structure.mode.second.damping=0.2"))
+    )
+    assert describe_scene(lambda: base.override(["structure.mode.second.damping=0.2"])) == expected
     # a mistake at a key set before
-    assert told(lambda: base.override(["normal.load=-2 N"])) == told(
+    assert describe_scene(lambda: base.override(["normal.load=-2 N"])) == describe_scene(
         lambda: loads(RIG, "scene.toml", (*first.sets, "normal.load=-2 N"))
     )
 
 
-def test_exact_a_mistake_knows_that_its_key_was_set_when_its_table_was_read_before():
+def test_exact_mistake_of_reused_table_names_setting():
+    """A mistake in a table that was read before is reported as one of the setting."""
     text = RIG.replace(COULOMB, NONLOCAL)
     base = BaseScene(loads(text, "scene.toml"))
     base.override(["friction.spread=1 um", "normal.width=1 mm"])
-    own = told(lambda: loads(text, "scene.toml", ["friction.spread=1 um"]))
-    assert own[0] == "refused" and told(lambda: base.override(["friction.spread=1 um"])) == own
+    expected = describe_scene(lambda: loads(text, "scene.toml", ["friction.spread=1 um"]))
+    assert (
+        expected[0] == "refused"
+        and describe_scene(lambda: base.override(["friction.spread=1 um"])) == expected
+    )
 
 
-def test_always_a_change_leaves_the_scene_and_later_changes_alone():
+def test_always_change_does_not_affect_original_scene():
+    """A change, also an invalid one, leaves the original scene and later changes unaffected."""
     base = BaseScene(loads(RIG, "scene.toml"))
-    before = told(lambda: base.override([]))
+    before = describe_scene(lambda: base.override([]))
     with pytest.raises(SceneError):
         base.override(["structure.mode.axial.damping=-1", "friction.lw=coulomb"])
     assert base.override(["structure.mode.axial.damping=0.5"]).structure.mode[0].damping == 0.5
-    assert told(lambda: base.override([])) == before
+    assert describe_scene(lambda: base.override([])) == before
 
 
-def test_exact_load_of_a_scene_takes_si_values():
+def test_exact_load_of_scene_accepts_si_values():
+    """`load` of a scene stores floating-point settings without rounding."""
     scene = load(RIG)
     for value in np.random.default_rng(5).uniform(1, 1e3, 5):
         assert load(scene, **{"normal.load": value}).normal.load == value
 
 
-def test_exact_tables_that_came_before_stand_beside_others():
-    """Cases of a product share the tables of each axis, whatever order they come in; a mistake is kept of none."""
+def test_exact_reused_tables_are_independent_of_order():
+    """Random combinations of settings give the same scenes in any order, with invalid ones among them."""
     base = BaseScene(loads(RIG, "scene.toml"))
     r = np.random.default_rng(8)
     loads_ = ["normal.load=1 N", "normal.load=2 N", "normal.load=-3 N"]
@@ -120,6 +132,6 @@ def test_exact_tables_that_came_before_stand_beside_others():
     for _ in range(40):
         sets = [*r.choice(loads_, 1), *r.choice(sizes, 1), *r.choice(more, 2)]
         sets = [str(one) for one in r.permutation(sets)]
-        assert told(lambda sets=sets: base.override(sets)) == told(
+        assert describe_scene(lambda sets=sets: base.override(sets)) == describe_scene(
             lambda sets=sets: loads(RIG, "scene.toml", sets)
         )

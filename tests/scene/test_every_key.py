@@ -1,5 +1,4 @@
-"""Every key of the schema in ten small scenes: it changes something, a bit of the answer, or is told to change nothing,
-or is refused. Values that a scene has already are the ones a default stands for, so each key is tried at several."""
+"""Every key of the schema in ten small scenes changes the result, gives a remark that it has no effect, or is refused."""
 
 import copy
 import tomllib
@@ -75,8 +74,8 @@ SIZES = {
     "stiffness": ["3e6 N/m", "2e7 N/m"],
     "rotational stiffness": ["300 N m/rad"],
 }
-QUICK = 0, 1, 3, 5, 9  # in seconds, of SCENES
-# words that stand in messages alone, what bars are held against, choices that "auto" makes too
+QUICK = 0, 1, 3, 5, 9  # positions in SCENES of scenes that run in seconds
+# keys used only in messages or for errors, and choices that "auto" also makes
 NEVER = (
     "title",
     "structure.mode.0.name",
@@ -86,17 +85,17 @@ NEVER = (
 )
 
 
-def leaves() -> list:
-    """(path, values to try) of every key of the schema that is no file."""
+def list_keys() -> list:
+    """Return (path, values to try) of every key of the schema that names no file."""
     return [
-        (path, values(path, kind))
+        (path, trial_values(path, kind))
         for path, kind, model in list_schema_keys()
         if model is None and path[-1] != "file" and ".".join(map(str, path)) not in NEVER
     ]
 
 
-def values(path: tuple, kind: str | None) -> list:
-    """Values for a key: of its choices all, of a quantity or a number some that are no default."""
+def trial_values(path: tuple, kind: str | None) -> list:
+    """Return values for a key: all its choices, or quantities and numbers that are no defaults."""
     name = ".".join(map(str, path))
     if name in WORDS:
         return WORDS[name]
@@ -117,8 +116,8 @@ def values(path: tuple, kind: str | None) -> list:
     return [one for one in words if one != field.default] or NUMBERS
 
 
-def with_key(tables: dict, path: tuple, value) -> dict | None:
-    """The tables with another value at a path; None where it stands there, or its table would make another kind."""
+def set_key(tables: dict, path: tuple, value) -> dict | None:
+    """Return the tables with another value at a path, or None if nothing would change."""
     out = at = copy.deepcopy(tables)
     if path[0] not in ("accuracy", *tables):
         return None
@@ -133,55 +132,56 @@ def with_key(tables: dict, path: tuple, value) -> dict | None:
     return out
 
 
-def answer(text: str) -> tuple:
-    """Every number of a run, as bytes, and its warnings."""
-    asked = plan(loads(text))
-    found = run(asked)
-    numbers = [str((name, m.value, m.error)) for name, m in sorted(found.measures.items())]
-    arrays = [getattr(found.response, name, None) for name in ("time", "slide", "force")] + list(
-        found.fields.values()
+def run_and_collect(text: str) -> tuple:
+    """Return all numbers of a run as bytes, and its warnings."""
+    run_plan = plan(loads(text))
+    result = run(run_plan)
+    numbers = [str((name, m.value, m.error)) for name, m in sorted(result.measures.items())]
+    arrays = [getattr(result.response, name, None) for name in ("time", "slide", "force")] + list(
+        result.fields.values()
     )
-    if found.patch is not None:
-        arrays += [found.patch.x, found.patch.pressure.sigma_n]
+    if result.patch is not None:
+        arrays += [result.patch.x, result.patch.pressure.sigma_n]
     return (
         *numbers,
         *(np.asarray(one).tobytes() for one in arrays if one is not None),
-    ), found.warnings
+    ), result.warnings
 
 
-def silent(scene: str) -> list:
-    """Keys that stand in a scene without a word and change no bit, at none of their values."""
+def keys_without_effect(scene: str) -> list:
+    """Return the keys that change no result at any value and give no remark."""
     tables = tomllib.loads(SCENES[scene])
-    base = answer(to_toml(tables))
+    base = run_and_collect(to_toml(tables))
     out = []
-    for path, tried in leaves():
+    for path, tried in list_keys():
         name = ".".join(map(str, path))
-        taken = False
+        is_silent = False
         for value in tried:
-            if (changed := with_key(tables, path, value)) is None:
+            if (changed := set_key(tables, path, value)) is None:
                 continue
             try:
-                taken = answer(to_toml(changed)) == base
+                is_silent = run_and_collect(to_toml(changed)) == base
             except (SceneError, PatchfemError, Missing, NotConverged):
                 continue
-            if not taken:
+            if not is_silent:
                 break
-        if taken:
+        if is_silent:
             out.append(name)
     return out
 
 
 @pytest.mark.share(*QUICK)
 @pytest.mark.parametrize("scene", SCENES)
-def test_always_each_key_changes_an_answer_or_is_told(scene, monkeypatch):
+def test_always_key_changes_result_or_gives_remark(scene, monkeypatch):
+    """No key of the schema is accepted silently without an effect."""
     share_one_loop(monkeypatch)
-    assert silent(scene) == []
+    assert keys_without_effect(scene) == []
 
 
 @pytest.mark.parametrize("method", ["auto", "harmonic"])
-def test_always_steps_that_an_engine_does_not_take_are_told(method):
-    """The method alone does not say it: over grooves a harmonic run has steps, and auto may choose the march."""
+def test_always_unused_steps_per_cycle_give_remark(method):
+    """The key steps_per_cycle gives a remark with engines that have no time steps."""
     text = SCENES["exact rig"] + f'[accuracy]\nmethod = "{method}"\nsteps_per_cycle = 60\n'
     engine = "harmonic" if method == "harmonic" else "exact"
     told = f"accuracy.steps_per_cycle has no meaning for engine '{engine}', which has no steps, and is not used"
-    assert told in answer(text)[1] and told in plan(loads(text)).verdict
+    assert told in run_and_collect(text)[1] and told in plan(loads(text)).verdict

@@ -1,4 +1,4 @@
-"""`patchfem new joint --ask`: each answer leads to a law whose scene runs, and the table says what the laws do."""
+"""`patchfem new joint --ask`: the questions select a friction law, whose scene runs and lists its limits."""
 
 import os
 import pty
@@ -24,11 +24,17 @@ from patchfem.scene.joint_laws import JOINT_LAWS
 
 ROWS = {f"{row.law}-{row.scene.rpartition('/')[2]}": row for row in JOINT_LAWS}
 POINT = '[normal]\nload = "100 N"\n[friction]\nstatic = 0.3\n'
-PATH = '[slide]\nkind = "file"\nfile = "path.csv"\n'  # 3 um, back to 1.5 um, to 3 um again
+PATH = (
+    '[slide]\nkind = "file"\nfile = "path.csv"\n'  # path to 3 um, back to 1.5 um and again to 3 um
+)
 BRISTLES = 'stiffness = "3e7 N/m"\n'  # the limit of 30 N is reached at 1 um
-LIMIT_AT_3 = 1 - np.exp(-3.0)  # force over its limit at 3 bond lengths: df/ds = 1 - f
-AT_TURN = (1 + LIMIT_AT_3) * np.exp(-1.5) - 1  # back by 1.5 bond lengths: df/ds = 1 + f
-OPEN_LOOP = 100 * (1 - (1 - AT_TURN) * np.exp(-1.5)) / LIMIT_AT_3  # forth again
+LIMIT_AT_3 = 1 - np.exp(-3.0)  # force / friction limit after 3 bond lengths: df/ds = 1 - f
+AT_TURN = (1 + LIMIT_AT_3) * np.exp(
+    -1.5
+) - 1  # force / friction limit after a reversal of 1.5 bond lengths: df/ds = 1 + f
+OPEN_LOOP = (
+    100 * (1 - (1 - AT_TURN) * np.exp(-1.5)) / LIMIT_AT_3
+)  # the same after the second reversal, in percent of the first maximum
 # friction force at 3 um for the second time divided by that for the first time, in percent
 SMALL_LOOPS = {
     'law = "elastic-plastic"\n' + BRISTLES: 100,
@@ -51,7 +57,8 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("name", ROWS)
-def test_always_the_scene_of_a_law_runs_and_has_its_keys(name):
+def test_always_scene_of_law_runs(name):
+    """The scene of each friction law runs without warnings and has the listed keys."""
     row = ROWS[name]
     choice = choose_law(",".join(row.known), ",".join(row.wanted))
     text = compose_scene(choice)
@@ -70,7 +77,8 @@ def test_always_the_scene_of_a_law_runs_and_has_its_keys(name):
 
 @pytest.mark.parametrize("want", WISHES)
 @pytest.mark.parametrize("know", KNOWLEDGE)
-def test_always_a_law_answers_the_wish_and_says_what_it_assumes(know, want):
+def test_always_selected_law_serves_the_aim(know, want):
+    """For each knowledge and each aim, the selected law serves the aim, and the scene lists limits and assumptions."""
     choice = choose_law(know, want)
     text = compose_scene(choice)
     missing = {*choice.row.known} - {know}
@@ -92,15 +100,19 @@ def test_always_a_law_answers_the_wish_and_says_what_it_assumes(know, want):
         ("loop,stiffness", "loss,ageing", "bouc-wen", "ageing"),
     ],
 )
-def test_always_a_second_wish_that_the_law_does_not_answer_is_named(know, want, law, unanswered):
+def test_always_unserved_aim_is_reported(know, want, law, unanswered):
+    """An aim that the selected law does not serve is named with the command for another law."""
     answer = run_cli("new", "joint", "--know", know, "--want", want)
     assert f"# law: {law};" in answer.out and "not used" not in answer.out
     advice = f"not answered by this law: {unanswered}; ask again with --want {unanswered}"
     assert advice in answer.out
 
 
-def test_the_command_in_the_scene_of_ageing_reads_the_force_after_the_rest(tmp_path, monkeypatch):
-    """The first peak, from zero force, is the larger one and hides that after a short rest."""
+def test_exact_ageing_scene_gives_force_after_rest(tmp_path, monkeypatch):
+    """The command in the scene of ageing gives the peak force after the rest, which grows with its duration.
+
+    The peak of the first loading is larger and would hide it.
+    """
     monkeypatch.chdir(tmp_path)
     scene = compose_scene(choose_law("rest", "ageing"))
     command = re.search(r"patchfem\.run.*\n", scene)[0]
@@ -116,7 +128,8 @@ def test_the_command_in_the_scene_of_ageing_reads_the_force_after_the_rest(tmp_p
 
 
 @pytest.mark.parametrize("law", SMALL_LOOPS)
-def test_exact_which_laws_close_a_small_loop_inside_a_larger_one(law, tmp_path):
+def test_exact_small_loop_closure_of_laws(law, tmp_path):
+    """The force ratio after a small reversal loop inside a larger one agrees with the closed form of each law within 1 %."""
     path = tmp_path / "scene.toml"
     path.write_text(f"{POINT}{law}{PATH}", "utf-8")
     (tmp_path / "path.csv").write_text(
@@ -127,7 +140,8 @@ def test_exact_which_laws_close_a_small_loop_inside_a_larger_one(law, tmp_path):
     assert 100 * second / first == pytest.approx(SMALL_LOOPS[law], abs=1)
 
 
-def test_exact_elastic_plastic_has_the_loop_area_to_1_percent_from_2_5_bond_lengths():
+def test_exact_elastic_plastic_loop_area_is_within_1_percent():
+    """At an amplitude of 2.5 bond lengths, the loop areas of the laws elastic-plastic and nonlocal agree within 1 %."""
     sine = '[slide]\nkind = "sine"\namplitude = "2.5 um"\nfrequency = "1 Hz"\ncycles = 4\n'
     scene = f'{POINT}bond_length = "1 um"\n{sine}'
     areas = [
@@ -138,8 +152,8 @@ def test_exact_elastic_plastic_has_the_loop_area_to_1_percent_from_2_5_bond_leng
 
 
 @pytest.mark.parametrize(("name", "power"), [("iwan-iwan", 2.5), ("bouc-wen-bouc-wen", 3.0)])
-def test_exact_the_loss_in_micro_slip_is_a_power_of_the_amplitude(name, power):
-    """chi + 3 with chi = -0.5, exponent + 2 with exponent = 1."""
+def test_exact_micro_slip_loss_exponent(name, power):
+    """The dissipation in micro-slip grows with the power chi + 3 (Iwan) and exponent + 2 (Bouc-Wen) of the amplitude."""
     scene = loads(compose_scene(choose_law(ROWS[name].known[0], "loss")))
     areas = [
         pf.run(scene, **{"slide.amplitude": amplitude}).measures["loop_area"].value
@@ -149,12 +163,14 @@ def test_exact_the_loss_in_micro_slip_is_a_power_of_the_amplitude(name, power):
 
 
 @pytest.mark.parametrize("words", REFUSED)
-def test_refuses_what_is_no_answer(words):
+def test_refuses_unknown_answers(words):
+    """Unknown answers to the questions are refused with a suggestion."""
     answer = run_cli("new", *words.split())
     assert answer.code == 2 and REFUSED[words] in answer.err and not answer.out
 
 
-def test_always_the_file_has_the_scene_and_the_screen_the_sentences(tmp_path):
+def test_always_new_joint_writes_scene_and_summary(tmp_path):
+    """The file has the scene; the screen shows the law, its keys and its limits."""
     path = tmp_path / "joint.toml"
     words = ("new", "joint", "--know", "loop", "--want", "loss")
     answer = run_cli(*words, "-o", path)
@@ -164,7 +180,7 @@ def test_always_the_file_has_the_scene_and_the_screen_the_sentences(tmp_path):
     assert "already exists" in run_cli(*words, "-o", path).err
 
 
-def converse(*answers: bytes) -> tuple[int, str]:
+def run_dialogue(*answers: bytes) -> tuple[int, str]:
     """Return exit code and screen of `patchfem new joint --ask` on a terminal with typed answers."""
     controller, terminal = pty.openpty()
     os.write(controller, b"".join(answers))
@@ -180,12 +196,13 @@ def converse(*answers: bytes) -> tuple[int, str]:
     return process.returncode, process.stdout.decode()
 
 
-def test_always_questions_are_asked_on_a_terminal():
-    code, screen = converse(b"loop, Roughness\n", b"loss\n")
+def test_always_dialogue_selects_law():
+    """On a terminal, the dialogue asks both questions and prints the scene; an early end and invalid bytes are refused."""
+    code, screen = run_dialogue(b"loop, Roughness\n", b"loss\n")
     scene = run_cli("new", "joint", "--know", "loop,roughness", "--want", "loss").out
     assert code == 0 and scene in screen
     assert all(f"  {word} " in screen for word in (*KNOWLEDGE, *WISHES))
-    code, screen = converse(b"\x04")  # end of file
+    code, screen = run_dialogue(b"\x04")  # end of file
     assert code == 2 and "the input ended before the answer; give --know" in screen
-    code, screen = converse(b"\xff\n", b"loss\n")
+    code, screen = run_dialogue(b"\xff\n", b"loss\n")
     assert code == 2 and "unknown answer" in screen

@@ -1,4 +1,4 @@
-"""What no run can do is refused by `check` already, at its line and key; what merely has no effect is remarked."""
+"""`check` refuses what no run can compute, at line and key, and remarks on keys without effect."""
 
 from __future__ import annotations
 
@@ -146,13 +146,15 @@ PLAIN = [
 
 
 @pytest.mark.parametrize("text, sets, key, says", REFUSED + PLAIN)
-def test_refuses_what_no_run_can_do(text, sets, key, says):
+def test_refuses_unsupported_combination(text, sets, key, says):
+    """A combination of keys that no run supports is refused with its key and a remedy."""
     message = get_only_mistake(text, *sets)
     assert message.startswith(f"--set: {key}: ") and says in message
     assert (UNBUILT in message) == ((text, sets, key, says) in REFUSED)
 
 
-def test_refuses_at_the_line_of_the_file():
+def test_refuses_unsupported_keys_at_their_lines():
+    """Unsupported keys in a file are refused at their lines."""
     text = RIG.replace("[friction]", "[contact.shear]\n[friction]\nbreakaway = 0.1")
     text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
     text += '[accuracy]\nmethod = "exact"\n'
@@ -164,7 +166,8 @@ def test_refuses_at_the_line_of_the_file():
     ]
 
 
-def test_refuses_combinations_beside_the_list_of_keys():
+def test_refuses_strips_and_lower_tilt_with_shear():
+    """Strips and a tilt of the lower piece are both refused with [contact.shear] and a breakaway force."""
     found = list_mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8", "friction.breakaway=0.1")
     assert sorted(message.split(": ")[1] for message in found) == [
         "contact.strips",
@@ -172,7 +175,8 @@ def test_refuses_combinations_beside_the_list_of_keys():
     ]
 
 
-def test_refuses_a_rig_in_which_nothing_slides():
+def test_refuses_rig_without_sliding_mode():
+    """A rig with friction whose modes all have slide = 0 is refused."""
     text = RIG.replace("slide = 0.8", "slide = 0.0").replace("slide = 0.1", "slide = 0.0")
     message = get_only_mistake(text)
     assert message.startswith(
@@ -183,6 +187,7 @@ def test_refuses_a_rig_in_which_nothing_slides():
 
 
 def test_refuses_a_duration_below_a_quarter_of_a_cycle():
+    """A duration below a quarter of a cycle is refused with the smallest duration."""
     text = LINEAR.replace("cycles = 200", 'duration = "1 ms"')
     assert (
         f"a.toml:{find_line(text, 'duration')}: drive.duration: the run must last at least a"
@@ -222,7 +227,8 @@ ALLOWED = [
 
 
 @pytest.mark.parametrize("text, sets, kind", ALLOWED)
-def test_exact_what_runs_is_let_through(text, sets, kind):
+def test_exact_supported_combinations_are_accepted(text, sets, kind):
+    """Supported combinations of keys are accepted."""
     assert loads(text, sets=sets).kind == kind
 
 
@@ -237,7 +243,8 @@ def test_exact_what_runs_is_let_through(text, sets, kind):
          "contact.element_size is not used, because the file of contact.mesh gives the elements"),
     ],
 )  # fmt: skip
-def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
+def test_exact_remarks_on_keys_without_effect(text, sets, remark):
+    """A key without effect gives a remark, and the resolved scene omits the key."""
     scene = loads(text, sets=sets)
     assert scene.remarks == [remark]
     assert loads(scene.resolved()).remarks == []
@@ -258,19 +265,22 @@ def test_exact_remarks_on_what_has_no_effect(text, sets, remark):
         ),
     ],
 )
-def test_refuses_a_hash_in_a_set_as_part_of_its_value(one, key, says):
+def test_refuses_hash_in_setting(one, key, says):
+    """A hash in --set is part of the value and does not begin a comment."""
     message = get_only_mistake(RIG, one)
     assert message.startswith(f"--set: {key}: ") and says in message
 
 
-def test_exact_a_number_of_a_set_may_begin_or_end_with_its_point():
+def test_exact_setting_accepts_leading_or_trailing_point():
+    """Numbers in --set may begin or end with the decimal point."""
     for text in (".3", "+.3e0", "3.e-1"):
         assert loads(RIG, sets=[f"friction.static={text}"]).friction.static == 0.3
     assert loads(RIG, sets=["title=.3"]).title == ".3"
     assert "without a unit" in get_only_mistake(RIG, "contact.load=.3")
 
 
-def test_exact_a_hash_reads_the_same_in_a_set_and_in_the_file():
+def test_exact_hash_is_read_equally_in_setting_and_file():
+    """A hash inside a text is read equally in --set and in a file."""
     in_file = get_only_mistake(RIG.replace('"26 lbf"', '"26#"'))
     assert (
         in_file.partition(": ")[2] == get_only_mistake(RIG, "contact.load=26#").partition(": ")[2]
@@ -287,7 +297,8 @@ STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))
 
 
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
-def test_exact_studies_load(path):
+def test_exact_study_scenes_load_without_remarks(path):
+    """Every scene of the studies loads without remarks."""
     assert load(path).remarks == []
 
 
@@ -301,9 +312,11 @@ OPTIONS = [
 
 @pytest.mark.parametrize("each", [11, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("text", [RIG, PATCH_BENCH], ids=["rig", "bench"])
-def test_always_a_scene_that_loads_can_be_planned(text, each):
-    """No combination passes the scene's rules and is then turned down by the choice of an engine; always one of
-    eleven, among which every two options meet, for no list of them has a multiple of eleven."""
+def test_always_loaded_scene_can_be_planned(text, each):
+    """Every combination of options that passes the check of the scene can be planned.
+
+    A normal run takes one of eleven, so that any two options meet.
+    """
     from patchfem.runs.plan import plan
 
     passed = 0

@@ -10,7 +10,7 @@ from patchfem.scene import MATERIALS, loads, make_schema, read_template
 from patchfem.scene.keys.materials import find_material_name, normalise_material_name
 
 PATCH = read_template("patch")
-# name that an engineer writes -> name in the table
+# spelling in a scene -> name in the table
 SPELLINGS = {
     "ti64": "Ti-6Al-4V",
     "Ti6Al4V": "Ti-6Al-4V",
@@ -89,14 +89,16 @@ def with_substrate(name: str) -> str:
 
 
 @pytest.mark.parametrize("written, name", SPELLINGS.items())
-def test_exact_a_material_is_found_in_any_spelling(written, name):
+def test_exact_material_spellings_are_accepted(written, name):
+    """Different spellings of a material name give the same material, in a file and in --set."""
     by_set = loads(PATCH, sets=[f"contact.substrate={written}"]).contact.substrate
     in_file = loads(with_substrate(written)).contact.substrate
     assert by_set == in_file == loads(with_substrate(name)).contact.substrate
     assert in_file.name == name and in_file.young == MATERIALS[name].young
 
 
-def test_always_the_schema_knows_the_same_spellings():
+def test_always_schema_accepts_material_spellings():
+    """The JSON schema accepts the same spellings of materials and refuses unknown ones."""
     check = Draft202012Validator(make_schema())
     for written in SPELLINGS:
         assert check.is_valid(tomllib.loads(with_substrate(written))), written
@@ -105,13 +107,15 @@ def test_always_the_schema_knows_the_same_spellings():
 
 
 @pytest.mark.parametrize("written, proposed", NEAREST.items())
-def test_refuses_an_unknown_material_and_names_the_nearest(written, proposed):
+def test_refuses_unknown_material(written, proposed):
+    """An unknown material is refused with the nearest names and the list of all."""
     with pytest.raises(pf.SceneError, match=f"did you mean {proposed}") as caught:
         loads(with_substrate(written))
     assert f"use one of {', '.join(MATERIALS)}" in str(caught.value)
 
 
-def test_always_records_are_plausible_and_name_their_sources():
+def test_always_material_records_are_plausible():
+    """Every material has plausible values, a source and unique names."""
     names = [
         spelling for name, record in MATERIALS.items() for spelling in (name, *record.other_names)
     ]
@@ -125,12 +129,13 @@ def test_always_records_are_plausible_and_name_their_sources():
         if record.strength is not None:
             assert 1e-4 < record.strength.strength / record.young < 3e-2
             assert record.strength.source.endswith(".")
-    # these break before they yield
+    # brittle materials have no yield strength
     for name in ("WC-Co", "WC-Co sintered", "alumina", "silicon nitride", "DLC", "TiN", "Cr"):
         assert MATERIALS[name].strength is None
 
 
-def test_exact_materials_keep_the_values_that_were_compared_with_sources():
+def test_exact_material_values_are_unchanged():
+    """The values of all materials equal those that were compared with data sheets."""
     assert list(MATERIALS) == list(VALUES)
     for name, (*elastic, strength) in VALUES.items():
         record = MATERIALS[name]

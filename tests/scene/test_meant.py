@@ -1,4 +1,4 @@
-"""What someone meant who wrote a key that no scene has: by its name, and by the kind of its value."""
+"""Suggestions for an unknown key, by its name and by the kind of its value."""
 
 import re
 
@@ -7,7 +7,7 @@ import pytest
 from patchfem.scene import loads, read_template
 from patchfem.scene.scene import SceneError
 
-MEANT = [  # kind of scene, what stands there, what was written, what was meant
+MEANT = [  # kind of scene, correct line, wrong line, suggested key
     ("rig", "static = 0.3", "mu = 0.3", "static"),
     ("rig", "static = 0.3", "coefficient = 0.3", "static"),
     ("rig", "moving_mass", "mass", "moving_mass"),
@@ -36,14 +36,15 @@ MEANT = [  # kind of scene, what stands there, what was written, what was meant
 @pytest.mark.parametrize(
     "kind, right, wrong, meant", MEANT, ids=[f"{wrong} {kind}" for kind, _, wrong, _ in MEANT]
 )
-def test_exact_the_key_that_was_meant(kind, right, wrong, meant):
+def test_exact_unknown_key_gets_suggestion(kind, right, wrong, meant):
+    """An unknown key in a file is refused with the suggestion of the intended key."""
     text = read_template(kind)
     assert right in text
-    with pytest.raises(SceneError) as refused:
+    with pytest.raises(SceneError) as error:
         loads(text.replace(right, wrong, 1))
-    said = [line for line in refused.value.mistakes if "unknown" in line]
-    assert len(said) == 1 and re.search(rf"; did you mean '{meant}'\?$", said[0]), (
-        refused.value.mistakes
+    messages = [line for line in error.value.mistakes if "unknown" in line]
+    assert len(messages) == 1 and re.search(rf"; did you mean '{meant}'\?$", messages[0]), (
+        error.value.mistakes
     )
 
 
@@ -56,18 +57,21 @@ def test_exact_the_key_that_was_meant(kind, right, wrong, meant):
         ("normal.force=3 N", "load"),
     ],
 )
-def test_exact_a_set_means_a_key_that_the_file_has(wrong, meant):
+def test_exact_setting_suggests_key_of_file(wrong, meant):
+    """An unknown key in --set gets the suggestion of a key that the file has."""
     with pytest.raises(SceneError, match=rf"^--set: \S+: unknown key; did you mean '{meant}'\?$"):
         loads(read_template("rig"), sets=[wrong])
 
 
-def test_always_of_several_lengths_none_is_meant():
+def test_always_ambiguous_key_gets_no_suggestion():
+    """An unknown key that fits several lengths gets a list of the known keys."""
     with pytest.raises(SceneError, match="unknown key; known here: length, width, height"):
         loads(read_template("patch"), sets=["contact.thicknes=1 mm"])
 
 
 @pytest.mark.parametrize("wrong", ["qqq = true", 'qqq = "blue"', "qqq = {a = 1}"])
-def test_always_what_nothing_tells_is_answered_by_all_that_is_known(wrong):
+def test_always_unrecognised_key_lists_known_keys(wrong):
+    """A key that resembles no other gets a list of the known keys."""
     with pytest.raises(SceneError) as refused:
         loads(read_template("rig").replace('kind = "base"', f'kind = "base"\n{wrong}'))
     assert [

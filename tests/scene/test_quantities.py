@@ -1,4 +1,4 @@
-"""The unit table: exact values, exact round trips, and every trap refused with what was wanted."""
+"""The table of units: exact values, exact round trips, and refusals with an example of a valid quantity."""
 
 from __future__ import annotations
 
@@ -46,11 +46,13 @@ from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, format_si
         ("0 K", "temperature", 0.0),
     ],
 )
-def test_exact_values(text, kind, value):
+def test_exact_quantity_values(text, kind, value):
+    """Quantities with units are converted to exact SI values."""
     assert parse_quantity(text, kind) == value
 
 
-def test_exact_pound_force_per_inch_and_its_relatives():
+def test_exact_imperial_units_agree_with_definitions():
+    """Imperial units agree exactly with their definitions by pound, inch and standard gravity."""
     pound = Fraction("0.45359237")
     inch = Fraction("0.0254")
     gravity = Fraction("9.80665")
@@ -65,7 +67,8 @@ def test_exact_pound_force_per_inch_and_its_relatives():
 
 
 @pytest.mark.parametrize("unit", UNIT_FACTORS["length"])
-def test_exact_drawn_numbers_are_rounded_once(unit):
+def test_exact_conversion_rounds_once(unit):
+    """The conversion of 300 random numbers rounds once, as exact fractions show."""
     for number in np.random.default_rng(7).lognormal(0, 20, 300).tolist():
         exact = Fraction(repr(number)) * Fraction(repr(UNIT_FACTORS["length"][unit]))
         assert parse_quantity(f"{number!r} {unit}", "length") == float(exact)
@@ -73,6 +76,7 @@ def test_exact_drawn_numbers_are_rounded_once(unit):
 
 @pytest.mark.parametrize("kind", UNIT_FACTORS)
 def test_exact_every_kind_has_its_si_unit_first_and_a_valid_example(kind):
+    """Every kind of quantity has its SI unit first and a valid example."""
     assert next(iter(UNIT_FACTORS[kind].values())) == 1.0
     assert parse_quantity(EXAMPLE_QUANTITIES[kind], kind) > 0.0
 
@@ -81,12 +85,14 @@ def test_exact_every_kind_has_its_si_unit_first_and_a_valid_example(kind):
     st.floats(allow_nan=False, allow_infinity=False),
     st.sampled_from([k for k in UNIT_FACTORS if k != "temperature"]),
 )
-def test_always_the_si_text_gives_back_the_same_float(value, kind):
+def test_always_si_text_round_trip_is_exact(value, kind):
+    """A value written in SI units is read back as the same floating-point number."""
     assert parse_quantity(format_si(value, kind), kind) == value
 
 
 @given(st.text(max_size=40), st.sampled_from(list(UNIT_FACTORS)))
-def test_always_a_finite_float_or_a_value_error(text, kind):
+def test_always_parser_returns_finite_or_raises_value_error(text, kind):
+    """Any text gives a finite number or a ValueError with a message."""
     try:
         assert math.isfinite(parse_quantity(text, kind))
     except ValueError as error:
@@ -94,7 +100,8 @@ def test_always_a_finite_float_or_a_value_error(text, kind):
 
 
 @given(st.sampled_from(list(UNIT_FACTORS)), st.data())
-def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
+def test_always_unit_parses_as_its_factor(kind, data):
+    """One of each unit is read as the factor of this unit."""
     unit = data.draw(st.sampled_from(list(UNIT_FACTORS[kind])))
     assert parse_quantity(f"1 {unit}", kind) == UNIT_FACTORS[kind][unit]
 
@@ -155,7 +162,8 @@ def test_always_every_unit_of_a_kind_parses_as_its_factor(kind, data):
         ("1 MM", "length", "unknown unit 'MM'"),
     ],
 )
-def test_refuses_traps(text, kind, says):
+def test_refuses_ambiguous_or_wrong_units(text, kind, says):
+    """Missing, ambiguous or wrong units are refused with an example of a valid quantity."""
     with pytest.raises(ValueError) as caught:
         parse_quantity(text, kind)
     assert says in str(caught.value)

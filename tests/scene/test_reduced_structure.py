@@ -1,4 +1,4 @@
-"""[structure.reduced] of a scene: runs against those of the whole matrices within their bars, what is refused where."""
+"""[structure.reduced] of a scene: its error estimates compared with runs of the full matrices, and refusals."""
 
 import numpy as np
 import pytest
@@ -38,8 +38,8 @@ WHOLE = SCENE[: SCENE.index("[structure.reduced]")].replace(
 
 
 @pytest.fixture
-def folder(tmp_path):
-    """Matrices of a chain of 40 masses, held at one end."""
+def matrix_folder(tmp_path):
+    """Return a folder with the matrices of a chain of 40 masses that is fixed at one end."""
     k = 1e7
     m = 0.02
     K = k * (2 * np.eye(COUNT) - np.eye(COUNT, k=1) - np.eye(COUNT, k=-1))
@@ -65,16 +65,20 @@ def folder(tmp_path):
     return tmp_path
 
 
-def run_of(folder, text, **sets):
-    (folder / "scene.toml").write_text(text)
-    return pf.run(folder / "scene.toml", **sets)
+def run_scene(matrix_folder, text, **sets):
+    """Write a scene into the folder, run it and return the result."""
+    (matrix_folder / "scene.toml").write_text(text)
+    return pf.run(matrix_folder / "scene.toml", **sets)
 
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["craig-bampton", "free-interface"])
-def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
-    """Under base and force, 95 % of the measures with an error."""
-    held = []
+def test_always_reduction_errors_cover_full_matrices(matrix_folder, method):
+    """At least 95 % of the errors of a reduced chain cover the values of the full matrices.
+
+    The drive is the motion of the base or a force.
+    """
+    is_covered = []
     for old, new, pushed in (
         ("", "", ""),
         ('kind = "base"', 'kind = "force"', 'acceleration = "5 g"'),
@@ -84,52 +88,59 @@ def test_always_bars_hold_the_run_of_the_whole_matrices(folder, method):
         for text, put in pairs:
             mass = "mass = 1" if text is SCENE else "mass = 40"
             text = text.replace("modes = 4", put).replace(old or "\0", new)
-            found.append(run_of(folder, text.replace(pushed or "\0", f'force = "60 N"\n{mass}')))
-        small, whole = found
-        # errors of each run itself
+            found.append(
+                run_scene(matrix_folder, text.replace(pushed or "\0", f'force = "60 N"\n{mass}'))
+            )
+        reduced, full = found
+        # difference of the two runs, and error estimate of the reduced run
         errors = {
-            name: (abs(one.value - whole.measures[name].value), one.error)
-            for name, one in small.measures.items()
-            if one.error is not None
-            and whole.measures.get(name) is not None
+            name: (abs(measure.value - full.measures[name].value), measure.error)
+            for name, measure in reduced.measures.items()
+            if measure.error is not None
+            and full.measures.get(name) is not None
             and not name.startswith("ring_")
             and name not in ERROR_MEASURES
         }
         assert len(errors) > 10
-        held += [gap <= bar + 1e-9 * gap for gap, bar in errors.values()]
+        is_covered += [gap <= bar + 1e-9 * gap for gap, bar in errors.values()]
         assert errors["relative_displacement_amplitude"][0] > 0
-    assert np.mean(held) >= 0.95
-    assert any("keeps 2 boundary coordinates and 4 " in note for note in small.extra["notes"])
+    assert np.mean(is_covered) >= 0.95
+    assert any("keeps 2 boundary coordinates and 4 " in note for note in reduced.extra["notes"])
 
 
-def test_exact_all_modes_kept_are_the_whole_matrices(folder):
-    small = run_of(folder, SCENE, **{"structure.reduced.modes": 100})
-    note = next(note for note in small.extra["notes"] if "reduced keeps" in note)
-    first = small.plan.model.rig.structure.frequencies[0]
+def test_exact_reduction_with_all_modes_equals_full_matrices(matrix_folder):
+    """With all modes kept, the measures agree with those of the full matrices within 1e-6."""
+    reduced = run_scene(matrix_folder, SCENE, **{"structure.reduced.modes": 100})
+    note = next(note for note in reduced.extra["notes"] if "reduced keeps" in note)
+    first = reduced.plan.model.rig.structure.frequencies[0]
     assert f"the first frequency of the reduced structure is {first:.5g} Hz" in note
-    whole = run_of(folder, WHOLE)
-    for name, one in whole.measures.items():
-        if one.value is not None:
+    full = run_scene(matrix_folder, WHOLE)
+    for name, measure in full.measures.items():
+        if measure.value is not None:
             np.testing.assert_allclose(
-                small.measures[name].value, one.value, rtol=1e-6, atol=one.floor, err_msg=name
+                reduced.measures[name].value,
+                measure.value,
+                rtol=1e-6,
+                atol=measure.floor,
+                err_msg=name,
             )
-    assert "reduced" not in small.measures["relative_displacement_amplitude"].causes.parts
+    assert "reduced" not in reduced.measures["relative_displacement_amplitude"].causes.parts
 
 
-def test_exact_no_more_modes_are_proposed_than_there_are(folder):
-    """Of 40 rows two are boundary coordinates; a tolerance of 1e-9 asks for 16 times the 6 coordinates."""
-    said = next(
+def test_exact_proposed_modes_are_limited_by_structure(matrix_folder):
+    """A tolerance of 1e-9 proposes 38 modes, since two of the 40 rows are boundary coordinates."""
+    warning = next(
         one
-        for one in run_of(folder, SCENE, **{"accuracy.tolerance": 1e-9}).warnings
+        for one in run_scene(matrix_folder, SCENE, **{"accuracy.tolerance": 1e-9}).warnings
         if "reduced.modes" in one
     )
-    assert int(said.rpartition("structure.reduced.modes = ")[2].split(";")[0]) == 38
+    assert int(warning.rpartition("structure.reduced.modes = ")[2].split(";")[0]) == 38
 
 
-def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
-    """N, mm and tonne; rows by node and direction in the order of nodes."""
+def test_exact_units_and_node_names_give_same_structure(matrix_folder):
+    """Matrices in N, mm and tonne, and rows given by node and direction, give the same amplitude within 1e-9."""
     plain, milli, named = (
-        run_of(folder, text)
+        run_scene(matrix_folder, text)
         for text in (
             SCENE,
             SCENE.replace("k.mtx", "mm.mtx")
@@ -143,27 +154,31 @@ def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
         np.testing.assert_allclose(two.value, one.value, rtol=1e-9)
 
 
-def test_exact_named_nodes_move_along_x_alone(folder):
-    """Odd nodes move along x: the base moves their mass, and interfaces name them."""
+def test_exact_base_moves_mass_of_x_direction_only(matrix_folder):
+    """With rows named by node and direction, the base moves only the mass along x.
+
+    A direction that a node lacks is refused.
+    """
     text = (
         SCENE.replace("k.mtx", "named.mtx")
         .replace("both.npz", "mass.mtx", 1)
         .replace("[40, 25]", '["40:y", "25:x"]')
         .replace('damping = "both.npz"', "damping = 0.01")
     )
-    (folder / "mass.mtx").write_text(
+    (matrix_folder / "mass.mtx").write_text(
         "\n".join(f"{i + 1},{1 + i % 2},{i + 1},{1 + i % 2},0.02" for i in range(COUNT))
     )
-    model = pf.build(pf.load(_written(folder, text.replace("modes = 4", "modes = 38"))))
+    model = pf.build(pf.load(write_scene(matrix_folder, text.replace("modes = 4", "modes = 38"))))
     np.testing.assert_allclose((model.rig.modes.base**2).sum(), 20 * 0.02, rtol=1e-9)
-    (folder / "scene.toml").write_text(text.replace("25:x", "25:z"))
-    answer = run_cli("check", folder / "scene.toml")
+    (matrix_folder / "scene.toml").write_text(text.replace("25:x", "25:z"))
+    answer = run_cli("check", matrix_folder / "scene.toml")
     assert answer.code == 2 and "the files have no 25:z; node 25 has x" in answer.err
 
 
-def _written(folder, text):
-    (folder / "scene.toml").write_text(text)
-    return folder / "scene.toml"
+def write_scene(matrix_folder, text):
+    """Write a scene into the folder and return its path."""
+    (matrix_folder / "scene.toml").write_text(text)
+    return matrix_folder / "scene.toml"
 
 
 REFUSED = {
@@ -211,10 +226,11 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("key, old, new", REFUSED)
-def test_refuses_with_the_line_of_the_key(folder, key, old, new):
+def test_refuses_invalid_reduction_keys_at_their_lines(matrix_folder, key, old, new):
+    """Invalid keys of the reduction are refused with their lines."""
     assert old in SCENE
     text = SCENE.replace(old, new, 1)
-    answer = run_cli("run", _written(folder, text), "-o", folder / "out")
+    answer = run_cli("run", write_scene(matrix_folder, text), "-o", matrix_folder / "out")
     assert answer.code == 2, answer.err
     line = f"scene.toml:{find_line(text, f'{key} = ')}: structure.reduced.{key}: "
     assert line in answer.err and REFUSED[key, old, new] in answer.err, answer.err
@@ -238,10 +254,11 @@ def test_refuses_with_the_line_of_the_key(folder, key, old, new):
         ),
     ],
 )
-def test_refuses_places_that_are_not_there(folder, old, new, says):
+def test_refuses_unknown_nodes(matrix_folder, old, new, says):
+    """Nodes that the matrices do not have are refused."""
     text = SCENE.replace(old, new)
     text = text.replace('load = "50 N"\n', "") if "normal" in new else text
-    answer = run_cli("check", _written(folder, text))
+    answer = run_cli("check", write_scene(matrix_folder, text))
     assert answer.code == 2 and says in answer.err, answer.err
 
 
@@ -252,10 +269,10 @@ PATCH = (
 OTHER = '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\nstatic = 0.4\nload = "9 N"\n[drive]'
 
 
-def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
-    """What is advised, for one interface or several, is a scene that can run."""
+def test_refuses_patch_beside_interfaces(matrix_folder):
+    """A patch beside interfaces is refused, and the proposed scene is valid."""
     for text in (SCENE, SCENE.replace("[drive]", OTHER)):
-        answer = run_cli("check", _written(folder, PATCH + text))
+        answer = run_cli("check", write_scene(matrix_folder, PATCH + text))
         assert answer.code == 2
         assert "move [contact] into the interface that it presses" in answer.err
         own = PATCH.replace("[contact", "[structure.interface.contact")
@@ -264,39 +281,45 @@ def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
         text = text.replace(
             "[[structure.interface]]\nbetween = [2", own + "[[structure.interface]]\nbetween = [2"
         )
-        answer = run_cli("check", _written(folder, text.replace("[drive]", own + "[drive]")))
+        answer = run_cli(
+            "check", write_scene(matrix_folder, text.replace("[drive]", own + "[drive]"))
+        )
         assert answer.code == 0, answer.err
 
 
-def test_exact_a_point_and_a_start_stand_on_the_boundary(folder):
-    """[normal] with slide = [1, 0] is the interface between them; a release moves drive.mass alone."""
+def test_exact_normal_load_equals_interface_on_boundary(matrix_folder):
+    """A point contact by [normal] with slide = [1, 0] equals the interface between these nodes within 1e-9.
+
+    A free decay displaces only the mass drive.mass.
+    """
     head, tail = SCENE.split("[[structure.interface]]\n")
     law, drive = tail.split("[drive]\n")
     law = law.replace("between = [1, 0]\n", "").replace('load = "50 N"\n', "")
-    one = run_of(folder, SCENE)
-    two = run_of(
-        folder,
+    by_interface = run_scene(matrix_folder, SCENE)
+    by_point = run_scene(
+        matrix_folder,
         head.replace("modes = 4", "modes = 4\nslide = [1, 0]") + '[normal]\nload = "50 N"\n'
         "[friction]\n" + law + "[drive]\n" + drive,
     )
     np.testing.assert_allclose(
-        two.measures["loop_area"].value, one.measures["loop_area"].value, rtol=1e-9
+        by_point.measures["loop_area"].value, by_interface.measures["loop_area"].value, rtol=1e-9
     )
     text = (
         SCENE.split("[drive]")[0]
         + '[drive]\nkind = "free"\nmass = 2\ndisplacement = "20 um"\ncycles = 5\n'
     )
-    model = pf.build(pf.load(_written(folder, text)))
+    model = pf.build(pf.load(write_scene(matrix_folder, text)))
     moved = model.rig.modes.shapes @ model.rig.start.z
     np.testing.assert_allclose(moved, [0, 20e-6, 0, 0, 0, 0], atol=1e-15)
 
 
 @pytest.mark.slow
-def test_exact_a_sweep_over_the_modes_has_a_reduction_for_each(folder):
-    table = pf.sweep(_written(folder, SCENE), {"structure.reduced.modes": [2, 30]})
+def test_exact_sweep_over_modes_reduces_each_case(matrix_folder):
+    """A sweep over the number of modes computes a reduction for each case, equal to single runs within 1e-9."""
+    table = pf.sweep(write_scene(matrix_folder, SCENE), {"structure.reduced.modes": [2, 30]})
     found = table["relative_displacement_amplitude"].values
     wanted = [
-        run_of(folder, SCENE, **{"structure.reduced.modes": k})
+        run_scene(matrix_folder, SCENE, **{"structure.reduced.modes": k})
         .measures["relative_displacement_amplitude"]
         .value
         for k in (2, 30)
@@ -306,19 +329,25 @@ def test_exact_a_sweep_over_the_modes_has_a_reduction_for_each(folder):
 
 
 @pytest.mark.parametrize("rubs", [False, True])
-def test_always_bars_of_a_backbone_hold_the_whole_matrices(folder, rubs):
-    """Two boundary coordinates and one mode, of which the third frequency is off by 13 %."""
-    small, whole = (
+def test_always_backbone_errors_cover_full_matrices(matrix_folder, rubs):
+    """The errors of a backbone of a reduced chain cover the values of the full matrices.
+
+    One frequency of the reduced chain is off by 13 %.
+    """
+    reduced, full = (
         text if rubs else text.split("[[")[0] + "[drive]" + text.split("[drive]")[1]
         for text in (SCENE.replace("modes = 4", "modes = 1"), WHOLE)
     )
     for way in ("balance", "quasi-static", "decay")[: 3 - rubs]:
-        one, other = (
+        reduced_curve, full_curve = (
             pf.backbone(
-                _written(folder, text), mode="31"[rubs], amplitudes=[1e-6, 1e-5], method=way
+                write_scene(matrix_folder, text),
+                mode="31"[rubs],
+                amplitudes=[1e-6, 1e-5],
+                method=way,
             )
-            for text in (small, whole)
+            for text in (reduced, full)
         )
         for name in (f"{way.replace('-', '_')}_{what}" for what in ("frequency", "damping")):
-            gap = np.abs(one[name].values - other[name].values)
-            assert (gap > 0).all() and (gap <= one[f"{name}_error"].values).all(), name
+            gap = np.abs(reduced_curve[name].values - full_curve[name].values)
+            assert (gap > 0).all() and (gap <= reduced_curve[f"{name}_error"].values).all(), name

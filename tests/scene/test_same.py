@@ -1,4 +1,4 @@
-"""Answers that are made once for an object."""
+"""`memoize`: results that are computed once per object."""
 
 import gc
 
@@ -6,8 +6,8 @@ from patchfem.scene import memoize
 from patchfem.scene.keys.memoize import MAX_CACHED_RESULTS
 
 
-class Held:
-    """A thing that is told apart by what it is, though it equals any other."""
+class NumberedObject:
+    """Object that compares equal to any other and can only be distinguished by its identity."""
 
     def __init__(self, number: int):
         self.number = number
@@ -18,21 +18,22 @@ class Held:
     __hash__ = None
 
 
-def test_exact_asked_once_of_an_object_and_again_of_an_equal_one():
-    asked = []
-    number = memoize(lambda what, *more: asked.append(what) or (what.number, *more))
-    one = Held(1)
-    other = Held(2)
-    assert [number(one), number(one), number(other)] == [(1,), (1,), (2,)]
-    assert [number(one, "a"), number(one)] == [(1, "a"), (1,)]
-    assert len(asked) == 3
+def test_exact_memoized_function_is_called_once_per_object():
+    """A memoised function is called once per object and set of arguments, and again for an equal object."""
+    calls = []
+    number = memoize(lambda what, *more: calls.append(what) or (what.number, *more))
+    first = NumberedObject(1)
+    second = NumberedObject(2)
+    assert [number(first), number(first), number(second)] == [(1,), (1,), (2,)]
+    assert [number(first, "a"), number(first)] == [(1, "a"), (1,)]
+    assert len(calls) == 3
 
 
-def test_always_an_object_that_is_gone_answers_for_no_other():
-    """A new object may have the id of one that is gone; those that are remembered are held."""
+def test_always_deleted_objects_are_not_confused():
+    """A new object with the id of a deleted one gets its own result, since cached objects are kept alive."""
     number = memoize(lambda what: what.number)
     for k in range(2 * MAX_CACHED_RESULTS + 5):
-        assert number(Held(k)) == k
+        assert number(NumberedObject(k)) == k
         if k % 500 == 0:
-            # these are young; all that a long session holds would be gone through for nothing
+            # only young objects are collected, which is fast in a long session
             gc.collect(1)

@@ -1,4 +1,4 @@
-"""Scenes: what a valid one holds in SI, that its resolved text is the same scene, that nothing else escapes."""
+"""Loading of scenes: values in SI units, the resolved text, and no exception other than SceneError."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ from patchfem.scene.lines import find_key_lines
 from patchfem.scene.scene import SceneError
 
 
-def test_exact_rig_in_si():
+def test_exact_rig_scene_has_si_values():
+    """The keys of a rig scene are stored in SI units."""
     scene = loads(RIG, "folder/a.toml")
     assert (scene.kind, scene.title, scene.remarks) == ("rig", "143 Hz, 5 g", [])
     assert scene.contact.length == 0.0127 and scene.contact.load == 115.653761996773  # 26 lbf
@@ -29,7 +30,8 @@ def test_exact_rig_in_si():
     assert scene.resolve_path("before.csv").as_posix() == "folder/before.csv"
 
 
-def test_exact_defaults():
+def test_exact_default_values():
+    """Absent keys have the documented defaults."""
     scene = loads(RIG)
     contact = scene.contact
     friction = scene.friction
@@ -57,7 +59,8 @@ def test_exact_defaults():
     assert (slide.cycles, slide.distance, slide.frequency) == (1.0, 0.0, None)
 
 
-def test_exact_kinetic_only_where_the_law_has_one():
+def test_exact_kinetic_coefficient_depends_on_law():
+    """The kinetic coefficient defaults to the static one, and is absent for laws without it."""
     assert loads(BENCH).friction.kinetic == 0.3
     plastic = loads(BENCH, sets=["friction.law=elastic-plastic", "friction.bond_length=1 um"])
     assert plastic.friction.kinetic is None
@@ -66,12 +69,14 @@ def test_exact_kinetic_only_where_the_law_has_one():
 @pytest.mark.parametrize(
     "text, kind", [(RIG, "rig"), (BENCH, "bench"), (LINEAR, "linear"), (PATCH, "patch")]
 )
-def test_exact_kinds(text, kind):
+def test_exact_kind_follows_tables(text, kind):
+    """The kind of a scene follows from its tables."""
     assert loads(text).kind == kind
     assert loads(text + '[measured]\nfile = "table1.csv"\n').kind == kind
 
 
-def test_exact_named_effects():
+def test_exact_effect_names_of_scenes():
+    """The names of the effects of a scene are listed in a fixed order."""
     extra = '[contact.shear]\n[accuracy]\nmethod = "march"\n[measured]\nfile = "t.csv"\n'
     assert loads(RIG + extra).effect_names() == [
         "contact", "contact.coating", "contact.tilt", "contact.shear", "friction.law=nonlocal",
@@ -85,6 +90,7 @@ def test_exact_named_effects():
     "text, sets", [(RIG, []), (RIG, FULL), (BENCH, []), (LINEAR, []), (PATCH, [])]
 )
 def test_exact_resolved_text_is_the_same_scene(text, sets):
+    """The resolved text of a scene is read as the same scene."""
     scene = loads(text, sets=sets)
     again = loads(scene.resolved())
     assert again.tables() == scene.tables()
@@ -97,6 +103,7 @@ def test_exact_resolved_text_is_the_same_scene(text, sets):
 
 
 def test_exact_resolved_text_has_no_unused_keys():
+    """The resolved text omits keys that the law does not use, and a remark names them."""
     scene = loads(BENCH + "[accuracy]\ntolerance = 1e-2\n", sets=["friction.bond_length=1 um"])
     assert "bond_length" not in scene.resolved() and scene.friction.bond_length is None
     assert scene.remarks == [
@@ -105,16 +112,19 @@ def test_exact_resolved_text_has_no_unused_keys():
 
 
 def test_exact_scene_survives_pickling():
+    """A pickled scene is equal to the original."""
     scene = loads(RIG, sets=FULL)
     assert pickle.loads(pickle.dumps(scene)) == scene
 
 
 def test_exact_tables_are_frozen():
+    """The tables of a scene cannot be changed."""
     with pytest.raises(ValidationError):
         loads(RIG).contact.load = 1.0
 
 
-def test_exact_load_reads_a_file_with_byte_order_mark(tmp_path):
+def test_exact_load_accepts_byte_order_mark(tmp_path):
+    """A file with a byte order mark and Windows line ends is read."""
     path = tmp_path / "a.toml"
     path.write_bytes(b"\xef\xbb\xbf" + RIG.replace("\n", "\r\n").encode())
     assert load(path).tables() == loads(RIG).tables()
@@ -122,18 +132,21 @@ def test_exact_load_reads_a_file_with_byte_order_mark(tmp_path):
 
 @pytest.mark.parametrize("name", MATERIALS)
 def test_exact_materials_by_name(name):
+    """A material given by name has the values of the table."""
     found = loads(PATCH, sets=[f"contact.substrate={name}"]).contact.substrate
     assert (found.young, found.poisson, found.density) == MATERIALS[name][:3]
 
 
-def test_exact_sets_in_order_and_by_mode_name():
+def test_exact_settings_apply_in_order():
+    """Settings apply in their order, and modes can be given by name or number."""
     scene = loads(RIG, sets=["structure.mode.axial.frequency=150 Hz", "contact.load=1 N", "contact.load=2 N",
                              "title=2024", "contact.crown.radius=1 m", "structure.mode.1.damping=0.02"])  # fmt: skip
     assert scene.structure.mode[0].frequency == 150.0 and scene.structure.mode[1].damping == 0.02
     assert (scene.contact.load, scene.title, scene.contact.crown.radius) == (2.0, "2024", 1.0)
 
 
-def test_exact_lines_of_a_hard_text():
+def test_exact_line_numbers_of_nested_toml():
+    """The line numbers of keys are found in a text with nested tables, comments and multi-line strings."""
     text = '''a = """
 [no]
 x = 1"""
@@ -179,7 +192,8 @@ ODD_SETS = [
 
 
 @st.composite
-def mutated(draw):
+def mutated_scenes(draw):
+    """Draw a scene text with up to four random edits."""
     text = draw(st.sampled_from([RIG, BENCH, PATCH, LINEAR]))
     for _ in range(draw(st.integers(1, 4))):
         lines = text.splitlines(keepends=True) or ["\n"]
@@ -197,8 +211,9 @@ def mutated(draw):
     return text
 
 
-@given(mutated(), st.lists(st.sampled_from(ODD_SETS), max_size=2))
-def test_always_a_scene_or_a_scene_error(text, sets):
+@given(mutated_scenes(), st.lists(st.sampled_from(ODD_SETS), max_size=2))
+def test_always_random_text_loads_or_raises_scene_error(text, sets):
+    """A randomly edited scene loads, or raises a SceneError with one-line messages."""
     try:
         scene = loads(text, "a.toml", sets)
     except SceneError as error:
@@ -210,6 +225,7 @@ def test_always_a_scene_or_a_scene_error(text, sets):
 
 
 def test_always_loading_imports_neither_numpy_nor_scipy(tmp_path):
+    """Loading a scene imports neither NumPy nor SciPy."""
     path = tmp_path / "a.toml"
     path.write_text(RIG)
     code = f"import sys; from patchfem.scene.scene import load; load({str(path)!r})\n"

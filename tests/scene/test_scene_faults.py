@@ -1,4 +1,4 @@
-"""Claims about the check of a scene that planted faults showed to be unchecked."""
+"""Checks of a scene that mutation tests showed to be missing."""
 
 import re
 
@@ -55,7 +55,8 @@ SHAKEN = POINT + COULOMB + MODE + DRIVE
         ),
     ],
 )
-def test_refuses_with_the_line_the_key_and_the_remedy(text, says):
+def test_refuses_scene_with_line_key_and_remedy(text, says):
+    """A mistake is reported with its line, its key and a remedy."""
     found = list_mistakes(text)
     assert len(found) == len(says)
     assert all(re.match(pattern, mistake) for pattern, mistake in zip(says, found))
@@ -71,12 +72,14 @@ def test_refuses_with_the_line_the_key_and_the_remedy(text, says):
         ),
     ],
 )
-def test_exact_a_key_without_meaning_is_remarked(text, key):
+def test_exact_key_without_effect_gives_remark(text, key):
+    """A key without effect gives one remark."""
     (remark,) = loads(text).remarks
     assert remark.startswith(f"{key} has no meaning ") and remark.endswith("is not used")
 
 
-def test_refuses_a_change_of_a_scene_that_names_an_absent_file(tmp_path):
+def test_refuses_change_to_absent_file(tmp_path):
+    """A change of a scene to an absent file is refused with its full path."""
     path = tmp_path / "a.toml"
     scene = loads(POINT + COULOMB + TRIANGLE, path)
     with pytest.raises(SceneError) as refusal:
@@ -85,7 +88,8 @@ def test_refuses_a_change_of_a_scene_that_names_an_absent_file(tmp_path):
     assert mistake.startswith(f"--set: measured.file: there is no file {tmp_path / 'no.csv'}")
 
 
-def test_refuses_a_scene_that_names_an_absent_file_with_its_line(tmp_path):
+def test_refuses_absent_file_at_its_line(tmp_path):
+    """A scene with an absent file is refused at the line of the file."""
     path = tmp_path / "a.toml"
     path.write_text(POINT + COULOMB + '[slide]\nkind = "file"\nfile = "no.csv"\n')
     with pytest.raises(SceneError) as refusal:
@@ -94,6 +98,7 @@ def test_refuses_a_scene_that_names_an_absent_file_with_its_line(tmp_path):
     assert f"a.toml:8: slide.file: there is no file {tmp_path / 'no.csv'}" in mistake
 
 
-def test_exact_an_end_radius_above_its_smallest_size_is_accepted():
+def test_exact_end_radius_above_minimum_is_accepted():
+    """An end radius of 0.13 um, just above the minimum, is accepted."""
     scene = loads(BLOCK + COULOMB + TRIANGLE + '[contact.upper]\nend_radius = "0.13 um"\n')
     assert scene.contact.upper.end_radius == pytest.approx(1.3e-7, rel=1e-12)

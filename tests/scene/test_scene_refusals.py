@@ -1,4 +1,4 @@
-"""Every mistake of a scene, by line and key, with what was wanted; all of them at once."""
+"""Mistakes of a scene, all reported at once with line, key and the expected value."""
 
 from __future__ import annotations
 
@@ -82,7 +82,8 @@ BAD_VALUES = [
 
 
 @pytest.mark.parametrize("line, key, says", BAD_VALUES)
-def test_refuses_a_wrong_value_with_its_line_and_key(line, key, says):
+def test_refuses_wrong_value_at_its_line(line, key, says):
+    """A wrong value in a file is refused with line, key and the expected form."""
     start = line.split("=")[0]
     old = next(row for row in RIG.splitlines() if row.split("=")[0].strip() == start.strip())
     message = get_only_mistake(RIG.replace(old, line, 1))
@@ -144,7 +145,8 @@ BAD_SETS = [
 
 
 @pytest.mark.parametrize("one, key, says", BAD_SETS)
-def test_refuses_a_wrong_set(one, key, says):
+def test_refuses_wrong_setting(one, key, says):
+    """A wrong value in --set is refused with its key and the expected form."""
     message = get_only_mistake(RIG, one)
     where = f"a.toml:{find_line(RIG, 'slide')}" if key == "structure.mode.axial.slide" else "--set"
     assert message.startswith(f"{where}: {key}: ")
@@ -173,7 +175,8 @@ MISSING = [
 
 
 @pytest.mark.parametrize("text, pattern, header, key, says", MISSING)
-def test_refuses_a_missing_key_at_its_table(text, pattern, header, key, says):
+def test_refuses_missing_key_at_its_table(text, pattern, header, key, says):
+    """A missing key is reported at the line of its table with an example."""
     cut, count = re.subn(pattern, "", text, count=1, flags=re.MULTILINE)
     assert count == 1
     message = get_only_mistake(cut)
@@ -196,13 +199,14 @@ def test_refuses_a_missing_key_at_its_table(text, pattern, header, key, says):
         (["normal.amplitude=1 N"], "normal.frequency", "normal.amplitude needs this key"),
     ],
 )
-def test_refuses_a_key_missing_for_the_selector(sets, key, says):
+def test_refuses_missing_key_of_selected_kind(sets, key, says):
+    """A key required by the selected law or kind is reported as missing."""
     message = get_only_mistake(BENCH, *sets)
     assert f": {key}: missing" in message and says in message
 
 
-def test_refuses_a_misspelled_alternative_as_that_key_only():
-    """The other alternative, bond_length, is not reported as missing."""
+def test_refuses_misspelt_alternative_key():
+    """A misspelt `stiffness` is the only mistake: the alternative `bond_length` is not reported as missing."""
     law = '"elastic-plastic"\nstifness = "2e6 N/m"'
     text = BENCH.replace('"coulomb"', law)
     assert get_only_mistake(text).endswith(
@@ -212,13 +216,15 @@ def test_refuses_a_misspelled_alternative_as_that_key_only():
 
 @pytest.mark.parametrize("law", ["tanh", "elastic-plastic", "convolution"])
 def test_refuses_kinetic_for_laws_with_one_coefficient(law):
+    """A kinetic coefficient is refused for laws that have only one coefficient of friction."""
     found = list_mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
                      "friction.reference_speed=1 mm/s")  # fmt: skip
     assert found == [f"--set: friction.kinetic: law '{law}' has only one coefficient of friction; laws with a kinetic "
                      "coefficient are coulomb, nonlocal and lugre"]  # fmt: skip
 
 
-def test_refuses_first_bonds_that_hold_any_force_beside_shear():
+def test_refuses_unbreakable_initial_bonds_with_shear():
+    """Initial bonds that no force can break are refused with [contact.shear]."""
     assert "gives points that no force can move" in get_only_mistake(
         RIG, "contact.shear={}", "friction.reading=report", "friction.order=-0.5"
     )
@@ -239,7 +245,8 @@ def test_refuses_first_bonds_that_hold_any_force_beside_shear():
     assert "must be > -1" in get_only_mistake(RIG, "friction.reading=report", "friction.order=-1")
 
 
-def test_refuses_load_lines_outside_the_patch():
+def test_refuses_load_line_outside_patch():
+    """A load line outside the patch is refused, given by its offset or by a moment."""
     text = PATCH.replace('[contact.tilt]\nangle = "0.1 mrad"\n', "[contact.load_line]\n")
     assert "contact.load_line.offset: missing; a length" in get_only_mistake(text)
     assert "exclude each other" in get_only_mistake(
@@ -260,7 +267,8 @@ def test_refuses_load_lines_outside_the_patch():
     )
 
 
-def test_refuses_a_free_roll_without_a_load_or_a_second_strip():
+def test_refuses_free_roll_without_load_or_strips():
+    """A free roll of strips is refused with a fixed roll, a single strip, a too large offset or a prescribed approach."""
     at = "contact.strips.offset"
     text = PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
     assert loads(text).contact.strips.offset == 1e-3
@@ -272,6 +280,7 @@ def test_refuses_a_free_roll_without_a_load_or_a_second_strip():
 
 
 def test_refuses_approach_together_with_load():
+    """[contact.approach] together with contact.load is refused."""
     message = get_only_mistake(PATCH + '[contact.approach]\ndistance = "0.2 um"\n')
     assert message.startswith("a.toml:12: contact.approach: ") and "exclude each other" in message
 
@@ -301,11 +310,13 @@ COMBINATIONS = [
 
 
 @pytest.mark.parametrize("text, start", COMBINATIONS)
-def test_refuses_tables_that_do_not_stand_together(text, start):
+def test_refuses_incompatible_tables(text, start):
+    """Tables that exclude each other, or of which one is missing, are refused."""
     assert list_mistakes(text)[0].startswith(start)
 
 
-def test_refuses_all_mistakes_at_once_in_the_order_of_the_file():
+def test_refuses_scene_with_mistakes_in_file_order():
+    """All mistakes of a scene are reported at once in the order of the file."""
     text = (
         RIG.replace('load = "26 lbf"', 'load = "26 lb"')
         .replace("static = 0.3", "static = 0.3\nkinetic = 0.4\norder = -3")
@@ -332,7 +343,8 @@ def test_refuses_all_mistakes_at_once_in_the_order_of_the_file():
         ("a = " + "1" * 5000, "a.toml:1: not valid TOML: "),
     ],
 )
-def test_refuses_a_text_that_is_not_toml(text, start):
+def test_refuses_invalid_toml(text, start):
+    """A text that is not valid TOML is refused with the line."""
     assert get_only_mistake(text).startswith(start)
 
 
@@ -355,11 +367,13 @@ def test_refuses_a_text_that_is_not_toml(text, start):
         ("a = 007", "statement (column 6)"),
     ],
 )
-def test_refuses_a_value_without_its_quotes_or_digits_by_how_it_is_written(text, end):
+def test_refuses_unquoted_value_with_correction(text, end):
+    """A value without quotes or digits is refused with its correct form."""
     assert get_only_mistake(text).endswith(end) and "not valid TOML" in get_only_mistake(text)
 
 
-def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
+def test_refuses_odd_keys_and_huge_numbers():
+    """Odd keys and huge numbers are refused with one line each."""
     assert "sum of `base`^2" in get_only_mistake(RIG, "structure.mode.axial.base=1e40")
     assert "outside the computable range" in get_only_mistake(
         RIG, "structure.mode.axial.base=1e200"
@@ -370,7 +384,7 @@ def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
     assert get_only_mistake(RIG, "structure.moving_mass=1e-300 kg").endswith(
         "must be 0 or have a magnitude from 1e-50 to 1e+50"
     )
-    # once: from 0 on
+    # a load has only an upper limit of its magnitude
     assert get_only_mistake(RIG, "contact.load=1e60 N").endswith(
         "the value must not exceed 1e+50 in magnitude"
     )
@@ -384,7 +398,8 @@ def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
     assert "a plain number is needed" in get_only_mistake(RIG, "friction.static=" + "9" * 400)
 
 
-def test_refuses_what_cannot_be_read(tmp_path):
+def test_refuses_unreadable_file(tmp_path):
+    """A folder, an absent file and a file that is not UTF-8 are refused."""
     for path, says in [(tmp_path, "cannot be read: Is a directory"), (tmp_path / "no.toml", "cannot be read: No such"),
                        ("a\0b", "cannot be read")]:  # fmt: skip
         with pytest.raises(SceneError) as caught:
@@ -412,7 +427,8 @@ def test_refuses_what_cannot_be_read(tmp_path):
         ),
     ],
 )
-def test_refuses_another_shape_of_table(text, says):
+def test_refuses_wrong_structure_of_table(text, says):
+    """A table where a value is expected, or the reverse, is refused."""
     assert any(says in message for message in list_mistakes(text))
 
 
@@ -456,19 +472,22 @@ UNBUILT = [
 
 
 @pytest.mark.parametrize("text, sets, key", UNBUILT)
-def test_refuses_what_is_not_yet_built_by_name(text, sets, key):
+def test_refuses_unsupported_features_by_name(text, sets, key):
+    """Features that are not supported yet are refused by name."""
     found = list_mistakes(text, *sets)
     assert all("not supported yet" in message for message in found), found
     assert any(f"{key}: " in message for message in found), found
 
 
-def test_refuses_nothing_unbuilt_before_the_scene_is_otherwise_valid():
+def test_refuses_other_mistakes_before_unsupported_features():
+    """Unsupported features are reported only if the scene is valid otherwise."""
     assert "not supported yet" not in get_only_mistake(
         RIG, "friction.breakaway=0.1", "drive.cycles=0"
     )
 
 
-def test_refuses_the_key_not_yet_built_in_the_mode_that_has_it():
+def test_refuses_unsupported_key_of_mode():
+    """An unsupported key of a mode is reported with the name of the mode, and accepted if it is zero."""
     assert UNSUPPORTED_KEY == "structure.mode.lateral"
     assert (
         get_only_mistake(RIG, "structure.mode.second.lateral=0.2")
@@ -478,6 +497,7 @@ def test_refuses_the_key_not_yet_built_in_the_mode_that_has_it():
 
 
 def test_always_masses_and_interfaces_are_read():
+    """Masses, springs and interfaces of a structure are read, and a kinetic coefficient above the static one is refused."""
     text = """
 [structure]
 masses = ["1 kg", "2 kg"]
@@ -545,7 +565,8 @@ OUTLINES = [
 
 
 @pytest.mark.parametrize("tables, sets, key, words", OUTLINES)
-def test_refuses_outlines_that_do_not_fit(tables, sets, key, words):
+def test_refuses_invalid_outlines(tables, sets, key, words):
+    """Outlines of the pieces that do not fit are refused with their keys."""
     text = PIECE + 'load = "26 lbf"\nsubstrate = "steel"\n' + tables
     assert any(f"{key}: " in line and words in line for line in list_mistakes(text, *sets)), (
         list_mistakes(text, *sets)
@@ -554,8 +575,8 @@ def test_refuses_outlines_that_do_not_fit(tables, sets, key, words):
 
 @pytest.mark.share(*range(0, 60, 4))
 @pytest.mark.parametrize("first", range(0, 1000, 10))
-def test_always_what_a_refusal_proposes_ends_its_mistake(first):
-    """Every value that a line names, tried in its place, makes the scene right or moves it to another mistake."""
+def test_always_proposed_value_resolves_mistake(first):
+    """Every value that a message proposes resolves the mistake or leads to another one."""
     assert not [
         one
         for seed in range(first, first + 10)
@@ -563,14 +584,16 @@ def test_always_what_a_refusal_proposes_ends_its_mistake(first):
     ]
 
 
-def test_exact_a_law_of_another_reading_is_not_proposed_as_itself():
+def test_exact_same_law_is_not_proposed_again():
+    """The message on an unsupported reading of a law proposes another reading or another law."""
     law = 'law = "nonlocal"\nreading = "report"\nstatic = 0.2'
     text = PAIR.replace('law = "elastic-plastic"\nstatic = 0.2', law) + FORCED
     assert "use reading = \"stretch\" with order = 1, or law 'coulomb'" in get_only_mistake(text)
     assert loads(text.replace('"report"', '"stretch"\norder = 1')).kind == "rig"
 
 
-def test_exact_wear_of_a_release_is_told_which_drives_repeat():
+def test_exact_wear_of_free_decay_names_periodic_drives():
+    """Wear with a free decay is refused with the names of the periodic drives."""
     text = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n'
     text += '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 100\n'
     assert "use kind 'base' or 'force'" in get_only_mistake(text)

@@ -1,4 +1,4 @@
-"""[structure] as masses and with a start: what is read, what is refused, and the linear runs against direct solves."""
+"""[structure] with masses, matrices or initial conditions: linear runs compared with direct solutions, and refusals."""
 
 from dataclasses import replace
 
@@ -50,14 +50,14 @@ M, K, C = (
 )
 
 
-def driven(text, *sets, **drive):
-    """The scene with another drive, also one that no run can do yet."""
+def with_drive(text, *sets, **drive):
+    """Return a scene with other values of its drive, without checking them."""
     scene = loads(text, sets=sets)
     return replace(scene, drive=scene.drive.model_copy(update=drive))
 
 
-def same(ours, want, near: float) -> None:
-    """Hold the measures of two results against each other, reasons too."""
+def assert_same_measures(ours, want, near: float) -> None:
+    """Assert that two results have the same measures within a relative tolerance, and the same reasons."""
     for name, measure in want.measures.items():
         found = ours.measures[name]
         assert found.reason == measure.reason, name
@@ -66,8 +66,8 @@ def same(ours, want, near: float) -> None:
         )
 
 
-def test_exact_linear_run_of_masses():
-    """Steady amplitude and absolute acceleration of mass 2 by (K + i w C - w^2 M)^-1 M r a."""
+def test_exact_linear_masses_agree_with_direct_solution():
+    """Amplitude and acceleration of mass 2 agree with (K + i w C - w^2 M)^-1 M r a within 1e-9 and 1e-6."""
     result = run(plan(loads(MASSES)))
     w = 2 * np.pi * 40
     x = np.linalg.solve(K + 1j * w * C - w * w * M, -M @ np.ones(2) * 2.0)
@@ -79,8 +79,8 @@ def test_exact_linear_run_of_masses():
     np.testing.assert_allclose(both[:, 1], result.response.output, atol=1e-15)
 
 
-def test_exact_one_mass_is_one_mode():
-    """The same rig as a mass with spring and damper, and as a mode with its frequency and damping."""
+def test_exact_single_mass_equals_single_mode():
+    """A mass with spring and damper gives the same measures as a mode with the same frequency and damping, within 1e-9."""
     w = 2 * np.pi * 143
     mass = f"""\
 [structure]
@@ -94,12 +94,15 @@ coefficient = "{2 * 0.003 * w * 0.884!r} N s/m"
 {STRUCTURE[STRUCTURE.index("[drive]") :]}"""
     ours = run(plan(loads(mass)))
     want = run(plan(loads(STRUCTURE)))
-    same(ours, want, 1e-9)
+    assert_same_measures(ours, want, 1e-9)
     assert ours.plan.chain["mode"] == pytest.approx(want.plan.chain["mode"], rel=1e-12)
 
 
-def test_exact_bonded_spring_in_a_run():
-    """f2 of the rig without friction: the stuck frequency is sqrt(K + ka); amplitude of the damped oscillator."""
+def test_exact_bonded_spring_raises_frequency():
+    """A bonded spring raises the frequency to sqrt((K + ka)/m).
+
+    The amplitude agrees with that of the damped oscillator within 1e-9.
+    """
     text = (
         STRUCTURE.replace("cycles = 30", "cycles = 1500")
         + '[structure.bonded]\nstiffness = "4e6 N/m"\n'
@@ -122,7 +125,11 @@ def test_exact_bonded_spring_in_a_run():
     )
 
 
-def test_exact_numbers_for_the_plan():
+def test_exact_plan_gives_modal_quantities():
+    """Modal quantities and dimensionless groups of the plan agree with closed forms.
+
+    These are frequencies, masses, stiffnesses and friction limits.
+    """
     rig = build(loads(MASSES)).rig
     np.testing.assert_allclose(rig.structure.frequencies, rig.modes.omega / 2 / np.pi)
     assert rig.first_mode.mass == pytest.approx(1 / rig.modes.output[0] ** 2)
@@ -150,41 +157,46 @@ def test_exact_numbers_for_the_plan():
     assert build(second).rig.first_mode.frequency == 990.0
 
 
-def test_exact_a_force_acts_where_it_is_said():
-    scene = driven(MASSES, kind="force", force=7.0, mass=None)
+def test_exact_force_acts_on_given_mass():
+    """The force of a drive acts on the given mass, else on the output."""
+    scene = with_drive(MASSES, kind="force", force=7.0, mass=None)
     found = build_modes(scene)
     np.testing.assert_allclose(
         found.shapes @ found.base, -np.linalg.solve(M, [0, 1]), rtol=1e-12, atol=1e-15
     )
-    found = build_modes(driven(MASSES, kind="force", force=7.0, mass=1))
+    found = build_modes(with_drive(MASSES, kind="force", force=7.0, mass=1))
     np.testing.assert_allclose(
         found.shapes @ found.base, -np.linalg.solve(M, [1, 0]), rtol=1e-12, atol=1e-15
     )
-    scene = driven(LINEAR, "structure.mode.second.output=0.5", kind="force")
+    scene = with_drive(LINEAR, "structure.mode.second.output=0.5", kind="force")
     assert build_modes(scene).base.tolist() == [-0.8, -0.5]
 
 
-def test_exact_starts_of_a_scene():
+def test_exact_initial_conditions_of_scene():
+    """Initial displacements and velocities of a scene agree with the given values.
+
+    They come from [structure.start], a free decay or a step.
+    """
     begin = '[structure.start]\ndisplacement = ["1 mm", "-2 mm"]\nvelocity = ["0 m/s", "3 mm/s"]\n'
     scene = loads(MASSES + begin)
     found = build_modes(scene)
     start = compute_initial_state(scene, found)
     np.testing.assert_allclose(found.shapes @ start.z, [1e-3, -2e-3], rtol=1e-13)
     np.testing.assert_allclose(found.shapes @ start.v, [0, 3e-3], rtol=1e-13, atol=1e-18)
-    free = driven(MASSES, kind="free", displacement=1e-3)
+    free = with_drive(MASSES, kind="free", displacement=1e-3)
     np.testing.assert_allclose(
         found.shapes @ compute_initial_state(free, found).z, [0, 1e-3], atol=1e-18
     )
-    free = driven(MASSES, kind="free", displacement=1e-3, mass=1)
+    free = with_drive(MASSES, kind="free", displacement=1e-3, mass=1)
     np.testing.assert_allclose(
         found.shapes @ compute_initial_state(free, found).z, [1e-3, 0], atol=1e-18
     )
-    step = driven(MASSES, waveform="step", displacement=1e-3, acceleration=None)
+    step = with_drive(MASSES, waveform="step", displacement=1e-3, acceleration=None)
     np.testing.assert_allclose(
         found.shapes @ compute_initial_state(step, found).z, [-1e-3, -1e-3], rtol=1e-13
     )
     assert not compute_initial_state(loads(MASSES), found).z.any()
-    one = driven(STRUCTURE, kind="free", displacement=1e-3)
+    one = with_drive(STRUCTURE, kind="free", displacement=1e-3)
     assert compute_initial_state(one, build_modes(one)).z.tolist() == [1e-3]
     assert "structure.start" in scene.effect_names()
     assert loads(scene.resolved()).structure.start == scene.structure.start
@@ -209,12 +221,14 @@ def test_exact_starts_of_a_scene():
     (["drive={kind = 'free', displacement = '1 mm', cycles = 9}", "structure.start.velocity=['1 m/s', '0 m/s']"],
      "structure.start", "[structure.start] and drive.displacement exclude each other"),
 ])  # fmt: skip
-def test_refuses_masses_that_are_not_there(sets, key, says):
+def test_refuses_unknown_masses(sets, key, says):
+    """Springs, dampers and interfaces between unknown masses are refused."""
     message = get_only_mistake(RUB + MASSES, *sets)
     assert message.startswith(f"--set: {key}: ") and says in message
 
 
-def test_refuses_at_the_line_of_the_file():
+def test_refuses_unknown_mass_at_its_line():
+    """An unknown mass in a file is refused at its line."""
     text = (RUB + MASSES).replace("between = [2, 0]", "between = [2, 5]")
     assert get_only_mistake(text).startswith(
         f"a.toml:{find_line(text, 'between = [2, 5]')}: structure.interface[1].between: "
@@ -233,15 +247,17 @@ def test_refuses_at_the_line_of_the_file():
     (STRUCTURE[:STRUCTURE.index("[[")].replace("moving", 'file = "rig.csv"\nmoving') +
      STRUCTURE[STRUCTURE.index("[drive]"):], "structure.file", "the name ends in '.csv'"),
 ])  # fmt: skip
-def test_refuses_what_does_not_go_together(text, key, says):
+def test_refuses_incompatible_structure_keys(text, key, says):
+    """Keys of a structure that exclude each other are refused."""
     message = get_only_mistake(text)
     assert f": {key}: " in message and says in message
 
 
-def test_always_a_mass_that_nothing_holds_is_allowed():
+def test_always_free_mass_is_allowed():
+    """A mass without a spring is allowed: its relative motion is minus that of the base, plus a uniform drift."""
     scene = loads(MASSES[: MASSES.index("[[structure.spring")] + MASSES[MASSES.index("[drive]") :])
     result = run(plan(scene))
-    # relative motion is the base's own, turned round, plus its drift from rest
+    # the relative motion is minus that of the base, plus a uniform drift from rest
     base = 2.0 / (2 * np.pi * 40) ** 2
     time = result.response.time
     want = base * (np.sin(2 * np.pi * 40 * time) - 2 * np.pi * 40 * time)
@@ -261,15 +277,16 @@ POINT = '[normal]\nload = "1 N"\n' + COULOMB
 
 
 def write_scene(folder, text):
+    """Write a scene into a folder and load it."""
     (folder / "scene.toml").write_text(text, "utf-8")
     return load(folder / "scene.toml")
 
 
-def test_exact_matrices_run_as_masses_do(tmp_path):
-    """M, K, C in a file and the same rig as masses: equal measures; interfaces between numbered coordinates."""
+def test_exact_matrices_equal_masses(tmp_path):
+    """Matrices M, K and C from a file give the same measures as the same rig given by masses, within 1e-9."""
     np.savez(tmp_path / "rig.npz", M=M, K=K, C=C, output=[0.0, 1.0])
     ours = run(plan(write_scene(tmp_path, FILE)))
-    same(ours, run(plan(loads(MASSES))), 1e-9)
+    assert_same_measures(ours, run(plan(loads(MASSES))), 1e-9)
     scene = write_scene(tmp_path, RUB + FILE)
     np.testing.assert_allclose(
         build_modes(scene).interfaces, build_modes(loads(RUB + MASSES)).interfaces, rtol=1e-9
@@ -277,7 +294,8 @@ def test_exact_matrices_run_as_masses_do(tmp_path):
     assert scene.kind == "rig"
 
 
-def test_exact_modes_of_a_file_run_as_written_ones(tmp_path):
+def test_exact_modes_of_file_equal_modes_of_scene(tmp_path):
+    """Modes from a .mat file give the same measures as modes in the scene, within 1e-9."""
     from scipy.io import savemat
 
     savemat(
@@ -290,12 +308,15 @@ def test_exact_modes_of_a_file_run_as_written_ones(tmp_path):
     )
     ours = run(plan(scene))
     want = run(plan(loads(POINT + STRUCTURE)))
-    same(ours, want, 1e-9)
+    assert_same_measures(ours, want, 1e-9)
     assert ours.plan.groups == pytest.approx(want.plan.groups)
 
 
-def test_exact_responses_of_a_file_run_as_the_mode_behind_them(tmp_path):
-    """Accelerance of one mode (0.884 kg at node 7) written as dataset 58; what is lost is the file's digits."""
+def test_exact_frequency_response_file_gives_its_mode(tmp_path):
+    """The accelerance of one mode in a universal file gives the measures of this mode within 1e-5.
+
+    The digits of the file limit the precision.
+    """
     import pyuff
 
     f = np.arange(100.0, 200.0, 0.25)
@@ -321,11 +342,12 @@ def test_exact_responses_of_a_file_run_as_the_mode_behind_them(tmp_path):
     pyuff.UFF(str(tmp_path / "rig.uff")).write_sets([one], mode="overwrite")
     text = '[structure]\nfile = "rig.uff"\nmoving_mass = "0.884 kg"\nslide_at = "7:+x"\n' + POINT
     ours = run(plan(write_scene(tmp_path, text + STRUCTURE[STRUCTURE.index("[drive]") :])))
-    same(ours, run(plan(loads(POINT + STRUCTURE))), 1e-5)
+    assert_same_measures(ours, run(plan(loads(POINT + STRUCTURE))), 1e-5)
     assert any("'slug' is not known" in line for line in ours.warnings)
 
 
-def test_refuses_files_at_the_line_of_the_scene(tmp_path):
+def test_refuses_unsuitable_structure_files(tmp_path):
+    """Structure files without required arrays, or of a wrong size, are refused at the line of the scene."""
     np.savez(tmp_path / "rig.npz", M=M, K=K)
     with pytest.raises(PatchfemError) as caught:
         plan(write_scene(tmp_path, FILE))
@@ -394,19 +416,21 @@ MODES = (
         ),
     ],
 )
-def test_exact_items_count_from_one_where_people_read_and_write(key, message, text):
+def test_exact_messages_count_items_from_one(key, message, text):
+    """Messages count the items of an array of tables from one."""
     text = POINT + text if text is MODES else text
     assert get_only_mistake(text, f"{key}=-1").startswith(f"--set: {message}")
 
 
-def test_exact_a_remark_counts_a_mode_whose_name_is_a_number_from_one():
-    """It once named structure.mode[4] where the name is "3"."""
+def test_exact_remark_numbers_mode_with_numeric_name():
+    """A remark on a mode that is given by number counts from one, although another mode has a number as its name."""
     assert loads(POINT + MODES, sets=["structure.mode[2].damping=0.7"]).remarks == [
         "structure.mode[2].damping = 0.7 is a damping ratio: 1 means critical damping, and 1 % is written 0.01"
     ]
 
 
-def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from_zero():
+def test_exact_item_numbers_in_brackets_count_from_one():
+    """structure.spring[2] and structure.spring.1 set the same item."""
     scene = loads(MASSES, sets=["structure.spring[2].stiffness=3 N/mm", "structure.masses[1]=5 kg"])
     assert scene.structure.spring[1].stiffness == 3e3 and scene.structure.masses[0] == 5.0
     from_zero = ["structure.spring.1.stiffness=3 N/mm", "structure.masses.0=5 kg"]
@@ -436,8 +460,11 @@ DAMPER = '[[structure.damper]]\nbetween = [1, 0]\ncoefficient = "12 N s/m"\n'
 PUSH = '[drive]\nkind = "force"\nfrequency = "90 Hz"\nforce = "300 N"\ncycles = 40\n'
 
 
-def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode():
-    """sqrt(k/m)/(2 pi) = 41.0936 Hz and c/(2 sqrt(k m)) = 0.00775 of 3 kg on 200 kN/m with 12 N s/m; one message."""
+def test_exact_mass_beside_contact_is_proposed_as_mode():
+    """A mass of 3 kg on 200 kN/m with 12 N s/m beside [contact] is refused, with the equivalent mode:
+
+    41.0936 Hz and a damping ratio of 0.00775.
+    """
     message = get_only_mistake(BLOCK + COULOMB + SPRING + DAMPER + PUSH)
     assert ": structure.masses: " in message
     assert 'moving_mass = "3 kg"' in message
@@ -448,15 +475,17 @@ def test_exact_a_mass_on_springs_beside_a_contact_is_told_as_its_mode():
 
 
 @pytest.mark.parametrize("rest", ['masses = ["1 kg", "2 kg"]\n', 'moving_mass = "3 kg"\n'])
-def test_refuses_other_masses_beside_a_contact_by_the_same_way_out(rest):
+def test_refuses_several_masses_beside_contact(rest):
+    """Several masses beside [contact] are refused without the proposal of [[structure.interface]]."""
     pair = "[1, 2]" if "masses" in rest else "[1, 0]"
     spring = f'[[structure.spring]]\nbetween = {pair}\nstiffness = "200 kN/m"\n'
-    found = refusal(BLOCK + COULOMB + "[structure]\n" + rest + spring + PUSH)
+    found = read_refusal(BLOCK + COULOMB + "[structure]\n" + rest + spring + PUSH)
     assert "with [contact], " in found and "write [[structure.interface]]" not in found
     assert ('frequency = "41.0936 Hz"' in found) == ("moving" in rest)
 
 
-def refusal(text: str) -> str:
+def read_refusal(text: str) -> str:
+    """Return the message with which a text is refused."""
     with pytest.raises(SceneError) as caught:
         loads(text)
     return str(caught.value)

@@ -1,4 +1,4 @@
-"""The JSON schema of a scene: it accepts what the program reads and refuses what an editor should mark."""
+"""The JSON schema of a scene accepts what the program reads and refuses what an editor should mark."""
 
 import re
 import tomllib
@@ -16,7 +16,7 @@ from patchfem.scene.schema import make_quantity_pattern
 ROOT = Path(__file__).parents[2]
 SCENES = sorted((ROOT / "studies").rglob("*.toml"))
 RIG = read_template("rig")
-WRONG = {  # what is changed in the scene of a rig, as neither the program nor the schema reads it
+WRONG = {  # change of a rig scene that both program and schema refuse -> (old text, new text)
     "a bare number": ('"115 N"', "115"),
     "a unit of another kind": ('"115 N"', '"115 mm"'),
     "an ambiguous unit": ('"115 N"', '"115 lb"'),
@@ -33,33 +33,41 @@ WRONG = {  # what is changed in the scene of a rig, as neither the program nor t
 
 
 @pytest.fixture(scope="module")
-def check():
+def schema_validator():
+    """Return a validator of the schema."""
     made = make_schema()
     Draft202012Validator.check_schema(made)
     return Draft202012Validator(made)
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: "-".join(path.parts[-2:]))
-def test_always_it_accepts_the_scenes_that_ship(check, path):
-    assert [one.message for one in check.iter_errors(tomllib.loads(path.read_text("utf-8")))] == []
+def test_always_schema_accepts_shipped_scenes(schema_validator, path):
+    """The schema accepts every shipped scene."""
+    assert [
+        one.message for one in schema_validator.iter_errors(tomllib.loads(path.read_text("utf-8")))
+    ] == []
 
 
 @pytest.mark.parametrize("kind", TEMPLATES)
-def test_always_it_accepts_the_scenes_to_start_from(check, kind):
-    assert check.is_valid(tomllib.loads(read_template(kind)))
+def test_always_schema_accepts_templates(schema_validator, kind):
+    """The schema accepts every template."""
+    assert schema_validator.is_valid(tomllib.loads(read_template(kind)))
 
 
 @pytest.mark.parametrize("right, wrong", WRONG.values(), ids=WRONG)
-def test_refuses_what_the_program_refuses(check, right, wrong):
+def test_refuses_scene_in_schema_and_program(schema_validator, right, wrong):
+    """Wrong values are refused both by the schema and by the program."""
     text = RIG.replace(right, wrong, 1)
-    assert not check.is_valid(tomllib.loads(text)) and check.is_valid(tomllib.loads(RIG))
+    assert not schema_validator.is_valid(tomllib.loads(text)) and schema_validator.is_valid(
+        tomllib.loads(RIG)
+    )
     with pytest.raises(SceneError):
         loads(text)
 
 
 @pytest.mark.parametrize("kind", UNIT_FACTORS)
-def test_exact_a_quantity_is_what_the_unit_table_reads(kind):
-    """Every unit of every kind, with each spelling of micro, powers and products: both read it or neither does."""
+def test_exact_quantity_pattern_agrees_with_parser(kind):
+    """The pattern of a quantity accepts exactly the texts that the program reads, for every unit and spelling."""
     units = {unit for units in UNIT_FACTORS.values() for unit in units}
     units |= {
         unit.translate(signs)
@@ -78,7 +86,8 @@ def test_exact_a_quantity_is_what_the_unit_table_reads(kind):
         assert bool(re.search(make_quantity_pattern(kind), text)) == reads, text
 
 
-def test_always_every_key_says_what_it_means():
+def test_always_schema_keys_have_descriptions():
+    """Every key of the schema has a description."""
     made = make_schema()
     for table in (made, *made["$defs"].values()):
         for one in (table, *table.get("anyOf", ())):
@@ -86,13 +95,13 @@ def test_always_every_key_says_what_it_means():
                 assert found.get("description") or "$ref" in str(found), key
 
 
-def test_exact_a_law_is_described_with_the_keys_that_the_program_asks_for():
-    """What a scene with nothing but the law's name is told to be missing is what its description names."""
+def test_exact_law_description_names_required_keys():
+    """The description of each law names exactly the keys that the program reports as missing."""
     keys = make_schema()["$defs"]["Friction"]["properties"]
-    told = keys["law"]["description"].replace(" or stiffness", "")
+    description = keys["law"]["description"].replace(" or stiffness", "")
     named = {
         law: set(words.split(", "))
-        for law, words in re.findall(r"'([\w-]+)' needs ([\w, ]+)", told)
+        for law, words in re.findall(r"'([\w-]+)' needs ([\w, ]+)", description)
     }
     for law in keys["law"]["enum"]:
         try:

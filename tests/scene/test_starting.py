@@ -1,4 +1,4 @@
-"""Scenes to start from: the numbers that their comments tell (`commands/test_clean_screens.py` runs them)."""
+"""Templates of scenes: the numbers in their comments (`commands/test_clean_screens.py` runs them)."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ BLADE = (np.array([[1e6, -1e6], [-1e6, 6e6]]), np.diag([0.15, 0.25]))  # stiffne
 FLATS = 7e7  # N/m
 
 
-def test_exact_the_linear_scene_is_a_resonance_curve():
-    """x = a/(w0² - w² + 2 i zeta w0 w) of the block against the base, off resonance."""
+def test_exact_linear_template_agrees_with_resonance_curve():
+    """The amplitude of the linear template agrees with a/(w0² - w² + 2 i zeta w0 w) within 1e-4."""
     from math import pi
 
     measured = pf.run(loads(read_template("linear"))).measures["relative_displacement_amplitude"]
@@ -24,14 +24,15 @@ def test_exact_the_linear_scene_is_a_resonance_curve():
     )
 
 
-def test_always_a_sweep_and_the_scene_of_the_rig_are_read():
+def test_always_misalignment_template_has_sweep():
+    """The misalignment template has a sweep over the tilt, and the shipped rig has measured rows."""
     scene = loads(read_template("misalignment"))
     assert [axis.key for axis in scene.sweep] == ["contact.tilt.angle"] and scene.kind == "rig"
     assert load(find_shipped_scene()).measured is not None
 
 
-def test_exact_the_numbers_that_the_damper_tells():
-    """Free and held frequency of two masses, the load of two flats of a wedge.
+def test_exact_damper_template_frequencies():
+    """Free and stuck frequency and wedge load in the damper template agree with an eigenvalue solution and statics.
 
     The resonance with held platforms is that of `runs/test_curve_peaks.py`.
     """
@@ -43,22 +44,25 @@ def test_exact_the_numbers_that_the_damper_tells():
     flats = 2 * 3e-3 * 0.3 * (10000 * np.pi / 30) ** 2 / (2 * np.sin(np.pi / 3))
     assert f"has {free:.0f} Hz with free platforms and {held:.0f} Hz with ones that stick" in text
     assert round(flats, -1) == 1140 and round(flats / 4) == 285
-    peak = pf.run(loads(damper()), **{"structure.interface[1].load": "1 N"}).measures[
+    peak = pf.run(loads(single_damper_scene()), **{"structure.interface[1].load": "1 N"}).measures[
         "peak_frequency"
     ]
     assert abs(peak.value - free) < peak.error + 0.2
 
 
-def damper() -> str:
-    """The scene of the damper, of one run."""
+def single_damper_scene() -> str:
+    """Return the damper template without its sweep."""
     text = read_template("damper")
     return text[: text.index("\n[sweep]")] + text[text.index("\n[accuracy]") :]
 
 
-def test_exact_the_peak_of_the_damper_is_smallest_at_the_load_that_the_scene_tells():
-    """0.7 and 1.4 times the best load of 316 N let the peak grow; its frequency lies between free and held."""
+def test_exact_damper_peak_is_smallest_at_optimal_load():
+    """The peak is smaller at the optimal load of 316 N than at 0.7 and 1.4 times this load.
+
+    The peak frequencies agree with the known ones within 3 Hz.
+    """
     runs = [
-        pf.run(loads(damper()), **{"structure.interface[1].load": load}).measures
+        pf.run(loads(single_damper_scene()), **{"structure.interface[1].load": load}).measures
         for load in (225.0, 316.2, 450.0)
     ]
     peaks = [measures["relative_displacement_amplitude"].value for measures in runs]
@@ -67,8 +71,8 @@ def test_exact_the_peak_of_the_damper_is_smallest_at_the_load_that_the_scene_tel
     assert places == pytest.approx([365.5, 380.2, 395.8], abs=3)
 
 
-def test_exact_the_numbers_that_the_shrouds_tell():
-    """Slides 0.3 sin(pi n/24); shrouds that hold are springs of friction limit over bond length."""
+def test_exact_shroud_template_numbers():
+    """Slides and stuck frequency in the shroud template agree with 0.3 sin(pi n/24) and the stiffness of the bonds."""
     text = read_template("shroud")
     for n, slide in ((2, "0.0776"), (4, "0.15"), (8, "0.2598")):
         assert f"{0.3 * np.sin(np.pi * n / 24):.4f}".rstrip("0") == slide.ljust(6, "0").rstrip("0")
@@ -77,7 +81,8 @@ def test_exact_the_numbers_that_the_shrouds_tell():
     assert f"up to {np.sqrt(stiff / 0.3) / (2 * np.pi):.0f} Hz with held ones" in text
 
 
-def test_always_the_beam_goes_from_the_bolted_to_the_free_frequency():
+def test_always_beam_template_backbone_softens():
+    """The backbone of the beam template begins at 150 Hz, and at 3 mm its frequency is lower and its damping higher."""
     found = pf.backbone(
         loads(read_template("beam")), amplitudes=[1e-6, 3e-3], method="quasi-static"
     )
@@ -86,6 +91,7 @@ def test_always_the_beam_goes_from_the_bolted_to_the_free_frequency():
     assert 100 < f[1] < 0.8 * f[0] and zeta[1] > 5 * zeta[0]
 
 
-def test_refuses_a_kind_that_is_not_there():
+def test_refuses_unknown_template():
+    """An unknown kind of template is refused with a suggestion."""
     with pytest.raises(PatchfemError, match="joitn: unknown kind of scene; did you mean 'joint'"):
         read_template("joitn")
