@@ -140,7 +140,7 @@ def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
         "no setting meets the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and takes 5 "
         "CPU s"
     )
-    still = [made("2", 1, 2.2), made("4", 2, 2.2), made("8", 5, 2.2)]
+    still = [made("2", 1, 2.22), made("4", 2, 2.22), made("8", 5, 2.22)]
     assert (
         cost_sentence(still, 1e-2)
         == "no setting meets the tolerance 0.01: with every setting the error of a is 2.2"

@@ -145,6 +145,8 @@ def test_exact_uncertain_frequency_is_omitted_from_chart():
     frequency, damping = backbone_charts(backbone.curves)
     assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
     assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2
+    # the bar of 1e-4 +- 2e-4 ends at a tenth of the smallest value on the logarithmic axis
+    assert damping["y"]["log"] and damping["marks"][1]["floor"] == pytest.approx(1e-5)
     assert "9.8 kHz" in page_html(backbone, "") and "left out of the picture" in page_html(
         backbone, ""
     )

@@ -267,3 +267,10 @@ def test_exact_levels_over_three_decades_are_logarithmic():
         axes = Figure().subplots()
         pictures.draw_charts(charts.levels_chart(chosen), axes_to_use=axes)
         assert axes.get_yscale() == scale
+
+
+@pytest.mark.parametrize("length, frame", [(8e-3, [216, 270]), (20e-3, [300, 150])])
+def test_exact_worn_map_keeps_aspect_ratio(length, frame):
+    """The map of the worn depth of a patch 10 mm wide keeps its ratio of length to width, within 300 x 270 pixels."""
+    (chart,) = charts.worn_map_chart(np.linspace(0, length, 9), 10e-3, np.full((4, 9), 1e-6))
+    assert chart["frame"] == frame

@@ -83,6 +83,7 @@ def test_exact_spectra_agree_with_transfer_function(random_run):
         "Acceleration",
         "H1:",
     ]
+    assert all(chart[axis]["log"] for chart in spectra_charts for axis in "xy")
     (density,), (_, base), (_, gain, peak) = (chart["marks"] for chart in spectra_charts)
     assert all(
         20 <= chart["x"].min() and chart["x"].max() <= 400 for chart in (density, base, gain)

@@ -146,6 +146,8 @@ def test_exact_summary_agrees_with_output_and_scene(run_case, name):
     seconds = summary["seconds"]
     assert ("contact" in seconds) == ("[contact]" in SCENES[name])
     assert 0 < seconds.get("contact", seconds["total"]) <= seconds["total"]
+    parts = [part for name, part in seconds.items() if name != "files"]
+    assert min(parts) >= 0 and max(parts) == seconds["total"]
     effect_names = [entry["effect"] for entry in summary["effects"]]
     assert all(set(entry) == {"effect", "equations", "seconds"} for entry in summary["effects"])
     assert effect_names == load(folder.with_suffix(".toml")).effect_names()

@@ -15,7 +15,7 @@ NONLOCAL_2UM = NONLOCAL.replace("1 um", "2 um")
 SPREAD = ["friction.spread=4 mm"]
 
 
-@pytest.mark.parametrize("width", [0.05, 0.7, 1.0, 4.0])
+@pytest.mark.parametrize("width", [1e-9, 0.05, 0.7, 1.0, 4.0])
 def test_exact_spread_factor_equals_double_integral(width):
     """The spread factor of a pad equals the double integral of the Gaussian weight over its width."""
     total, _ = dblquad(
