@@ -1,4 +1,4 @@
-"""Frequency and damping of a decay over its amplitude, from half swings without noise."""
+"""Frequency and damping of a free decay as functions of the amplitude, from half cycles without noise."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,8 @@ RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\
 
 
 @pytest.mark.parametrize("zeta", [1e-4, 0.02, 0.3])
-def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
+def test_exact_viscous_decay_has_constant_damping(zeta):
+    """The curve of a viscous decay has the constant damping ratio within 1e-9 and the damped frequency within 1e-12."""
     k = np.arange(30)
     own = 700.0 * np.sqrt(1 - zeta**2)
     found = fit_decay_curve(
@@ -31,15 +32,19 @@ def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
 
 
-def viscous(zeta: float, omega: float, samples: int):
+def make_viscous_decay(zeta: float, omega: float, samples: int):
+    """Return times, displacement and velocity of a viscous decay over 40 periods."""
     t = np.linspace(0, 40 * 2 * np.pi / omega, samples)
     lam = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2))
     y = np.exp(lam * t)
     return t, y.real, (lam * y).real
 
 
-def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
-    """An oscillator released at 2 mm, whose last six cycles begin larger than the last one."""
+def test_exact_release_amplitude_is_that_of_last_cycle():
+    """The amplitude of a released oscillator is that of its last whole cycle within 1e-6.
+
+    The cycles before have larger amplitudes.
+    """
     text = (
         (POINT + make_friction_table("elastic-plastic")).replace("static = 0.3", "static = 0")
         + KILOGRAM
@@ -58,16 +63,19 @@ def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
     assert np.ptp(found.window.output) / 2 > 1.05 * main.value
 
 
-def test_order_turns_lie_between_samples_to_the_fourth():
-    """The cubic of places and speeds at both ends misses the place of a turn by the fourth power of the step."""
+def test_order_reversals_between_samples_is_four():
+    """The error of the damping falls with the fourth power of the step, as reversals are found by cubic interpolation."""
     off = []
     for samples in (407, 1627):
-        found = fit_decay_curve(make_half_cycles(*locate_reversals(*viscous(0.01, 300.0, samples))))
+        found = fit_decay_curve(
+            make_half_cycles(*locate_reversals(*make_viscous_decay(0.01, 300.0, samples)))
+        )
         off.append(np.abs(found.damping - 0.01).max())
     assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
 
 
-def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
+def test_exact_decay_curve_interpolation():
+    """Interpolation returns the curve at its own points and NaN outside, and differences are added to the errors."""
     found = fit_decay_curve(make_half_cycles(np.pi * np.arange(9), (-0.9) ** np.arange(9.0)))
     there = found.interpolate(found.amplitude[2:5])
     assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
@@ -83,9 +91,13 @@ def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
     ).all()
 
 
-def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
-    """ln A falls by pi c A^p/(1 + A^p) a half cycle, solved; the ratio where a half swing is 2 A. Without what the
-    amplitude changes between two turns 68 % held."""
+def test_always_decay_intervals_cover_nonlinear_damping():
+    """More than 95 % of the intervals cover a damping ratio that depends on the amplitude.
+
+    The logarithm of the amplitude falls by pi c A^p/(1 + A^p) per half cycle.
+
+    Without the term for its change between two reversals, 68 % covered it.
+    """
     held = []
     for seed in range(16):
         r = np.random.default_rng(seed)
@@ -112,7 +124,8 @@ def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
     assert np.concatenate(held).mean() > 0.95
 
 
-def test_too_few_swings_or_one_that_grows_end_it():
+def test_exact_growing_or_few_half_cycles_end_decay_curve():
+    """A decay curve ends at a half cycle that grows, and is empty for fewer than four reversals."""
     assert (
         fit_decay_curve(make_half_cycles(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).time.size == 0
     )
@@ -124,8 +137,8 @@ def test_too_few_swings_or_one_that_grows_end_it():
     assert locate_reversals(np.arange(3.0), np.arange(3.0), np.ones(3))[0].size == 0
 
 
-def test_exact_a_release_under_coulomb_friction():
-    """The decay_ columns of result.nc: one frequency, the ratio in closed form, errors that hold."""
+def test_exact_coulomb_decay_agrees_with_closed_form():
+    """Under Coulomb friction, the decay has the natural frequency and the damping ratio 2 h/(pi a) within its errors."""
     data = pf.run(
         POINT + make_friction_table("coulomb") + KILOGRAM.replace("0.003", "0.0") + RELEASED
     ).to_xarray()
@@ -137,8 +150,11 @@ def test_exact_a_release_under_coulomb_friction():
     assert set(data.decay_time.dims) == {"decay_time"} and "decay_frequency_error" in data
 
 
-def test_a_release_of_an_iwan_joint_follows_its_balance():
-    """The closed loop of the static curve misses what a swing that loses 2 pi zeta of itself leaves open: 4 zeta."""
+def test_always_iwan_decay_agrees_with_quasi_static_backbone():
+    """The decay of an Iwan joint agrees with its quasi-static backbone within the errors and 4 zeta.
+
+    The term 4 zeta is the change within one cycle.
+    """
     text = (
         POINT
         + make_friction_table("iwan")
@@ -188,8 +204,11 @@ cycles = 60
 """
 
 
-def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
-    """Another mode rings beside it, so the turns of the output tell of neither. No point is as uncertain as large."""
+def test_exact_decay_that_ends_stuck_has_stuck_eigenvalue():
+    """A decay that ends stuck has frequency and damping of the eigenvalue of the stuck rig.
+
+    They agree within 1e-9 and 1e-7, although another mode rings too.
+    """
     done = pf.run(TWO_MODES)
     omega = 2 * np.pi * np.array([40.0, 131.0])
     slide = np.array([1.0, 0.7])
@@ -238,7 +257,7 @@ cycles = 60
 )
 
 
-def mindlins(amplitude, stuck: float, slide: float):
+def mindlin_damping(amplitude, stuck: float, slide: float):
     """Damping ratio of CROWNED at amplitudes [m] of the output, its mode held at `stuck` [Hz].
 
     A crown gives way by du/dQ = 1/K - ln(1 - Q/(mu P))/(pi E* b) under a force Q (Jaeger 1998: as under the normal load
@@ -264,14 +283,14 @@ def mindlins(amplitude, stuck: float, slide: float):
 
 
 @pytest.mark.parametrize("slide", [1.0, 0.03])
-def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
-    """Of (6.3632 +- 0.0076)e-5 at 9.13 nm, where neither mesh slips, Mindlin's 2.3e-4 was no part."""
+def test_always_decay_errors_cover_mindlin_damping(slide):
+    """The errors of a decay cover Mindlin's damping at amplitudes where no node of the mesh slips."""
     a = np.array([9.13e-9, 6e-8]) / slide
     found = compute_backbone(
         pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",)
     )
     one = found.curves["decay"]
-    law = mindlins(a, found.frequencies.stuck, slide)
+    law = mindlin_damping(a, found.frequencies.stuck, slide)
     assert one.amplitude.size == a.size
     assert (np.abs(one.damping - law) <= one.damping_error).all()
     assert one.damping[0] == pytest.approx(0.002 * 150 / found.frequencies.stuck, rel=2e-3)
@@ -280,16 +299,19 @@ def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
     assert (one.damping_error < 0.1 * one.damping)[-1]
 
 
-def test_a_release_and_what_rings_hold_mindlins_damping():
+def test_always_release_and_ringing_errors_cover_mindlin_damping():
+    """The errors of the decay curve and of the ringing cover Mindlin's damping."""
     result = pf.run(CROWNED)
     decay = result.extra["decay"]
     ring = result.measures["ring_damping"]
     stuck = result.measures["ring_frequency"].value
     known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
-    law = mindlins(decay.amplitude[known], stuck, 1.0)
+    law = mindlin_damping(decay.amplitude[known], stuck, 1.0)
     assert known.size > 20 and law.max() > 2e-4
     assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
-    beside = mindlins(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[0]
+    beside = mindlin_damping(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[
+        0
+    ]
     assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
 
 
@@ -308,7 +330,8 @@ cycles = 12
 )
 
 
-def test_a_release_states_what_its_errors_leave_out():
+def test_always_release_note_names_omitted_errors():
+    """A note states that the errors of a decay omit the energy lost in slip, and why."""
     result = pf.run(BEHIND_BONDS)
     said = "the errors of ring_frequency and ring_damping and of the decay curve include "
     (note,) = [one for one in result.notes if one.startswith("the errors of")]
@@ -337,7 +360,8 @@ def test_a_release_states_what_its_errors_leave_out():
         ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes"),
     ],
 )
-def test_without_a_static_loop_the_error_of_the_mesh_has_a_reason(old, new, why):
+def test_always_missing_static_loop_gives_reason(old, new, why):
+    """If the friction law has no static loop, the mesh error of a decay is zero and has a reason."""
     scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
         old, new, 1
     )
@@ -348,8 +372,11 @@ def test_without_a_static_loop_the_error_of_the_mesh_has_a_reason(old, new, why)
 
 
 @pytest.mark.parametrize("begin", [0.0, 100.0])
-def test_exact_a_reversal_at_which_the_force_jumps_is_extrapolated_from_both_sides(begin):
-    """Two parabolas that meet at their crests, of accelerations 1 and 3: the cubic across the jump is bent by it."""
+def test_exact_reversal_with_force_jump_is_extrapolated(begin):
+    """A reversal at which the acceleration jumps is found within 1e-12 by extrapolation from both sides.
+
+    A cubic across the jump misses it by more than 2e-4.
+    """
     crests = begin + np.array([0.2537, 0.7421])
     time = begin + np.arange(0.0, 1.0, 0.02)
     place = np.empty(time.size)

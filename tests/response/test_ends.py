@@ -1,4 +1,4 @@
-"""What a window that lies a share of a step elsewhere changes, beside the measures of that window."""
+"""Change of measures if the end of their window lies a fraction of a step elsewhere."""
 
 import numpy as np
 import pytest
@@ -11,8 +11,8 @@ from patchfem.response.run_events import slips_and_displacements
 PERIOD, STEPS = 1.0, 4000
 
 
-def window(end, cycles):
-    """Samples of a growing motion that drifts, with a force of its own, over the last `cycles` before a time."""
+def make_window(end, cycles):
+    """Return samples of a growing, drifting motion with a force over the last `cycles` before `end`."""
     t = np.linspace(end - cycles, end, max(round(cycles * STEPS), 4) + 1)
     y = np.exp(0.3 * t) * np.sin(5 * t)
     v = np.exp(0.3 * t) * (0.3 * np.sin(5 * t) + 5 * np.cos(5 * t))
@@ -21,8 +21,8 @@ def window(end, cycles):
     return Response(t, y[:, None], v[:, None], y, v, y, v, a, 0 * t, force, y - 0.1 * force)
 
 
-def read(w, cycles):
-    """The measures by their definitions."""
+def compute_measures(w, cycles):
+    """Return the measures of a window by their definitions."""
     return {
         "drift_per_cycle": mean_drift(w.time, w.slide, w.slide_rate, PERIOD),
         "loop_area": float(np.trapezoid(w.force, w.slide)) / cycles,
@@ -36,17 +36,21 @@ def read(w, cycles):
 
 @pytest.mark.parametrize("cycles", [1.0, 3.0])
 @pytest.mark.parametrize("end", [3.7, 4.05])
-def test_exact_to_first_order_a_window_elsewhere(cycles, end):
+def test_exact_window_shift_changes_measures_to_first_order(cycles, end):
+    """The estimated change of each measure agrees with that of a shifted window within 5 %."""
     offset = 0.05
-    here, there = (read(window(e, cycles), cycles) for e in (end, end + offset / STEPS))
+    here, there = (
+        compute_measures(make_window(e, cycles), cycles) for e in (end, end + offset / STEPS)
+    )
     # the run begins where it began
-    last = read(window(end + offset / STEPS, offset / STEPS), 1.0)["friction_work"]
+    last = compute_measures(make_window(end + offset / STEPS, offset / STEPS), 1.0)["friction_work"]
     there["friction_work"] = here["friction_work"] + last
-    found = estimate_window_error(window(end, cycles), PERIOD, offset)
+    found = estimate_window_error(make_window(end, cycles), PERIOD, offset)
     for name, value in here.items():
         assert abs(there[name] - value) == pytest.approx(found[name], rel=0.05, abs=3e-7), name
     assert found["stick_fraction"] == pytest.approx(offset / (cycles * STEPS))
 
 
-def test_always_an_end_at_a_sample_leaves_nothing_open():
-    assert estimate_window_error(window(3.7, 3.0), PERIOD, 0.0) == {}
+def test_always_window_end_at_sample_has_no_error():
+    """A window that ends at a sample has no error of its end."""
+    assert estimate_window_error(make_window(3.7, 3.0), PERIOD, 0.0) == {}

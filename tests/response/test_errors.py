@@ -1,4 +1,4 @@
-"""Do stated errors hold the true error? Sequences of known order, and random rigs against themselves far finer."""
+"""Stated errors compared with true errors: sequences of known order, and random rigs with far finer steps."""
 
 from dataclasses import replace
 
@@ -52,7 +52,8 @@ slide = {}
 """
 
 
-def random_scene(rng):
+def make_random_scene(rng):
+    """Return a random rig with the law nonlocal or elastic-plastic."""
     other = OTHER.format(rng.uniform(60, 400), rng.uniform(0.05, 0.3)) if rng.random() < 0.5 else ""
     return scene.loads(
         TEXT.format(
@@ -67,12 +68,15 @@ def random_scene(rng):
     )
 
 
-def coverage(count, seed, finest=12800):
-    """Share of stated errors of random rigs at 400 steps a cycle that hold, off `finest` steps."""
+def coverage_of_errors(count, seed, finest=12800):
+    """Return the fraction of stated errors of random rigs that cover the difference to `finest` steps.
+
+    The rigs are computed with 400 steps per cycle.
+    """
     rng = np.random.default_rng(seed)
     held = []
     for _ in range(count):
-        model = build(random_scene(rng))
+        model = build(make_random_scene(rng))
         numerics = choose_numerics(model)
         runs = {
             n: rig_march.run_march(model, replace(numerics, steps=n), None).values
@@ -86,33 +90,34 @@ def coverage(count, seed, finest=12800):
     return float(np.mean(held))
 
 
-def test_always_stated_errors_hold_the_true_error():
-    assert coverage(6, 5, 6400) >= 0.95
+def test_always_stated_errors_cover_true_errors():
+    """At least 95 % of the stated errors of six random rigs cover the true errors."""
+    assert coverage_of_errors(6, 5, 6400) >= 0.95
 
 
-def values_at(*steps, order, size=1e-3):
-    """Runs whose value is 1 with an error of size * h**order at each step h."""
+def make_sequence(*steps, order, size=1e-3):
+    """Return runs whose value is 1 with an error of size * h**order at each step h."""
     return [{NAME: 1 + size * h**order} for h in steps]
 
 
 @pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
 @pytest.mark.parametrize("size", [1e-3, -1e-3])
 @pytest.mark.parametrize("count", [3, 4, 5])
-def test_exact_a_sequence_of_known_order_has_its_error(order, size, count):
-    """Three runs or more show the order, whatever the sign: the stated error is SAFETY times the true one."""
-    runs = values_at(*2.0 ** np.arange(count), order=order, size=size)
+def test_exact_error_of_sequence_of_known_order(order, size, count):
+    """For three or more runs of a known order, the stated error is SAFETY_FACTOR times the true error."""
+    runs = make_sequence(*2.0 ** np.arange(count), order=order, size=size)
     assert convergence_errors(*runs)[NAME] == pytest.approx(SAFETY_FACTOR * abs(size), rel=1e-9)
 
 
 @pytest.mark.parametrize("order", [0.5, 0.8, 3.0, 4.0])
-def test_always_the_error_of_another_order_is_held(order):
-    """From an order of 1/2 to one of 4, of which no more than the second is believed."""
-    assert convergence_errors(*values_at(1, 2, 4, order=order))[NAME] >= 1e-3
+def test_always_errors_cover_orders_from_half_to_four(order):
+    """The stated error covers the true one for orders from 1/2 to 4, although orders above 2 count as 2."""
+    assert convergence_errors(*make_sequence(1, 2, 4, order=order))[NAME] >= 1e-3
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_always_an_irregular_sequence_is_held(seed):
-    """Errors of either sign of up to h^p, as reversals between two steps leave them: 95 % of the errors hold."""
+def test_always_errors_cover_irregular_sequences(seed):
+    """At least 95 % of the errors cover irregular sequences with errors of either sign up to h^p."""
     rng = np.random.default_rng(seed)
     errors = 2.0 ** (rng.uniform(1, 2, 400) * np.arange(3)[:, None]) * rng.uniform(-1, 1, (3, 400))
     assert (
@@ -124,27 +129,29 @@ def test_always_an_irregular_sequence_is_held(seed):
 
 
 @pytest.mark.parametrize(("ratio", "order"), [(2.0, 1.0), (2.0, 2.0), (4.0, 2.0), (30.0, 1.0)])
-def test_exact_two_runs_take_the_order_that_is_declared(ratio, order):
-    """The largest of several changes counts; a measure that a coarser run does not have gets no error."""
-    fine, coarse = values_at(1.0, ratio, order=order)
+def test_exact_two_runs_use_given_order(ratio, order):
+    """For two runs the given order determines the error; a measure absent from the coarser run gets none."""
+    fine, coarse = make_sequence(1.0, ratio, order=order)
     found = coarser_errors(fine | {"loop_area": 1.0}, coarse, fine, ratio=ratio, order=order)
     assert found == {NAME: pytest.approx(SAFETY_FACTOR * 1e-3)}
 
 
-def test_exact_instants_of_events_are_of_first_order_in_the_cells_and_other_measures_of_second():
+def test_exact_cell_error_orders_of_measures():
+    """The error from the cells of a law is of first order for instants of events, and of second order for other measures."""
     fine = {"stick_fraction": 0.2, "loop_area": 1.0}
     coarse = {"stick_fraction": 0.21, "loop_area": 1.15}
     found = merged_cell_errors(fine, coarse, fine)
     assert found == {"stick_fraction": pytest.approx(0.01), "loop_area": pytest.approx(0.03)}
 
 
-def test_exact_a_phase_is_compared_modulo_pi():
+def test_exact_phase_difference_is_modulo_pi():
+    """The difference of two phases is taken modulo pi."""
     found = absolute_change({"slip_start_phase": 0.01}, {"slip_start_phase": np.pi - 0.01})
     assert found["slip_start_phase"] == pytest.approx(0.02)
 
 
-def test_exact_what_counts_samples_has_their_resolution():
-    """Runs that agree to the last digit: a share of time still hangs on the samples of a cycle."""
+def test_exact_time_fractions_have_sampling_error():
+    """Fractions of time and phases have an error of the sampling interval, even if all runs agree."""
     same = {"open_fraction": 0.25, "slip_start_phase": 0.6, "stick_fraction": 0.2, NAME: 1.0}
     assert step_errors(same, same, same, steps=128) == pytest.approx(
         {
@@ -178,9 +185,8 @@ method = "march"
 """
 
 
-def test_exact_a_small_drive_is_met_as_a_large_one():
-    """Drive and load a billion times smaller: the same steps and the same relative errors. With 1e-10 m beside 6e-14 m
-    any error was small enough."""
+def test_exact_errors_scale_with_drive():
+    """A rig with drive and load a billion times smaller takes the same steps and has the same relative errors."""
     large, small = (
         run(scene.loads(RUBBING.format(load=30 * size, size=5 * size))) for size in (1.0, 1e-9)
     )
@@ -196,9 +202,8 @@ def test_exact_a_small_drive_is_met_as_a_large_one():
     assert error_floor("loop_area", 1e-12) == 1e-10
 
 
-def test_exact_errors_depend_on_the_kind_of_measure():
-    """Error of the parts and a share of the value; a phase modulo pi is at most a quarter turn off; a balance is 0 but
-    for its error; a drift is a difference of means with digits of the amplitude."""
+def test_exact_error_rules_of_measure_kinds():
+    """Errors contain a relative part; a phase error is at most pi/2, and a drift error depends on the amplitude."""
     values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}
     parts = {NAME: 1e-6, "slip_start_phase": 1.8, "energy_balance": 1e-10, "drift_per_cycle": 1e-15}
     errors = [("steps", parts)]
@@ -214,10 +219,11 @@ def test_exact_errors_depend_on_the_kind_of_measure():
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
 
 
-def test_exact_orders_are_those_that_the_changes_show():
-    """h^p for p of 1, 2 and 4, which counts as 2; what does not fall, or does not change, has none."""
+def test_exact_observed_orders_of_sequences():
+    """The observed order of h^p is p, at most 2; a sequence that does not converge has none."""
 
-    def at(h):
+    def values_at_step(h):
+        """Return the values of all sequences at step h."""
         return {
             "one": 1 + h,
             "two": 1 + h**2,
@@ -227,7 +233,7 @@ def test_exact_orders_are_those_that_the_changes_show():
             "slow": h**0.3,
         }
 
-    found = observed_orders(at(1.0), at(2.0), at(4.0))
+    found = observed_orders(values_at_step(1.0), values_at_step(2.0), values_at_step(4.0))
     assert found == {
         "one": pytest.approx(1.0),
         "two": pytest.approx(2.0),

@@ -1,4 +1,4 @@
-"""The table of events: seen in samples, cut at its length, and the stick intervals between events."""
+"""The table of events: detection in samples, and the stick intervals between events."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from patchfem.response.events import Events, compute_slip_states, detect_events,
 from patchfem.response.run_events import select_last_cycle
 
 
-def stick_slip(rest=0.25):
-    """(time, slip): three cosine ways to and fro in 1 s, with a rest of `rest` of it at either end."""
+def make_stick_slip(rest=0.25):
+    """Return (time, slip) of three back-and-forth cosine strokes of 1 s with a rest at either end."""
     time = np.linspace(0, 3, 3 * 800 + 1)
     phase = time % 1.0
     half = 0.5 - rest
@@ -20,9 +20,12 @@ def stick_slip(rest=0.25):
     return time, rise - fall
 
 
-def test_exact_stops_and_releases_of_a_known_motion():
-    """Speed sin(pi t/half): it passes 1e-2 of its peak asin(0.01)/pi of the stroke from either end."""
-    time, slip = stick_slip()
+def test_exact_stops_and_releases_are_detected():
+    """Stops and releases of a known motion are found within a sample.
+
+    They are the instants at which the speed passes 1e-2 of its peak.
+    """
+    time, slip = make_stick_slip()
     found = detect_events(time, slip[:, None], 2 * slip[:, None], 1.0)
     early = 0.25 * np.arcsin(0.01) / np.pi
     wanted = [
@@ -38,8 +41,8 @@ def test_exact_stops_and_releases_of_a_known_motion():
     assert set(found.interface) == {1} and found.count == found.time.size
 
 
-def test_exact_reversals_without_a_stop():
-    """A sine sampled so coarsely that no sample falls into its slow parts."""
+def test_exact_reversals_without_stop_are_detected():
+    """Reversals of a coarsely sampled sine without a stop are found within 0.01 of a period."""
     time = np.linspace(0, 4, 4 * 20 + 1) + 0.01
     found = detect_events(
         time, np.sin(2 * np.pi * time)[:, None], np.sin(2 * np.pi * time)[:, None], 1.0
@@ -48,8 +51,9 @@ def test_exact_reversals_without_a_stop():
     assert found.time == pytest.approx(0.25 + 0.5 * np.arange(8), abs=0.01)
 
 
-def test_exact_a_slip_below_the_bound_is_no_event():
-    time, slip = stick_slip()
+def test_exact_slip_below_threshold_gives_no_event():
+    """Slip below the threshold gives no event."""
+    time, slip = make_stick_slip()
     assert (
         detect_events(time, 1e-9 * slip[:, None], slip[:, None], 1.0, max_stick_slip=1e-8).time.size
         == 0
@@ -58,8 +62,9 @@ def test_exact_a_slip_below_the_bound_is_no_event():
 
 
 @given(st.floats(0.05, 0.4), st.floats(0, 1.3), st.floats(1.6, 3))
-def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end):
-    time, slip = stick_slip(rest=rest)
+def test_always_stick_intervals_and_slip_fill_window(rest, begin, end):
+    """The total stick time between events agrees with that of the samples within eight samples."""
+    time, slip = make_stick_slip(rest=rest)
     found = detect_events(time, slip[:, None], slip[:, None], 1.0)
     spans = find_stick_spans(found, begin, end, [True])
     held = sum(b - a for a, b in spans)
@@ -70,8 +75,11 @@ def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end
     assert all(b > a for a, b in spans)
 
 
-def test_exact_sticks_are_cut_where_another_interface_changes():
-    """The first one sticks from 1 to 9; the second slips from 0 to 2 and from 6 to 7: stuck together 2..6 and 7..9."""
+def test_exact_stick_intervals_of_two_interfaces_are_intersected():
+    """The stick intervals of two interfaces are the times in which both stick:
+
+    2 to 6 and 7 to 9.
+    """
     rows = [
         (1, 1, events.STOP),
         (2, 2, events.STOP),
@@ -84,9 +92,8 @@ def test_exact_sticks_are_cut_where_another_interface_changes():
     assert find_stick_spans(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
 
 
-def test_exact_sticks_of_one_cycle_are_whole():
-    """Two a period, of which the first and the last are cut by the window: those of the last cycle but one count;
-    a stick that outlasts its cycle stands for none."""
+def test_exact_stick_intervals_of_last_whole_cycle():
+    """The selected stick intervals are whole and lie in the last cycle but one; one longer than a cycle is omitted."""
     sticks_of_all = [
         (0.0, 0.2),
         (0.4, 0.7),

@@ -1,4 +1,4 @@
-"""Levels: brackets, jumps and hysteresis of a table, onset by halving on scenes."""
+"""Drive levels: onset of slip, jumps and hysteresis of a table, and onsets found by bisection."""
 
 import numpy as np
 import pytest
@@ -41,33 +41,39 @@ tolerance = 1e-3
 ONSET = 0.3 * 26 * 4.4482216152605 / 0.884
 
 
-def level(drive, amplitude, stuck=False, error=0.0):
+def make_level(drive, amplitude, stuck=False, error=0.0):
+    """Return a drive level with an amplitude and its error."""
     return Level(drive, stuck, {NAME: amplitude}, {NAME: error})
 
 
-def test_exact_bracket_jump_and_hysteresis_of_a_table():
+def test_exact_onset_jump_and_hysteresis_of_table():
+    """Onset bracket, largest jump and largest hysteresis of a table of levels are those computed by hand."""
     table = [
-        level(3, 0.0, True),
-        level(4, 0.0, True),
-        level(5, 1.0),
-        level(6, 6.0, error=0.1),
-        level(5, 1.5, error=0.2),
-        level(4, 0.4),
+        make_level(3, 0.0, True),
+        make_level(4, 0.0, True),
+        make_level(5, 1.0),
+        make_level(6, 6.0, error=0.1),
+        make_level(5, 1.5, error=0.2),
+        make_level(4, 0.4),
     ]
     slips = make_onset_test("slip")
     assert bracket_onset(table, slips) == (1, 2)
     assert bracket_onset(table[2:], slips) == (-1, 0)
     assert bracket_onset(table[:2], slips) is None
-    assert bracket_onset([level(4, 0, True), level(3, 0, True), level(3, 1.0)], slips) is None
+    assert (
+        bracket_onset([make_level(4, 0, True), make_level(3, 0, True), make_level(3, 1.0)], slips)
+        is None
+    )
     assert bracket_onset(table, make_onset_test("gauge", 2.0)) == (2, 3)
     assert largest_jump(table) == (6, pytest.approx(6 * 5 / 6), 1)
     # not the widest of the table
-    assert largest_jump([level(1, 1.0), level(4, 4.1), level(4.5, 9.0)])[2] == 0.5
+    assert largest_jump([make_level(1, 1.0), make_level(4, 4.1), make_level(4.5, 9.0)])[2] == 0.5
     assert largest_hysteresis(table) == (pytest.approx(0.5), pytest.approx(0.2))
     assert largest_hysteresis(table[:4]) is None and largest_jump(table[:2]) is None
 
 
-def measured(law, levels, method="", cycles=30):
+def run_levels(law, levels, method="", cycles=30):
+    """Return the result and the measures of a rig at several drive levels."""
     result = run(
         loads(RIG.format(law=law, levels=levels, method=method), sets=[f"drive.cycles={cycles}"])
     )
@@ -75,9 +81,9 @@ def measured(law, levels, method="", cycles=30):
 
 
 @pytest.mark.parametrize("levels", ['["3 g", "3.9 g", "4.5 g", "3.9 g"]', '["4.5 g", "5 g"]'])
-def test_exact_onset_of_a_rigid_block_is_mu_n_over_m(levels):
-    """By the event engine: |a| = mu N/m, to the tolerance of the halving; from rest where the first level slips."""
-    result, found = measured('law = "coulomb"', levels)
+def test_exact_onset_of_rigid_block_is_mu_n_over_m(levels):
+    """The onset level of a rigid block agrees with mu N/m within its error, at most 1e-3."""
+    result, found = run_levels('law = "coulomb"', levels)
     onset = found["onset_level"]
     assert abs(onset.value - ONSET) <= onset.error <= 1e-3 * ONSET
     table = result.extra["levels"]
@@ -87,16 +93,17 @@ def test_exact_onset_of_a_rigid_block_is_mu_n_over_m(levels):
     assert np.all(np.diff(result.response.time) >= 0)
 
 
-def test_exact_no_onset_where_every_level_holds():
-    _, found = measured('law = "coulomb"', '["1 g", "3 g"]')
+def test_exact_no_onset_below_friction_limit():
+    """Without slip at any level, onset and jump are absent and have a reason."""
+    _, found = run_levels('law = "coulomb"', '["1 g", "3 g"]')
     assert found["onset_level"].value is None
     assert found["onset_level"].reason == "no level of the increasing sequence slips"
     assert found["jump_level"].value is None
     assert f"below {MIN_JUMP_FACTOR:g} times" in found["jump_level"].reason
 
 
-def alone(level: str, cycles: int = 30):
-    """A run at one level [g] from rest, as a block that held until then has it."""
+def run_single_level(level: str, cycles: int = 30):
+    """Return a run at one drive level [g] from rest."""
     text = (
         RIG.format(law='law = "coulomb"', levels='["1 g"]', method="")
         .replace('waveform = "levels"\n', "")
@@ -105,8 +112,8 @@ def alone(level: str, cycles: int = 30):
     return run(loads(text), estimate=False)
 
 
-def third(window) -> float:
-    """Third over first harmonic of the acceleration in the window, by the trapezoidal rule on its uneven samples."""
+def third_harmonic_ratio(window) -> float:
+    """Return the ratio of the third to the first harmonic of the acceleration in a window."""
     wave = [
         np.trapezoid(window.acceleration * np.exp(-2j * np.pi * n * 143 * window.time), window.time)
         for n in (1, 3)
@@ -114,25 +121,30 @@ def third(window) -> float:
     return abs(wave[1] / wave[0])
 
 
-def test_exact_onset_by_distortion_is_where_the_third_harmonic_passes_three_percent():
-    """The default. A block that slips by 1e-8 m at 4.01 g shows nothing in the acceleration; a person reads 4.2 g."""
+def test_exact_distortion_onset_has_three_percent_third_harmonic():
+    """At the onset by distortion, the default, the third harmonic of the acceleration passes 3 % of the first."""
     text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "5 g"]', method="").replace(
         'onset = "slip"\n', ""
     )
     onset = run(loads(text)).measures["onset_level"]
     assert onset.value > 1.005 * ONSET and onset.error <= 1e-3 * onset.value
-    below, above = (third(alone((onset.value + way * onset.error) / G_N).window) for way in (-1, 1))
+    below, above = (
+        third_harmonic_ratio(run_single_level((onset.value + way * onset.error) / G_N).window)
+        for way in (-1, 1)
+    )
     assert below < 0.03 < above < 0.031
 
 
-def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
+def test_exact_gauge_onset_has_given_amplitude():
+    """At the onset by a gauge, the amplitude of the output passes the given length."""
     text = RIG.format(law='law = "coulomb"', levels='["3.9 g", "4.8 g", "6 g"]', method="")
     found = run(
         loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "0.1 mil"'))
     ).measures
     onset = found["onset_level"]
     below, above = (
-        alone((onset.value + way * onset.error) / G_N).measures[NAME].value for way in (-1, 1)
+        run_single_level((onset.value + way * onset.error) / G_N).measures[NAME].value
+        for way in (-1, 1)
     )
     assert below < 2.54e-6 < above < 1.03 * 2.54e-6
     never = run(
@@ -146,8 +158,8 @@ def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["", 'method = "march"\nsteps_per_cycle = 200'])
-def test_exact_onset_of_a_force_drive_is_mu_n(method):
-    """Levels of a force, in newtons: the held block slips where the force passes mu N."""
+def test_exact_onset_of_force_drive_is_mu_n(method):
+    """The onset level of a force drive agrees with mu N within its error."""
     text = RIG.format(
         law='law = "coulomb"', levels='["20 N", "5.5 lbf", "40 N", "50 N"]', method=method
     ).replace('kind = "base"', 'kind = "force"')
@@ -164,8 +176,8 @@ def test_exact_onset_of_a_force_drive_is_mu_n(method):
 def test_exact_levels_by_the_march_are_those_of_the_event_engine():
     """Coulomb: each level's amplitude within its error, onset by forks of the march."""
     levels = '["3.5 g", "4.4 g", "4.8 g", "4.4 g"]'
-    exact, _ = measured('law = "coulomb"', levels, cycles=12)
-    march, found = measured(
+    exact, _ = run_levels('law = "coulomb"', levels, cycles=12)
+    march, found = run_levels(
         'law = "coulomb"', levels, 'method = "march"\nsteps_per_cycle = 800', 12
     )
     for a, b in zip(exact.extra["levels"], march.extra["levels"]):

@@ -1,4 +1,4 @@
-"""The friction loop of a window: range, stiffness, damping and drift, from even and from uneven samples."""
+"""The friction loop of a window: range, stiffness, damping and drift, from uniform and non-uniform samples."""
 
 from math import acos, pi, sin
 
@@ -38,8 +38,8 @@ def unevenly(count, steps):
     return time, OMEGA * time
 
 
-def coefficients(time, slide, force):
-    """First Fourier coefficients of slide and force by the trapezium rule."""
+def fourier_coefficients(time, slide, force):
+    """Return the first Fourier coefficients of slide and force by the trapezoidal rule."""
     weight = np.full(time.size, 1.0)
     weight[[0, -1]] = 0.5
     return compute_harmonic(time, weight, slide - slide.mean(), OMEGA), compute_harmonic(
@@ -50,8 +50,8 @@ def coefficients(time, slide, force):
 # stiffness and damping
 
 
-def jenkins_loop(amplitude, length, steps):
-    """(time, slide, rate, force) of the second of two cycles of a slider of length 1 behind a spring 1/length."""
+def simulate_jenkins_loop(amplitude, length, steps):
+    """Return time, slide, rate and force of the second of two cycles of a Jenkins element."""
     time, phase = evenly(2, steps)
     slide = amplitude * np.sin(phase)
     force = np.zeros(phase.size)
@@ -64,16 +64,18 @@ def jenkins_loop(amplitude, length, steps):
 
 
 @pytest.mark.parametrize("amplitude, length", [(3.0, 1.0), (1.5, 1.0), (1.0, 2.0)])
-def test_exact_loop_of_a_jenkins_element(amplitude, length):
-    """The first harmonic of a bilinear loop (Caughey 1960), its area, and the line between its ends."""
-    t, q, v, f = jenkins_loop(amplitude, length, 20_000)
+def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
+    """Area, secant and equivalent stiffness of a bilinear loop agree with the closed form (Caughey 1960) within 1e-6."""
+    t, q, v, f = simulate_jenkins_loop(amplitude, length, 20_000)
     work = np.sum((f[1:] + f[:-1]) / 2 * np.diff(q))
     area, _ = friction_forms.jenkins_loop(amplitude, length)
     assert work == pytest.approx(float(area), rel=1e-6, abs=1e-12)
     turns = loops.find_reversals(t, q, v, f, PERIOD)
     assert loops.mean_half_range(turns) == pytest.approx(amplitude, rel=1e-12)
     assert loops.secant_stiffness(turns) == pytest.approx(1 / max(amplitude, length), rel=1e-9)
-    found = loops.interface_loop(loops.mean_half_range(turns), *coefficients(t, q, f), work, 0.5)
+    found = loops.interface_loop(
+        loops.mean_half_range(turns), *fourier_coefficients(t, q, f), work, 0.5
+    )
     turn = acos(1 - 2 * length / amplitude) if amplitude > length else pi
     stiffness = (turn - sin(2 * turn) / 2) / (pi * length)
     assert found["loop_area"] == work
@@ -85,10 +87,13 @@ def test_exact_loop_of_a_jenkins_element(amplitude, length):
 
 @given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
 def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope, shift):
+    """The stiffness of a loop is independent of the offset and the phase of the slide."""
     time, phase = evenly(1, 128)
     slide = offset + amplitude * np.sin(phase + shift)
     force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
-    found = loops.interface_loop(np.ptp(slide) / 2, *coefficients(time, slide, force), 1.0, 0.0)
+    found = loops.interface_loop(
+        np.ptp(slide) / 2, *fourier_coefficients(time, slide, force), 1.0, 0.0
+    )
     assert found["equivalent_stiffness"] == pytest.approx(slope, abs=1e-10)
     turns = loops.find_reversals(
         time, slide, amplitude * OMEGA * np.cos(phase + shift), slope * (slide - offset), PERIOD
@@ -98,8 +103,8 @@ def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope
     assert loops.secant_stiffness(turns) == pytest.approx(slope, abs=1e-3)
 
 
-def test_order_range_between_the_samples():
-    """The samples miss both ends of a sine by 0.35 of a step."""
+def test_order_half_range_between_samples_is_four():
+    """The error of the half range falls with the fourth power of the step."""
     errors = []
     for steps in (20, 40, 80):
         phase = 2 * pi * (np.arange(3 * steps + 1) + 0.35) / steps
@@ -114,9 +119,8 @@ def test_order_range_between_the_samples():
 
 @pytest.mark.parametrize("rest", [0.0, 0.2, 0.9])
 @pytest.mark.parametrize("fall", [0.0, 0.4])
-def test_exact_secant_where_the_force_jumps(rest, fall):
-    """A slide that rests for `rest` rad at its ends, the friction 1 - fall before a rest, at -1 after it begins again:
-    the rest itself and what holds there do not count, only the two sides."""
+def test_exact_secant_stiffness_at_force_jump(rest, fall):
+    """The secant stiffness at a rest with jumps of the force depends only on the forces before and after the rest."""
     phase = 2 * pi * np.arange(3 * 400 + 1) / 400 - 1.0
     turn, part = np.divmod(phase, pi)
     way = 1 - 2 * (turn % 2)
@@ -133,9 +137,8 @@ def test_exact_secant_where_the_force_jumps(rest, fall):
 
 @pytest.mark.parametrize("early", [0.05, 0.3, 0.5, 0.8])
 @pytest.mark.parametrize("length", [1e-4, 1e-3, 2.0])
-def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
-    """A slider gives way over a length far below a step at the turn, and holds its limit there all the same; one that
-    holds has its own stiffness."""
+def test_exact_secant_stiffness_of_unresolved_reversal(length, early):
+    """The secant stiffness of a slider agrees with its limit within 1e-6, although no step resolves its elastic range."""
     phase = 2 * pi * (np.arange(3 * 100 + 1) + early) / 100
     slide = np.sin(phase)
     force = np.zeros(phase.size)
@@ -147,7 +150,8 @@ def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
     assert loops.secant_stiffness(turns) == pytest.approx(1 / max(1.0, length), rel=1e-6)
 
 
-def test_always_no_secant_without_slide_or_sides():
+def test_always_no_secant_without_reversals():
+    """A slide without reversals has no secant stiffness."""
     time = np.linspace(0, PERIOD, 9)
     zero = np.zeros(9)
     force = np.arange(9.0)
@@ -167,8 +171,8 @@ def test_always_no_secant_without_slide_or_sides():
 
 @pytest.mark.parametrize("samples", [evenly, unevenly])
 @pytest.mark.parametrize("count", [2, 5, 10])
-def test_exact_drift(count, samples):
-    """A mean by time: the crowded half of a cycle counts no more than the other."""
+def test_exact_mean_drift_of_nonuniform_samples(count, samples):
+    """The drift per cycle agrees with the true one within 1e-9, for uniform and non-uniform samples."""
     time, phase = samples(count, 60)
     slide = 3e-6 * np.sin(phase + 0.3) + 2e-7 * phase / (2 * pi) + 1e-6
     rate = OMEGA * (3e-6 * np.cos(phase + 0.3) + 2e-7 / (2 * pi))
@@ -179,8 +183,8 @@ def test_exact_drift(count, samples):
 # scenes
 
 
-def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
-    """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
+def sample_slide_densely(done, begin: float, samples: int = 20_000) -> np.ndarray:
+    """Return the slide (k,) [m] at the middles of equal parts of one cycle, by the event engine."""
     from patchfem.dynamics import make_coulomb_elements
     from patchfem.dynamics.events.histories import evaluate_motion
 
@@ -197,11 +201,10 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
 
 
 @pytest.mark.parametrize("more, drive", [("", "7 g"), ("", "5 g"), ("kinetic = 0.2", "5 g")])
-def test_exact_range_and_drift_of_an_exact_run(more, drive):
-    """A ring-up, sliding through and sticking: the last cycles by the engine's series at 20 000 instants a cycle. Both
-    bars hold; they did not while A came from Gauss nodes and the drift from a mean of uneven samples."""
+def test_exact_drift_and_damping_of_event_engine(more, drive):
+    """Drift and equivalent damping of a run agree within their errors with 20 000 samples per cycle of the exact motion."""
     done = run(BLOCK.format(more=more, drive=drive, cycles=21))
-    slides = [dense(done, begin) for begin in (19, 20)]
+    slides = [sample_slide_densely(done, begin) for begin in (19, 20)]
     drift = done.measures["drift_per_cycle"]
     damping = done.measures["equivalent_damping"]
     rough = 1e-8 * np.ptp(slides[0]) * 1e-3  # of the midpoint rule across stops: 1/20000^2
@@ -213,12 +216,11 @@ def test_exact_range_and_drift_of_an_exact_run(more, drive):
 
 
 @pytest.mark.parametrize("border, secant", [(0.05, None), (0.03, None), (0.002, 0.0), (0.0, 0.0)])
-def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, secant):
-    """A steep law of the rate: F = 0 at every turn, although F is not where a decaying slide is largest at a border.
+def test_exact_secant_of_rate_dependent_force_is_zero(border, secant):
+    """The secant stiffness of a force that depends on the rate is zero, as is the force at each reversal.
 
-    Where the largest slide is far from a turn there is no secant.
-
-    border: time from the last turn before the first cycle to its begin, over the period.
+    There is no secant if the largest slide lies far from a reversal. `border` is the time from the last reversal before
+    the first cycle to the beginning of this cycle, in periods.
     """
     decay = 0.02 * OMEGA
     turn = np.arctan2(-decay, OMEGA) / OMEGA  # exp(-decay t) cos(OMEGA t) is largest there
@@ -239,9 +241,12 @@ def test_exact_no_secant_of_a_force_that_is_zero_where_the_slide_turns(border, s
 
 
 @pytest.mark.parametrize("decay, early", [(0.3, 0.003), (-0.3, 0.997)])
-def test_exact_force_of_a_turn_between_a_border_and_the_sample_beyond_it(decay, early):
-    """A force in proportion to the rate is 0 where the slide turns: in the step before a cycle of a motion that falls,
-    in the one after a cycle of one that rises. decay over a period; early: of the turn before the cycle, in periods."""
+def test_exact_force_at_reversal_next_to_window_end(decay, early):
+    """The force at a reversal in the step next to the window is interpolated.
+
+    A force in proportion to the rate is zero there. `decay` is the exponent of the motion over a period, `early` the
+    time from the reversal to the beginning of the cycle, in periods.
+    """
     time = np.arange(401) / 100  # period 1
     # exp(-decay t) cos(angle) turns at -early, 1 - early
     angle = 2 * pi * (time + early) + np.arctan2(-decay, 2 * pi)

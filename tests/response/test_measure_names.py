@@ -1,4 +1,4 @@
-"""Units, floors and errors of the measures of further interfaces, and of a steady tail that has come to rest."""
+"""Floors of the measures of several interfaces."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,8 @@ from patchfem.core import Measure
 from patchfem.response import set_final_floors
 
 
-def test_exact_what_is_a_difference_is_judged_by_its_larger_terms():
-    """A drift of no size beside a slip of 10 um, that of its own interface; a share by the whole."""
+def test_exact_floors_of_differences_follow_amplitudes():
+    """The floor of a drift is relative to the slip of its interface, and that of a phase to its range."""
     found = {
         "slip_amplitude": Measure(1e-5, "m", 1e-9, 1e-10),
         "slip_amplitude_2": Measure(0.0, "m", 0.0, 1e-10),

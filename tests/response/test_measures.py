@@ -1,4 +1,4 @@
-"""Measures on signals whose answers are known by hand."""
+"""Measures of signals whose values are known in closed form."""
 
 from math import asin, cos, pi
 
@@ -16,7 +16,8 @@ OMEGA = 2 * pi * 143
 DRIVE = SineDrive(5 * G_N, OMEGA)
 
 
-def response(time, slip=None, slide=None, force=None, acceleration=None):
+def make_response(time, slip=None, slide=None, force=None, acceleration=None):
+    """Return a response with the given signals and zeros elsewhere."""
     zero = np.zeros(time.size)
     pick = [zero if v is None else v for v in (slip, slide, force, acceleration)]
     return Response(
@@ -41,8 +42,8 @@ def response(time, slip=None, slide=None, force=None, acceleration=None):
 
 
 @pytest.mark.parametrize("floor", [0.1, 0.2, 0.4])
-def test_exact_slip_with_pauses(floor):
-    """Slip speed sign(sin) max(|sin| - c, 0) of a slide with speed sin: half of it is slip where |sin| = 2 c."""
+def test_exact_slip_measures_with_stick_phases(floor):
+    """Slip amplitude, stick fraction and phase of a slip with pauses agree with the closed form."""
     steps = 8000
     time, _ = evenly(4, steps)
     start = asin(floor)
@@ -55,7 +56,7 @@ def test_exact_slip_with_pauses(floor):
         return np.where(turn % 2 == 0, one, full - one)
 
     found = measures.compute_slip_measures(
-        response(time, slip=stroke(OMEGA * time), slide=-np.cos(OMEGA * time)), DRIVE, steps
+        make_response(time, slip=stroke(OMEGA * time), slide=-np.cos(OMEGA * time)), DRIVE, steps
     )
     level = asin(2 * floor)
     assert found["slip_amplitude"] == pytest.approx(cos(start) - floor * (pi / 2 - start), rel=1e-6)
@@ -63,18 +64,20 @@ def test_exact_slip_with_pauses(floor):
     assert found["slip_start_phase"] == pytest.approx(level, abs=1e-6)
 
 
-def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
+def test_exact_slip_measures_at_rest_and_in_sliding():
+    """An interface at rest has a stick fraction of 1, and one in steady sliding of 0."""
     time, _ = evenly(2, 100)
-    still = measures.compute_slip_measures(response(time), DRIVE, 100)
+    still = measures.compute_slip_measures(make_response(time), DRIVE, 100)
     assert still == {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     steady = measures.compute_slip_measures(
-        response(time, slip=1e-3 * time, slide=2e-3 * time), DRIVE, 100
+        make_response(time, slip=1e-3 * time, slide=2e-3 * time), DRIVE, 100
     )
     assert steady["stick_fraction"] == 0.0 and "slip_start_phase" not in steady
 
 
 @given(st.floats(0, pi), st.floats(0, 0.22))
-def test_always_one_phase_of_starts_that_agree(middle, spread):
+def test_always_slip_start_phase_is_mean_modulo_pi(middle, spread):
+    """Slip starts that agree modulo pi have their mean as the phase."""
     found = measures.slip_start_measure(
         np.array([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
     )
@@ -84,7 +87,8 @@ def test_always_one_phase_of_starts_that_agree(middle, spread):
 
 
 @pytest.mark.parametrize("degrees", [[18, 51, 141, 170], [10, 60], []])
-def test_refuses_the_mean_of_several_slips_per_half_cycle(degrees):
+def test_refuses_phase_of_several_slips_per_half_cycle(degrees):
+    """Several slips per half cycle have no common start phase."""
     assert measures.slip_start_measure(np.radians(np.array(degrees, float))) == {}
 
 
@@ -92,38 +96,40 @@ def test_refuses_the_mean_of_several_slips_per_half_cycle(degrees):
 
 
 @pytest.mark.parametrize("shift", [0.3, 0.4, 0.5])
-def test_order_acceleration_peak_between_samples(shift):
-    """The top lies `shift` steps beside a sample; the parabola through three samples misses it by O(h^4)."""
+def test_order_acceleration_peak_is_four(shift):
+    """The error of the acceleration peak between samples falls with the fourth power of the step."""
     errors = []
     steps = (50, 100, 200)
     for count in steps:
         time, phase = evenly(2, count)
         top = (7 + shift) * 2 * pi / count
         found = measures.compute_acceleration_peak(
-            response(time, acceleration=-7 * np.cos(phase - top))
+            make_response(time, acceleration=-7 * np.cos(phase - top))
         )
         errors.append(abs(found / 7 - 1))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx(4, abs=0.1)
     assert errors[-1] < (2 * pi / steps[-1]) ** 4 / 30
 
 
-def test_exact_acceleration_peak_of_a_parabola_and_of_a_jump():
+def test_exact_acceleration_peak_of_parabola_and_jump():
+    """The peak of a parabola is exact, and that of a jump is the largest sample with its sampling error."""
     time = np.linspace(0, 1, 21)
-    round_top = response(time, acceleration=40 - 3 * (time - 0.513) ** 2)
+    round_top = make_response(time, acceleration=40 - 3 * (time - 0.513) ** 2)
     assert measures.compute_acceleration_peak(round_top) == pytest.approx(40.0, rel=1e-14)
-    jump = response(time, acceleration=np.where(time < 0.5, time, -0.2))
+    jump = make_response(time, acceleration=np.where(time < 0.5, time, -0.2))
     assert measures.compute_acceleration_peak(jump) == pytest.approx(0.45, rel=0.01)
     # its parabola rises by .07
-    small = response(time, acceleration=40 + np.where(time < 0.52, time, time - 0.9))
+    small = make_response(time, acceleration=40 + np.where(time < 0.52, time, time - 0.9))
     assert measures.compute_acceleration_peak(small) == 40.5
     # a step on the slope
     assert measures.peak_sampling_errors(small)["absolute_acceleration_peak"] == pytest.approx(0.05)
     assert measures.peak_sampling_errors(round_top) == {}
-    edge = response(time, acceleration=time)
+    edge = make_response(time, acceleration=time)
     assert measures.compute_acceleration_peak(edge) == 1.0
 
 
 def test_exact_window_amplitudes():
+    """The amplitudes of windows of cycles are half the range of their extremes, counted from the end."""
     low = -np.arange(1.0, 8.0)
     high = 2 * np.arange(1.0, 8.0)
     extremes = np.column_stack([low, high])
@@ -135,7 +141,8 @@ def test_exact_window_amplitudes():
     np.testing.assert_array_equal(measures.window_amplitudes(extremes, 1), (high - low) / 2)
 
 
-def test_order_extremes_of_a_sine():
+def test_order_hermite_extremes_is_four():
+    """The error of the extremes of a sine falls with the fourth power of the step."""
     errors = []
     for steps in (20, 40, 80):
         _, phase = evenly(1, steps)

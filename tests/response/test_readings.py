@@ -1,4 +1,4 @@
-"""What an accelerometer shows, on motions whose harmonics are known."""
+"""Readings of an accelerometer for motions with known harmonics."""
 
 import numpy as np
 import pytest
@@ -10,8 +10,8 @@ from patchfem.response.spectrum import READINGS
 OMEGA = 2 * np.pi * 143
 
 
-def motion(drive, count=2000):
-    """A cycle of y = sum c_n exp(i n w t) with n = 1, 2, 3, and the absolute acceleration of its own."""
+def make_motion(drive, count=2000):
+    """Return one cycle of a motion with three harmonics, and the harmonics of its acceleration."""
     parts = {1: 3e-5 - 1e-5j, 2: 4e-6j, 3: -2e-6 + 1e-6j}
     t = np.linspace(0, 2 * np.pi / OMEGA, count + 1)
     y, v, a = (
@@ -28,8 +28,9 @@ def motion(drive, count=2000):
 
 @pytest.mark.parametrize("moving", [True, False])
 def test_exact_readings_of_known_harmonics(moving):
+    """Peak, fundamental, rms and low-pass readings agree with those computed from the known harmonics."""
     drive = SineDrive(30.0, OMEGA, moving)
-    window, total = motion(drive)
+    window, total = make_motion(drive)
     peak = float(np.abs(window.acceleration).max())
     assert read_instrument(window, drive, peak) == peak
     assert read_instrument(window, drive, peak, "fundamental") == pytest.approx(
@@ -50,14 +51,16 @@ def test_exact_readings_of_known_harmonics(moving):
         )
 
 
-def test_always_a_high_cutoff_passes_everything():
+def test_always_high_cutoff_gives_peak():
+    """A low-pass reading with a high cutoff agrees with the peak within 1e-3."""
     drive = SineDrive(30.0, OMEGA)
-    window, _ = motion(drive)
+    window, _ = make_motion(drive)
     peak = float(np.abs(window.acceleration).max())
     assert read_instrument(window, drive, peak, "lowpass", 1e6) == pytest.approx(peak, rel=1e-3)
 
 
-def test_refuses_a_reading_that_is_none():
+def test_refuses_unknown_reading():
+    """An unknown reading is refused with the list of readings."""
     drive = SineDrive(30.0, OMEGA)
     with pytest.raises(ValueError, match=", ".join(READINGS)):
-        read_instrument(motion(drive)[0], drive, 1.0, "mean")
+        read_instrument(make_motion(drive)[0], drive, 1.0, "mean")

@@ -1,4 +1,4 @@
-"""Why a run has no value of a measure: loops that do not close, a ratio of zeros."""
+"""Reasons for absent measures, such as a loop that does not close."""
 
 from types import SimpleNamespace
 
@@ -32,8 +32,8 @@ cycles = {cycles}
 """
 
 
-def seen(stored: float, lost: float) -> SimpleNamespace:
-    """Two cycles in which an interface stores and dissipates so much [J]."""
+def make_window(stored: float, lost: float) -> SimpleNamespace:
+    """Return two cycles in which an interface stores and dissipates the given energies [J]."""
     time = np.linspace(0.3, 0.5, 5)
     rise = np.linspace(0, 1, 5)
     ledger = np.stack([(stored + lost) * rise, 7.0 + stored * rise, 2.0 + lost * rise, 0 * rise])
@@ -52,9 +52,10 @@ def seen(stored: float, lost: float) -> SimpleNamespace:
         (-2.1e-10, 0.0, True),
     ],
 )  # the floor is 1e-10 J a cycle
-def test_exact_a_loop_closes_that_stores_no_more_than_it_dissipates(stored, lost, open_):
+def test_exact_loop_area_needs_dissipation_above_storage(stored, lost, open_):
+    """A loop that stores more energy than it dissipates is not closed and has no area."""
     area = Measure((stored + lost) / 2, "J", 0.0, 1e-10)
-    found = find_missing_loops({"loop_area": area}, seen(stored, lost), FREE)
+    found = find_missing_loops({"loop_area": area}, make_window(stored, lost), FREE)
     assert set(found) == ({"loop_area"} if open_ else set())
     if open_:
         one = found["loop_area"]
@@ -71,10 +72,9 @@ def test_exact_a_loop_closes_that_stores_no_more_than_it_dissipates(stored, lost
     ("second", "created", "opened"),
     [(-1e-6, 0.0, True), (1e-6, 0.0, False), (-1e-8, 0.0, False), (-1e-6, 1e-6, False)],
 )
-def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than_it_takes(
-    second, created, opened
-):
-    window = seen(-3e-6, 4e-6)
+def test_exact_loop_with_negative_work_is_open(second, created, opened):
+    """A loop of several that returns energy without a source is not closed and has no area."""
+    window = make_window(-3e-6, 4e-6)
     window.extra["ledger"][3] = np.linspace(0, created, 5)
     loops = {
         "loop_area": Measure(2e-6, "J", 0.0, 1e-10),
@@ -83,24 +83,24 @@ def test_exact_one_of_several_loops_does_not_close_where_it_gives_back_more_than
     assert set(find_missing_loops(loops, window, FREE)) == ({"loop_area_2"} if opened else set())
 
 
-def measures(text: str):
-    """Measures and friction work by cycle of a scene."""
+def run_measures(text: str):
+    """Return the measures and the result of a scene."""
     found = run(text)
     assert found.outcome.value in ("steady", "stuck", "transient")
     return found.measures, found
 
 
 @pytest.mark.parametrize("cycles", [15, 15.3])
-def test_exact_an_interface_that_only_springs_back_has_no_loop(cycles):
-    """Released within its elastic range it dissipates nothing: its work is k (x1^2 - x0^2)/2 of a decaying ring."""
-    found, _ = measures(RELEASED.format(start="20 um", cycles=cycles))
+def test_exact_elastic_interface_has_no_loop(cycles):
+    """An interface released within its elastic range dissipates nothing and has no loop area."""
+    found, _ = run_measures(RELEASED.format(start="20 um", cycles=cycles))
     assert found["energy_dissipated"].value == pytest.approx(0.0, abs=1e-15)
     assert found["loop_area"].value is None and found["loop_area"].reason == OPEN_LOOP_REASON
 
 
 @pytest.mark.parametrize(("force", "there"), [("1e-9 N", False), ("1 N", True)])
-def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
-    """The reversible motion behind 30 N of friction moves 1 kg by 8 mm/s^2 under 1 N, by nothing under a nanonewton."""
+def test_exact_output_at_rest_has_no_distortion(force, there):
+    """An output at rest has no distortion of its acceleration, and a reason for this."""
     text = (
         RELEASED.partition("[drive]")[0].replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
         + f'[drive]\nkind = "force"\nforce = "{force}"\nfrequency = "80 Hz"\ncycles = 20\n'
@@ -114,9 +114,8 @@ def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
 
 
 @pytest.mark.parametrize(("start", "cycles"), [("20 um", 15), ("20 um", 15.3)])
-def test_always_no_drift_where_no_drive_gives_a_period(start, cycles):
-    """The stuck interface rings with a period of its own, so means over periods of the free mode differ by nothing that
-    moves on."""
+def test_always_free_motion_has_no_drift(start, cycles):
+    """A free motion has no drift per cycle, since no drive defines a period."""
     found = run(RELEASED.format(start=start, cycles=cycles)).measures["drift_per_cycle"]
     assert found.value is None and found.error is None and found.reason == APERIODIC_REASON
 
@@ -143,7 +142,7 @@ cycles = 12
 
 
 def test_exact_several_slips_per_half_cycle_have_no_start_phase():
-    """Its slips start at 18, 51, 141 and 170 deg of the force; the circular mean was 3.72 deg."""
+    """A motion that slips several times per half cycle, at 18, 51, 141 and 170 deg, has no start phase."""
     done = run(STICK_SLIP)
     events = done.extra["events"]
     starts = (
@@ -154,8 +153,8 @@ def test_exact_several_slips_per_half_cycle_have_no_start_phase():
 
 
 @pytest.mark.parametrize(("kinetic", "there"), [("0.2", False), ("0.05", True)])
-def test_exact_no_secant_where_rigid_friction_sticks_at_the_largest_slide(kinetic, there):
-    """The force of a stick is any between both limits; a block that slides through its turns has a mean of 0."""
+def test_exact_no_secant_if_interface_sticks_at_reversal(kinetic, there):
+    """Rigid friction that sticks at a reversal has no secant stiffness; one that slides through has zero."""
     text = STICK_SLIP.replace("kinetic = 0.2", f"kinetic = {kinetic}")
     if there:
         text = (

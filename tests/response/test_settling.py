@@ -1,4 +1,4 @@
-"""Whether a motion has settled: windows, tails, beats, and scenes that were called steady or stuck too early."""
+"""Steady state, transient and growth of a motion, and extrapolation of its steady amplitude."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,8 @@ from patchfem.scene import loads
 
 
 @pytest.mark.parametrize("ratio", [0.3, 0.8, 0.97, 0.995, -0.6])
-def test_exact_geometric_tail_is_extrapolated(ratio):
+def test_exact_geometric_transient_is_extrapolated(ratio):
+    """The steady amplitude after a geometric transient is extrapolated within 1e-9."""
     a = 2.0 - 0.9 * ratio ** np.arange(6)
     assert settling.classify(a, 1e-6) is Outcome.TRANSIENT
     assert a[-1] + settling.geometric_remainder(a[-3:]) == pytest.approx(2.0, rel=1e-9)
@@ -22,14 +23,15 @@ def test_exact_geometric_tail_is_extrapolated(ratio):
 
 
 @pytest.mark.parametrize("turn", [0.3, 1.0, 2.5])
-def test_exact_a_beat_is_extrapolated_by_its_complex_factor(turn):
-    """A free motion beside the drive: the amplitudes swing about the steady one, the phasors close in on it."""
+def test_exact_beat_is_extrapolated(turn):
+    """The steady amplitude of a beat is extrapolated by its complex factor within 1e-9."""
     p = 2.0 - 1.1 * (0.9 * np.exp(1j * turn)) ** np.arange(9)
     steady, error = settling.extrapolate_steady_amplitude(np.abs(p), p)
     assert steady == pytest.approx(2.0, rel=1e-9) and error < 1e-6
 
 
-def test_exact_two_decays_are_bracketed_by_the_error():
+def test_always_error_covers_two_decays():
+    """The error of the extrapolation covers a transient of two decays."""
     n = np.arange(12)
     a = 1.0 + 0.3 * 0.8**n + 0.1 * 0.4**n
     steady, error = settling.extrapolate_steady_amplitude(a, a)
@@ -38,15 +40,16 @@ def test_exact_two_decays_are_bracketed_by_the_error():
     assert settling.extrapolate_steady_amplitude(a[:6], a[:6]) == (None, None)
 
 
-def test_always_no_estimate_without_a_shrinking_change():
+def test_always_no_extrapolation_without_decay():
+    """Amplitudes whose changes do not shrink are not extrapolated."""
     a = 1 + 0.1 * np.arange(8)
     assert settling.extrapolate_steady_amplitude(a, a) == (None, None)
     assert settling.extrapolate_steady_amplitude(a[:3], a[:3]) == (None, None)
 
 
 @pytest.mark.parametrize("map_", [[[0.7, 0.3], [-0.4, 0.6]], [[0.9, 0.2], [0.0, 0.5]]])
-def test_exact_a_map_of_the_plane_is_summed(map_):
-    """Against the sum of its Neumann series, (1 - M)^-1 M d; one turns, one shrinks along two lines."""
+def test_exact_plane_map_remainder_agrees_with_neumann_series(map_):
+    """The remainder of a linear map of the plane agrees with (1 - M)^-1 M d within 1e-9."""
     map_ = np.array(map_)
     end = np.array([2.0, 1.0])
     away = [np.array([0.3, -0.5])]
@@ -63,12 +66,13 @@ def test_exact_a_map_of_the_plane_is_summed(map_):
 @pytest.mark.parametrize(
     "growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05 ** np.arange(6)]
 )
-def test_exact_endless_growth(growth):
+def test_exact_growth_is_classified(growth):
+    """Amplitudes that grow linearly or exponentially are classified as growing."""
     assert settling.classify(growth, 1e-3) is Outcome.GROWS
 
 
-def test_exact_growth_that_no_tolerance_notices_is_steady():
-    """A change below a twentieth of the tolerance, or of the floor, would take very long to count."""
+def test_exact_growth_below_tolerance_is_steady():
+    """A growth below a twentieth of the tolerance or of the floor is steady."""
     assert settling.classify(1 + 1e-6 * np.arange(6), 1e-3) is Outcome.STEADY
     tiny = 1e-7 + 1e-10 * np.arange(6)
     assert settling.classify(tiny, 1e-6) is Outcome.GROWS
@@ -77,10 +81,12 @@ def test_exact_growth_that_no_tolerance_notices_is_steady():
 
 @given(st.lists(st.floats(-4e-7, 4e-7), min_size=2, max_size=8), st.floats(0.1, 10))
 def test_always_noise_is_steady(noise, size):
+    """Amplitudes with noise of 4e-7 are steady."""
     assert settling.classify(size * (1 + np.array(noise)), 1e-3) is Outcome.STEADY
 
 
-def test_exact_short_and_odd_runs():
+def test_exact_short_runs_are_classified():
+    """Runs of one to six windows are classified as steady or transient by their changes."""
     assert settling.classify([1.0], 1e-3) is Outcome.TRANSIENT
     assert settling.classify([1.0, 1.0001], 1e-3) is Outcome.STEADY
     assert settling.classify([1.0, 1.1], 1e-3) is Outcome.TRANSIENT
@@ -94,17 +100,17 @@ def test_exact_short_and_odd_runs():
 CYCLES = np.arange(120)
 
 
-def swinging(beat: float, decay: float, count: int = 120) -> np.ndarray:
-    """Extremes (c, 2) of 1 + 0.3 exp(-decay c) cos(beat c) per cycle."""
+def make_beating_extremes(beat: float, decay: float, count: int = 120) -> np.ndarray:
+    """Return the extremes (c, 2) of 1 + 0.3 exp(-decay c) cos(beat c) per cycle."""
     high = 1 + 0.3 * np.exp(-decay * CYCLES[:count]) * np.cos(beat * CYCLES[:count])
     return np.column_stack([-high, high])
 
 
 @pytest.mark.parametrize("beat", [2.3, 1.1, 0.7])
 @pytest.mark.parametrize("decay", [0.01, 0.03, 0.06])
-def test_exact_what_is_left_of_a_short_beat(beat, decay):
-    """The amplitude of the last window less that of the settled motion, to a factor of three."""
-    extremes = swinging(beat, decay)
+def test_exact_remaining_free_motion_of_beat(beat, decay):
+    """The estimate of the remaining free motion of a beat is right within a factor of three."""
+    extremes = make_beating_extremes(beat, decay)
     amplitude = settling.window_amplitude_means(extremes, 10)[0]
     left = settling.remaining_free_motion(extremes, 10, 10 * decay)
     assert 0.4 * (amplitude[-1] - 1) < left < 3 * (amplitude[-1] - 1)
@@ -114,9 +120,12 @@ def test_exact_what_is_left_of_a_short_beat(beat, decay):
 
 
 @given(st.floats(0.1, 3.0), st.floats(0.05, 0.5), st.integers(1, 10))
-def test_always_less_is_left_of_a_longer_run(beat, decay, window):
+def test_always_remaining_free_motion_falls_with_length(beat, decay, window):
+    """The estimate of the remaining free motion falls with the length of the run."""
     short, long = (
-        settling.remaining_free_motion(swinging(beat, decay, count), window, decay * window)
+        settling.remaining_free_motion(
+            make_beating_extremes(beat, decay, count), window, decay * window
+        )
         for count in (60, 120)
     )
     assert long <= short + 1e-12 and long < 3 * np.exp(-decay * (110 - 2 * window))
@@ -164,8 +173,8 @@ tolerance = 0.01
 """
 
 
-def test_exact_three_modes_that_beat_are_not_steady_while_they_do():
-    """Called steady at 2.606e-4 m, as two windows moved by less than 1 %; it settles at 2.459e-4 m.
+def test_exact_beating_modes_are_transient():
+    """Three modes that beat are transient, and the error of the steady amplitude covers the value after 2500 cycles.
 
     After 2500 cycles the slowest mode has exp(-27) of its free motion left.
     """
@@ -182,8 +191,8 @@ def test_exact_three_modes_that_beat_are_not_steady_while_they_do():
 
 @pytest.mark.parametrize("size", ["1 g", "1e-9 g"])
 @pytest.mark.parametrize("cycles, outcome", [(30, "transient"), (1200, "steady")])
-def test_exact_the_size_of_a_linear_drive_does_not_settle_it(size, cycles, outcome):
-    """A ring-up to 1e-5 or 1e-14 m: below 1e-10 m every change counted as none."""
+def test_exact_outcome_of_linear_rig_is_independent_of_drive(size, cycles, outcome):
+    """A linear rig has the same outcome for a drive of 1 g and of 1e-9 g."""
     text = BEATING[
         BEATING.index("[structure]") : BEATING.index('[[structure.mode]]\nname = "m1')
     ].replace("damping = 0.0", "damping = 0.003")
@@ -217,8 +226,11 @@ CREST = {
 
 
 @pytest.mark.parametrize("cycles", [24, 25, 26, 27])
-def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
-    """Called steady at 445.05 +- 0.24 um after 25 cycles, tolerance 1e-3; the harmonic balance gives 443.852 um."""
+def test_exact_rig_at_overshoot_is_transient(cycles):
+    """A rig at the maximum of its overshoot is transient.
+
+    Its steady amplitude agrees with harmonic balance within the errors.
+    """
     name = "relative_displacement_amplitude"
     scene = CREST | {"drive": CREST["drive"] | {"cycles": float(cycles)}}
     truth = pf.run(scene, **{"accuracy.method": "harmonic"}).measures[name]
@@ -236,7 +248,8 @@ def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
         )
 
 
-def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_steady_amplitude():
+def test_exact_unresolved_transient_gives_reason():
+    """A transient of 8 cycles has a reason in place of a steady amplitude."""
     done = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 8.0}})
     steady = done.measures["relative_displacement_amplitude_steady"]
     assert done.outcome == "transient"
@@ -268,9 +281,11 @@ kind = "free"
 
 
 @pytest.mark.parametrize("end, outcome", [(20.0, "transient"), (40.0, "steady"), (100.0, "steady")])
-def test_exact_a_belt_does_not_end_stuck(end, outcome):
-    """A block on a belt of 0.1 m/s sticks for 8 s of every 11.63 s, so windows of one cycle, 6.28 s, see no slip or
-    half of one. One of two cycles holds a whole period: 0.6 +- sqrt(0.17) m, from 40 s on twice in a row."""
+def test_exact_block_on_belt_is_not_stuck(end, outcome):
+    """A block on a moving belt is steady with the amplitude sqrt(0.17) m.
+
+    It sticks longer than a cycle of the drive.
+    """
     result = run(loads(BELT + f'duration = "{end} s"\n'), estimate=False)
     slipped = result.response.slide[-1] - result.response.slide[0]
     assert abs(slipped) > 0.1 and result.outcome == outcome
@@ -309,8 +324,11 @@ tolerance = 1e-2
 
 
 @pytest.mark.parametrize("cycles, settled", [(20, False), (600, True)])
-def test_exact_a_motion_that_sticks_and_rings_on_is_said_to_be_transient(cycles, settled):
-    """Of a held linear rig the steady amplitude is a/|w_1^2 - w^2 + 2 i z_1 w_1 w|."""
+def test_exact_stuck_ringing_motion_gives_warning(cycles, settled):
+    """A stuck motion that still rings gives a warning with the number of cycles needed.
+
+    After 600 cycles the amplitude agrees with the closed form.
+    """
     done = pf.run(HOLDS.format(cycles=cycles))
     own = 2 * np.pi * 100
     omega = 2 * np.pi * 150
@@ -321,7 +339,8 @@ def test_exact_a_motion_that_sticks_and_rings_on_is_said_to_be_transient(cycles,
     assert settled or "drive.cycles = " in told[0]
 
 
-def test_exact_the_cycles_that_are_named_let_a_motion_that_sticks_settle():
+def test_exact_proposed_cycles_reach_steady_state():
+    """With the proposed number of cycles, a stuck motion gives no such warning."""
     told = next(
         one
         for one in pf.run(HOLDS.format(cycles=20)).warnings

@@ -1,4 +1,4 @@
-"""Harmonics of a motion from uneven samples, of its acceleration where it jumps, and of the friction behind it."""
+"""Harmonics of motion, acceleration and friction force from non-uniform samples."""
 
 from math import pi
 
@@ -13,8 +13,8 @@ from patchfem.runs import choose_numerics, solve
 OMEGA, PERIOD = 2.0, pi
 
 
-def uneven(count: int, steps: int):
-    """Times of `count` cycles with both ends, crowded in places, some an ulp apart."""
+def make_nonuniform_times(count: int, steps: int):
+    """Return non-uniform times of `count` cycles with both ends."""
     time = np.linspace(0, count * PERIOD, count * steps + 1)
     times = np.unique(
         np.concatenate([time, time[3::7] + 0.2 * PERIOD / steps, np.nextafter(time[5::11], 0)])
@@ -22,10 +22,11 @@ def uneven(count: int, steps: int):
     return times[times <= time[-1]]
 
 
-def test_order_harmonic_of_a_motion():
+def test_order_motion_harmonic_is_four():
+    """The error of the harmonics of a motion falls with the fourth power of the step."""
     errors = []
     for steps in (40, 80, 160):
-        t = uneven(3, steps)
+        t = make_nonuniform_times(3, steps)
         y = 0.7 + np.sin(OMEGA * t) + 0.4 * np.cos(3 * OMEGA * t)
         v = OMEGA * (np.cos(OMEGA * t) - 1.2 * np.sin(3 * OMEGA * t))
         errors.append(
@@ -37,9 +38,9 @@ def test_order_harmonic_of_a_motion():
 
 
 @pytest.mark.parametrize("steps", [8, 100])
-def test_exact_harmonics_of_an_acceleration_that_jumps(steps):
-    """y'' = +-1 by half cycles: 4/(pi n) in every odd harmonic. A parabola in each half is its own cubic."""
-    t = np.unique(np.concatenate([uneven(2, steps), np.arange(5) * PERIOD / 2]))
+def test_exact_harmonics_of_jumping_acceleration(steps):
+    """The odd harmonics of an acceleration of +-1 by half cycles are 4/(pi n)."""
+    t = np.unique(np.concatenate([make_nonuniform_times(2, steps), np.arange(5) * PERIOD / 2]))
     half, part = np.divmod(t, PERIOD / 2)
     way = 1 - 2 * (half % 2)
     speed = way * (part - PERIOD / 4)
@@ -50,8 +51,8 @@ def test_exact_harmonics_of_an_acceleration_that_jumps(steps):
 
 
 @pytest.mark.parametrize("moving", [True, False])
-def test_exact_distortion_with_and_without_a_moving_base(moving):
-    """y'' = 3 sin + 0.5 sin 3 beside a base of 2 sin: 0.5/5, and 0.5/3 under a force."""
+def test_exact_distortion_includes_base_acceleration(moving):
+    """The distortion refers to the absolute acceleration, which includes that of a moving base."""
     t = np.linspace(0, 4 * PERIOD, 1601)
     y = -3 / OMEGA**2 * np.sin(OMEGA * t) - 0.5 / (3 * OMEGA) ** 2 * np.sin(3 * OMEGA * t)
     v = -3 / OMEGA * np.cos(OMEGA * t) - 0.5 / (3 * OMEGA) * np.cos(3 * OMEGA * t)
@@ -102,8 +103,8 @@ cycles = 12
     "kind, size", [("force", 'force = "1 N"'), ("base", 'acceleration = "1 m/s^2"')]
 )
 @pytest.mark.parametrize("kinetic", [1.0, 0.7])
-def test_exact_friction_harmonic_is_that_of_the_force(kind, size, kinetic):
-    """Two modes, sticking and sliding, by the event engine: from the motion alone and from the force's own series."""
+def test_exact_friction_harmonic_from_motion_and_force_agree(kind, size, kinetic):
+    """The equivalent stiffness from the motion alone agrees with that from the friction force within 1e-8."""
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
     model = build(text)
     found = solve(model, choose_numerics(model), None)

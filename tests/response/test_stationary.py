@@ -1,5 +1,4 @@
-"""What a random record leaves behind: spectra against scipy's, a blurred peak against its integral, closed forms inside
-the scatter."""
+"""Random vibration: spectra compared with SciPy, rms values with integrals, and intervals with the scatter of records."""
 
 import numpy as np
 import pytest
@@ -12,7 +11,8 @@ from patchfem.response import stationary
 from patchfem.structure.noise import draw_random_record
 
 
-def test_exact_spectra_are_those_of_scipy():
+def test_exact_spectra_agree_with_scipy():
+    """Power spectra and gain of a record agree with scipy.signal within 1e-9."""
     window, drive = simulate_random_response(100.0, 0.02, 4.0, 3)
     record = stationary.make_record(window, drive)
     found = stationary.compute_spectra(window, drive)
@@ -37,7 +37,8 @@ def test_exact_spectra_are_those_of_scipy():
 
 @pytest.mark.parametrize("zeta", [0.003, 0.05, 0.6])
 @pytest.mark.parametrize("band", [(20.0, 300.0), (90.0, 110.0), (150.0, 400.0)])
-def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):
+def test_exact_rms_closed_forms_agree_with_integrals(zeta, band):
+    """The closed forms of the rms response to a band of noise agree with quadrature within 1e-9."""
     omega = 2 * np.pi * 100
 
     def place(f):
@@ -55,8 +56,8 @@ def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):
 
 
 @pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
-def test_closed_forms_lie_inside_the_scatter_of_records(count):
-    """200 records of the first case: the intervals of 95 % hold the truth of 95 % less three standard deviations."""
+def test_always_record_intervals_cover_closed_forms(count):
+    """The 95 % intervals of random records cover the closed forms in 95 % less three standard deviations."""
     rows = np.array([normalized_measures(*CASES[0], seed) for seed in range(count)])
     inside = np.abs(rows[..., 0] - 1) <= rows[..., 1]
     assert np.all(inside.mean(axis=0) >= 0.95 - 3 * np.sqrt(0.95 * 0.05 / count)), dict(
@@ -69,8 +70,8 @@ def test_closed_forms_lie_inside_the_scatter_of_records(count):
     assert np.all(rows[..., 1].mean(axis=0) <= 4 * rows[..., 0].std(axis=0))
 
 
-def test_exact_a_record_has_the_power_of_its_spectrum_between_its_rows():
-    """Lines of the record, straight between its rows, over 40 seeds: the mean power is the spectrum's."""
+def test_exact_random_record_has_given_spectrum():
+    """The mean power of 40 random records agrees with the given spectrum between its rows."""
     powers, (low, high), span = [], (20.0, 100.0), 5.0
     for seed in range(40):
         drive = draw_random_record((low, 50.0, high), (1.0, 4.0, 1.0), span, seed, 0.01)
