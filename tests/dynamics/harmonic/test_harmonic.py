@@ -32,9 +32,9 @@ from patchfem.dynamics import (
     points_model,
 )
 from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
-from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
+from patchfem.dynamics.harmonic.laws import FlowLaw, Jenkins, SampledSlide
 from patchfem.dynamics.harmonic.point import make_group
-from patchfem.friction import Bonds
+from patchfem.friction import Bonds, LuGre
 from patchfem.friction.bonds.recursion import advance_bonds
 
 DRIVE = SineDrive(1.0, 1.0)
@@ -111,13 +111,14 @@ def test_always_bonds_agree_with_recursion(seed, count, scale):
         Spring(2.0, 5.0),
         Interlock(3.0, 0.5),
         make_speed_law(0.8, 0.3),
+        FlowLaw(LuGre(0.8, 0.6, 8.0, 0.5, 0.02, 0.01).element(1.0)),
     ],
-    ids=lambda law: type(law).__name__,
+    ids=["Jenkins", "Bonds", "Spring", "Interlock", "SpeedLaw", "LuGre"],
 )
 def test_exact_derivatives_of_forces_agree_with_differences(law):
     """The derivatives of the forces with respect to the slide and the frequency agree with central
     differences within 1e-7."""
-    group = LawGroup(make_sdof(), law, 4096)
+    group = LawGroup(make_sdof(), law, 16384)
     q = random_harmonics(3, 5)[None]
     result = group(q, 1.3)
     v = pack_harmonics(random_harmonics(3, 5)[None])
