@@ -1,4 +1,4 @@
-"""Rigs identified from rows of responses: tables made by known rigs, and what a fit may not see."""
+"""Identification of rigs from measured rows: recovery of known rigs, and independence of rows held out."""
 
 import csv
 import json
@@ -61,41 +61,46 @@ cycles = 400
 HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
 
 
-def scene_of(tmp_path, text, *sets):
+def write_and_load(tmp_path, text, *sets):
+    """Write a scene into a folder and load it with settings."""
     path = tmp_path / "scene.toml"
     path.write_text(text, "utf-8")
     return load(path, sets)
 
 
-def table(tmp_path, rows, name="rows.csv"):
-    """A CSV of (frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], flag), "" where nothing is."""
+def write_rows(tmp_path, rows, name="rows.csv"):
+    """Write a table of (frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], flag) and return its path."""
     path = tmp_path / name
     lines = [
-        f"{f!r},{a / G_N!r},{_cell(x, G_N)},{_cell(y, MIL)},{flag}" for f, a, x, y, flag in rows
+        f"{f!r},{a / G_N!r},{format_cell(x, G_N)},{format_cell(y, MIL)},{flag}"
+        for f, a, x, y, flag in rows
     ]
     path.write_text(HEAD + "\n".join(lines) + "\n", "utf-8")
     return path
 
 
-def _cell(value, unit):
+def format_cell(value, unit):
+    """Return a value in another unit as text, or "" if it is absent."""
     return value if value == "" else repr(float(value) / unit)
 
 
-def linear(f, level, own=141.0, zeta=0.03):
-    """(absolute acceleration, relative displacement) of a driven oscillator in closed form."""
+def linear_response(f, level, own=141.0, zeta=0.03):
+    """Return absolute acceleration and relative displacement of a driven oscillator in closed form."""
     w = 2 * np.pi * f
     wn = 2 * np.pi * own
     z = -level / (wn**2 - w**2 + 2j * zeta * wn * w)
     return float(abs(level - w**2 * z)), float(abs(z))
 
 
-def free(*texts):
+def read_free_keys(*texts):
+    """Return the ranges of the free keys."""
     found, wrong = read_ranges(texts)
     assert not wrong
     return found
 
 
-def fitted(scene, path, wanted, **beside):
+def fit_to_rows(scene, path, wanted, **beside):
+    """Fit a scene to rows and return the result."""
     how = SearchSettings(
         beside.pop("starts", 2), beside.pop("seed", 0), beside.pop("unstable", "bound")
     )
@@ -107,23 +112,24 @@ LINEAR_FREE = (
 )
 
 
-def linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
+def make_linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
+    """Return rows of an oscillator at five frequencies, with noise and gains."""
     draw = np.random.default_rng(seed)
     out = []
     for f in (120.0, 135.0, 143.0, 150.0, 160.0):
-        a, y = linear(f, 20.0)
+        a, y = linear_response(f, 20.0)
         spread = np.exp(noise * draw.standard_normal(2))
         out.append((f, 20.0, a * scale * spread[0], y * seen * spread[1], ""))
     return out
 
 
-def test_exact_a_linear_rig_is_recovered_from_closed_forms(tmp_path):
-    """Rows of an oscillator in closed form give back its frequency, its damping and the factors of both readings."""
+def test_exact_linear_rig_is_recovered_from_closed_form(tmp_path):
+    """A fit to rows of an oscillator in closed form recovers frequency, damping and both gains within 1e-6."""
     gains = "measured.acceleration_gain=0.5..2", "measured.displacement_gain=0.5..2"
-    found = fitted(
-        scene_of(tmp_path, LINEAR),
-        table(tmp_path, linear_rows(scale=1.3, seen=0.8)),
-        free(*LINEAR_FREE, *gains),
+    found = fit_to_rows(
+        write_and_load(tmp_path, LINEAR),
+        write_rows(tmp_path, make_linear_rows(scale=1.3, seen=0.8)),
+        read_free_keys(*LINEAR_FREE, *gains),
         starts=3,
     )
     assert found.keys.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
@@ -136,13 +142,17 @@ def test_exact_a_linear_rig_is_recovered_from_closed_forms(tmp_path):
     assert found.score(found.logs, found.left_out_logs)["fitted"]["all"] < 1e-6
 
 
-def test_intervals_of_a_linear_rig_hold_the_truth(tmp_path):
-    """Of 10 noisy tables 95 % intervals of two values hold the truth in 16 of 20 cases or more: less has a chance of
-    0.3 %."""
+def test_always_intervals_cover_parameters_of_linear_rig(tmp_path):
+    """The 95 % intervals of two parameters cover the true values in at least 16 of 20 cases with noise.
+
+    Fewer have a probability of 0.3 %.
+    """
     held = 0
     for seed in range(10):
-        path = table(tmp_path, linear_rows(0.05, seed=seed))
-        found = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
+        path = write_rows(tmp_path, make_linear_rows(0.05, seed=seed))
+        found = fit_to_rows(
+            write_and_load(tmp_path, LINEAR), path, read_free_keys(*LINEAR_FREE), starts=1
+        )
         ends = found.keys.fit.intervals.ends
         held += sum(low <= value <= high for (low, high), value in zip(ends, (141.0, 0.03)))
     assert held >= 16
@@ -153,8 +163,8 @@ TRUE = {"friction.static": "0.45", "structure.bonded.stiffness": "2.4e6 N/m"}
 
 
 @pytest.fixture(scope="module")
-def rubbed(tmp_path_factory):
-    """Rows of a rubbing rig with known values, marched to its steady motion from yield to yield."""
+def friction_rows(tmp_path_factory):
+    """Return rows of a rig with friction and known parameters, marched to its steady state."""
     out = []
     for f in (135.0, 143.0, 150.0):
         for level in (5.0, 7.0):
@@ -177,25 +187,31 @@ def rubbed(tmp_path_factory):
     return out
 
 
-def test_exact_a_rig_with_friction_is_recovered_from_its_own_rows(tmp_path, rubbed):
-    found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, rubbed), free(*RUBS_FREE), starts=1)
+def test_exact_friction_rig_is_recovered_from_its_rows(tmp_path, friction_rows):
+    """A fit recovers friction coefficient and stiffness of a rig from its computed rows within 1e-5."""
+    found = fit_to_rows(
+        write_and_load(tmp_path, RUBS),
+        write_rows(tmp_path, friction_rows),
+        read_free_keys(*RUBS_FREE),
+        starts=1,
+    )
     assert found.keys.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
     assert any("steady motions are computed" in text for text in found.keys.warnings)
 
 
-def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed):
-    """Other readings in the rows held out, and in those left out, change no bit of the values, nor of any start."""
-    scene = scene_of(
+def test_always_held_out_rows_do_not_affect_fit(tmp_path, friction_rows):
+    """Other values in rows held out or left out change neither the fit nor any of its starts."""
+    scene = write_and_load(
         tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}"
     )
-    wanted = free("friction.static=0.3..0.6")
-    rows = rubbed[1::2]
+    wanted = read_free_keys("friction.static=0.3..0.6")
+    rows = friction_rows[1::2]
     other = [
         (f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag)
         for f, level, a, y, flag in rows
     ]
     first, second = (
-        fitted(scene, table(tmp_path, each), wanted, hold=("frequency=150 Hz",))
+        fit_to_rows(scene, write_rows(tmp_path, each), wanted, hold=("frequency=150 Hz",))
         for each in (rows, other)
     )
     assert np.array_equal(first.keys.fit.values, second.keys.fit.values)
@@ -204,7 +220,7 @@ def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed
     )
     assert not np.array_equal(first.logs, second.logs)
     one, two = (
-        fitted(scene, table(tmp_path, each), wanted, leave_out="frequency", starts=1)
+        fit_to_rows(scene, write_rows(tmp_path, each), wanted, leave_out="frequency", starts=1)
         for each in (rows, other)
     )
     assert [fold.name for fold in one.folds] == ["135 Hz", "143 Hz", "150 Hz"]
@@ -217,20 +233,25 @@ def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed
     )
 
 
-def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
-    path = table(tmp_path, rubbed)
+def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
+    """The readings computed in a fit agree with marched rows within 1e-6, from cold and from nearby starts."""
+    path = write_rows(tmp_path, friction_rows)
     cells = read_readings(path)
-    asked = ConditionModels(scene_of(tmp_path, RUBS), cells.conditions, free(*RUBS_FREE), path)
+    asked = ConditionModels(
+        write_and_load(tmp_path, RUBS), cells.conditions, read_free_keys(*RUBS_FREE), path
+    )
     computed = ModelReadings(asked)
     cold = np.array(computed([0.45, 2.4e6], range(6)))
-    assert np.abs(cells.logs(*cold)).max() < 1e-6  # marched rows: 400 cycles leave that much
+    assert (
+        np.abs(cells.logs(*cold)).max() < 1e-6
+    )  # the remaining transient of the rows after 400 cycles
     computed([0.46, 2.5e6], range(6))
-    # from motions nearby
+    # started from motions at nearby values
     assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)
 
 
-def test_exact_a_marched_motion_is_watched_as_it_runs():
-    """Nothing is kept from before the window, and no bit of what is measured in it changes."""
+def test_exact_motion_observer_equals_run_measures():
+    """The observer of a marched motion gives exactly the measures of a run."""
     model = build(
         loads(
             RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]
@@ -242,12 +263,16 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
     assert seen.displacement == measures["relative_displacement_amplitude"].value
 
 
-def test_rows_flagged_u_are_lower_bounds(tmp_path):
-    """A computed response above a bound counts nothing, below it as any other; a row left out counts nothing."""
-    path = table(tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()])
+def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
+    """A computed response above a row flagged U has no residual; below it the residual is that of any row."""
+    path = write_rows(
+        tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in make_linear_rows()]
+    )
     cells = read_readings(path)
-    scene = scene_of(tmp_path, LINEAR)
-    computed = ModelReadings(ConditionModels(scene, cells.conditions, free(*LINEAR_FREE), path))
+    scene = write_and_load(tmp_path, LINEAR)
+    computed = ModelReadings(
+        ConditionModels(scene, cells.conditions, read_free_keys(*LINEAR_FREE), path)
+    )
     every = np.ones(cells.row.size, bool)
     for damping, is_above in ((0.01, True), (0.1, False)):
         logs = cells.logs(*computed([141.0, damping], range(5)))
@@ -260,7 +285,7 @@ def test_rows_flagged_u_are_lower_bounds(tmp_path):
         )
         assert np.all(logs[cells.unstable] > 0) == is_above
         assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
-    stable = fitted(scene, path, free(*LINEAR_FREE), starts=1)
+    stable = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
     whole, without = (
         stable.score(stable.logs, stable.left_out_logs, stable=part)["fitted"]
         for part in (False, True)
@@ -276,16 +301,21 @@ def test_rows_flagged_u_are_lower_bounds(tmp_path):
         pytest.param("friction.static=0.1..0.3", marks=pytest.mark.slow),
     ],
 )
-def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
-    """A rigid block whose friction is too weak to hold an undamped spring runs away: said, and no failure."""
+def test_always_unbounded_motion_has_capped_residual(tmp_path, wanted):
+    """A rig without a bounded motion gets a residual of log 1000 and a warning, and the fit does not fail."""
     text = RUBS.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
     text = text.replace("damping = 0.003", "damping = 0.0").replace(
         text[text.index("[structure.bonded]") : text.index("[drive]")], ""
     )
-    path = table(
+    path = write_rows(
         tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, ""), (150.0, 4 * G_N, 5 * G_N, 1e-5, "")]
     )
-    found = fitted(scene_of(tmp_path, text, "friction.static=0.2"), path, free(wanted), starts=1)
+    found = fit_to_rows(
+        write_and_load(tmp_path, text, "friction.static=0.2"),
+        path,
+        read_free_keys(wanted),
+        starts=1,
+    )
     assert found.keys.fit.counts.failures == 0
     assert any("no bounded motion is found at 143 Hz" in text for text in found.keys.warnings)
     assert np.abs(found.logs).max() == pytest.approx(np.log(1e3))
@@ -299,23 +329,25 @@ def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
         ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "too few to determine 3 values"),
     ],
 )
-def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
-    path = table(
+def test_refuses_keys_that_rows_do_not_determine(tmp_path, sets, wanted, match):
+    """Free keys that the rows cannot determine are refused."""
+    path = write_rows(
         tmp_path,
         [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""), (155.0, 20.0, 30.0, "", "")],
     )
     with pytest.raises((PatchfemError, SceneError), match=match):
-        fitted(scene_of(tmp_path, LINEAR, *sets), path, free(*wanted))
+        fit_to_rows(write_and_load(tmp_path, LINEAR, *sets), path, read_free_keys(*wanted))
 
 
-def test_the_verb_answers_as_the_contract_says(tmp_path):
+def test_exact_fit_command_writes_documented_json(tmp_path):
+    """`patchfem fit` writes values, intervals, scores, null models and folds in the documented form."""
     out = tmp_path / "out"
-    rows = linear_rows(0.02)
+    rows = make_linear_rows(0.02)
     given = [
         "fit",
-        str(scene_of(tmp_path, LINEAR).path),
+        str(write_and_load(tmp_path, LINEAR).path),
         "--to",
-        str(table(tmp_path, rows)),
+        str(write_rows(tmp_path, rows)),
         "--free",
         *LINEAR_FREE,
         "--hold",
@@ -349,7 +381,7 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
         written = list(csv.DictReader(file))
     damping = answer["values"]["structure.mode.axial.damping"]["value"]
     for row, (f, level, a, y, _) in zip(written, rows, strict=True):
-        computed = linear(f, level, one["value"], damping)
+        computed = linear_response(f, level, one["value"], damping)
         for name, unit, value, wanted in (
             ("acceleration [g]", G_N, a, computed[0]),
             ("displacement [mil]", MIL, y, computed[1]),
@@ -358,15 +390,14 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
             assert float(row[f"computed {name}"]) == pytest.approx(wanted / unit, rel=1e-4)
         assert row["held"] == ("1" if f == 160 else "0")
     again = pf.run(out / "scene.fitted.toml").measures["absolute_acceleration_peak"].value
-    assert again == pytest.approx(linear(143.0, G_N, one["value"], damping)[0], rel=1e-4)
+    assert again == pytest.approx(linear_response(143.0, G_N, one["value"], damping)[0], rel=1e-4)
 
 
-def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
-    """With the ends of all starts, or of the first alone, kept on disk: the same bits with less work; those of another
-    question count for nothing."""
-    scene = scene_of(tmp_path, LINEAR)
-    path = table(tmp_path, linear_rows(0.05))
-    wanted = free(*LINEAR_FREE)
+def test_exact_fit_resumes_from_stored_starts(tmp_path):
+    """A fit resumed from stored starts gives the same bits with less work; starts of another question are ignored."""
+    scene = write_and_load(tmp_path, LINEAR)
+    path = write_rows(tmp_path, make_linear_rows(0.05))
+    wanted = read_free_keys(*LINEAR_FREE)
     file = tmp_path / "starts.json"
 
     def go(question, resume):
@@ -387,19 +418,19 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["[]", "3", "{", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
-def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
-    """The first two once ended `fit --resume` with an internal fault."""
+def test_exact_invalid_stored_starts_are_ignored(tmp_path, text):
+    """A file of stored starts with another structure is ignored."""
     (tmp_path / "starts.json").write_text(text)
     assert SearchCheckpoint(tmp_path / "starts.json", "one", True).known == {}
 
 
-def test_placebos_are_complete_fits(tmp_path):
-    """The rows of a rig with a damping of 0.03, fitted with it and with another."""
-    scene = scene_of(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
-    found = fitted(
+def test_exact_placebos_are_complete_fits(tmp_path):
+    """A placebo with the true damping gives the same fit, and one with another damping a large residual."""
+    scene = write_and_load(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
+    found = fit_to_rows(
         scene,
-        table(tmp_path, linear_rows()),
-        free("structure.mode.axial.frequency=120 Hz..160 Hz"),
+        write_rows(tmp_path, make_linear_rows()),
+        read_free_keys("structure.mode.axial.frequency=120 Hz..160 Hz"),
         placebos=("structure.mode.axial.damping=0.03,0.1",),
         starts=1,
     )
@@ -425,12 +456,13 @@ def test_placebos_are_complete_fits(tmp_path):
         (["--unstable", "maybe"], "unstable"),
     ],
 )
-def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
+def test_refuses_unsuitable_rows_options(tmp_path, words, said):
+    """Options that do not apply to a fit to rows are refused before any file is written."""
     given = [
         "fit",
-        str(scene_of(tmp_path, LINEAR).path),
+        str(write_and_load(tmp_path, LINEAR).path),
         "--to",
-        str(table(tmp_path, linear_rows())),
+        str(write_rows(tmp_path, make_linear_rows())),
         "--free",
         *LINEAR_FREE,
         "-o",
@@ -442,10 +474,10 @@ def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
     assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
 
 
-def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instruments(tmp_path):
-    """A root mean square of a sine is its peak over sqrt 2; the seed says where the starts are."""
-    path = table(tmp_path, linear_rows(scale=1.3 / np.sqrt(2), seen=0.8))
-    scene = scene_of(
+def test_exact_fit_uses_reading_and_gains_of_scene(tmp_path):
+    """A fit uses the reading (rms) and the gains of the scene, and the seed determines its starts."""
+    path = write_rows(tmp_path, make_linear_rows(scale=1.3 / np.sqrt(2), seen=0.8))
+    scene = write_and_load(
         tmp_path,
         LINEAR,
         "measured.file=rows.csv",
@@ -453,6 +485,9 @@ def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instrument
         "measured.reading=rms",
         "measured.displacement_gain=0.8",
     )
-    one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
+    one, two = (
+        fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1, seed=seed)
+        for seed in (0, 1)
+    )
     assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
     assert not np.array_equal(one.search.starts, two.search.starts)

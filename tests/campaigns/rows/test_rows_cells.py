@@ -1,4 +1,4 @@
-"""Rows of measured responses as readings: conditions, repeats, flags, scores, and the models without mechanics."""
+"""Rows of measured responses as readings: conditions, repeats, flags, scores and null models."""
 
 from pathlib import Path
 
@@ -15,23 +15,28 @@ HEAD = "frequency [Hz],input [g],acceleration [g],displacement [mil],flag\n"
 MIL = 25.4e-6
 
 
-def table(tmp_path, *rows):
+def write_table(tmp_path, *rows):
+    """Write rows as a table and return its path."""
     path = tmp_path / "rows.csv"
     path.write_text(HEAD + "\n".join(rows) + "\n", "utf-8")
     return path
 
 
-def test_table_1_has_the_readings_of_the_report():
+def test_exact_table_1_has_readings_of_report():
+    """Table 1 of the report has 27 accelerations and 8 displacements in 20 conditions and 6 runs."""
     cells = read_readings(TABLE_1)
     assert (np.count_nonzero(cells.felt), np.count_nonzero(~cells.felt)) == (27, 8)
-    assert len(cells.conditions) == 20 and cells.empty == [8]  # 143 Hz, 8 g: unstable, nothing read
+    assert len(cells.conditions) == 20 and cells.empty == [
+        8
+    ]  # the condition 143 Hz, 8 g is unstable and has no reading
     assert np.count_nonzero(cells.unstable) == 4
-    assert len(set(cells.runs)) == 6  # four columns, two of them twice
+    assert len(set(cells.runs)) == 6  # four frequencies, two of them with repeats
 
 
-def test_exact_repeats_of_a_condition_are_readings_of_their_own(tmp_path):
+def test_exact_repeated_conditions_are_separate_readings(tmp_path):
+    """Repeated rows of a condition are separate readings, with the log ratios of computed to measured values."""
     cells = read_readings(
-        table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "150,4,,,U", "143,5,6,,")
+        write_table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "150,4,,,U", "143,5,6,,")
     )
     assert cells.condition.tolist() == [0, 0, 0, 1] and cells.row.tolist() == [0, 0, 1, 3]
     assert cells.conditions.tolist() == [[143.0, 4 * G_N], [143.0, 5 * G_N]]
@@ -41,14 +46,16 @@ def test_exact_repeats_of_a_condition_are_readings_of_their_own(tmp_path):
     )
 
 
-def test_exact_displacements_below_the_floor_count_as_the_floor(tmp_path):
-    cells = read_readings(table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
+def test_exact_displacements_are_limited_by_floor(tmp_path):
+    """Displacements below the floor count as the floor."""
+    cells = read_readings(write_table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
     logs = cells.logs([1.0, 1.0], [MIN_DISPLACEMENT / 10, MIN_DISPLACEMENT / 10])
     assert logs == pytest.approx([0.0, np.log(0.5)], abs=1e-14)
 
 
-def test_exact_scores_are_root_mean_squares_by_kind(tmp_path):
-    cells = read_readings(table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
+def test_exact_scores_are_rms_by_kind(tmp_path):
+    """Scores are the rms of the log ratios by kind of reading, or None without readings."""
+    cells = read_readings(write_table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
     found = scores(cells, [0.3, 0.4, -0.5], np.array([True, True, True]))
     assert found == pytest.approx(
         {"acceleration": np.sqrt(0.17), "displacement": 0.4, "all": np.sqrt(0.5 / 3)}
@@ -57,8 +64,9 @@ def test_exact_scores_are_root_mean_squares_by_kind(tmp_path):
     assert scores(cells, [0.3, 0.4, -0.5], np.zeros(3, bool)) is None
 
 
-def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
-    cells = read_readings(table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U"))
+def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):
+    """Rows are selected by frequency, input, flag or run, and grouped by run."""
+    cells = read_readings(write_table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U"))
     assert cells.select("frequency=150 Hz").tolist() == [False, False, False, True]
     assert cells.select("frequency=0.143 kHz,150 Hz").all()
     assert cells.select("input=4 g").all()
@@ -82,9 +90,10 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
         ("input=4 Hz", "--hold input=4 Hz"),
     ],
 )
-def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
+def test_refuses_selection_without_rows(tmp_path, text, wanted):
+    """A selection without rows is refused."""
     with pytest.raises(PatchfemError, match=wanted):
-        read_readings(table(tmp_path, "143,4,5.0,0.1,")).select(text)
+        read_readings(write_table(tmp_path, "143,4,5.0,0.1,")).select(text)
 
 
 @pytest.mark.parametrize(
@@ -95,13 +104,14 @@ def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
         ("143,4,,,*", "nothing can be fitted"),
     ],
 )
-def test_refuses_rows_that_have_no_ratio(tmp_path, row, wanted):
+def test_refuses_rows_without_positive_values(tmp_path, row, wanted):
+    """Rows with values that have no logarithm are refused."""
     with pytest.raises(PatchfemError, match=wanted):
-        read_readings(table(tmp_path, row))
+        read_readings(write_table(tmp_path, row))
 
 
-def test_table_1_null_scores_are_those_of_the_closed_forms():
-    """By hand: a mean of logarithms, and normal equations solved as they stand."""
+def test_exact_table_1_null_models_agree_with_closed_forms():
+    """Null models of table 1 agree with a mean of logarithms within 1e-12 and with normal equations within 1e-8."""
     cells = read_readings(TABLE_1)
     f, a = cells.conditions[cells.condition].T
     train = ~cells.select("frequency=135 Hz,150 Hz,155 Hz")
@@ -120,8 +130,11 @@ def test_table_1_null_scores_are_those_of_the_closed_forms():
     )
 
 
-def test_table_1_null_scores_leave_one_frequency_out():
-    """The constant and the strong null, as an independent program found them: .125 and .090 of the accelerations."""
+def test_exact_table_1_null_scores_with_frequency_left_out():
+    """The scores of null models of table 1 with one frequency left out agree with an independent program:
+
+    0.125 and 0.090.
+    """
     cells = read_readings(TABLE_1)
     every = np.ones(cells.row.size, bool)
     found = {}
@@ -136,9 +149,9 @@ def test_table_1_null_scores_leave_one_frequency_out():
     assert found["power_input_frequency"]["acceleration"] == pytest.approx(0.090, abs=6e-4)
 
 
-def test_exact_a_null_keeps_what_its_rows_do_not_determine(tmp_path):
-    """At one frequency its power stays 0, at one input the power of the input 1."""
-    cells = read_readings(table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
+def test_exact_null_model_keeps_undetermined_powers(tmp_path):
+    """A null model keeps a power of 0 for a single frequency, and of 1 for a single input."""
+    cells = read_readings(write_table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
     one = fit_null_model(cells, "power_input_frequency", np.array([True, True, False]))[1][
         "acceleration"
     ]
