@@ -1,4 +1,4 @@
-"""The cases of a sweep: which there are, in which order, under which names."""
+"""The cases of a sweep: their number, order and names."""
 
 from dataclasses import replace
 from itertools import product as combinations
@@ -15,14 +15,16 @@ from patchfem.scene import loads, read_axes
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
 
 
-def cases(*texts) -> Cases:
+def make_cases(*texts) -> Cases:
+    """Return the cases of axes given as texts."""
     found, wrong = read_axes(texts)
     assert wrong == []
     return Cases(tuple(found))
 
 
-def test_exact_all_combinations_the_last_key_fastest():
-    found = cases(*THREE)
+def test_exact_cases_are_all_combinations():
+    """The cases are all combinations of the values, and the last key varies fastest."""
+    found = make_cases(*THREE)
     want = list(combinations(("1 N", "2 N"), ("0.1", "0.2", "0.3"), ("1 mm/s", "2 mm/s")))
     assert [found.texts(number) for number in range(len(found))] == want and found.shape == (
         2,
@@ -32,14 +34,16 @@ def test_exact_all_combinations_the_last_key_fastest():
     assert found.sets(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
 
 
-def test_exact_a_product_of_products_is_the_product():
-    whole = cases(*THREE)
-    assert combine_cases([cases(THREE[0]), cases(*THREE[1:])]) == whole
+def test_exact_combined_cases_equal_direct_product():
+    """Cases combined from two parts equal those of all axes at once."""
+    whole = make_cases(*THREE)
+    assert combine_cases([make_cases(THREE[0]), make_cases(*THREE[1:])]) == whole
 
 
-def test_exact_rows_beside_lists():
-    rows = replace(cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), rows=True)
-    found = combine_cases([rows, cases("slide.speed=1 mm/s,2 mm/s")])
+def test_exact_rows_are_combined_with_axes():
+    """Rows of a table are combined with every value of an axis."""
+    rows = replace(make_cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), rows=True)
+    found = combine_cases([rows, make_cases("slide.speed=1 mm/s,2 mm/s")])
     assert found.rows and found.shape == (4,)
     assert [found.texts(number) for number in range(4)] == [
         ("1 N", "0.3", "1 mm/s"),
@@ -49,74 +53,85 @@ def test_exact_rows_beside_lists():
     ]
 
 
-def test_exact_a_name_says_what_is_computed():
+def test_exact_case_name_depends_on_values_only():
+    """The name of a case depends on its values, not on their order, their units or the other cases."""
     asked = SweepScene(Path("a.toml"), BENCH)
-    one = cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(asked).tolist()
+    one = make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(asked).tolist()
     assert len(set(one)) == 4
-    other = cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(asked)
+    other = make_cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(asked)
     assert other.tolist() == [one[0], one[2], one[1], one[3]]
-    assert set(cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(asked)) & set(
+    assert set(make_cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(asked)) & set(
         one
     ) == set(one[:2])
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
     assert (
-        cases("normal.load=1 N,2 N", "friction.static=0.1,0.2")
+        make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2")
         .names(SweepScene(Path("a.toml"), swept))
         .tolist()
         == one
     )
 
 
-def test_exact_cases_of_the_same_pieces_follow_each_other():
-    found = cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
+def test_exact_cases_with_same_pieces_are_neighbours():
+    """Cases with the same pieces are computed one after another."""
+    found = make_cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
     assert found.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
-    assert cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [
+    assert make_cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [
         0,
         1,
         2,
         3,
     ]
-    assert cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
-    found = cases("drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm")
+    assert make_cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
+    found = make_cases(
+        "drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm"
+    )
     assert found.neighbours(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]  # those of one patch side by side
-    assert replace(cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours([2, 0, 1]) == [
+    assert replace(make_cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours(
+        [2, 0, 1]
+    ) == [
         0,
         1,
         2,
     ]
 
 
-def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
+def test_exact_cases_with_shared_mesh_are_named_by_sweep():
+    """If all cases share an automatically chosen mesh, their names depend on the other cases of the sweep."""
     pinned = SweepScene(Path("a.toml"), SMALL_PATCH)
     chosen = SweepScene(Path("a.toml"), PATCH)
-    one = cases("contact.load=1 N,2 N")
-    two = cases("contact.load=1 N,3 N")
+    one = make_cases("contact.load=1 N,2 N")
+    two = make_cases("contact.load=1 N,3 N")
     assert one.names(pinned)[0] == two.names(pinned)[0]
     assert one.names(chosen)[0] != two.names(chosen)[0]
     assert (
-        one.names(chosen).tolist() == cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
+        one.names(chosen).tolist()
+        == make_cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
     )
     sets = SweepScene(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
     assert one.names(sets)[0] == two.names(sets)[0]
-    sizes = [cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)]
+    sizes = [
+        make_cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)
+    ]
     assert sizes[0] == sizes[1]  # each case pins its own
 
 
-def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
+def test_exact_case_name_depends_on_file_content(tmp_path):
+    """The name of a case changes with the content of a file that it uses."""
     path = tmp_path / "path.csv"
     path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")
     text = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
     asked = SweepScene(tmp_path / "a.toml", text)
-    found = cases("normal.load=1 N")
+    found = make_cases("normal.load=1 N")
     asked_beside = SweepScene(tmp_path / "a.toml", BENCH)
-    beside = cases("slide.file=path.csv")
+    beside = make_cases("slide.file=path.csv")
     before = found.names(asked), beside.names(asked_beside)
     path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
     assert found.names(asked)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
 
 
-def test_exact_a_case_is_the_scene_with_its_values_set():
-    """Whether the base is a valid scene by itself or not, with and without a table [sweep]."""
+def test_exact_case_equals_scene_with_settings():
+    """A case equals the scene loaded with its values, also if the base scene lacks a required key."""
     for text in (
         BENCH,
         BENCH.replace("static = 0.3\n", ""),
@@ -128,8 +143,9 @@ def test_exact_a_case_is_the_scene_with_its_values_set():
             assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind
 
 
-def test_always_spread_cases_hold_the_ends_of_every_axis():
-    found = cases(
+def test_always_spread_cases_contain_axis_ends():
+    """A selection of at most 100 cases contains the first and the last value of every axis."""
+    found = make_cases(
         "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
     )
     some = found.spread_cases(100)
@@ -141,7 +157,8 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
     assert found.spread_cases(720) == list(range(720))
 
 
-def test_exact_a_mistake_of_all_drawn_cases_is_reported_once():
+def test_exact_common_mistake_is_reported_once():
+    """A mistake that all random cases share is reported once."""
     text = BENCH.replace("static = 0.3", "static = 0.3\nkinetic = 0.3")
     with pytest.raises(SceneError) as refused:
         read_cases(

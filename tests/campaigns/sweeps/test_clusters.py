@@ -1,4 +1,4 @@
-"""Clusters: a worker that is not what asks is refused, one whose scheduler dies says so, and nobody looks in."""
+"""Clusters: workers with other versions or files, a lost scheduler, TLS, and no public web pages."""
 
 import os
 import subprocess
@@ -30,36 +30,38 @@ time.sleep(100)
 """
 
 
-def work(place: Path, text=BENCH, values="0.2,0.3,-1") -> Work:
+def make_work(place: Path, text=BENCH, values="0.2,0.3,-1") -> Work:
+    """Return the work of a sweep over the friction coefficient."""
     return Work(SweepScene(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0])))
 
 
 @pytest.fixture
-def scene(tmp_path):
+def scene_path(tmp_path):
+    """Return the path of a scene in a folder with a path file, beside another folder."""
     (tmp_path / "here").mkdir()
     (tmp_path / "there").mkdir()
     (tmp_path / "here" / "path.csv").write_text(PATH)
     return tmp_path / "here" / "bench.toml"
 
 
-def test_exact_a_worker_in_another_folder_answers_from_the_files_of_the_scene(scene, monkeypatch):
-    """Messages name the scene as it was named where the sweep runs; the worker's folder stays as it is."""
-    monkeypatch.chdir(scene.parent)
-    asked = work(Path("bench.toml"), BY_FILE)
+def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
+    """A worker in another folder reads the files of the scene, gives the same results, and stays in its folder."""
+    monkeypatch.chdir(scene_path.parent)
+    asked = make_work(Path("bench.toml"), BY_FILE)
     want, _ = compute_chunk(asked, [0, 1, 2])
-    there = work(scene, BY_FILE)
+    there = make_work(scene_path, BY_FILE)
     mine = environment_versions(asked)
-    monkeypatch.chdir(scene.parents[1] / "there")
+    monkeypatch.chdir(scene_path.parents[1] / "there")
     _, (found, _) = _answer(there, [0, 1, 2], (mine, Path("bench.toml")))
     assert found.messages == want.messages and len(want.messages) == 1
     assert found.values["friction_work"].tolist()[:2] == want.values["friction_work"].tolist()[:2]
     assert Path.cwd().name == "there"
-    (scene.parent / "path.csv").write_text(PATH.replace("5", "6"))
+    (scene_path.parent / "path.csv").write_text(PATH.replace("5", "6"))
     assert _answer(there, [0], (mine, Path("bench.toml")))["files"] != mine["files"]
 
 
-class Worn:
-    """A future of a scheduler that is gone, or one that failed."""
+class FailedFuture:
+    """Future of a scheduler that is gone, or one that failed."""
 
     def __init__(self, status, error=None):
         self.status = status
@@ -69,9 +71,10 @@ class Worn:
         return self.error
 
 
-def test_always_the_differences_of_a_worker_are_named():
+def test_always_worker_differences_are_named():
+    """The error message names the packages and files in which a worker differs from this machine."""
     here = Cluster.__new__(Cluster)
-    here.name, mine = "--executor dask:tcp://x:1", environment_versions(work(Path("a.toml")))
+    here.name, mine = "--executor dask:tcp://x:1", environment_versions(make_work(Path("a.toml")))
     said = str(
         here._worker_error(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine)
     )
@@ -87,21 +90,21 @@ def test_always_the_differences_of_a_worker_are_named():
         here._worker_error(AttributeError("no own_of"), mine)
     )
     with pytest.raises(Missing, match="the connection to the scheduler is lost"):
-        here._report_death(Worn("cancelled"))
-    assert "OSError: no" in here._report_death(Worn("error", OSError("no")))[1].reason
+        here._report_death(FailedFuture("cancelled"))
+    assert "OSError: no" in here._report_death(FailedFuture("error", OSError("no")))[1].reason
 
 
 SEEN = []
 
 
-def changing(asked=None) -> dict:
-    """`own_of` with another version every time: by reference, as what travels to a worker by value is a copy."""
+def changing_versions(asked=None) -> dict:
+    """Return the versions of this environment with another version of patchfem at each call."""
     SEEN.append(asked)
     return environment_versions(asked) | {"patchfem": f"0.{len(SEEN)}"}
 
 
-def test_refuses_a_worker_of_another_version(monkeypatch):
-    """Workers that are there at once are asked before anything is sent, one that comes later with its first chunk."""
+def test_refuses_worker_with_other_version(monkeypatch):
+    """A worker with another version of patchfem is refused, before the sweep or at its first chunk."""
     import distributed
 
     said = r"a worker has patchfem 0.\d, but this machine has patchfem 0.\d; install the same version on all"
@@ -115,14 +118,17 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
     ) as one:
         ready = Cluster(one.scheduler.address)
         left = [[0], [1]]
-        monkeypatch.setattr(cluster, "environment_versions", changing)
+        monkeypatch.setattr(cluster, "environment_versions", changing_versions)
         with pytest.raises(Missing, match=said):
             Cluster(one.scheduler.address)
         with pytest.raises(Missing, match=said):
-            list(ready.run(work(Path("a.toml")), lambda idle=True: left.pop() if left else None))
+            list(
+                ready.run(make_work(Path("a.toml")), lambda idle=True: left.pop() if left else None)
+            )
 
 
-def test_refuses_tls_without_certificates_and_names_the_variables(tmp_path):
+def test_refuses_tls_without_certificates(tmp_path):
+    """A TLS address without certificates is refused with the names of the variables."""
     (tmp_path / "bench.toml").write_text(BENCH)
     answer = run_cli(
         "sweep",
@@ -140,7 +146,8 @@ def test_refuses_tls_without_certificates_and_names_the_variables(tmp_path):
 
 
 @pytest.mark.slow
-def test_always_a_lost_scheduler_ends_the_sweep_with_what_is_kept(tmp_path):
+def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
+    """A lost scheduler ends the sweep with code 4, and the finished cases are kept."""
     (tmp_path / "bench.toml").write_text(BENCH)
     server = subprocess.Popen(
         [sys.executable, "-P", "-c", SERVER], stdout=subprocess.PIPE, text=True
@@ -174,7 +181,8 @@ def test_always_a_lost_scheduler_ends_the_sweep_with_what_is_kept(tmp_path):
 
 
 @pytest.mark.slow
-def test_always_a_cluster_of_this_machine_shows_itself_to_nobody():
+def test_always_local_cluster_serves_no_web_pages():
+    """A local cluster listens only on 127.0.0.1 and serves no web pages."""
     one = Cluster("", 1)
     try:
         places = [held.getsockname() for held in one.own.scheduler.http_server._sockets.values()]

@@ -1,4 +1,4 @@
-"""Executors: whoever works, and whatever dies on the way, the answers are those of this process."""
+"""Executors of sweeps: the results are those of a single process, also if workers die."""
 
 import os
 import signal
@@ -37,13 +37,14 @@ SUPPORT = Path(__file__).parents[2] / "support"
 RIG = POINT + COULOMB + SHORT
 
 
-def work(text=BENCH, count=8, tell=None) -> Work:
+def make_work(text=BENCH, count=8, tell=None) -> Work:
+    """Return the work of a sweep over the friction coefficient."""
     axes, _ = read_axes([f"friction.static=0.05..0.6:{count}lin"])
     return Work(SweepScene(Path("a.toml"), text), Cases(tuple(axes)), tell)
 
 
-def all_of(asked: Work, executor) -> tuple:
-    """(Answers in the order of the cases, what was told in that order)."""
+def run_all_cases(asked: Work, executor) -> tuple:
+    """Return the results in the order of the cases, and the values reported by `tell` by case."""
     count = len(asked.cases)
     parts = list(iterate_chunks(asked, range(count), executor))
     assert sorted(number for numbers, *_ in parts for number in numbers) == list(range(count))
@@ -51,7 +52,8 @@ def all_of(asked: Work, executor) -> tuple:
     return join_case_results(count, [part[:2] for part in parts]), pairs
 
 
-def same(found: CaseResults, want: CaseResults, cases) -> None:
+def assert_same_results(found: CaseResults, want: CaseResults, cases) -> None:
+    """Assert that the results of the given cases are identical."""
     at = list(cases)
     assert found.values.keys() == want.values.keys() >= {"loop_area"}
     assert found.outcome[at].tolist() == want.outcome[at].tolist()
@@ -61,7 +63,8 @@ def same(found: CaseResults, want: CaseResults, cases) -> None:
 
 
 @pytest.fixture
-def importable(monkeypatch):
+def support_on_path(monkeypatch):
+    """Make the modules of tests/support importable in worker processes."""
     monkeypatch.setenv(
         "PYTHONPATH", os.pathsep.join([str(SUPPORT), os.environ.get("PYTHONPATH", "")])
     )
@@ -70,22 +73,23 @@ def importable(monkeypatch):
 @pytest.mark.parametrize(
     "once", [pytest.param(True, marks=pytest.mark.slow), False], ids=["once", "always"]
 )
-def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, once):
-    one_case_only(tmp_path, once, Pool(2))
+def test_exact_killed_worker_loses_one_case(tmp_path, support_on_path, once):
+    """If a case kills its worker, all other cases have the same results as without it."""
+    assert_only_killing_case_fails(tmp_path, once, Pool(2))
 
 
-def one_case_only(tmp_path: Path, once: bool, executor) -> None:
-    """Of cases that kill their worker, once or always, all others are as if nothing had died."""
+def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None:
+    """Assert that only cases that always kill their worker fail."""
     deadly = (3, 5) if once else (3,)
-    asked = work(tell=KillingMeasure(deadly, tmp_path, once))
-    found, told = all_of(asked, executor)
-    want, _ = all_of(work(), LocalExecutor())
+    asked = make_work(tell=KillingMeasure(deadly, tmp_path, once))
+    found, told = run_all_cases(asked, executor)
+    want, _ = run_all_cases(make_work(), LocalExecutor())
     lost = [] if once else [3]
     rest = [number for number in range(8) if number not in lost]
-    same(found, want, rest)
+    assert_same_results(found, want, rest)
     assert told == {number: number for number in rest}
     for number in deadly:
-        # halves of a chunk
+        # the chunk is halved after each death
         assert len((tmp_path / str(number)).read_text()) in (
             [1] if once else [MAX_DEATHS, MAX_DEATHS + 1]
         )
@@ -93,7 +97,8 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
         assert found.outcome[number] == FAILED_OUTCOME and "died" in found.messages[number]
 
 
-def test_exact_chunks_hand_out_every_case_once():
+def test_exact_chunks_contain_each_case_once():
+    """The chunks contain every case exactly once."""
     chunks = Chunks(range(1000), 2)
     seen = []
     while (chunk := chunks.take()) is not None:
@@ -102,22 +107,23 @@ def test_exact_chunks_hand_out_every_case_once():
     assert seen == list(range(1000))
 
 
-def test_exact_chunks_take_as_long_as_was_asked_and_end_together():
+def test_exact_chunk_size_follows_time_per_case():
+    """The size of a chunk follows the measured time per case."""
     chunks = Chunks(range(1000), 2)
     assert len(chunks.take()) == 1
     chunks.record_time([0], 0.02)
-    assert len(chunks.take()) == 50  # of a second
+    assert len(chunks.take()) == 50  # chunks of one second
     chunks.record_time([0], 1e-6)
-    assert len(chunks.take()) == 238  # a quarter of what is left, for two workers
+    assert len(chunks.take()) == 238  # a quarter of the cases left, for two workers
 
 
-def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
-    """A few tell nothing of how long many take: a sweep of 10 000 said "53 min left" after its first four cases."""
-    few = work(RIG, 40)
-    many = work(RIG, 300)
-    kept = replace(work(RIG, 300), keep=print)
+def test_exact_batched_cases_are_given_in_full_batches():
+    """Cases that can be marched together are given to a worker in full batches."""
+    few = make_work(RIG, 40)
+    many = make_work(RIG, 300)
+    kept = replace(make_work(RIG, 300), keep=print)
     assert [
-        len(next(iterate_chunks(one, range(len(one.cases)), Counting()))[0])
+        len(next(iterate_chunks(one, range(len(one.cases)), IdleExecutor()))[0])
         for one in (few, many, kept)
     ] == [1, 300, 1]
     chunks = Chunks(range(200), 1, 64)
@@ -126,8 +132,8 @@ def test_exact_cases_of_lanes_are_handed_out_as_many_as_march_together():
     assert len(chunks.take()) == 64 and len(chunks.take()) == 64 and len(chunks.take()) == 8
 
 
-class Counting:
-    """An executor that answers nothing."""
+class IdleExecutor:
+    """Executor that takes all chunks and computes nothing."""
 
     workers = 1
 
@@ -136,7 +142,8 @@ class Counting:
             yield chunk, 1.0, (None, [])
 
 
-def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
+def test_exact_failed_case_is_retried_last():
+    """A case that killed its worker is retried alone after all others, and then given up."""
     chunks = Chunks(range(3), 1)
     assert chunks.take() == [0] and chunks.record_death([0]) == [] and chunks.take() == [1]
     chunks.take()
@@ -147,8 +154,8 @@ def test_exact_what_died_is_tried_alone_after_all_others_and_given_up():
     assert chunks.take() is None
 
 
-def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
-    """The other 999 cases of it are answered in 10 chunks, not one by one; the one that kills is alone at last."""
+def test_exact_failed_chunk_is_bisected():
+    """A chunk of 1000 cases with one that kills its worker is bisected: the other 999 need at most 10 chunks."""
     chunks = Chunks(range(1000), 1, 1000)
     tried = []
     lost = []
@@ -161,22 +168,26 @@ def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
     assert len(fine) <= 10
 
 
-def test_exact_the_remaining_time_is_known_after_the_first_chunks():
-    """By the work of all workers but of their first chunks, the last chunk counting most."""
+def test_exact_remaining_time_after_first_chunks():
+    """The remaining time is estimated from all chunks except the first of each worker, which load code."""
     clock = RemainingTime(4000, 2)
-    assert clock(1, 7.0) is None and clock(1, 9.0) is None  # each brings what its cases run by
+    assert (
+        clock(1, 7.0) is None and clock(1, 9.0) is None
+    )  # the first chunk of each worker also loads code
     assert clock(998, 9.98) == pytest.approx(15.0)  # 3000 cases of 10 ms on two workers
     assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.left == 2000
 
 
-def test_exact_a_cluster_answers_as_this_process_does():
+def test_exact_cluster_equals_local_executor():
+    """A Dask cluster gives the same results as a single process."""
     pytest.importorskip("distributed")
-    found, _ = all_of(work(), Cluster("", 1))
-    want, _ = all_of(work(), LocalExecutor())
-    same(found, want, range(8))
+    found, _ = run_all_cases(make_work(), Cluster("", 1))
+    want, _ = run_all_cases(make_work(), LocalExecutor())
+    assert_same_results(found, want, range(8))
 
 
-def test_refuses_executors_that_are_not_there(monkeypatch):
+def test_refuses_unknown_executors(monkeypatch):
+    """Unknown executors, zero processes and a missing package are refused."""
     with pytest.raises(PatchfemError, match="--executor slurm: not possible; use --executor dask"):
         executors.make_executor("slurm")
     with pytest.raises(PatchfemError, match="-j 0: the number of processes must be"):
@@ -201,11 +212,13 @@ sweep_into(sweep, cases, SweepTarget(Path(sys.argv[2])), Pool(2), report_progres
 """
 
 
-def names(folder: Path) -> list:
+def file_names(folder: Path) -> list:
+    """Return the sorted names in a folder."""
     return sorted(one.name for one in folder.iterdir())
 
 
-def test_exact_progress_begins_with_the_cases_that_are_there(tmp_path):
+def test_exact_progress_counts_stored_cases(tmp_path):
+    """The progress of a resumed sweep begins with the number of stored cases."""
     (tmp_path / "rig.toml").write_text(RIG, encoding="utf-8")
     progress = []
 
@@ -228,7 +241,8 @@ def test_exact_progress_begins_with_the_cases_that_are_there(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory):
+def whole_sweep(tmp_path_factory):
+    """Return scene, axis and folder of a finished sweep."""
     place = tmp_path_factory.mktemp("whole")
     (place / "rig.toml").write_text(RIG, encoding="utf-8")
     over = "friction.static=0.05..0.6:20lin"
@@ -236,25 +250,28 @@ def whole(tmp_path_factory):
     return place / "rig.toml", over, place / "whole"
 
 
-def resumed(whole: tuple, out: Path) -> None:
-    """What is there is whole, some but not all of it; going on gives the same files as one sweep from end to end."""
-    path, over, want = whole
+def assert_resumes_to_same_files(whole_sweep: tuple, out: Path) -> None:
+    """Assert that stored cases are complete, and that the resumed sweep writes the files of a whole one."""
+    path, over, want = whole_sweep
     there = [one for one in (out / "cases").iterdir() if not one.name.startswith(".")]
-    assert 0 < len(there) < len(names(want / "cases")) and not (out / "sweep.csv").exists()
+    assert 0 < len(there) < len(file_names(want / "cases")) and not (out / "sweep.csv").exists()
     assert all((one / "summary.json").read_text().endswith("}\n") for one in there)
     assert run_cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
     for name in ("sweep.csv", "sweep.nc"):
         assert (out / name).read_bytes() == (want / name).read_bytes()
-    assert names(out / "cases") == names(want / "cases") and names(out) == names(want)
+    assert file_names(out / "cases") == file_names(want / "cases") and file_names(
+        out
+    ) == file_names(want)
 
 
 @pytest.mark.slow
-def test_exact_a_sweep_killed_in_the_middle_goes_on_to_the_same_files(whole, tmp_path):
-    path, over, _ = whole
+def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
+    """A sweep that is killed can be resumed to the same files."""
+    path, over, _ = whole_sweep
     out = tmp_path / "swept"
     done = subprocess.run([sys.executable, "-c", KILLED, path, out, over], timeout=120)
     assert done.returncode == -signal.SIGKILL
     half = out / "cases" / ".0123456789abcdef.1"  # as a process killed while it writes leaves it
     half.mkdir()
     (half / "summary.json").write_text('{"patchf')
-    resumed(whole, out)
+    assert_resumes_to_same_files(whole_sweep, out)
