@@ -101,13 +101,18 @@ def test_always_ringing_of_1_7_periods_is_found(periods, zeta, phase, omega, siz
     )
 
 
-def test_exact_stronger_of_two_ringings_is_found():
-    """Of two ringings the stronger one is found."""
+@pytest.mark.parametrize(
+    "modes",
+    [
+        [(12, 0.02, 1.0), (31, 0.01, 0.3)],
+        [(100, 0.01, 1.0), (70, 0.005, 0.2), (8, 0.002, 0.04)],
+    ],
+)
+def test_exact_strongest_of_several_ringings_is_found(modes):
+    """Of two or three ringings the strongest one is found, whose frequency is the first."""
     t = np.linspace(0, 1.0, 501)
-    both = make_signal(t, 3.0, 2 * np.pi * 12, 0.02) + make_signal(
-        t, 3.0, 2 * np.pi * 31, 0.01, 0.3
-    )
-    assert fit_ringing(t, both, 3.0).frequency == pytest.approx(12, rel=1e-6)
+    value = sum(make_signal(t, 3.0, 2 * np.pi * f, zeta, size) for f, zeta, size in modes)
+    assert fit_ringing(t, value, 3.0).frequency == pytest.approx(modes[0][0], rel=1e-6)
 
 
 def test_exact_ringing_error_covers_noise():

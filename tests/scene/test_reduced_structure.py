@@ -236,6 +236,19 @@ def test_refuses_invalid_reduction_keys_at_their_lines(matrix_folder, key, old, 
     assert line in answer.err and REFUSED[key, old, new] in answer.err, answer.err
 
 
+def test_refuses_missing_matrix_with_single_message(matrix_folder):
+    """A matrix without a file is reported once, and another missing file does not hide a fault of the matrices."""
+    missing_matrix = SCENE.replace("k.mtx", "absent.mtx")
+    answer = run_cli("check", write_scene(matrix_folder, missing_matrix))
+    assert "structure.reduced.stiffness: there is no file" in answer.err
+    assert answer.err.count("scene.toml:") == 1
+    wrong_size = SCENE.replace('mass = "both.npz"', 'mass = "small.npz"')
+    text = wrong_size + '[measured]\nfile = "absent.csv"\n'
+    answer = run_cli("check", write_scene(matrix_folder, text))
+    assert "the matrices differ in size: 40 x 40 and 9 x 9" in answer.err
+    assert answer.err.count("scene.toml:") == 2
+
+
 @pytest.mark.parametrize(
     "old, new, says",
     [

@@ -170,6 +170,9 @@ def test_always_absent_pile_up_has_upper_bound():
     before, after, _ = make_ridged_track("band", HELD_OUT + 2, 0.0, 0.0)
     found = compare_traces(before, after).tracks.sizes
     assert found["pile_up"].value == 0.0 < found["pile_up"].high < 0.02 * found["area_gross"].value
+    assert found["pile_up"].high == pytest.approx(
+        np.hypot(found["pile_up_left"].high, found["pile_up_right"].high), rel=1e-12, abs=0
+    )
     assert found["area_net"].value == found["area_gross"].value
 
 

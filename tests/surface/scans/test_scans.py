@@ -303,7 +303,9 @@ def test_exact_identical_scans_show_no_wear(grooved_scans, tmp_path):
         "no wear shown\n  The heights of both scans are the same"
     )
     assert "Another part" not in answer.out
-    assert "<title>scan.x3p and scan.x3p" in (tmp_path / "out" / "report.html").read_text()
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "<title>scan.x3p and scan.x3p" in page
+    assert page.count("<figure>") == 2 == page.count('<svg role="img" aria-label="')
     assert {path.name for path in (tmp_path / "out").iterdir()} <= set(FILES)
     assert (
         "a shift can be given only for traces"
