@@ -75,12 +75,10 @@ MIN_FREE_BYTES = 1 << 21  # the machine code of a run needs this disk space
 # CPU seconds; a function that would take longer as Python in this process is compiled. This is about a tenth of the
 # compile time (10 to 30 s), because later processes reuse the machine code.
 MAX_PYTHON_SECONDS = 2.0
-MAX_LOCK_WAIT = (
-    300.0  # s to wait for another process that compiles: ten times the longest compilation
-)
-LOCK_CHECK_INTERVAL = (
-    0.05  # s between two attempts to take the lock; short compared with a compilation
-)
+# Time to wait for another process that compiles [s]: ten times the longest compilation.
+MAX_LOCK_WAIT = 300.0
+# Time between two attempts to take the lock [s]; short compared with a compilation.
+LOCK_CHECK_INTERVAL = 0.05
 # Functions called by this process whose machine code cannot be stored, so every process imports numba for them.
 UNCACHED_FUNCTIONS = set()
 # One thread at a time loads code, because loading a function twice at the same time crashes the process.

@@ -20,9 +20,8 @@ import numpy as np
 
 from ..core import NotConverged
 
-OPENING_NOISE = (
-    1e-14  # rounding error of an opening relative to the sum of the magnitudes of its terms
-)
+# Rounding error of an opening relative to the sum of the magnitudes of its terms.
+OPENING_NOISE = 1e-14
 N_REFINEMENTS = 2  # steps of iterative refinement; a third one changes nothing
 
 

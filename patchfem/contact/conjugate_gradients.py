@@ -12,9 +12,8 @@ import numpy as np
 
 from .active_set import OPENING_NOISE, ContactProblem
 
-ENERGY_NOISE = (
-    1e-13  # rounding error of the energy relative to the sum of the magnitudes of its terms
-)
+# Rounding error of the energy relative to the sum of the magnitudes of its terms.
+ENERGY_NOISE = 1e-13
 # ratio of the error of a resultant to the load, above which the forces are projected once more
 RESULTANT_TOL = 1e-12
 

@@ -24,8 +24,12 @@ from .harmonic.forces import LawGroup
 from .harmonic.harmonic import pack_harmonics
 from .harmonic.point import make_balance
 
-N_SAMPLES = 4096  # number of samples of a cycle for its amplitude; parabolas between samples make the error negligible
-N_AMPLITUDES = 48  # number of amplitudes at which the damping of a free motion is evaluated to bracket its sign changes
+# Number of samples of a cycle for its amplitude; parabolas between samples make the error
+# negligible.
+N_SAMPLES = 4096
+# Number of amplitudes at which the damping of a free motion is evaluated to bracket its sign
+# changes.
+N_AMPLITUDES = 48
 # smallest and largest of these amplitudes over the amplitude 4 F/(pi |c| omega) of den Hartog's balance
 MIN_AMPLITUDE_RATIO = 1e-6
 MAX_AMPLITUDE_RATIO = 4.0
@@ -41,9 +45,11 @@ AMPLITUDE_TOL = 1e-9
 # largest slide velocity at a reversal times the half period, over the slide, that counts as zero
 REST_TOL = 1e-8
 MAX_SECANT_STEPS = 12  # largest number of secant steps for the damping that balances an amplitude
-MAX_FIRST_RATIO = 2.0  # largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times
+# Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times.
+MAX_FIRST_RATIO = 2.0
 # the elastic force at the reversal, so the interface sticks there
-N_HARMONICS = 9  # number of harmonics of the first solution; a second one with twice as many estimates its error
+# Number of harmonics of the first solution; a second one with twice as many estimates its error.
+N_HARMONICS = 9
 
 
 class LimitCycle(NamedTuple):

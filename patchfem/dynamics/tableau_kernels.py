@@ -8,9 +8,8 @@ II.6 (the method of Dormand and Prince). The order conditions are tested.
 
 import numpy as np
 
-N_STAGES = (
-    16  # number of stages: 12 of the step, the slope at its end, and three of the dense output
-)
+# Number of stages: 12 of the step, the slope at its end, and three of the dense output.
+N_STAGES = 16
 
 # A row of a table below begins in the first column of its line. The first number is the column in which the second and
 # all further coefficients stand, one after the other; the first coefficient stands in column 0. All others are 0.

@@ -18,9 +18,8 @@ from ..unilateral import RESIDUAL_TOL
 from .arrays import Cases, NestedStretches, make_cases
 
 kernels = compiled.load("contact.batch.interval_kernels")
-MAX_LEFT_ENDS = (
-    12  # left ends that are tried if the stretch is known; beyond them all others are tried
-)
+# Left ends that are tried if the stretch is known; beyond them all others are tried.
+MAX_LEFT_ENDS = 12
 MIN_COARSE_NODES = 40  # nodes above which the contacts are first located on a coarser interface
 COARSENING_FACTOR = 4  # the coarse interface has every fourth node
 BATCH_SIZE = 256  # cases that are solved together, so that their forces stay in the cache

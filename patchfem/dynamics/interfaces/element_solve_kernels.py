@@ -8,9 +8,8 @@ from .arrays import SolvedStep
 
 MAX_ITERATIONS = 200
 N_NEWTON_STEPS = 40  # number of Newton iterations before bisection steps are inserted
-BOUND_MARGIN = (
-    1.001  # enlarges the bracket, so that the solution of a contact in full slip lies inside it
-)
+# Enlarges the bracket, so that the solution of a contact in full slip lies inside it.
+BOUND_MARGIN = 1.001
 ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
 
 

@@ -56,7 +56,8 @@ EVENT_KEEPS_STICK = False
 # The friction and the mean square of the stretches follow the linear map of a cycle.
 N_LAW_VARIABLES = 2
 
-MAX_PARTS = 4  # Maximum number of parts of a step, which has at most one reversal and a kink on either side of it.
+# Maximum number of parts of a step, which has at most one reversal and a kink on either side of it.
+MAX_PARTS = 4
 # Number of Newton steps for the time of an event; a cubic across a kink has an error of second order, so two are
 # needed.
 N_CORRECTIONS = 2

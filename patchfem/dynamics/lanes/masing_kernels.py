@@ -80,14 +80,16 @@ STACK_FORM_ROWS = (
     int(SliderRow.N_REVERSALS),
 )
 
-MIN_ABSCISSA = 1e-30  # Smallest abscissa on the curve of the first loading, because a power needs its logarithm.
+# Smallest abscissa on the curve of the first loading, because a power needs its logarithm.
+MIN_ABSCISSA = 1e-30
 # Last Newton step as a fraction of a step, below which an event is found; the remaining error is its square.
 EVENT_TOL = 1e-9
 N_NEWTON = 6
 MAX_EVENTS = 32  # Maximum number of events in a step; further events are ignored.
 # Relative displacement [m] of an event that does not happen; no motion reaches it.
 NO_EVENT_SLIDE = 1e300
-SAME_SLIDE_TOL = 1e-9  # Fraction of the branch within which a relative displacement counts as equal to that of an event.
+# Fraction of the branch within which a relative displacement counts as equal to that of an event.
+SAME_SLIDE_TOL = 1e-9
 
 # Kinds of events in increasing order of priority; of several events in a step the kind with the largest number is
 # reported.

@@ -15,7 +15,8 @@ from .element_arrays import (
     SingleContact,
 )
 
-STEP_TOL = 1e-11  # largest residual of a step solution over the friction limit; it is far below any time-step error
+# Largest residual of a step solution over the friction limit; it is far below any time-step error.
+STEP_TOL = 1e-11
 # [N]; smallest tolerance of a spring force, so that it stays above 0 if the force scale of the model is 0
 TINY_FORCE = 1e-300
 

@@ -45,14 +45,16 @@ HAS_SLOPES = parts.HAS_SLOPES
 HAS_CONTACT = parts.HAS_CONTACT
 IS_COUPLED = parts.IS_COUPLED
 HAS_PLANES = parts.HAS_PLANES
-MAX_SWEEPS = 1000  # largest number of sweeps of the block descent over all elements, after which it has failed
+# Largest number of sweeps of the block descent over all elements, after which it has failed.
+MAX_SWEEPS = 1000
 # Largest number of sweeps if stops and releases lie inside the step; the first half of the sweeps determines them.
 MAX_EVENT_SWEEPS = 60
 # tolerance of a single element solution within a sweep, over the tolerance of the element in the step
 FORCE_GOAL_FRACTION = 0.1
 # ratio of the force changes in two successive sweeps, above which the block descent converges slowly
 SLOW_CONVERGENCE_RATIO = 0.2
-FIRST_NEWTON_SWEEP = 5  # number of sweeps before the first Newton step on all forces, as fewer cost less than that step
+# Number of sweeps before the first Newton step on all forces, as fewer cost less than that step.
+FIRST_NEWTON_SWEEP = 5
 # Smallest attainable residual, over the force and over the free slide divided by its compliance, due to round-off.
 ROUND_OFF = 4e-15
 

@@ -10,7 +10,8 @@ from ... import compiled
 from ..interfaces.dispatch import COULOMB_LAW, load_law
 
 PACKAGE = "dynamics.march"
-SHEARED_LISTS_MODULE = "dynamics.interfaces.shear_list_kernels"  # module of the contact of lists of bonds behind shear modes
+# Module of the contact of lists of bonds behind shear modes.
+SHEARED_LISTS_MODULE = "dynamics.interfaces.shear_list_kernels"
 # Kinds of loads: constant, varying resultant on the interface, varying load on each point.
 CONSTANT_LOAD = ""
 COMMON_LOAD = "whole"

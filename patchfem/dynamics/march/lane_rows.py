@@ -2,18 +2,16 @@
 
 from enum import IntEnum
 
-LANES = (
-    32  # number of cases that march side by side; a multiple of the vector length of the processor
-)
+# Number of cases that march side by side; a multiple of the vector length of the processor.
+LANES = 32
 N_POINTS = 6  # number of points of the interface of a case
 N_PIECE_MODES = 2  # number of shear modes of the pieces of a case
 N_RIG_MODES = 2  # number of modes of the rig
 N_UNKNOWNS = (
     1 + N_PIECE_MODES
 )  # number of unknowns of a step: increments of the slide and of the coordinates of the pieces
-N_LOSS_COEFFICIENTS = (
-    6  # number of coefficients of the quadratic form of the viscous loss of a mode
-)
+# Number of coefficients of the quadratic form of the viscous loss of a mode.
+N_LOSS_COEFFICIENTS = 6
 N_SAMPLE = 2 * N_RIG_MODES + 2  # number of values in a sample: coordinates, rates, force, slip
 
 # quantities of a case in the workspace that have several rows, with the number of these

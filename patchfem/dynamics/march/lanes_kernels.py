@@ -17,13 +17,11 @@ from .lane_rows import LANES, N_POINTS, N_RIG_MODES, At, RigRow, StepColumn
 
 NEWTON_TOL = 4e-6  # largest last Newton step [bond lengths], as in `shear_solve_kernels`
 MAX_SWEEPS = 60  # largest number of Newton iterations in a step
-CURVATURE_TOL = (
-    1e-9  # neglected force change by curvature over the last Newton step, over the friction limit
-)
+# Neglected force change by curvature over the last Newton step, over the friction limit.
+CURVATURE_TOL = 1e-9
 MAX_SERIES_SLIDE = 0.5  # largest slide [bond lengths] for which the series is used
-MAX_EXPONENTIAL_SLIDE = (
-    40.0  # slide [bond lengths] beyond which exp(-x) of the bonds is below round-off
-)
+# Slide [bond lengths] beyond which exp(-x) of the bonds is below round-off.
+MAX_EXPONENTIAL_SLIDE = 40.0
 
 
 @njit(**NJIT_INLINE)

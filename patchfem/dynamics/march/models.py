@@ -19,12 +19,12 @@ from ..interfaces.dispatch import COULOMB_LAW
 
 INTERFACES_FOLDER = "dynamics.interfaces"
 ELEMENT_KERNELS = f"{INTERFACES_FOLDER}.element_kernels"
-N_FIRST_ENTRIES = (
-    256  # initial number of entries of the list of a point, in addition to those of one step
-)
+# Initial number of entries of the list of a point, in addition to those of one step.
+N_FIRST_ENTRIES = 256
 # width [bond lengths] over which the initial bonds of a point are distributed, so that their force is continuous
 FIRST_BOND_WIDTH = 1e-6
-POINTS_MULTIPLE = 16  # number of points is padded to a multiple of this, the number that compiled loops process at once
+# Number of points is padded to a multiple of this, the number that compiled loops process at once.
+POINTS_MULTIPLE = 16
 # kind of an idle contact, which is never evaluated
 IDLE_KIND = ELEMENT_KERNELS, "friction.laws.elastic_plastic_kernels"
 

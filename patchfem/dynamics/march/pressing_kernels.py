@@ -44,9 +44,8 @@ MAX_ITERATIONS = 100  # largest number of residuals of heave and pitch in a step
 MIN_DECREASE = 0.1  # smallest relative decrease of the residual by a full Newton step
 MIN_STEP_FRACTION = 1e-9  # smallest fraction of a Newton step in the line search
 ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
-STALL_FACTOR = (
-    64  # residual over its round-off error, below which a step without decrease is the last
-)
+# Residual over its round-off error, below which a step without decrease is the last.
+STALL_FACTOR = 64
 SHORT_STALL_FACTOR = 1e3  # the same for a step fraction below SHORT_STEP_FRACTION
 SHORT_STEP_FRACTION = 0.2
 

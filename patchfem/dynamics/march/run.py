@@ -37,9 +37,8 @@ from .recording import FIRST_SUM, N_SUMS, Mark, make_mark, read_output_extremes
 
 # Displacement over the travel above which the motion has diverged within a step.
 DIVERGENCE_RATIO = 10.0
-MAX_STEPS_AT_ONCE = (
-    8000  # largest number of steps that are marched at once, which bounds the memory for samples
-)
+# Largest number of steps that are marched at once, which bounds the memory for samples.
+MAX_STEPS_AT_ONCE = 8000
 MAX_CYCLES_AT_ONCE = 16  # largest number of cycles that are marched at once
 PERIODIC_TOL = 1e-12  # largest relative change of a periodic motion in all remaining cycles
 # Ledger positions of sums that increase from cycle to cycle.

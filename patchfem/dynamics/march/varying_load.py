@@ -31,9 +31,8 @@ from .march import march as run
 from .models import IDLE_KIND, Joint, element_model, nodal_load_fields, point_lists_model
 from .run import Run
 
-LIST_TOL_FACTOR = (
-    1e4  # attainable residual of sums over lists of bonds, over the tolerance of other laws
-)
+# Attainable residual of sums over lists of bonds, over the tolerance of other laws.
+LIST_TOL_FACTOR = 1e4
 # smallest pressure of a node in the weights of the shear modes, over the mean pressure of the preload
 MIN_PRESSURE_FRACTION = 1.0
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")

@@ -64,13 +64,16 @@ MAX_GROWTH_STRIPS = 16
 NEW_BOND_TOL = 1e-9
 # distance of an increment from displacement 0 / its length, below which it touches the initial bonds
 TOUCH_TOL = 1e-6
-MIN_ENERGY_STEP = 1e-3  # increment in bond lengths; below it, a difference of energies has more round-off than the force
+# Increment in bond lengths; below it, a difference of energies has more round-off than the force.
+MIN_ENERGY_STEP = 1e-3
 # same limit if the initial bonds are distributed, because solvers then rely on a force without jumps
 MIN_ENERGY_STEP_SPREAD = 1e-6
 MAX_SIMPSON_STEP = 0.1  # increment in bond lengths up to which Simpson's rule is accurate enough
 MAX_SIMPSON_STEP_FRACTIONAL = 0.03  # same limit for an order below 1
 MAX_PANEL_LENGTH = 0.5  # longest first panel of five Gauss points, in bond lengths
-MAX_EXPONENT = 300.0  # exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point number
+# Exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point
+# number.
+MAX_EXPONENT = 300.0
 # path in bond lengths; below it, the moments of new bonds are computed by power series
 MAX_SERIES_PATH = 1e-2
 # number of strips, in addition to a fifth of the list, by which a list grows before it is merged again

@@ -35,7 +35,8 @@ MAX_GROWTH_SPAN = 0.1  # largest range of the growth J of a merged strip of grow
 # largest fraction by which the last bond of a merged strip is shorter than its first
 MAX_SHORTENING = 0.1
 MAX_RANGE_MISMATCH = 1e-3  # mismatch / width; below it, two ranges count as the same
-MAX_AGE = 200.0  # age in bond lengths beyond which the permitted width no longer grows, which keeps it finite
+# Age in bond lengths beyond which the permitted width no longer grows, which keeps it finite.
+MAX_AGE = 200.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

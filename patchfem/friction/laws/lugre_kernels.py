@@ -29,7 +29,8 @@ from .exponential_kernels import exp_minus
 NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
 # ratio of the velocity to v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
 MAX_STRIBECK_RATIO = 6.0
-MIN_LIMIT_RATIO = 1e-9  # smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0
+# Smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0.
+MIN_LIMIT_RATIO = 1e-9
 
 
 class _Relaxation(NamedTuple):
