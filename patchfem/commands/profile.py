@@ -140,7 +140,7 @@ def _print_split(
     if json_:
         print(json.dumps({"patchfem": __version__, "split": asdict(divided)}, ensure_ascii=False))
         return
-    print(f"{trace}: {divided.describe()}")
+    print(f"{trace}: {divided.describe(cutoff is not None)}")
     if out is not None:
         print(f"scene: {out}")
 

@@ -123,7 +123,11 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
             )
             meshes = still[1:] or coarse
         warnings = [_format_warning(finding, static, _static_remedy(at_rest, static, meshes))]
-        if isinstance(finding.patch, press.Patch) and model.patch.gap.profile is not None:
+        if (
+            isinstance(finding.patch, press.Patch)
+            and finding.patch.points is None
+            and model.patch.gap.profile is not None
+        ):
             from .patch import trace_split
 
             warnings += trace_split.advise_split(model.patch)

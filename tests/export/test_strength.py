@@ -167,10 +167,30 @@ def test_exact_coating_of_same_metal_is_one_piece():
         }
         for side, stress in (("lower", 100e6), ("upper", 300e6))
     }
-    (note,) = find_yielding(
-        SimpleNamespace(pieces=SimpleNamespace(lower=piece, upper=piece)), bodies
-    ).values()
+    pieces = SimpleNamespace(lower=piece, upper=piece, plane="strain")
+    (note,) = find_yielding(SimpleNamespace(pieces=pieces), bodies).values()
     assert "300 MPa in the steel of the upper piece" in note and "other piece" not in note
+
+
+@pytest.mark.parametrize("peak, n_notes", [(500e6, 1), (5e9, 0)])
+def test_exact_smaller_stress_of_mesh_gives_no_note(peak, n_notes):
+    """The stress of the mesh has no note if the peak pressure causes more stress at the face."""
+    steel = SimpleNamespace(
+        name="steel",
+        young=MATERIALS["steel"].young,
+        poisson=MATERIALS["steel"].poisson,
+        yield_=None,
+    )
+    piece = SimpleNamespace(substrate=steel, coating=None)
+    body = {
+        "points": np.array([[x, y] for x in (0.0, 1.0) for y in (0.0, 1.0)]),
+        "blocks": [np.array([[0, 2, 3, 1]])],
+        "material": [False],
+        "mises": np.array([[300e6]]),
+    }
+    pieces = SimpleNamespace(lower=piece, upper=piece, plane="strain")
+    notes = find_yielding(SimpleNamespace(pieces=pieces), {"lower": body, "upper": body}, peak)
+    assert len(notes) == n_notes
 
 
 @pytest.mark.slow

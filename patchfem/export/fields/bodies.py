@@ -79,7 +79,11 @@ def write_fields(result, path: Path) -> dict:
     for one, other_body in ((low, high), (high, low)):
         one["stress_error"] = one["error"].relative_error(other_body["error"])[0]
     notes = result.extra.setdefault("notes", [])
-    yield_notes = find_yielding(result.plan.model.patch, {"lower": low, "upper": high})
+    peak = result.measures.get("pressure_peak")
+    min_peak = 0.0
+    if peak is not None and peak.value is not None:
+        min_peak = peak.value - (peak.error or 0.0)
+    yield_notes = find_yielding(result.plan.model.patch, {"lower": low, "upper": high}, min_peak)
     faces = result.extra.get("yielding_faces", {})
     notes[:] = [text for text in notes if text not in faces.values()]
     notes += [text for text in (faces | yield_notes).values() if text not in notes]

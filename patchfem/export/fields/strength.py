@@ -6,14 +6,19 @@ The model does not include plastic flow.
 import numpy as np
 
 from ...formatting import format_length
-from ...runs.patch.strength import YIELDING_NEGLECTED, Strength, yield_strength
+from ...runs.patch.strength import (
+    YIELDING_NEGLECTED,
+    Strength,
+    min_stress_ratio,
+    yield_strength,
+)
 
 # Fraction of the height of a piece near its fixed far face, where stress increases as elements
 # shrink (test_strength).
 FIXED_REGION_FRACTION = 0.2
 
 
-def find_yielding(patch_model, bodies: dict) -> dict:
+def find_yielding(patch_model, bodies: dict, min_peak: float = 0.0) -> dict:
     """Find the materials whose von Mises stress exceeds their yield strength anywhere.
 
     The region near the fixed far face is left out, because the stress in its corners is unbounded
@@ -25,6 +30,9 @@ def find_yielding(patch_model, bodies: dict) -> dict:
     bodies : dict
         "lower" and "upper" -> {"points" (n, 2) [m], "blocks" of cells, "material" (c,) True for
         coating, "mises" (f, c) [Pa]}.
+    min_peak : float
+        Lower limit of the peak pressure [Pa]. A material of a face is left out if this pressure
+        causes a larger stress than the mesh shows (`yielding_faces` has its note).
 
     Returns
     -------
@@ -48,7 +56,11 @@ def find_yielding(patch_model, bodies: dict) -> dict:
                 continue
             highest = body["mises"][:, mine].max(axis=0)
             cell = int(mine[np.argmax(highest)])
-            if highest.max() > strength.pressure:
+            stress_at_face = 0.0
+            if min_peak and (coated or piece.coating is None):
+                plane = patch_model.pieces.plane
+                stress_at_face = min_stress_ratio(kind.poisson, plane) * min_peak
+            if highest.max() > max(strength.pressure, stress_at_face):
                 places_by_strength.setdefault(strength, []).append(
                     (float(highest.max()), side, middle[cell])
                 )

@@ -40,14 +40,19 @@ class TraceSplit:
     pressure: float
     tables: str
 
-    def describe(self) -> str:
+    def describe(self, is_cutoff_given: bool = False) -> str:
         """Describe the split, what it can compute, and its tables in a text of several lines."""
         cutoff = format_length(self.cutoff)
+        reason = (
+            f"under {format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
+            f"({format_length(self.element, 3)})"
+        )
+        if is_cutoff_given:
+            reason = f"the elements are {format_length(self.element, 3)} long"
         table_lines = self.tables.replace("\n", "\n    ").rstrip()
         return (
-            f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; under "
-            f"{format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
-            f"({format_length(self.element, 3)}). Use the stiffnesses of the split. Its pressure is a mean over the short "
+            f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; "
+            f"{reason}. Use the stiffnesses of the split. Its pressure is a mean over the short "
             "waves, and its contact_fraction counts where the layer carries, not where peaks touch. The layer is too soft "
             f"where the pressure exceeds {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves flat, "
             "and too stiff where few of them carry. The changes at twice the cutoff and at a hundredth of the decay_length "
