@@ -11,6 +11,7 @@ import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_curve
 from patchfem.core import PatchfemError
+from patchfem.scene import loads
 
 IWAN = (
     POINT
@@ -131,3 +132,17 @@ def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
 def test_the_chi_square_found_is_the_least_one_beside_the_truth(seed, tmp_path):
     """A made decay with noise, by the recipe of `decay_fits`."""
     assert all(row.holds for row in decay_fits.compare_fit(seed, tmp_path)["rows"])
+
+
+def test_exact_progress_counts_computed_curves(monkeypatch):
+    """The lines of progress of a fit count the computed curves, without repeated ones."""
+    messages = []
+    monkeypatch.setattr(curves, "PROGRESS_SECONDS", 0.0)
+    monkeypatch.setattr(curves.CurveModel, "model", lambda self, values: None)
+    monkeypatch.setattr(
+        curves.CurveModel, "compute_model_curve", lambda self, model, method: np.zeros((2, 3))
+    )
+    curve_model = curves.CurveModel(loads(IWAN), [], AMPLITUDES, messages.append)
+    for value in (1.0, 2.0, 2.0, 3.0):
+        curve_model.compute("balance", [value])
+    assert [message.split(" ")[0] for message in messages] == ["0", "1", "2"]

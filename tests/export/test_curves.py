@@ -271,6 +271,6 @@ def test_exact_levels_over_three_decades_are_logarithmic():
 
 @pytest.mark.parametrize("length, frame", [(8e-3, [216, 270]), (20e-3, [300, 150])])
 def test_exact_worn_map_keeps_aspect_ratio(length, frame):
-    """The map of the worn depth of a patch 10 mm wide keeps its ratio of length to width, within 300 x 270 pixels."""
+    """The map of the worn depth keeps the ratio of length to width, within 300 x 270 pixels."""
     (chart,) = charts.worn_map_chart(np.linspace(0, length, 9), 10e-3, np.full((4, 9), 1e-6))
     assert chart["frame"] == frame

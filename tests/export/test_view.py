@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -153,6 +154,15 @@ def test_always_magnification_is_rounded_down(factor):
     mantissa = rounded / 10.0 ** np.floor(np.log10(rounded * (1 + 1e-9)))
     assert min(abs(mantissa - step) for step in (1, 2, 5)) <= 1e-9
     assert round_down_factor(factor) == max(1.0, round_down_factor(factor))
+
+
+@pytest.mark.parametrize("has_colour_bar", [True, False])
+def test_exact_panel_has_requested_colour_bar(bench_folder, has_colour_bar):
+    """A panel of the window has a colour bar only if it is requested."""
+    frame = read_frame(bench_folder)
+    plotter = MagicMock()
+    view._draw_pieces(plotter, frame, make_panels(frame)[0], "a", has_colour_bar)
+    assert plotter.add_scalar_bar.call_count == int(has_colour_bar)
 
 
 @pytest.mark.slow

@@ -13,6 +13,7 @@ from scene_texts import (
     LINEAR,
     MODE,
     PATCH,
+    PLASTIC,
     POINT,
     RIG,
     SECOND,
@@ -315,6 +316,26 @@ def test_always_every_effect_names_a_module_that_exists():
     """The module of every effect that has code of its own can be imported."""
     for name, effect in EFFECTS.items():
         assert not effect.module or import_effect(name).__name__ == effect.module, name
+
+
+def test_exact_drive_amplitude_is_divided_by_bond_length():
+    """The amplitude of a base driven by 2 m/s^2 at 10 Hz is divided by the bond length of 1 um; a
+    law without a bond length has no such ratio."""
+    text = POINT + PLASTIC + STRUCTURE
+    sets = ["drive.acceleration=2 m/s^2", "drive.frequency=10 Hz", "friction.bond_length=1 um"]
+    name = "drive_amplitude_over_bond_length"
+    assert plan(loads(text, sets=sets)).groups[name] == pytest.approx(2 / (20 * np.pi) ** 2 / 1e-6)
+    assert name not in plan(loads(POINT + COULOMB + STRUCTURE)).groups
+
+
+def test_exact_run_in_of_one_stroke_has_steps_of_cycles():
+    """A run-in as long as the amplitude of a triangle has the same steps as its cycles."""
+    slide = build(loads(BENCH, sets=["slide.distance=10 um", "slide.cycles=2"])).slide
+    path = slide.samples(80)
+    assert path.time.size == 20 + 160 + 1 and path.last_cycle == 20 + 80
+    assert np.abs(np.diff(path.rel_disp)) == pytest.approx(0.5e-6, rel=1e-9)
+    assert path.rel_disp[20] == slide.amplitude
+    assert np.diff(path.time) == pytest.approx(0.5e-6 / slide.speed, rel=1e-9)
 
 
 @pytest.mark.parametrize("length, overhangs", [(12.7, False), (16.0, True), (26.0, True)])

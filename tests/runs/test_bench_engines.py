@@ -2,6 +2,7 @@
 progress are right."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from patchfem.core import Missing
 from patchfem.friction import MAX_LIST_SECONDS, steady_loop
 from patchfem.runs import PassOptions, solve_with_coarser
 from patchfem.runs.bench import bench
+from patchfem.runs.bench.averaged import limit_tractions
 from patchfem.runs.bench.ledger import N_BLOCK_SAMPLES, Slide
 from patchfem.runs.bench.stepped import slide_step_by_step
 from patchfem.runs.run import run
@@ -273,3 +275,20 @@ def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
     assert (
         0 < measures["loop_area"].error < 40 * abs(measures["loop_area"].value - area) + 1e-6 * area
     )
+
+
+def test_exact_averaged_tractions_shift_by_bond_length():
+    """The tractions of the averaged law sum to the force, and their centroid is that of the pressure
+    moved by the bond length, to larger x for a positive force and to smaller x for a negative one."""
+    x = np.linspace(-1.0, 1.0, 2001)
+    sigma = np.maximum(1 - np.abs(x) / 0.5, 1e-9)
+    patch = SimpleNamespace(
+        x=x,
+        pressure=SimpleNamespace(sigma_n=sigma),
+        pieces=SimpleNamespace(interface=SimpleNamespace(weight=np.full(x.size, 1e-3))),
+    )
+    model = SimpleNamespace(friction=SimpleNamespace(bond_length=0.02, order=0))
+    force = np.array([3.0, -2.0, 0.0])
+    tractions = limit_tractions(model, patch, force)
+    assert tractions.sum(axis=1) * 1e-3 == pytest.approx(force, rel=1e-12)
+    assert tractions @ x * 1e-3 == pytest.approx([3.0 * 0.02, 2.0 * 0.02, 0.0], rel=1e-3)

@@ -1,5 +1,7 @@
 """Errors of all static measures cover the results on meshes refined twice."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scene_texts import PIECE
@@ -94,3 +96,13 @@ def test_exact_limit_of_geometric_series(ratio):
     assert estimate.extrapolated_error == pytest.approx(
         (limit - sums[-1]) / (4 if ratio > 2.6 else 2), rel=1e-12
     )
+
+
+def test_exact_cost_limit_of_static_patch_is_larger():
+    """Without prescribed slip, a moving patch has the smaller cost limit at any tolerance, and a
+    static patch the larger one."""
+    for is_static in (False, True):
+        patch_model = SimpleNamespace(mesh=SimpleNamespace(slip=None, is_static=is_static))
+        for tolerance in (None, 1e-2, 1e-6):
+            limit = ladder.max_condensing_seconds(patch_model, tolerance)
+            assert limit == ladder.MAX_CONDENSING_SECONDS[is_static]

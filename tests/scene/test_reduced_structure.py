@@ -237,7 +237,7 @@ def test_refuses_invalid_reduction_keys_at_their_lines(matrix_folder, key, old, 
 
 
 def test_refuses_missing_matrix_with_single_message(matrix_folder):
-    """A matrix without a file is reported once, and another missing file does not hide a fault of the matrices."""
+    """A missing matrix is reported once, and another missing file hides no fault of the matrices."""
     missing_matrix = SCENE.replace("k.mtx", "absent.mtx")
     answer = run_cli("check", write_scene(matrix_folder, missing_matrix))
     assert "structure.reduced.stiffness: there is no file" in answer.err

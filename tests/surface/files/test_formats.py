@@ -433,6 +433,19 @@ def test_always_fault_of_reader_library_is_contained(tmp_path, monkeypatch):
         read_bytes(tmp_path, data, "sleeps.opdx")
 
 
+def test_exact_trace_of_instrument_keeps_metres(tmp_path, monkeypatch):
+    """Positions and heights of a trace that the reader library gives in metres are not scaled."""
+    x = np.arange(50) * 1e-6
+    z = 1e-9 * (np.arange(50) % 7)
+    about = '{"unit": "m", "format": "OPDx", "version": "1.2"}'
+    monkeypatch.setattr(
+        instruments, "_run_script", lambda path, file: {"x": x, "z": z, "about": about}
+    )
+    found = read_bytes(tmp_path, b"\x00\x01\x02" * 99, "trace.opdx")
+    assert isinstance(found, Profile)
+    assert found.x == pytest.approx(x, rel=1e-12) and np.ptp(found.z) == pytest.approx(6e-9)
+
+
 def test_exact_mat_files_of_scipy_agree(tmp_path):
     """MAT files of SciPy give the written columns in all numeric classes; other variables are ignored."""
     for kind in ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8"):
