@@ -1,4 +1,4 @@
-"""Backbones of modes whose damping is negative, zero or positive: each law, each method, with picture and page."""
+"""Backbones of modes with negative, zero and positive damping, for each friction law and method."""
 
 import numpy as np
 import pytest
@@ -24,8 +24,8 @@ DAMPING = (-0.011, 0.0, 0.005)
 AMPLITUDES = np.geomspace(1e-5, 8e-3, 5)
 
 
-def rig(law: str, damping: float, other_mode: str = "", drive: str = ""):
-    """A block of 0.5 kg at 100 Hz on friction of at most 30 N, as a Model."""
+def make_rig(law: str, damping: float, other_mode: str = "", drive: str = ""):
+    """Return the Model of a block of 0.5 kg at 100 Hz with a friction limit of 30 N."""
     drive = drive or 'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"'
     return joint.remove_joint(
         pf.build(f"""
@@ -48,8 +48,8 @@ cycles = 20
     )
 
 
-def written(found) -> str:
-    """The page of a backbone, after its picture, its table and its netCDF contents have been made."""
+def write_page(found) -> str:
+    """Return the page of a backbone after writing its picture, its table and its netCDF contents."""
     if found.curves:
         pictures.draw_charts(backbone_files.backbone_charts(found.curves))
     backbone_files.backbone_contents(found)
@@ -57,10 +57,10 @@ def written(found) -> str:
     return backbone_files.page_html(found, "title")
 
 
-def check_ends_well(law: str, damping: float, way: str, other_mode: str) -> None:
-    """Check that a method gives a curve with errors, or a sentence, and that both can be written."""
-    found = compute_backbone(rig(law, damping, other_mode), "", AMPLITUDES, (way,))
-    assert "<html" in written(found)
+def check_curve_or_reason(law: str, damping: float, way: str, other_mode: str) -> None:
+    """Check that a method gives either a curve with errors or a reason, and that the page can be written."""
+    found = compute_backbone(make_rig(law, damping, other_mode), "", AMPLITUDES, (way,))
+    assert "<html" in write_page(found)
     assert (way in found.curves) != (way in found.missing)
     for curve in found.curves.values():
         for error in (curve.frequency_error, curve.damping_error):
@@ -70,16 +70,20 @@ def check_ends_well(law: str, damping: float, way: str, other_mode: str) -> None
 
 @pytest.mark.parametrize("damping", DAMPING)
 @pytest.mark.parametrize("law", FAST_LAWS)
-def test_every_sign_of_damping_ends_well(law, damping):
-    check_ends_well(law, damping, "balance", "")
+def test_balance_gives_curve_or_reason_for_each_sign_of_damping(law, damping):
+    """Harmonic balance gives a curve or a reason for negative, zero and positive damping."""
+    check_curve_or_reason(law, damping, "balance", "")
 
 
 @pytest.mark.parametrize("law", FAST_LAWS)
-def test_exact_viscous_damping_adds_to_that_of_friction(law):
-    """The free motion that a damping keeps up does not depend on the viscous part of one mode: zeta_s f_0/f is
-    added."""
+def test_exact_viscous_damping_adds_to_friction_damping(law):
+    """The viscous damping of a single mode adds zeta_s f_0/f to the damping by friction.
+
+    The motion that the backbone describes does not depend on the viscous damping, so the
+    frequencies are equal.
+    """
     negative, positive = (
-        compute_backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
+        compute_backbone(make_rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
         for damping in (-0.011, 0.005)
     )
     assert negative.frequency == pytest.approx(positive.frequency, rel=1e-7)
@@ -88,21 +92,27 @@ def test_exact_viscous_damping_adds_to_that_of_friction(law):
 
 
 @pytest.mark.parametrize("law", FAST_LAWS)
-def test_the_damping_is_zero_at_the_limit_cycle_of_a_run(law):
-    """A run without a drive finds the unstable limit cycle from its own equations, without a backbone."""
-    found = compute_backbone(rig(law, -0.02), "", AMPLITUDES, ("balance",))
-    free = pf.run(rig(law, -0.02, drive='kind = "free"\ndisplacement = "0.1 mm"'))
+def test_damping_is_zero_at_limit_cycle_of_a_run(law):
+    """The amplitude of zero damping agrees with the unstable limit cycle of a run within 1e-4.
+
+    The run without a drive computes the limit cycle from its own equations, without a backbone.
+    """
+    found = compute_backbone(make_rig(law, -0.02), "", AMPLITUDES, ("balance",))
+    free = pf.run(make_rig(law, -0.02, drive='kind = "free"\ndisplacement = "0.1 mm"'))
     assert found.flutter == pytest.approx(free.measures["flutter_amplitude"].value, rel=1e-4)
-    assert "the mode gains energy" in written(found)
+    assert "the mode gains energy" in write_page(found)
 
 
-def test_a_decay_below_the_limit_cycle_is_read_where_larger_releases_grow():
-    """The largest amplitudes are left out with a sentence; below, the decay loses what the balance says.
+def test_decay_is_evaluated_below_an_unstable_limit_cycle():
+    """Below an unstable limit cycle the damping of a decay agrees with the balance within 5 %.
+
+    Amplitudes above the limit cycle, from which the motion grows, are left out with a note; one
+    cycle loses up to 40 % of the amplitude here, so both agree to a few percent only.
 
     One swing loses up to 40 % of the amplitude here, so both agree to a few percent only.
     """
     found = compute_backbone(
-        rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay")
+        make_rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay")
     )
     decay = found.curves["decay"]
     balance = found.curves["balance"]

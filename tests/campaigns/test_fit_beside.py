@@ -1,4 +1,4 @@
-"""What a fit settles besides the values of its scene: offsets of the record, a warm-up, any elastic range."""
+"""Fits with offsets of the record and with a cycle before its first row (warm-up)."""
 
 import json
 
@@ -16,8 +16,11 @@ TRUTH = [0.31, 2.3e-6]
 NAMES = ("friction.static", "friction.bond_length")
 
 
-def test_exact_a_steady_loop_with_an_offset_of_the_force(tmp_path):
-    """Cut out of a running motion, biased by 7 N: a warm-up and a free offset find the numbers again."""
+def test_exact_offset_of_force_is_recovered_from_steady_loop(tmp_path):
+    """Parameters and a force offset of 7 N are recovered from a loop cut out of a steady motion.
+
+    Without warm-up and offset the fit is poor and proposes `--warm-up`.
+    """
     time, slide = rows(80, 4)
     force = dahl(slide, *TRUTH) + 7.0
     cut = slice(93, 280)
@@ -30,11 +33,11 @@ def test_exact_a_steady_loop_with_an_offset_of_the_force(tmp_path):
     assert plain.rms > 1.0 and any("--warm-up" in one for one in plain.keys.warnings)
 
 
-def test_exact_the_unstressed_place_is_found(tmp_path):
-    """A record that begins 1.1 um beyond the unstressed place."""
+def test_exact_offset_of_displacement_is_recovered(tmp_path):
+    """The offset of a record that begins 1.1 um from the unstressed position is recovered within 1e-5."""
     time, slide = rows(80, 1)
-    place = 1.1e-6 + slide
-    force = play(np.concatenate([[0.0], place]), *TRUTH)[1:]
+    position = 1.1e-6 + slide
+    force = play(np.concatenate([[0.0], position]), *TRUTH)[1:]
     loop = table(tmp_path / "loop.csv", time, slide, force)
     found = fit_loop(
         scene_of(tmp_path, "elastic-plastic"),
@@ -45,20 +48,24 @@ def test_exact_the_unstressed_place_is_found(tmp_path):
     assert found.keys.fit.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
 
 
-def test_exact_a_lead_in_ends_where_the_record_begins(tmp_path):
-    """Rows of a sine cut at any phase: one period lies between a warm row and its repetition."""
+def test_exact_warm_up_path_ends_at_first_row(tmp_path):
+    """The warm-up path ends at the first row of a sine that begins at an arbitrary phase.
+
+    One period lies between a row of the warm-up and the same row of the record.
+    """
     time, slide = rows(50, 2)
-    place = slide[3:] - slide[3]
-    loop = read_loop(table(tmp_path / "loop.csv", time[3:], place, np.ones(place.size)))
-    warm = count_whole_cycles(loop)
-    assert warm == 50 or warm == 51
-    moments, path, before = prepend_warm_up(loop.time, loop.displacement, warm, 2e-6)
-    assert before == warm + 1 and path[0] == 0 and np.diff(moments).min() > 0
+    position = slide[3:] - slide[3]
+    loop = read_loop(table(tmp_path / "loop.csv", time[3:], position, np.ones(position.size)))
+    warm_up_rows = count_whole_cycles(loop)
+    assert warm_up_rows == 50 or warm_up_rows == 51
+    times, path, before = prepend_warm_up(loop.time, loop.displacement, warm_up_rows, 2e-6)
+    assert before == warm_up_rows + 1 and path[0] == 0 and np.diff(times).min() > 0
     assert path[before:] - 2e-6 == pytest.approx(loop.displacement, abs=1e-18)
-    assert moments[before] - moments[1] == pytest.approx(1e-2, abs=2e-4 * 1e-2 + 1e-9)
+    assert times[before] - times[1] == pytest.approx(1e-2, abs=2e-4 * 1e-2 + 1e-9)
 
 
-def test_refuses_a_warm_up_of_a_record_without_a_cycle(tmp_path):
+def test_refuses_warm_up_of_record_without_full_cycle(tmp_path):
+    """A warm-up of a record that is shorter than one cycle is refused, as is an unknown offset."""
     time, slide = rows(80, 1)
     loop = table(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
     with pytest.raises(PatchfemError, match="returns to its first value and passes it"):
@@ -69,7 +76,8 @@ def test_refuses_a_warm_up_of_a_record_without_a_cycle(tmp_path):
         fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions(("time",)))
 
 
-def test_always_the_verb_writes_its_offsets(tmp_path):
+def test_always_fit_command_writes_offsets(tmp_path):
+    """The command writes the fitted offset of the force and the effective number of rows."""
     time, slide = rows(40, 4)
     loop = table(tmp_path / "loop.csv", time[47:], slide[47:], dahl(slide, *TRUTH)[47:] - 3.0)
     (tmp_path / "scene.toml").write_text(POINT + LAWS["bonds"] + SINE, "utf-8")

@@ -1,4 +1,4 @@
-"""Parameters of a joint from frequency and damping over the amplitude."""
+"""Tests of fitting the parameters of a joint to its frequency and damping over the amplitude."""
 
 import decay_fits
 import numpy as np
@@ -24,8 +24,11 @@ AMPLITUDES = np.geomspace(1e-6, 2e-5, 3)
 FREE = {"friction.stiffness": ("3e5 N/m", "3e6 N/m"), "friction.chi": (-0.9, -0.05)}
 
 
-def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLITUDES):
-    """The balanced curve of a scene as a decay on disk, with relative noise on frequency (a hundredth) and damping."""
+def write_decay(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLITUDES):
+    """Write the balance curve of a scene as a measured decay and return its path.
+
+    The damping has the relative noise `noise`, the frequency a hundredth of it.
+    """
     curve = pf.backbone(text, amplitudes=amplitudes, method="balance")
     a, f, z = (curve[f"balance_{name}"].values for name in ("amplitude", "frequency", "damping"))
     rng = np.random.default_rng(seed)
@@ -40,11 +43,14 @@ def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLI
     return path
 
 
-def test_exact_the_parameters_of_a_computed_decay_are_recovered(tmp_path):
-    """Stiffness and exponent of an Iwan joint from its own curve, and the fitted scene has it."""
-    path = written(tmp_path / "decay.csv", IWAN)
+def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
+    """Stiffness and exponent of an Iwan joint are recovered from its curve within 1e-5.
+
+    The fitted scene has the same values.
+    """
+    path = write_decay(tmp_path / "decay.csv", IWAN)
     found = pf.fit(START, to=path, free=FREE, starts=2, out=tmp_path / "out")
-    values = {name: one["value"] for name, one in found["values"].items()}
+    values = {name: fitted["value"] for name, fitted in found["values"].items()}
     assert values["friction.stiffness"] == pytest.approx(1e6, rel=1e-5)
     assert values["friction.chi"] == pytest.approx(-0.35, abs=1e-5)
     assert found["outcome"] == "done" and found["rms"]["damping"] < 1e-5
@@ -63,10 +69,14 @@ FLUID = make_shaken_block('law = "tanh"\nreference_speed = "0.3 m/s"').replace(
 )
 
 
-def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
-    """A block damped by a film, 60 N at high speed: below some 0.1 m/s, where the scene begins, its damping ratio is
-    above 1 at the smallest amplitude; with 1 kN at all of them."""
-    path = written(tmp_path / "decay.csv", FLUID, amplitudes=np.geomspace(1e-4, 1e-3, 3))
+def test_exact_overdamped_trials_are_skipped(tmp_path):
+    """Trial values at which the mode is overdamped are skipped, and the reference speed is recovered.
+
+    With friction of 60 N and a reference speed below about 0.1 m/s, where the search begins, the
+    damping ratio at the smallest amplitude is above 1; with 1 kN it is above 1 at every amplitude,
+    and the fit is refused.
+    """
+    path = write_decay(tmp_path / "decay.csv", FLUID, amplitudes=np.geomspace(1e-4, 1e-3, 3))
     free = {"friction.reference_speed": ("0.01 m/s", "3 m/s")}
     found = pf.fit(
         FLUID,
@@ -86,13 +96,14 @@ def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
         pf.fit(FLUID, to=path, free={"friction.static": (10.0, 20.0)}, out=tmp_path / "none")
 
 
-def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
+def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatch):
+    """The command fits a curve from a file and refuses tables that are no single valid curve."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rig.toml").write_text(START)
-    written(tmp_path / "decay.csv", IWAN)
-    ask = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
-    assert "--hold" in run_cli(*ask, "--hold", "frequency=1 Hz").err
-    answer = run_cli(*ask, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")
+    write_decay(tmp_path / "decay.csv", IWAN)
+    command = ["fit", "rig.toml", "--to", "decay.csv", "--free", "friction.chi=-0.9..-0.05"]
+    assert "--hold" in run_cli(*command, "--hold", "frequency=1 Hz").err
+    answer = run_cli(*command, "--set", "friction.stiffness=1e6 N/m", "--starts", "1", "-o", "out")
     assert answer.code == 0
     assert "3 amplitudes of decay.csv by balance" in answer.out
     assert "friction.chi" in answer.out
@@ -102,22 +113,27 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
         and page.count("<svg") == 1
         and "rms of the residual" in page
     )
-    both = tmp_path / "backbone.csv"
-    both.write_text("method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n")
+    table = tmp_path / "backbone.csv"
+    table.write_text(
+        "method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n"
+    )
     with pytest.raises(PatchfemError, match="several methods"):
-        read_curve(both)
-    both.write_text("amplitude [m],frequency [Hz],damping\n-1e-6,100,0.1\n2e-6,100,0.1\n")
+        read_curve(table)
+    table.write_text("amplitude [m],frequency [Hz],damping\n-1e-6,100,0.1\n2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="above 0"):
-        read_curve(both)
-    both.write_text(
+        read_curve(table)
+    table.write_text(
         "amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n"
     )
     with pytest.raises(PatchfemError, match="errors must be 0 or more"):
-        read_curve(both)
+        read_curve(table)
 
 
-def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
-    """An amplitude has two values, a frequency and a damping: for four keys three amplitudes are needed."""
+def test_refuses_fewer_values_than_parameters(tmp_path):
+    """Two amplitudes are refused for four parameters, with the number of amplitudes that are needed.
+
+    Each amplitude has two values, a frequency and a damping ratio.
+    """
     path = tmp_path / "few.csv"
     path.write_text("amplitude [m],frequency [Hz],damping [1]\n1e-6,100,0.01\n2e-6,99,0.01\n")
     free = {**FREE, "friction.static": (0.1, 0.6), "friction.beta": (0.1, 2)}
@@ -129,13 +145,13 @@ def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8000, 8030))
-def test_the_chi_square_found_is_the_least_one_beside_the_truth(seed, tmp_path):
-    """A made decay with noise, by the recipe of `decay_fits`."""
+def test_fit_reaches_minimum_chi_square_near_true_parameters(seed, tmp_path):
+    """The chi-square of a fit to a noisy synthetic decay is within 1 % of the minimum near the truth."""
     assert all(row.holds for row in decay_fits.compare_fit(seed, tmp_path)["rows"])
 
 
 def test_exact_progress_counts_computed_curves(monkeypatch):
-    """The lines of progress of a fit count the computed curves, without repeated ones."""
+    """The progress of a fit counts computed curves, without repeated ones."""
     messages = []
     monkeypatch.setattr(curves, "PROGRESS_SECONDS", 0.0)
     monkeypatch.setattr(curves.CurveModel, "model", lambda self, values: None)

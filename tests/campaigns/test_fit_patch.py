@@ -1,4 +1,4 @@
-"""Laws of one point from the loops of a patch."""
+"""Tests of fitting a single-point friction law to the hysteresis loops of a patch."""
 
 import json
 
@@ -48,18 +48,22 @@ tangential_ratio = 0.8
         ("elastic-plastic", {"bond_length": 7e-6}),
     ],
 )
-def test_exact_a_law_finds_itself_in_its_own_loops(law, keys):
-    own = Friction.model_construct(law=law, static=0.3, **keys)
-    slides = np.geomspace(2e-7, 6e-5, 20)
-    target = Curves(*steady_loop(own, 100.0, slides))
-    found = LawProblem(law, 0.3, 100.0, slides, target, 5e6).solve()
+def test_exact_parameters_of_each_law_are_recovered_from_its_loops(law, keys):
+    """The parameters of a law are recovered from its own steady loops within 1e-6."""
+    true_law = Friction.model_construct(law=law, static=0.3, **keys)
+    amplitudes = np.geomspace(2e-7, 6e-5, 20)
+    target = Curves(*steady_loop(true_law, 100.0, amplitudes))
+    found = LawProblem(law, 0.3, 100.0, amplitudes, target, 5e6).solve()
     assert found.values == pytest.approx(keys, rel=1e-6)
     assert np.abs(found.deviations).max() < 1e-6
 
 
-def test_a_mesh_is_refined_until_the_exponent_of_mindlins_contact_is_known():
-    """A crowned strip loses energy with the third power of a small slide, chi = 0. A pinned mesh that leaves the loss
-    open is told, and what is told serves."""
+def test_mesh_is_refined_until_micro_slip_exponent_is_accurate():
+    """The mesh is refined until the micro-slip exponent of a crowned strip is accurate.
+
+    The energy loss grows with the third power of a small amplitude, so chi = 0; a fixed coarse mesh
+    gives a warning that names the remedy, and the remedy works.
+    """
     pinned = fit_patch(pf.load(JOINT + SLIDE))
     assert "energy loss has an error" in pinned.warnings[0]
     assert "leave contact.element_size out" in pinned.warnings[0]
@@ -69,18 +73,24 @@ def test_a_mesh_is_refined_until_the_exponent_of_mindlins_contact_is_known():
     assert np.sqrt(np.mean(found.patch.mesh_change[1] ** 2)) < 0.1
 
 
-def test_exact_a_rough_wedge_is_an_iwan_law():
-    """Under a pressure that falls linearly to zero the points behind a linear skin slip one after the other at slides
-    that are spread evenly: chi = 0 and no last slider, K = k_t A."""
+def test_exact_rough_wedge_is_fitted_by_an_iwan_law():
+    """A wedge on a soft elastic layer is an Iwan joint: chi = 0, beta = 0, K = k_t A within 1e-3.
+
+    The pressure falls linearly to zero, so that the yield displacements of the nodes are uniformly
+    distributed.
+    """
     found = fit_patch(pf.load(WINKLER), np.geomspace(5e-8, 1e-6, 12))
-    one = found.laws["iwan"]
-    assert one.values["chi"] == 0.0 and one.values["beta"] == pytest.approx(0.0, abs=2e-2)
-    assert one.values["stiffness"] == pytest.approx(0.8e12 * 12.7e-3**2, rel=1e-3)
-    assert np.abs(one.deviations).max() < 2e-3 and found.best == "iwan"
+    iwan = found.laws["iwan"]
+    assert iwan.values["chi"] == 0.0 and iwan.values["beta"] == pytest.approx(0.0, abs=2e-2)
+    assert iwan.values["stiffness"] == pytest.approx(0.8e12 * 12.7e-3**2, rel=1e-3)
+    assert np.abs(iwan.deviations).max() < 2e-3 and found.best == "iwan"
 
 
-def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
-    """Frequency and damping of both agree within the differences that the fit prints, for each of the laws."""
+def test_rig_with_fitted_law_has_backbone_of_the_patch(tmp_path):
+    """The patch and each fitted law give the rig the same frequency and damping.
+
+    The differences are at most those that the fit states.
+    """
     answer = pf.fit(RIG, from_patch=True, out=tmp_path / "out")
     slides = np.geomspace(*answer["amplitudes"], answer["rows"])
     method = {"method": "quasi-static", "amplitudes": slides}
@@ -94,7 +104,8 @@ def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
         stiffness, loss = (abs(one[part]["largest"]) for part in ("stiffness", "dissipation"))
         assert np.abs(f).max() <= 1 - np.sqrt(1 - stiffness)
         assert np.abs(zeta).max() <= (1 + loss) / (1 - stiffness) - 1
-        assert np.abs(f).max() > 0.2 * stiffness  # the mode rests on the contact
+        # The stiffness of the contact has a large effect on the frequency of the mode.
+        assert np.abs(f).max() > 0.2 * stiffness
     runs = [
         pf.run(scene, **{"drive.acceleration": "1 g"})
         .measures["relative_displacement_amplitude"]
@@ -114,8 +125,8 @@ def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
     ],
     ids=["strips", "holder"],
 )
-def test_exact_the_slip_force_is_that_of_the_load(table):
-    """Whatever gives way, all elements together slip at mu N, which each law keeps."""
+def test_exact_slip_force_is_friction_coefficient_times_load(table):
+    """The slip force of a patch and of each fitted law is mu N, also with strips or a holder."""
     found = fit_patch(
         pf.load(RIG.replace("[contact.shear]\n", "[contact.shear]\n" + table)), [1e-8, 1e-6, 1e-4]
     )
@@ -126,8 +137,8 @@ def test_exact_the_slip_force_is_that_of_the_load(table):
     )
 
 
-def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
-    """The differences that are printed are those of the table of loops."""
+def test_fit_command_prints_largest_differences_of_the_loops(tmp_path, monkeypatch):
+    """The largest differences that the command prints are those of the table of loops."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bench.toml").write_text(JOINT + SLIDE)
     answer = run_cli(
@@ -137,12 +148,15 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
     law = json.loads((tmp_path / "out/fit.json").read_text())["law"].replace("-", "")
     rows = np.genfromtxt(tmp_path / "out/fit.csv", delimiter=",", names=True)
     for part, name, unit in (("stiffness", "force", "N"), ("energy loss per cycle", "loss", "J")):
-        own = rows[f"patch_{name}_{unit}"]  # there is no loss at 10 nm, where no element slips
-        off = rows[f"{law}_{name}_{unit}"] / np.where(own > 0, own, np.nan) - 1
-        k = np.nanargmax(np.abs(off))
-        size = f"{'+' if off[k] > 0 else ''}{format_number(100 * off[k], 2)} %"
-        at = format_quantity(rows["slide_m"][k], "m", 3)
-        assert f"{size} of the {part} (at {at})" in answer.out.split("\n")[0]
+        # No element slips at 10 nm, so that the energy loss is 0 there.
+        patch_values = rows[f"patch_{name}_{unit}"]
+        difference = (
+            rows[f"{law}_{name}_{unit}"] / np.where(patch_values > 0, patch_values, np.nan) - 1
+        )
+        k = np.nanargmax(np.abs(difference))
+        size = f"{'+' if difference[k] > 0 else ''}{format_number(100 * difference[k], 2)} %"
+        amplitude = format_quantity(rows["slide_m"][k], "m", 3)
+        assert f"{size} of the {part} (at {amplitude})" in answer.out.split("\n")[0]
     assert {"scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.iwan.toml"} <= {
         one.name for one in (tmp_path / "out").iterdir()
     }
@@ -151,7 +165,7 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
         for one in (tmp_path / "out/scene.fitted.toml", JOINT + SLIDE)
     )
     assert fitted == pytest.approx(patch, rel=1e-6)
-    # its own folder is replaced
+    # A second fit replaces the folder of the first.
     assert run_cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0
 
 
@@ -185,14 +199,16 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
         ),
     ],
 )
-def test_refuses_a_patch_that_is_no_set_of_elements_with_the_remedy(text, said, mended):
-    with pytest.raises(pf.PatchfemError) as wrong:
+def test_refuses_unsuitable_patch_and_names_remedy(text, said, mended):
+    """A scene whose patch has no single-point law is refused, and the stated remedy makes the fit possible."""
+    with pytest.raises(pf.PatchfemError) as error:
         fit_patch(pf.load(text))
-    assert said in str(wrong.value)
+    assert said in str(error.value)
     assert fit_patch(pf.load(mended), [1e-8, 5e-8, 2e-7]).laws
 
 
-def test_refuses_words_that_do_not_stand_together():
+def test_refuses_incompatible_options_of_fit():
+    """Options that exclude each other, and ranges of amplitudes that are too short, are refused."""
     for given, said in (
         ({}, "from_patch alone"),
         ({"from_patch": True, "to": "a.csv"}, "from_patch alone"),

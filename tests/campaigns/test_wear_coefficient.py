@@ -1,4 +1,4 @@
-"""A wear coefficient from a measured depth: recovered from the program's own depth, refused where none fits."""
+"""Tests of fitting a wear coefficient to a measured depth."""
 
 import json
 
@@ -26,26 +26,30 @@ def scene(tmp_path):
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("name", ["worn_depth_max", "worn_depth_mean"])
-def test_exact_the_coefficient_comes_back_from_its_own_depth(scene, tmp_path, name):
-    found = pf.run(load(WORN)).measures
+def test_exact_wear_coefficient_is_recovered_from_computed_depth(scene, tmp_path, name):
+    """The wear coefficient is recovered from the computed worn depth within 1e-3."""
+    measures = pf.run(load(WORN)).measures
     length = 12.7e-3
-    value = {"worn_depth_mean": found["worn_volume"].value / length**2}.get(name) or found[
+    value = {"worn_depth_mean": measures["worn_volume"].value / length**2}.get(name) or measures[
         name
     ].value
     answer = run_cli(
         "fit", scene, "--to", f"{name}={value!r} m", *FREE, "-o", tmp_path / "fit", "--json"
     )
     assert answer.code == 0, answer.err
-    one = json.loads(answer.out)["values"]["wear.coefficient"]
-    assert one["value"] == pytest.approx(3e-15, rel=1e-3) and one["low"] == one[
+    fitted = json.loads(answer.out)["values"]["wear.coefficient"]
+    assert fitted["value"] == pytest.approx(3e-15, rel=1e-3) and fitted["low"] == fitted[
         "high"
-    ] == pytest.approx(one["value"])
-    again = pf.run(tmp_path / "fit" / "scene.fitted.toml").measures
-    assert again["worn_volume"].value == pytest.approx(found["worn_volume"].value, rel=1e-3)
+    ] == pytest.approx(fitted["value"])
+    refitted = pf.run(tmp_path / "fit" / "scene.fitted.toml").measures
+    assert refitted["worn_volume"].value == pytest.approx(measures["worn_volume"].value, rel=1e-3)
 
 
-def test_exact_an_interval_of_the_depth_becomes_one_of_the_coefficient(scene, tmp_path):
-    """Volume goes with the coefficient, so its interval has the same ends."""
+def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path):
+    """The interval of the coefficient has the relative ends of the interval of the depth.
+
+    The worn volume is proportional to the coefficient.
+    """
     page = tmp_path / "compare.json"
     page.write_text(
         json.dumps(
@@ -56,12 +60,14 @@ def test_exact_an_interval_of_the_depth_becomes_one_of_the_coefficient(scene, tm
         )
     )
     answer = run_cli("fit", scene, "--to", page, *FREE, "-o", tmp_path / "fit", "--json")
-    one = json.loads(answer.out)["values"]["wear.coefficient"]
-    assert one["low"] / one["value"] == pytest.approx(0.75, rel=2e-3)
-    assert one["high"] / one["value"] == pytest.approx(1.5, rel=2e-3)
+    fitted = json.loads(answer.out)["values"]["wear.coefficient"]
+    assert fitted["low"] / fitted["value"] == pytest.approx(0.75, rel=2e-3)
+    assert fitted["high"] / fitted["value"] == pytest.approx(1.5, rel=2e-3)
 
 
-def test_refuses_what_cannot_be_fitted(scene, tmp_path):
+def test_refuses_unsuitable_depths_and_parameters(scene, tmp_path):
+    """Depths outside the bounds, other quantities, other parameters and scenes without a patch are refused."""
+
     def said(*words):
         answer = run_cli("fit", scene, *words)
         assert answer.code == 2
