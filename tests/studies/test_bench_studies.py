@@ -1,4 +1,4 @@
-"""The sentences of the bench studies: friction against speed, and ageing at rest."""
+"""Figures of the bench studies: friction against sliding velocity, and ageing at rest."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from study_module import load_study
 
 
 def check_speeds(rows):
+    """Check that the steady friction is the Lorentzian of the velocity."""
     for row in rows:
         lorentz = 0.42 + 0.18 / (1 + row["share"] ** 2)
         assert row["promised"] == pytest.approx(lorentz, rel=1e-13)
@@ -16,15 +17,19 @@ def check_speeds(rows):
 
 
 @pytest.mark.slow
-def test_exact_friction_against_speed_is_the_lorentzian_and_g_of_it(tmp_path):
+def test_exact_friction_against_velocity_is_a_lorentzian(tmp_path):
+    """The steady friction coefficient is a Lorentzian of velocity / characteristic velocity."""
     rows = load_study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
     check_speeds(rows)
-    assert rows[0]["stretch"] == pytest.approx(0.51, rel=1e-12)  # half way at v_c = sqrt(a_s l_k)
+    assert rows[0]["stretch"] == pytest.approx(
+        0.51, rel=1e-12
+    )  # half of the drop at v_c = sqrt(a_s l_k)
     assert "<svg" in (tmp_path / "picture.svg").read_text()
 
 
 @pytest.mark.slow
-def test_exact_the_whole_study_of_friction_against_speed():
+def test_exact_complete_velocity_study_agrees_with_lorentzian():
+    """All velocities agree with the Lorentzian; the fastest depart by the figures of the study."""
     rows = load_study("bench/stribeck.py").main(path=None)
     check_speeds(rows)
     fast = {
@@ -36,8 +41,8 @@ def test_exact_the_whole_study_of_friction_against_speed():
     assert fast[1.0] == pytest.approx({0: -0.63, 1: -0.15}, abs=6e-3)
 
 
-def peak_after(part, start, before):
-    """Largest z/eps_0 of z' = 1 - z/eps with 2.10 along the path, from a bond length `start`, force `before`."""
+def integrate_peak_after_rest(part, start, before):
+    """Return the largest z/eps_0 of z' = 1 - z/eps, eps by equation 2.10, after a period at rest."""
     rate = 2e-6 / 1e-6 + 1 / (part * 2e-6)
     slow = before
     found = solve_ivp(
@@ -52,7 +57,8 @@ def peak_after(part, start, before):
     return found.y[0].max()
 
 
-def test_exact_ageing_is_exponential_and_the_peak_stays_below_it(tmp_path):
+def test_exact_ageing_is_exponential_and_bounds_the_friction_peak(tmp_path):
+    """The bond length ages exponentially; the next friction peak agrees with an integrated equation."""
     rows = load_study("bench/ageing.py").main(
         (0.1, 10.0), (0.5, 5.0), tmp_path / "picture.svg", 1200
     )
@@ -64,7 +70,7 @@ def test_exact_ageing_is_exponential_and_the_peak_stays_below_it(tmp_path):
         assert row["before"] == pytest.approx(slow, rel=1e-9) and row["rested"] == row["before"]
         assert row["aged"] == pytest.approx(1 - (1 - slow) * np.exp(-2 * row["hold"]), rel=1e-12)
         assert row["peak"] == pytest.approx(
-            peak_after(row["part"], row["aged"], row["before"]), rel=1e-4
+            integrate_peak_after_rest(row["part"], row["aged"], row["before"]), rel=1e-4
         )
         assert row["before"] < row["peak"] < row["aged"]
     shown = {
@@ -80,7 +86,8 @@ def test_exact_ageing_is_exponential_and_the_peak_stays_below_it(tmp_path):
 
 
 @pytest.mark.slow
-def test_exact_the_longest_bonds_of_the_ageing_study():
+def test_exact_peak_after_ageing_of_the_longest_bonds():
+    """Bonds of 50 slip lengths show 92 % of their ageing in the friction peak after rest."""
     study_ = load_study("bench/ageing.py")
     before, rested, peak = study_.dwell(10.0, 50.0)
     assert before == rested and (peak - before) / (

@@ -1,4 +1,4 @@
-"""Measurements of others: what the docstrings of the benchmarks say."""
+"""Benchmarks against published measurements: the figures in the docstrings of the studies."""
 
 import os
 from pathlib import Path
@@ -12,17 +12,19 @@ wear = make_study_fixture("benchmarks/ti64_wear.py")
 FOLDER = Path(os.environ.get("PATCHFEM_DATA") or "no folder")
 
 
-def rms(values):
+def compute_rms(values):
+    """Return the root mean square of the values."""
     return np.sqrt(np.mean(np.square(values)))
 
 
-def test_always_the_sentences_on_the_beam(beam):
+def test_always_beam_study_gives_its_stated_scores(beam):
+    """Frequencies and damping ratios of the bolted beam differ from the measured ones as stated."""
     rows = {test: [row for row in beam.main() if row.test == test] for test in ("hammer", "shaker")}
     ratio = {t: [r.damping / r.measured_damping for r in rows[t]] for t in rows}
     miss = {t: [r.frequency - r.measured_frequency for r in rows[t]] for t in rows}
     scores = [beam.damping_score(ratio[test], 1) for test in rows]
     assert scores == pytest.approx([0.016, 0.158], abs=5e-4)
-    assert [rms(miss[test]) for test in rows] == pytest.approx([0.019, 0.394], abs=5e-4)
+    assert [compute_rms(miss[test]) for test in rows] == pytest.approx([0.019, 0.394], abs=5e-4)
     assert [min(ratio["shaker"]), max(ratio["shaker"])] == pytest.approx([0.85, 1.30], abs=5e-3)
     first, last = rows["hammer"][0], rows["hammer"][-1]
     assert first.frequency - last.frequency == pytest.approx(0.195, abs=5e-4)
@@ -30,15 +32,16 @@ def test_always_the_sentences_on_the_beam(beam):
     assert beam.score_lines()[0] == pytest.approx(0.157, abs=5e-4)
     mean = beam.HAMMER.mean(axis=0)
     assert beam.damping_score(mean[2], beam.SHAKER[:, 3]) == pytest.approx(0.77, abs=5e-3)
-    assert rms(beam.SHAKER[:, 1] - mean[1]) == pytest.approx(0.19, abs=5e-3)
-    assert rms(beam.HAMMER[:, 1] - mean[1]) == pytest.approx(0.057, abs=5e-4)
+    assert compute_rms(beam.SHAKER[:, 1] - mean[1]) == pytest.approx(0.19, abs=5e-3)
+    assert compute_rms(beam.HAMMER[:, 1] - mean[1]) == pytest.approx(0.057, abs=5e-4)
     every = [*rows["hammer"], *rows["shaker"]]
     assert max(r.frequency_error for r in every) < 3e-5
     assert max(r.damping_error / r.damping for r in every) < 3e-4
 
 
 @pytest.mark.slow
-def test_the_scene_of_the_beam_has_the_fitted_values(beam):
+def test_beam_fit_gives_the_values_of_its_scene(beam):
+    """A fit to the damping ratios of the beam gives the values of its scene file."""
     values, half = beam.fit_damping()
     force = 100 * np.exp(values[0] + half[0] * np.array([0, -1, 1]))
     assert force == pytest.approx([19.4, 12.7, 29.5], abs=0.1)
@@ -47,7 +50,8 @@ def test_the_scene_of_the_beam_has_the_fitted_values(beam):
 
 
 @pytest.mark.parametrize("index", [0, 1])
-def test_exact_the_tables_of_the_beam_are_those_of_its_records(beam, index):
+def test_exact_beam_tables_agree_with_the_measured_files(beam, index):
+    """The tables in the study agree with the published files of the beam."""
     file = FOLDER / beam.FILES[index]
     if not file.exists():
         pytest.skip(f"PATCHFEM_DATA names no folder with {file.name}")
@@ -55,7 +59,8 @@ def test_exact_the_tables_of_the_beam_are_those_of_its_records(beam, index):
     assert read(file) == pytest.approx(typed, rel=1e-3, abs=1e-3 * index)
 
 
-def test_always_the_sentences_on_the_wear_of_titanium(wear):
+def test_always_titanium_study_gives_its_stated_depths_and_widths(wear):
+    """Depths, widths and the fitted wear coefficient of the titanium tracks are those stated."""
     tracks = {track.name: track for track in wear.main()}
     deep = tracks.pop("f_2")
     assert [1e6 * deep.depth, 1e6 * deep.depth_error] == pytest.approx([67.8, 0.1], abs=0.05)
@@ -71,7 +76,8 @@ def test_always_the_sentences_on_the_wear_of_titanium(wear):
     assert fit["value"] / by_volume == pytest.approx(3.4, abs=0.05)
 
 
-def test_exact_the_volumes_of_titanium(wear):
+def test_exact_wear_coefficients_of_titanium_from_volumes(wear):
+    """Wear coefficients from volumes, and their scores for other tests, are those stated."""
     assert wear.fit_coefficient(wear.LOW_FREQUENCY) == pytest.approx(
         [4.23e-13, 3.70e-13, 4.84e-13], abs=5e-16
     )

@@ -1,4 +1,4 @@
-"""The sentence of the study of orders, on its cheapest grids, and the parts of its own solver against closed forms."""
+"""The study of element orders: its solver against closed forms, and its result on coarse grids."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from study_module import make_study_fixture
 orders = make_study_fixture("contact/order_four.py")
 
 
-def test_exact_the_weights_of_a_cell_are_positive_and_integrate_degree_seven(orders):
+def test_exact_lobatto_weights_integrate_degree_seven(orders):
+    """The Gauss-Lobatto weights of order 4 are positive and integrate polynomials of degree 7."""
     points, weights = orders.lobatto(4)
     assert weights.min() > 0
     exact = [2 / (k + 1) if k % 2 == 0 else 0 for k in range(8)]
@@ -17,8 +18,9 @@ def test_exact_the_weights_of_a_cell_are_positive_and_integrate_degree_seven(ord
 
 
 @pytest.mark.parametrize("order", [1, 4])
-def test_exact_a_cell_carries_no_force_in_a_rigid_motion(orders, order):
-    # a cell 1 long, 2 high
+def test_exact_rigid_motion_of_an_element_causes_no_force(orders, order):
+    """A translation and a rotation of an element cause no nodal force."""
+    # element of length 1 and height 2
     along, across = np.meshgrid(0.5 * orders.lobatto(order)[0], orders.lobatto(order)[0])
     stiffness = orders.cell_stiffness(order, np.array([2.0]), 1.0, 0.3)[0]
     moves = [np.concatenate(pair) for pair in ((1 + 0 * along.ravel(), 0 * along.ravel()),
@@ -27,7 +29,8 @@ def test_exact_a_cell_carries_no_force_in_a_rigid_motion(orders, order):
 
 
 @pytest.mark.parametrize("order", [1, 4])
-def test_exact_dissection_and_condensed_cells_leave_the_compliance_of_all_unknowns(orders, order):
+def test_exact_condensed_compliance_equals_that_of_the_full_matrix(orders, order):
+    """The compliance by nested dissection equals the inverse of the full stiffness matrix."""
     xs = np.array([0.0, 1.0, 1.5, 3.0]) * 1e-3
     ys = np.array([0.0, 0.5, 1.0, 3.0, 8.0]) * orders.COATING
     nodes_x = 3 * order + 1
@@ -41,14 +44,17 @@ def test_exact_dissection_and_condensed_cells_leave_the_compliance_of_all_unknow
         )
         node = (j * order + row) * nodes_x + i * order + column
         full[np.ix_([0, 1], node, [0, 1], node)] += cell
-    free = (nodes_y - 1) * nodes_x  # the far row is held
+    free = (nodes_y - 1) * nodes_x  # the row of nodes far from the contact is fixed
     stiffness = full[:, :free, :, :free].reshape(2 * free, 2 * free)
     expected = np.linalg.inv(stiffness)[free : free + nodes_x, free : free + nodes_x]
     assert orders.face_compliance(xs, ys, order)[0] == pytest.approx(expected, rel=1e-9, abs=0)
 
 
-def test_order_four_reaches_1e_4_with_a_fifth_of_the_unknowns_that_miss_it_bilinearly(orders):
-    """The tilt of 1e-4 rad: 5790 unknowns of order 4 are within 1e-4, 30 780 bilinear ones not within 2.5e-4."""
+def test_order_four_needs_fewer_unknowns_than_bilinear_elements(orders):
+    """At a tilt of 1e-4 rad, 5790 unknowns of order 4 have errors below 1e-4.
+
+    30 780 unknowns of bilinear elements have errors above 2.5e-4.
+    """
     case = orders.CASES["1e-4 rad"]
     fine = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.7, 0.8, 1e-3)), 4)
     rough = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.125, 0.8, 1e-4)), 1)

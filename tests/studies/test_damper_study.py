@@ -1,4 +1,4 @@
-"""The measured damper loop: what the docstring of the study says, on the record itself."""
+"""The study of a measured damper loop: the figures of its docstring, from the measured file."""
 
 import os
 import subprocess
@@ -15,7 +15,8 @@ FOLDER = os.environ.get("PATCHFEM_DATA")
 FILE = Path(FOLDER or ".") / "friction-damper-1hz.csv"
 
 
-def test_exact_the_plateau_begins_half_a_stroke_after_a_reversal():
+def test_exact_plateau_begins_half_a_stroke_after_reversal():
+    """The plateau of the loop begins half a stroke after each reversal."""
     slide = np.array([0.0, 1, 2, 1, 0, 1, 2])
     assert damper.plateau(slide).tolist() == [False, True, True, True, True, True, True]
     slide = np.array([0.0, 0.5, 2, 1.5, 0.5, 0, 0.5, 1.5])
@@ -26,7 +27,11 @@ def test_exact_the_plateau_begins_half_a_stroke_after_a_reversal():
 @pytest.mark.skipif(
     not FILE.exists(), reason="PATCHFEM_DATA names no folder with friction-damper-1hz.csv"
 )
-def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
+def test_bond_law_fits_the_plateaus_but_not_the_backlash():
+    """The bond law fits the work and the plateaus of the loop.
+
+    No law fits the backlash of the joint.
+    """
     rows = {row.law: row for row in damper.main(FILE, ("coulomb", "elastic-plastic", "stretch"))}
     stretch = rows["stretch"]
     loop = rows["stretch"].fitted.loop
@@ -43,7 +48,8 @@ def test_one_length_describes_the_plateaus_and_no_law_the_backlash():
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("words", [(), ("nothing_here.csv",)])
-def test_refuses_to_run_without_its_record_in_one_line(words):
+def test_refuses_missing_measured_file(words):
+    """Without its measured file the study stops with one line that names the source and the command."""
     script = Path(__file__).parents[2] / "studies" / "damper" / "damper.py"
     done = subprocess.run(
         [sys.executable, str(script), *words], capture_output=True, text=True, check=False

@@ -1,4 +1,4 @@
-"""What the drift study says, from its cheap share, beside the closed form of a cycle."""
+"""The drift study: its inexpensive cases against closed forms of a cycle."""
 
 import friction_forms
 import numpy as np
@@ -10,7 +10,8 @@ from patchfem.friction import FirstOrderBonds
 table = make_study_fixture("drift/drift_table.py")
 
 
-def test_exact_drift_of_the_stretch_is_the_closed_form(table):
+def test_exact_drift_of_the_bond_law_agrees_with_closed_form(table):
+    """The drift per cycle under an oscillating force agrees with the closed form within 1e-9."""
     for name, engine in table.engines(False, (1.0,)).items():
         if name.startswith("stretch"):
             for case in ("force .5+-.1", "force .5+-.3", "force .3+-.3"):
@@ -23,7 +24,8 @@ def test_exact_drift_of_the_stretch_is_the_closed_form(table):
                 )
 
 
-def test_exact_laws_that_close_their_loops_do_not_drift(table):
+def test_exact_laws_with_closed_loops_do_not_drift(table):
+    """Laws whose loops close, such as Iwan's, do not drift under an oscillating force."""
     for name, engine in table.laws_without_bonds().items():
         for case in table.CASES:
             steps = 3 if name == "elastic-plastic" else 2
@@ -36,7 +38,8 @@ def test_exact_laws_that_close_their_loops_do_not_drift(table):
     assert all(table.closed_form_rows(case)[0].last == 0 for case in table.CASES)
 
 
-def test_always_a_load_that_changes_at_a_held_force_moves_none_but_order_zero(table):
+def test_always_oscillating_load_causes_drift_only_at_order_zero(table):
+    """At a constant tangential force, an oscillating load causes drift only with bonds of order 0."""
     for name, engine in table.engines(False, shares=(0.0, 0.3)).items():
         if "p = 0," in name:
             continue
@@ -49,7 +52,8 @@ def test_always_a_load_that_changes_at_a_held_force_moves_none_but_order_zero(ta
     assert table.row(name, engine, "load +-10 %", 3).last == pytest.approx(0.2048, abs=5e-4)
 
 
-def test_exact_creep_and_the_way_of_bouc_wen(table):
+def test_exact_drift_of_tanh_and_bouc_wen_agrees_with_integrals(table):
+    """The creep of the tanh law and the drift of Bouc-Wen agree with integrals of their equations."""
     rows = {row.law: row.last for row in table.closed_form_rows("force .5+-.1")}
     time = (np.arange(4000) + 0.5) / 4000
     slow = 1e-3 * np.arctanh(0.4 + 0.2 * time).mean() / 143 / 2e-6
@@ -63,7 +67,9 @@ def test_exact_creep_and_the_way_of_bouc_wen(table):
     assert rows["Bouc-Wen n = 2"] == pytest.approx(up - 0.2, abs=1e-4)
 
 
-def test_always_growth_asks_for_a_longer_elastic_range(table):
+def test_always_bond_growth_needs_a_larger_elastic_range(table):
+    """If bonds grow at rest, drift stops only at a larger elastic range, by the factor 1/0.7."""
+
     def last(share, case):
         law = table.ladder.bonds(breakaway=share, **table.ladder.GROWTH)
         return table.row("", FirstOrderBonds(law), case, 4).last
@@ -72,10 +78,11 @@ def test_always_growth_asks_for_a_longer_elastic_range(table):
     assert last(0.3, "force .3+-.3") == pytest.approx(0.033, abs=1e-3)
     assert last(0.1 / 0.7, "force .5+-.1") == pytest.approx(0.0, abs=1e-12)
     assert last(0.3 / 0.7, "force .3+-.3") == pytest.approx(0.0, abs=1e-12)
-    assert last(0.5, "force .5+-.3") is None  # away
+    assert last(0.5, "force .5+-.3") is None  # the displacement grows without bound
 
 
-def test_exact_the_printed_law_locks_up_slowly(table):
+def test_exact_drift_of_the_report_law_decays_with_the_square(table):
+    """The drift per cycle of the law as printed in the report falls as 0.2/n^2 with the cycle n."""
     from force_control import slides
 
     engine = table.engines(False, (1.0,), (0.0,))["report p = 1"]
@@ -87,7 +94,8 @@ def test_exact_the_printed_law_locks_up_slowly(table):
     assert steps[-1] * 8**2 == pytest.approx(0.2, abs=0.02)
 
 
-def test_exact_an_elastic_range_narrows_the_loop(table):
+def test_exact_loop_area_lost_to_an_elastic_range(table):
+    """The loop area lost to an elastic range agrees with the closed form."""
     found = table.breakaway_cost((1.0, 3.0, 12.5))
     for (b, amplitude), (area, _) in found.items():
         loss = [
@@ -107,7 +115,8 @@ def test_exact_an_elastic_range_narrows_the_loop(table):
 
 
 @pytest.mark.slow
-def test_always_the_table_of_drift(table, capsys):
+def test_always_drift_table_has_the_stated_values(table, capsys):
+    """The table of drift per cycle has the values stated in the study."""
     found = table.main()
     cases = tuple(table.CASES)
     wanted = {

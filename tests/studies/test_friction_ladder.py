@@ -1,4 +1,4 @@
-"""What the friction ladder says, from its cheap share, beside closed forms and an integrated equation."""
+"""The comparison of friction laws: inexpensive cases against closed forms and an integrated law."""
 
 import friction_forms
 import numpy as np
@@ -16,11 +16,13 @@ ladder = make_study_fixture("friction_ladder/ladder_cycles.py")
 
 @pytest.fixture(scope="module")
 def today(ladder):
+    """Module with the laws in common use today."""
     return ladder.today
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
-def test_exact_areas_without_growth(ladder, amplitude):
+def test_exact_loop_areas_without_bond_growth(ladder, amplitude):
+    """Without growth of bonds, the loop areas of the Dahl and Jenkins laws agree with closed forms."""
     dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
     sharp = ladder.elastic_plastic(amplitude)
     assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
@@ -29,14 +31,16 @@ def test_exact_areas_without_growth(ladder, amplitude):
     assert miss == pytest.approx(np.tanh(amplitude) / amplitude, rel=2e-6)
 
 
-def test_exact_rms_of_coulomb_falls_as_the_fourth_root(ladder):
+def test_exact_rms_error_of_coulomb_at_large_amplitude(ladder):
+    """The rms difference of Coulomb's law from Dahl's falls with the fourth root of the amplitude."""
     dahl = ladder.last_cycle(ladder.points(ladder.bonds()), 400.0, 48_000)
     assert ladder.error(ladder.coulomb(dahl), dahl)[1] == pytest.approx(
         (4 / np.pi / 400) ** 0.25, rel=0.01
     )
 
 
-def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
+def test_exact_lugre_is_the_bond_law_with_instant_growth(ladder):
+    """The bond law with instantaneous growth agrees with the integrated LuGre equation within 4e-6."""
     amplitude = 1.0
     steps = ladder.STEPS
     omega = 2 * np.pi * ladder.HERTZ
@@ -60,7 +64,8 @@ def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
     assert found.force == pytest.approx((z[1:] + z[:-1]) / 2, abs=4e-6)
 
 
-def test_exact_bouc_wen_of_the_first_power_is_the_constant_length(ladder, today):
+def test_exact_bouc_wen_of_exponent_one_is_dahl(ladder, today):
+    """Bouc-Wen with the exponent 1 equals the bond law of constant length on a random path."""
     path = np.random.default_rng(1).normal(0, 0.7, 200).cumsum()
     law = FirstOrderBonds(ladder.bonds())
     one = np.ones(1)
@@ -73,7 +78,8 @@ def test_exact_bouc_wen_of_the_first_power_is_the_constant_length(ladder, today)
 
 
 @pytest.mark.parametrize("count", [5, 20, 100])
-def test_order_elements_meet_the_virgin_curve_to_half_over_their_number_squared(today, count):
+def test_order_of_iwan_elements_on_the_virgin_curve(today, count):
+    """n Iwan elements approximate the virgin curve with an error of 0.5/n^2."""
     k, s = today.iwan_elements(count)
     x = np.linspace(0, 12, 2001)
     gap = np.abs(np.minimum(x[:, None], s) @ k + np.expm1(-x)).max()
@@ -82,14 +88,16 @@ def test_order_elements_meet_the_virgin_curve_to_half_over_their_number_squared(
 
 
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
-def test_exact_iwan_by_masing_is_a_bond_length_short(ladder, today, amplitude):
+def test_exact_iwan_loop_area_is_short_by_four_bond_lengths(ladder, today, amplitude):
+    """The loop area of Iwan elements is 4 mu N eps smaller than that of Dahl's law (Masing's rule)."""
     assert ladder.iwan(amplitude, 400).area == pytest.approx(today.iwan_loop(amplitude), rel=3e-3)
     dahl = friction_forms.stretch_loop(12.5, 1.0)[0]
     assert today.iwan_loop(12.5) - dahl == pytest.approx(-4, abs=1e-3)
     assert today.iwan_loop(12.5, 0.5) == pytest.approx(dahl, abs=1e-8)
 
 
-def test_always_where_the_growing_rungs_are_enough(ladder, table):
+def test_always_laws_with_bond_growth_differ_as_stated(ladder, table):
+    """The laws with growing bonds differ from LuGre and from constant bonds by the stated rms values."""
     for amplitude, wanted in ((0.3, (0.0, 0.001, 0.011)), (3.0, (0.0019, 0.22, 0.029))):
         stretch, lugre = (
             ladder.last_cycle(ladder.points(law), amplitude)
@@ -105,7 +113,8 @@ def test_always_where_the_growing_rungs_are_enough(ladder, table):
     assert table.slow_path(3.0)[0].above == pytest.approx((-0.0098, 0.0152), rel=0.01)
 
 
-def test_always_best_rate(ladder):
+def test_always_best_velocity_scale_of_the_tanh_law(ladder):
+    """The velocity scale of the tanh law that fits Dahl's loop best, and its rms error, are as stated."""
     for amplitude, wanted, rms in ((1.0, 3.23, 0.520), (50.0, 0.257, 0.287)):
         dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
         share = dahl.dq / np.abs(dahl.dq).max()
@@ -114,7 +123,8 @@ def test_always_best_rate(ladder):
 
 
 @pytest.mark.slow
-def test_always_the_table_of_the_ladder(table, capsys):
+def test_always_table_of_friction_laws_has_the_stated_values(table, capsys):
+    """The table of rms differences between friction laws has the values stated in the study."""
     found = table.main()
     known = {
         ("off", "report p = 1"): (0.638, 0.512, 0.244, 0.106, 0.072, 0.050),
@@ -138,6 +148,7 @@ def test_always_the_table_of_the_ladder(table, capsys):
 
 
 @pytest.mark.slow
-def test_always_the_picture_names_its_curves(tmp_path):
+def test_always_picture_of_friction_laws_labels_its_curves(tmp_path):
+    """The picture of the friction laws has labels at its axis and its curves."""
     text = load_study("friction_ladder/picture.py").main(tmp_path / "x.svg", (0.3, 3.0)).read_text()
     assert all(word in text for word in ("amplitude [bond lengths]", "LuGre", "Iwan 20, reversals"))

@@ -1,4 +1,4 @@
-"""The studies of the comparison integrators keep their word."""
+"""The comparison of time integrators: the figures stated in its studies."""
 
 import json
 import sys
@@ -13,8 +13,8 @@ from patchfem.core import Missing
 failure = make_study_fixture("integrators/failure.py")
 
 
-def test_exact_two_masses_by_the_event_engine(failure):
-    """The numbers of a second, 40-digit computation."""
+def test_exact_two_masses_by_the_event_driven_solver(failure):
+    """The event-driven solver agrees with a 40-digit computation of two masses within 1e-10."""
     times = np.array(
         [8.079711463905416, 10.00410372419476, 12.96534318337974, 15.73725378200728, 400.0]
     )
@@ -29,7 +29,8 @@ def test_exact_two_masses_by_the_event_engine(failure):
 
 
 @pytest.mark.slow
-def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
+def test_exact_failures_of_the_report_method_are_those_stated(failure, capsys):
+    """Early slip, force errors and failed steps of the report's method are those stated."""
     rows, curves = failure.main(draw=False)
     at = {r.name: r for r in rows}
     loose = at["Fig 17, 18: displacement 1e-2"]
@@ -65,53 +66,59 @@ work = make_study_fixture("integrators/work_precision.py")
 
 @pytest.fixture(scope="module")
 def engines(work):
+    """Module of the time integrators."""
     return sys.modules["engines"]
 
 
 @pytest.fixture(scope="module")
 def problem(work):
+    """Function that makes a test problem from its name."""
     return sys.modules["engine_problems"].problem
 
 
 @pytest.fixture(scope="module")
 def rows(work):
+    """Module that computes the rows of the work-precision table."""
     return sys.modules["precision_rows"]
 
 
 @pytest.fixture(scope="module")
 def table(work):
+    """Saved work-precision table."""
     return json.loads(work.TABLE.read_text())
 
 
-def row(table, where, name, knob):
+def find_row(table, where, name, knob):
+    """Return the row of a problem, an integrator and its accuracy setting."""
     return next(
         r for r in table["rows"] if (r["problem"], r["engine"], r["knob"]) == (where, name, knob)
     )
 
 
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
-def test_exact_dop853_from_event_to_event(engines, problem, where):
+def test_exact_dop853_restarted_at_events(engines, problem, where):
+    """DOP853 restarted at each event has an error below 5e-9."""
     one = problem(where)
     assert one.error(engines.dop853(one, 1e-10)) < 5e-9
 
 
-def test_exact_free_decay_by_the_event_engine(engines, problem):
-    """Free decay has a closed form."""
+def test_exact_free_decay_by_the_event_driven_solver(engines, problem):
+    """The event-driven solver agrees with the closed form of free decay within 1e-12."""
     run, knobs, places = engines.OURS["exact"]
     one = problem("decay")
     assert "decay" in places and one.error(run(one, knobs[0])) < 1e-12
 
 
-def test_exact_without_a_longest_step_dop853_passes_over_releases(engines, problem):
-    """No warning, 4 events instead of 240."""
+def test_exact_dop853_without_step_limit_misses_events(engines, problem):
+    """Without a limit of its step, DOP853 finds 4 of 240 events and gives no warning."""
     one = problem("block")
     slide, events = engines.slide_and_events(one, 1e-8, 1e9)
     assert events == 4 and one.error(slide) > 0.5
     assert engines.slide_and_events(one, 1e-8, 1 / 8)[1] == 240
 
 
-def test_exact_errors_of_the_saved_table(engines, problem, table):
-    """Errors do not depend on the machine: the cheap rows again."""
+def test_exact_saved_errors_are_reproduced(engines, problem, table):
+    """The errors of the inexpensive rows of the saved table are reproduced within 2 %."""
     for where in ("decay", "block", "two"):
         for name, knobs in (
             ("march", (200, 800)),
@@ -122,23 +129,24 @@ def test_exact_errors_of_the_saved_table(engines, problem, table):
             run, _, places = engines.OURS[name]
             for knob in knobs if where in places else ():
                 one = problem(where)
-                saved = row(table, where, name, knob)["error"]
+                saved = find_row(table, where, name, knob)["error"]
                 assert one.error(run(one, knob)) == pytest.approx(saved, rel=0.02, abs=1e-11)
 
 
-def test_exact_sentences_of_the_saved_table(work, table):
+def test_exact_saved_table_supports_the_stated_conclusions(work, table):
+    """Orders, smallest errors and ratios of CPU time in the saved table are those stated."""
     of = lambda where, name: work.curve(table["rows"], where, name)  # noqa: E731
     assert {r["problem"] for r in table["rows"]} == {"decay", "block", "two", "patch"}
     for where in ("block", "two"):
         second = of(where, "newmark, and force")[0]
-        assert second[0] / second[-1] > 1000  # 64 times the steps
+        assert second[0] / second[-1] > 1000  # ratio of errors for 64 times the steps
         assert of(where, "newmark, stick speed")[0].min() > 0.05
         assert of(where, "exact")[0].max() == work.FLOOR
         assert of(where, "DOP853 + events")[0].min() < 1e-10
         assert of(where, "SUNDIALS CVODE")[0].min() < 1e-9
-    assert of("block", "euler, tanh")[0].min() > 0.015  # the law itself
+    assert of("block", "euler, tanh")[0].min() > 0.015  # error of the regularised law
     assert of("block", "newmark, stick speed")[0][-1] == pytest.approx(1.0, abs=0.01)
-    # the march at 204800 steps is the truth to this
+    # error of the reference solution, a march of 204800 steps
     assert of("patch", "SUNDIALS CVODE")[0].min() < 1e-7
     marched = of("patch", "march")[0]
     assert marched[0] / marched[-1] > 1e4
@@ -153,7 +161,8 @@ def test_exact_sentences_of_the_saved_table(work, table):
     assert of("block", "DOP853 + events")[1].min() > 300 * seconds[0]
 
 
-def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, capsys, tmp_path):
+def test_refuses_missing_peer_programs_and_continues(work, engines, monkeypatch, capsys, tmp_path):
+    """A missing peer program is named in a message, and the other integrators are still measured."""
     for _, _, _, _, variable, _ in work.PEERS.values():
         monkeypatch.setenv(variable, "/nowhere/python")
     few = {"newmark, and force": (engines.newmark_cured, (100,), ("block",))}
@@ -170,7 +179,10 @@ def test_refuses_absent_peers_by_name_and_goes_on(work, engines, monkeypatch, ca
     "name, knob, error", [("SUNDIALS CVODE", 1e-8, 5e-6), ("Siconos, theta 1/2", 1000, 5e-4)]
 )
 @pytest.mark.parametrize("where", ["decay", "block", "two"])
-def test_exact_peers_find_the_same_motion(problem, work, rows, name, knob, error, where):
+def test_exact_peer_programs_agree_with_the_reference_motion(
+    problem, work, rows, name, knob, error, where
+):
+    """SUNDIALS and Siconos agree with the reference motion within the stated error."""
     ask, _, _, script, variable, remedy = work.PEERS[name]
     try:
         peer = rows.Peer(name, script, variable, sys.executable, remedy)
@@ -183,8 +195,11 @@ def test_exact_peers_find_the_same_motion(problem, work, rows, name, knob, error
 
 
 @pytest.mark.slow
-def test_exact_the_patch_by_two_programs(engines, problem):
-    """Elastic-plastic elements by the march and by DOP853 between reversals; with longer steps it misses some."""
+def test_exact_patch_motion_by_two_integrators(engines, problem):
+    """The time march and DOP853 between reversals agree on elastic-plastic elements.
+
+    DOP853 with longer steps misses reversals.
+    """
     one = problem("patch")
     assert one.error(engines.dop853(one, 1e-10)) < 1e-6
     assert one.error(engines.march(one, 3200)) < 1e-4

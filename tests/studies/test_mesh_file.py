@@ -1,4 +1,4 @@
-"""A mesh from a file, assembled by scikit-fem, and the mesh that is made: what both say of the pieces of the rig."""
+"""The study of a mesh from a file, assembled by scikit-fem, beside the generated mesh of the rig."""
 
 import re
 
@@ -9,8 +9,8 @@ mesh_file = load_study("patch/from_file.py")
 
 
 @pytest.mark.slow
-def test_always_a_mesh_from_a_file_presses_as_the_made_one():
-    """Every departure lies within the error stated for it, and the docstring has the numbers."""
+def test_always_mesh_from_file_agrees_with_generated_mesh():
+    """Results of both meshes differ by less than their error estimates, as the docstring states."""
     printed = [
         [float(number) for number in re.findall(r"-?[0-9.]+", line)]
         for line in mesh_file.__doc__.splitlines()

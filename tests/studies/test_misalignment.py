@@ -1,4 +1,4 @@
-"""The sentences of the misalignment studies, from a cheap share of their runs, beside closed forms and identities."""
+"""The misalignment studies: inexpensive cases against closed forms, identities and stated figures."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ fixtures = make_study_fixture("misalignment/fixtures.py")
 
 @pytest.fixture(scope="module")
 def tilted(fixtures):
+    """Module of the tilted pieces that the study imports."""
     return fixtures.tilted
 
 
@@ -34,20 +35,22 @@ rough = make_study_fixture("misalignment/rough_skin.py")
 
 @pytest.fixture(scope="module")
 def asperities(rough):
+    """Module of the asperity models that the study imports."""
     return rough.asperities
 
 
 # ---- fixtures and skins
 
 
-def coarse(tilted, found):
+def solve_coarse(tilted, found):
+    """Return the measures of a pressed patch on the coarse meshes."""
     return values(press_patch(found, tilted.pair(1)))
 
 
 @pytest.mark.share(2)
 @pytest.mark.parametrize("tilt", ["1e-6", "1e-5", "1e-4", "1e-3", "1e-2"])
-def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, tilt):
-    """The rows of the rigid fixture, number by number with the digits that stand there."""
+def test_exact_fixture_table_has_the_computed_values(tilted, fixtures, tilt):
+    """The table of the rigid fixture in the docstring has the computed values, to its last digit."""
     row = re.search(rf"(?m)^  {tilt} +(.*)$", fixtures.__doc__)[1]
     names = (
         "contact_fraction",
@@ -64,12 +67,13 @@ def test_exact_the_docstring_of_fixtures_holds_what_it_prints(tilted, fixtures, 
         assert abs(value - float(cell)) <= 0.5001 * last, (name, value, cell)
 
 
-def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
+def test_always_error_estimates_cover_an_independent_solution(tilted, fixtures):
+    """The error estimates cover the solution of an independent program with elements of order 5."""
     from patchfem.runs import estimate_measures
 
     found = fixtures.held_pieces(1e-3, None)
     two = estimate_measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
-    # an independent program with elements of order 5
+    # values of an independent program with elements of order 5
     best = {
         "contact_fraction": 0.0239193,
         "pressure_peak": 60.8446e6,
@@ -81,7 +85,8 @@ def test_always_errors_of_the_coarse_meshes_hold_the_finest(tilted, fixtures):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
-def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
+def test_always_two_mesh_gradings_agree_within_error_estimates(tilted, angle, skin):
+    """Solutions on two differently graded meshes differ by less than the sum of their error estimates."""
     from patchfem.runs import estimate_measures, solve_with_coarser
 
     found = tilted.case(angle, skin)
@@ -98,21 +103,26 @@ def test_always_meshes_graded_anew_agree_within_the_errors(tilted, angle, skin):
         assert abs(ours[name].value - other[name].value) <= ours[name].error + other[name].error
 
 
-def test_always_a_free_piece_keeps_less_than_the_kern(tilted, fixtures):
+def test_always_free_piece_loses_contact_inside_the_kern(tilted, fixtures):
+    """A load offset within the middle third opens the contact of elastic pieces, unlike rigid ones."""
     for offset, fraction in ((0.15, 1.0), (1 / 3, 0.445)):
-        found = coarse(tilted, fixtures.free(offset))
+        found = solve_coarse(tilted, fixtures.free(offset))
         assert found["contact_fraction"] == pytest.approx(fraction, abs=0.02)
         assert found["pressure_centre"] == pytest.approx(-offset * LENGTH, rel=1e-9)
     assert (
-        coarse(tilted, fixtures.free(0.16))["contact_fraction"]
+        solve_coarse(tilted, fixtures.free(0.16))["contact_fraction"]
         < 1
         == exact.kern_contact_fraction(0.16, 1.0)
     )
 
 
-def test_always_the_soft_skin_keeps_its_stiffness(tilted, fixtures):
+def test_always_soft_surface_layer_keeps_its_normal_stiffness(tilted, fixtures):
+    """The softer the surface layer, the less normal stiffness is lost at a tilt of 10 mrad."""
     even, tipped = (
-        {skin: coarse(tilted, fixtures.held_pieces(tilt, None, skin)) for skin in tilted.SKINS}
+        {
+            skin: solve_coarse(tilted, fixtures.held_pieces(tilt, None, skin))
+            for skin in tilted.SKINS
+        }
         for tilt in (1e-6, 1e-2)
     )
     for skin, left in (("bare", 0.052), ("linear", 0.05), ("peaks", 0.112), ("exponential", 0.824)):
@@ -120,12 +130,13 @@ def test_always_the_soft_skin_keeps_its_stiffness(tilted, fixtures):
         assert ratio == pytest.approx(left, rel=0.03)
 
 
-def test_exact_skin_far_softer_than_the_pieces_is_a_rigid_wedge(tilted):
-    found = coarse(tilted, tilted.case(5e-2, "exponential", "asperities.decay_length=500 um"))
+def test_exact_soft_layer_is_a_rigid_wedge_on_asperities(tilted):
+    """With a layer much softer than the pieces, the contact agrees with a rigid wedge on asperities."""
+    found = solve_coarse(tilted, tilted.case(5e-2, "exponential", "asperities.decay_length=500 um"))
     fraction, centre = exact.wedge_on_asperities(5e-2, LENGTH, 500e-6)
     assert found["loaded_fraction"] == pytest.approx(fraction, rel=3e-4)
     assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
-    stiffer = coarse(tilted, tilted.case(1e-3, "exponential"))["loaded_fraction"]
+    stiffer = solve_coarse(tilted, tilted.case(1e-3, "exponential"))["loaded_fraction"]
     assert stiffer / exact.wedge_on_asperities(1e-3, LENGTH, 2.5e-6)[0] == pytest.approx(
         1.04, abs=0.005
     )
@@ -134,7 +145,8 @@ def test_exact_skin_far_softer_than_the_pieces_is_a_rigid_wedge(tilted):
 # ---- conclusion 5
 
 
-def test_exact_a_spring_adds_what_it_gives_way(tilted, conclusion, fixtures):
+def test_exact_fixture_spring_adds_its_rotation(tilted, conclusion, fixtures):
+    """A fixture spring adds its own rotation to the tilt that gives a contact fraction of 0.5."""
     for skin in tilted.SKINS:
         for spring in (1e4, 300.0):
             angle = conclusion.neutral(0.5, skin, spring, 0)
@@ -145,7 +157,8 @@ def test_exact_a_spring_adds_what_it_gives_way(tilted, conclusion, fixtures):
             )
 
 
-def test_always_misalignment_that_each_portion_means(conclusion):
+def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
+    """The tilt and the moment at a given contact fraction are those stated in the study."""
     wanted = {
         ("bare", 0.5): (2.9e-5, 0.46),
         ("linear", 0.5): (7.4e-5, 0.48),
@@ -163,7 +176,8 @@ def test_always_misalignment_that_each_portion_means(conclusion):
     )
 
 
-def test_always_holders_that_a_thousandth_of_an_inch_allows(conclusion):
+def test_always_admissible_fixture_stiffness_has_stated_limits(conclusion):
+    """The range of fixture stiffness that a misalignment of 2 mrad allows is that stated."""
     least, most = conclusion.springs_for(2e-3, "bare", halvings=1)
     assert (least, most) == (pytest.approx(125, rel=0.02), pytest.approx(480, rel=0.02))
     assert conclusion.springs_for(2e-3, "linear", halvings=1)[1] == np.inf
@@ -173,7 +187,8 @@ def test_always_holders_that_a_thousandth_of_an_inch_allows(conclusion):
 # ---- roll
 
 
-def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
+def test_exact_roll_by_strips_agrees_with_linear_foundation(tilted, roll):
+    """A patch divided into strips and rolled agrees with a wedge on a linear foundation."""
     pair = tilted.pair(0)
     k = values(press_patch(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
     for angle in (5e-6, 1e-4):
@@ -183,7 +198,8 @@ def test_exact_strips_are_a_wedge_on_springs(tilted, roll):
         assert found["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
 
 
-def test_always_yaw_moments_of_a_roll(roll):
+def test_always_yaw_moment_of_a_rolled_patch(roll):
+    """The yaw moment of a rolled patch is friction force times centre of pressure, as stated."""
     for skin, angle, moment in (
         ("bare", 1e-5, 0.074),
         ("bare", 1e-4, 0.173),
@@ -201,7 +217,8 @@ def test_always_yaw_moments_of_a_roll(roll):
 # ---- the rough skin
 
 
-def test_exact_equal_ridges_and_equal_peaks(asperities):
+def test_exact_stiffness_of_equal_ridges_and_peaks(asperities):
+    """Stiffnesses of equal ridges and equal peaks agree with Westergaard's and Hertz's solutions."""
     flat = np.zeros(16)
     modulus = exact.combined_modulus(*asperities.CARBIDE)
     closed = exact.westergaard_stiffness(
@@ -219,14 +236,16 @@ def test_exact_equal_ridges_and_equal_peaks(asperities):
 
 
 @pytest.mark.parametrize("scatter", [1e-6, 5e-6])
-def test_exact_one_force_per_ridge_is_the_resolved_ridge(asperities, scatter):
+def test_exact_one_force_per_ridge_agrees_with_resolved_ridges(asperities, scatter):
+    """One force per ridge gives the stiffness of the resolved ridges within 1 %."""
     depth = asperities.depths(32, scatter, "uniform")
     assert asperities.one_each(depth)[0] == pytest.approx(
         asperities.explicit(depth, 2**15), rel=0.01
     )
 
 
-def test_always_scatter_that_makes_1e13(rough, asperities):
+def test_always_height_scatter_for_a_stiffness_of_1e13(rough, asperities):
+    """The stated scatter of ridge and peak heights gives a stiffness of 1e13 Pa/m."""
     for scatter, shape in ((4.5e-6, "uniform"), (0.2e-6, "gaussian")):
         many = [
             asperities.one_each(asperities.depths(160, scatter, shape, seed))[0]
@@ -241,7 +260,8 @@ def test_always_scatter_that_makes_1e13(rough, asperities):
     assert found["touching"] == pytest.approx(0.18, abs=0.01)
 
 
-def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
+def test_always_opening_tilts_of_pieces_and_layer_add(rough):
+    """The tilt at which contact opens is the sum of those of the pieces and of the surface layer."""
     own = rough.opening(None, 1)
     assert own == pytest.approx(9.28e-6, rel=3e-3)
     for k in (1e15, 1e13, 5e11):
@@ -250,7 +270,8 @@ def test_always_opening_tilt_is_that_of_the_pieces_and_of_the_skin(rough):
 
 
 @pytest.mark.slow
-def test_always_the_picture_names_its_curves(tmp_path):
+def test_always_misalignment_picture_labels_its_curves(tmp_path):
+    """The picture of misalignment has labels at its axes and curves, and the curves fall."""
     picture = load_study("misalignment/picture.py")
     text = picture.main(tmp_path / "x.svg", np.array([1e-5, 1e-4])).read_text()
     for word in (
@@ -271,19 +292,21 @@ moving = make_study_fixture("misalignment/in_motion.py")
 
 @pytest.fixture(scope="module")
 def maps(moving):
-    """Aligned, at the tilt that may be left alone, and at one that may not; stuck and slipping."""
+    """Maps over three tilts, with a stuck and a slipping interface."""
     return moving.sweep_measures((1e-6, 3e-5, 1e-4), (26.0,), (3.0, 5.0))
 
 
 @pytest.fixture(scope="module")
-def moved(maps):
+def maps_at_one_load(maps):
+    """The maps without the dimension of the contact load."""
     return maps.squeeze("contact_load")
 
 
 @pytest.mark.slow
-def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moving, moved):
-    stuck = moved.isel(drive_acceleration=0)
-    slipping = moved.isel(drive_acceleration=1)
+def test_always_tolerated_tilt_changes_the_motion_by_under_five_percent(moving, maps_at_one_load):
+    """The tilt that the study tolerates changes stiffness, loop area and amplitude by less than 5 %."""
+    stuck = maps_at_one_load.isel(drive_acceleration=0)
+    slipping = maps_at_one_load.isel(drive_acceleration=1)
     assert slipping["contact_fraction"].values == pytest.approx([1.0, 0.49, 0.219], rel=0.03)
     for found, names in (
         (stuck, ("equivalent_stiffness",)),
@@ -309,9 +332,10 @@ def test_always_the_motion_hardly_feels_the_tilt_that_the_study_tolerates(moving
     )
 
 
-def test_always_the_table_of_the_rig_in_motion(moving, moved):
-    stuck = moved.isel(drive_acceleration=0)
-    slipping = moved.isel(drive_acceleration=1)
+def test_always_table_of_the_moving_rig_has_stated_values(moving, maps_at_one_load):
+    """Stiffness, resonance, loop area and amplitude with and without tilt are those stated."""
+    stuck = maps_at_one_load.isel(drive_acceleration=0)
+    slipping = maps_at_one_load.isel(drive_acceleration=1)
     at = [0, 2]
     assert 1e-6 * stuck["equivalent_stiffness"].values[at] == pytest.approx([31.9, 29.2], abs=0.15)
     assert moving.resonance(stuck["equivalent_stiffness"].values[at]) == pytest.approx(
@@ -324,9 +348,12 @@ def test_always_the_table_of_the_rig_in_motion(moving, moved):
     )
 
 
-def test_always_a_stuck_interface_is_a_little_softer_than_pieces_and_bonds_in_series(moved):
-    """What the patch shears by and what the bonds stretch by add up, and the first of its nodes have yielded."""
-    stuck = moved.isel(drive_acceleration=0)
+def test_always_stuck_interface_is_softer_than_series_of_springs(maps_at_one_load):
+    """A stuck interface is up to 6 % softer than pieces and bonds in series.
+
+    Some nodes at the edge already slip.
+    """
+    stuck = maps_at_one_load.isel(drive_acceleration=0)
     bonds = 0.30 * LOAD / 1e-6
     both = 1 / (1 / bonds + 1 / stuck["tangential_stiffness"].values)
     assert stuck["equivalent_stiffness"].values[0] == pytest.approx(both[0], rel=0.06)
@@ -334,7 +361,8 @@ def test_always_a_stuck_interface_is_a_little_softer_than_pieces_and_bonds_in_se
 
 
 @pytest.mark.slow
-def test_always_the_maps_name_what_they_show(moving, maps, tmp_path):
+def test_always_misalignment_maps_have_labels(moving, maps, tmp_path):
+    """The maps of misalignment have labels at their axes and panels."""
     text = moving.picture(maps, tmp_path / "x.svg").read_text()
     for word in (
         "misalignment [mrad]",

@@ -1,5 +1,4 @@
-"""Notebooks and the site's tasks with code: short, without stored outputs, of the public names alone, and true from the
-first cell to the last."""
+"""Notebooks and pages with code: short, without stored output, with public names, and executable."""
 
 import ast
 import os
@@ -27,13 +26,13 @@ PICTURES = {
     "patch_at_every_interface": 1,
     "own_law": 1,
 }
-# Markdown whose cells of code the site runs
+# Pages in Markdown with code cells that the site executes.
 TASKS = ("backbone", "measured_loop", "own_law", "patch_at_every_interface", "sweep_of_a_thousand")
 NAMES = tuple(PICTURES)
 
 
-def read(name: str):
-    """A notebook, or a task of the site with its text and its cells of code in turns."""
+def read_notebook(name: str):
+    """Return a notebook, or a page of the site as a notebook of text and code cells."""
     if name not in TASKS:
         return nbformat.read(ROOT / f"studies/notebooks/{name}.ipynb", 4)
     text = (ROOT / f"studies/site/tasks/{name}.md").read_text("utf-8").partition("\n---\n")[2]
@@ -42,16 +41,17 @@ def read(name: str):
     return nbformat.v4.new_notebook(cells=[make[k % 2](part) for k, part in enumerate(parts)])
 
 
-BOOKS = {name: read(name) for name in NAMES}
+BOOKS = {name: read_notebook(name) for name in NAMES}
 
 
-def sources(name: str, kind: str) -> list:
+def cell_sources(name: str, kind: str) -> list:
+    """Return the text of all cells of one kind."""
     return [cell.source for cell in BOOKS[name].cells if cell.cell_type == kind]
 
 
 @pytest.fixture(scope="module")
 def kernel(tmp_path_factory):
-    """One process for all notebooks, which imports and loads compiled code once, in a folder of its own."""
+    """Kernel that runs all notebooks, and its working folder."""
     folder = tmp_path_factory.mktemp("notebooks")
     with pytest.MonkeyPatch.context() as patch:
         for name in ("IPYTHONDIR", "JUPYTER_RUNTIME_DIR", "JUPYTER_CONFIG_DIR"):
@@ -66,8 +66,8 @@ def kernel(tmp_path_factory):
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("name", NAMES)
-def test_always_what_a_notebook_says_holds(name, kernel):
-    """Each cell runs in an emptied namespace, the asserts among them; pictures are shown, nothing is complained of."""
+def test_always_notebook_runs_without_errors_or_warnings(name, kernel):
+    """All cells of a notebook run, with their asserts; it shows its pictures and writes no warning."""
     manager, folder = kernel
     book = nbformat.v4.new_notebook(
         cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, BOOKS[name].cells)],
@@ -86,7 +86,8 @@ def test_always_what_a_notebook_says_holds(name, kernel):
     assert list(folder.glob("*.*")) == []
 
 
-def test_always_every_notebook_is_run_and_linked():
+def test_always_every_notebook_is_tested_and_linked():
+    """Every notebook and page with code is tested here and linked in studies/README.md."""
     assert sorted(path.stem for path in (ROOT / "studies/notebooks").iterdir()) == sorted(
         set(NAMES) - set(TASKS)
     )
@@ -100,11 +101,11 @@ def test_always_every_notebook_is_run_and_linked():
     assert {path.stem for path in tasks if "code-cell" in path.read_text("utf-8")} == set(TASKS)
 
 
-def test_always_the_own_law_exports_what_engines_call():
-    """The names that its compiled file takes from the package exist; it exports those of a law of the same form."""
-    text = next(cell for cell in sources("own_law", "code") if "dahl_kernels.py" in cell).split(
-        "'''"
-    )[1]
+def test_always_notebook_law_exports_the_protocol_functions():
+    """The compiled law of the notebook defines or imports all functions of the kernel protocol."""
+    text = next(
+        cell for cell in cell_sources("own_law", "code") if "dahl_kernels.py" in cell
+    ).split("'''")[1]
     tree = ast.parse(text)
     taken = {
         one.name
@@ -121,7 +122,8 @@ def test_always_the_own_law_exports_what_engines_call():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_always_a_notebook_is_valid_and_keeps_no_output(name):
+def test_always_notebook_is_valid_and_without_output(name):
+    """A notebook has a valid format and no stored output."""
     nbformat.validate(BOOKS[name])
     assert all(
         cell.outputs == [] and cell.execution_count is None
@@ -131,16 +133,19 @@ def test_always_a_notebook_is_valid_and_keeps_no_output(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_always_a_notebook_is_read_in_five_minutes(name):
-    """At 200 words and 40 lines of code a minute."""
-    words = sum(len(text.split()) for text in sources(name, "markdown"))
-    lines = sum(bool(line.strip()) for text in sources(name, "code") for line in text.splitlines())
+def test_always_notebook_takes_under_five_minutes_to_read(name):
+    """Reading takes less than five minutes at 200 words or 40 lines of code per minute."""
+    words = sum(len(text.split()) for text in cell_sources(name, "markdown"))
+    lines = sum(
+        bool(line.strip()) for text in cell_sources(name, "code") for line in text.splitlines()
+    )
     assert words / 200 + lines / 40 < 5
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_always_a_notebook_uses_public_names_and_checks_itself(name):
-    tree = ast.parse("\n".join(sources(name, "code")))
+def test_always_notebook_uses_public_names_and_asserts(name):
+    """A notebook imports only `patchfem`, uses its public names and has at least four asserts."""
+    tree = ast.parse("\n".join(cell_sources(name, "code")))
     ours = [
         one
         for node in ast.walk(tree)
