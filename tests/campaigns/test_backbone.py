@@ -9,6 +9,7 @@ import patchfem as pf
 from patchfem.campaigns import compute_backbone
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
 from patchfem.campaigns.backbone.joint import build_joint
+from patchfem.response.errors import error_of_change
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -565,3 +566,11 @@ def test_python_gives_a_dataset():
         pf.backbone(make_shaken_block(IWAN), method="static")
     with pytest.raises(pf.PatchfemError, match="above 0"):
         pf.backbone(make_shaken_block(IWAN), amplitudes=[0.0])
+
+
+def test_exact_error_of_cells_follows_largest_change():
+    """The error due to the cells of an Iwan law follows from the largest change by merged cells."""
+    values = iter([1.0, 1.01, 0.98, 1.005, 1.0])
+    joint = build_joint(model(IWAN), "")
+    error = joint.spatial_discretization_errors(lambda group: next(values))
+    assert error == pytest.approx(error_of_change(0.02, ratio=4.0, order=2.0), rel=1e-9)

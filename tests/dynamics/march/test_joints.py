@@ -1,6 +1,8 @@
 """Several interfaces and nonlinear springs in one march: against single contacts, closed forms and
 DOP853."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from event_run import simulate
@@ -11,6 +13,7 @@ from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
+from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.dynamics import (
     JointsModel,
@@ -350,3 +353,28 @@ def test_order_two_for_coupled_stops_with_kinetic_below_static(
             / np.abs(reference.amplitudes).max()
         )
     assert errors[0] < 1e-3 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4
+
+
+def test_exact_sampled_forces_are_limited_to_static_friction():
+    """Only the forces of set-valued elements are limited, each to its own static friction."""
+    kernels = load_uncompiled("patchfem.dynamics.march.faces_kernels")
+    stops = SimpleNamespace(names=np.zeros(2), element=np.array([0, 2]))
+    elements = SimpleNamespace(
+        stops=stops,
+        mem=np.array([[2.0], [9.0], [-3.0]]),
+        num=np.array([[0.0, 1.5], [0.0, 1.0], [0.0, 1.0]]),
+    )
+    kernels.limit_sampled_forces(elements)
+    np.testing.assert_array_equal(elements.mem, [[1.5], [9.0], [-1.0]])
+
+
+@pytest.mark.parametrize("change, count", [(2.0, -12), (1.0, 6)])
+def test_exact_unconverged_descent_has_negative_count(change, count, monkeypatch):
+    """The number of iterations is negative if the forces still change in the last of two sweeps."""
+    kernels = load_uncompiled("patchfem.dynamics.march.faces_kernels")
+    flags = {"HAS_CONTACT": False, "HAS_STOPS": False, "IS_COUPLED": True, "MAX_SWEEPS": 2}
+    for name, value in flags.items():
+        monkeypatch.setattr(kernels, name, value)
+    system = SimpleNamespace(elements=SimpleNamespace(links=np.zeros((1, 2))))
+    monkeypatch.setattr(kernels, "solve_element", lambda *arguments: (change, 3))
+    assert kernels.solve_coupled_forces(SimpleNamespace(dt=1.0), system) == (0.0, count)
