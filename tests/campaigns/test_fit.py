@@ -1,4 +1,4 @@
-"""Measured friction loops identified: every law from loops whose numbers are known, and what the verb answers."""
+"""Parameters of each friction law fitted to friction loops, and output and refusals of the fit command."""
 
 import csv
 import json
@@ -57,22 +57,25 @@ FREE = {
 }  # fmt: skip
 
 
-def rows(count=80, cycles=2):
-    """(time, slide) of a sine of 10 um at 100 Hz."""
+def sine_path(count=80, cycles=2):
+    """Return time [s] and relative displacement [m] of a sine of 10 um at 100 Hz, (n,) each."""
     time = np.arange(count * cycles + 1) / count / 100
     return time, 10e-6 * np.sin(2 * np.pi * 100 * time)
 
 
-def play(slide, mu, eps):
-    """Elastic-plastic force in N: the play operator, one clip per straight leg."""
+def elastic_plastic_force(slide, mu, eps):
+    """Return the elastic-plastic friction force (n,) [N] along straight legs, by the play operator."""
     out = [0.0]
     for dq in np.diff(slide):
         out.append(min(max(out[-1] + mu * LOAD * dq / eps, -mu * LOAD), mu * LOAD))
     return np.array(out)
 
 
-def dahl(slide, mu, eps):
-    """Force of bonds of constant length: F' = mu N (sgn v - F/mu N) |v|/eps, solved leg by leg."""
+def dahl_force(slide, mu, eps):
+    """Return the friction force (n,) [N] of bonds of constant length along straight legs.
+
+    It solves F' = mu N (sgn v - F/mu N) |v|/eps in closed form on each leg.
+    """
     out = [0.0]
     for dq in np.diff(slide):
         g = np.sign(dq) * mu * LOAD
@@ -80,8 +83,11 @@ def dahl(slide, mu, eps):
     return np.array(out)
 
 
-def grown(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
-    """z' = v - |v| z/eps beside 2.10, by a Runge-Kutta method of order 8 along straight legs; force in N."""
+def growing_bond_force(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
+    """Return the friction force (n,) [N] of bonds whose length grows at rest, along straight legs.
+
+    It integrates z' = v - |v| z/eps and equation 2.10 by a Runge-Kutta method of order 8.
+    """
     out = [0.0]
     eps = eps0
     z = 0.0
@@ -105,24 +111,26 @@ def grown(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
     return np.array(out)
 
 
-def forces(law, time, slide, truth):
+def reference_force(law, time, slide, truth):
+    """Return the friction force (n,) [N] of a law, computed without the package where a formula exists."""
     values = list(truth.values())
     if law == "elastic-plastic":
-        return play(slide, *values)
+        return elastic_plastic_force(slide, *values)
     if law == "springs":
-        return play(slide, values[0], values[0] * LOAD / values[1])
+        return elastic_plastic_force(slide, values[0], values[0] * LOAD / values[1])
     if law == "bonds":
-        return dahl(slide, *values)
+        return dahl_force(slide, *values)
     if law == "growth":
-        return grown(time, slide, *values)
+        return growing_bond_force(time, slide, *values)
     speed = np.diff(slide) / np.diff(time)
     side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
-    # a row stands between two legs
+    # The force of a row is the mean of the two adjacent legs.
     both = np.concatenate([side[:1], (side[1:] + side[:-1]) / 2, side[-1:]])
     return values[0] * LOAD * both
 
 
-def table(path, time, slide, force, cycle=None, quantity="force [N]"):
+def write_loop(path, time, slide, force, cycle=None, quantity="force [N]"):
+    """Write a measured loop as CSV and return its path; `cycle` (n,) adds a column of labels."""
     with open(path, "w", newline="") as file:
         out = csv.writer(file)
         out.writerow(
@@ -141,24 +149,29 @@ def table(path, time, slide, force, cycle=None, quantity="force [N]"):
     return path
 
 
-def scene_of(tmp_path, law, *sets, slide=SINE):
+def load_scene(tmp_path, law, *sets, slide=SINE):
+    """Return the scene of a single point with a friction law, after writing its file."""
     path = tmp_path / "scene.toml"
     path.write_text(POINT + LAWS[law] + slide, "utf-8")
     return load(path, sets)
 
 
-def free_of(*names):
+def free_ranges(*names):
+    """Return the option `--free` with the ranges of the given keys."""
     return [",".join(f"{name}={FREE[name]}" for name in names)]
 
 
-# ---- every law from a loop of known numbers
+# ---- each law from a loop with known parameters
 
 
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "springs", "tanh", "bonds"])
-def test_exact_known_values_are_recovered(tmp_path, law):
-    time, slide = rows()
-    loop = table(tmp_path / "loop.csv", time, slide, forces(law, time, slide, TRUTH[law]))
-    found = fit_loop(scene_of(tmp_path, law), loop, free_of(*TRUTH[law]))
+def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
+    """The parameters of each law are recovered from a computed loop within 1e-6."""
+    time, slide = sine_path()
+    loop = write_loop(
+        tmp_path / "loop.csv", time, slide, reference_force(law, time, slide, TRUTH[law])
+    )
+    found = fit_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
     assert found.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
     assert found.rms < 1e-7 * LOAD and found.held_rms is None and found.step_error == 0
     assert (
@@ -167,17 +180,20 @@ def test_exact_known_values_are_recovered(tmp_path, law):
     assert np.ptp(found.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
 
 
-def test_exact_growth_of_bonds_is_recovered(tmp_path):
-    """The same numbers at the steps of the rows, the loop by the law itself: nothing is left over."""
-    time, slide = rows(40)
+def test_exact_parameters_of_bond_growth_are_recovered(tmp_path):
+    """Three parameters of growing bonds are recovered from a computed loop within 1e-6.
+
+    The loop is a run of the package with the time steps of the fit, so the residual is zero.
+    """
+    time, slide = sine_path(40)
     names = ["friction.static", "friction.kinetic", "friction.slip_growth"]
     fixed = [
         f"friction.bond_length={2.3e-6} m",
         "friction.rest_growth=7 m/s^2",
         "accuracy.steps_per_cycle=80",
     ]
-    scene = scene_of(tmp_path, "growth", *fixed)
-    true = loads(
+    scene = load_scene(tmp_path, "growth", *fixed)
+    true_scene = loads(
         scene.text,
         sets=[
             *fixed,
@@ -186,19 +202,26 @@ def test_exact_growth_of_bonds_is_recovered(tmp_path):
             "friction.slip_growth=1.1e-6 m",
         ],
     )
-    force = bench.run(build(true), None, 4, path=(time, slide, 0, 0.0)).force
-    found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force), free_of(*names))
+    force = bench.run(build(true_scene), None, 4, path=(time, slide, 0, 0.0)).force
+    found = fit_loop(
+        scene, write_loop(tmp_path / "loop.csv", time, slide, force), free_ranges(*names)
+    )
     assert found.keys.fit.values == pytest.approx(
         [TRUTH["growth"][name] for name in names], rel=1e-6
     )
     assert found.pieces == 1 and found.rms < 1e-6
 
 
-def test_order_of_the_growing_model_is_two(tmp_path):
-    """Steps between the rows halve until they change the loop by less than a tenth of the tolerance; the change they
-    still make bounds what is left over against the integrated loop."""
-    time, slide = rows(24, 1)
-    loop = table(tmp_path / "loop.csv", time, slide, forces("growth", time, slide, TRUTH["growth"]))
+def test_order_of_bond_growth_fit_is_two(tmp_path):
+    """The residual of a fit with growing bonds falls with the second power of the time step.
+
+    The steps are halved until the loop changes by less than a tenth of the tolerance, and this
+    change bounds the residual against the integrated reference loop.
+    """
+    time, slide = sine_path(24, 1)
+    loop = write_loop(
+        tmp_path / "loop.csv", time, slide, reference_force("growth", time, slide, TRUTH["growth"])
+    )
     sets = [
         f"{name}={value!r}"
         + {"m": " m", "r": " m/s^2"}.get(
@@ -207,105 +230,120 @@ def test_order_of_the_growing_model_is_two(tmp_path):
         for name, value in TRUTH["growth"].items()
         if name != "friction.static"
     ]
-    rest = []
+    results = []
     for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
-        scene = scene_of(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
-        found = fit_loop(scene, loop, free_of("friction.static"))
+        scene = load_scene(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
+        found = fit_loop(scene, loop, free_ranges("friction.static"))
         assert found.step_error <= 0.1 * tolerance * 31
         assert found.rms < 1.4 * found.step_error
         assert pieces is None or found.pieces == pieces
-        rest.append((found.pieces, found.rms))
-    (few, rough), (many, fine) = rest
-    assert np.log(rough / fine) / np.log(many / few) == pytest.approx(2, abs=0.1) and fine < 3e-4
+        results.append((found.pieces, found.rms))
+    (few_pieces, coarse_rms), (many_pieces, fine_rms) = results
+    assert (
+        np.log(coarse_rms / fine_rms) / np.log(many_pieces / few_pieces)
+        == pytest.approx(2, abs=0.1)
+        and fine_rms < 3e-4
+    )
 
 
-def test_exact_a_ratio_column_and_a_patch_fit_alike(tmp_path):
-    """The resultant of a patch under a rigid slide is that of one point, so its loop has the same numbers."""
-    time, slide = rows(24)
-    force = forces("bonds", time, slide, TRUTH["bonds"]) / LOAD
-    loop = table(tmp_path / "loop.csv", time, slide, force, quantity="friction_ratio")
+def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
+    """A column of friction ratios gives the same parameters for a point and a rigidly sliding patch of elements.
+
+    The resultant of a rigid patch is that of a single point.
+    """
+    time, slide = sine_path(24)
+    ratio = reference_force("bonds", time, slide, TRUTH["bonds"]) / LOAD
+    loop = write_loop(tmp_path / "loop.csv", time, slide, ratio, quantity="friction_ratio")
     text = (
         '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nelement_size = '
         '"2 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n'
     )
     (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
-    for scene in (scene_of(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
-        found = fit_loop(scene, loop, free_of(*TRUTH["bonds"]))
+    for scene in (load_scene(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
+        found = fit_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
         assert found.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
 
 
-def test_exact_the_loop_of_a_moved_patch_is_the_same_whatever_was_asked_before(tmp_path):
-    """A free tilt moves the contact, not the mesh, so a value has one answer."""
-    time, slide = rows(8, 1)
-    loop = read_loop(table(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
+def test_exact_loop_of_tilted_patch_is_independent_of_earlier_trials(tmp_path):
+    """The loop of a patch at a tilt is the same to the bit for any earlier trial values.
+
+    A free tilt moves the contact but not the mesh.
+    """
+    time, slide = sine_path(8, 1)
+    loop = read_loop(write_loop(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
     text = (
         '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
         '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n'
     )
     scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
-    wanted, _ = read_ranges(["contact.tilt.angle=5 urad..200 urad"])
-    found = []
+    ranges, _ = read_ranges(["contact.tilt.angle=5 urad..200 urad"])
+    loops = []
     for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
-        model = BenchModel(scene, loop, wanted)
-        found.append([model(np.array([value])) for value in values])
-    assert np.array_equal(found[0][1], found[1][1]) and np.array_equal(found[0][2], found[1][0])
-    assert np.abs(found[0][0] - found[0][2]).max() > 1e-3 * np.abs(found[0][0]).max()
+        model = BenchModel(scene, loop, ranges)
+        loops.append([model(np.array([value])) for value in values])
+    assert np.array_equal(loops[0][1], loops[1][1]) and np.array_equal(loops[0][2], loops[1][0])
+    assert np.abs(loops[0][0] - loops[0][2]).max() > 1e-3 * np.abs(loops[0][0]).max()
 
 
 # ---- noise
 
 
-def noisy(law, seed, sigma=0.6, count=40):
-    time, slide = rows(count)
-    force = forces(law, time, slide, TRUTH[law])
+def noisy_loop(law, seed, sigma=0.6, count=40):
+    """Return time [s], displacement [m] and force [N] of a loop with Gaussian noise of `sigma` [N]."""
+    time, slide = sine_path(count)
+    force = reference_force(law, time, slide, TRUTH[law])
     return time, slide, force + sigma * np.random.default_rng(seed).normal(size=force.size)
 
 
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
-def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_path, law):
-    """Design matrix from the force of this test, not from the package, at the fitted values."""
-    time, slide, force = noisy(law, 0)
+def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
+    """The intervals of a fit to a noisy loop agree with the normal equations within 2e-4.
+
+    The design matrix is computed from the reference force of this file at the fitted values.
+    """
+    time, slide, force = noisy_loop(law, 0)
     found = fit_loop(
-        scene_of(tmp_path, law),
-        table(tmp_path / "loop.csv", time, slide, force),
-        free_of(*TRUTH[law]),
+        load_scene(tmp_path, law),
+        write_loop(tmp_path / "loop.csv", time, slide, force),
+        free_ranges(*TRUTH[law]),
     )
     best = found.keys.fit.values
     names = list(TRUTH[law])
 
     def at(k, share):
-        return forces(
+        return reference_force(
             law,
             time,
             slide,
             dict(zip(names, best * np.where(np.arange(best.size) == k, 1 + share, 1.0))),
         )
 
-    # per ln of a value
+    # Derivatives with respect to the logarithm of a value.
     design = np.stack([(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1)
-    left = at(-1, 0.0) - force
-    assert design.T @ left == pytest.approx(
-        0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(left) / 9
+    residual = at(-1, 0.0) - force
+    assert design.T @ residual == pytest.approx(
+        0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(residual) / 9
     )
     dof = force.size - best.size
     half = student.ppf(0.975, dof) * np.sqrt(
-        np.diag(np.linalg.inv(design.T @ design)) * (left @ left) / dof
+        np.diag(np.linalg.inv(design.T @ design)) * (residual @ residual) / dof
     )
     ends = np.stack([best * (1 - half), best * (1 + half)], axis=1)
-    if law == "elastic-plastic":  # the bond length is searched in logarithms
+    if law == "elastic-plastic":  # the bond length is fitted on a logarithmic scale
         ends[1] = best[1] * np.exp([-half[1], half[1]])
     assert found.keys.fit.intervals.methods == ("linear",) * best.size
     assert found.keys.fit.intervals.ends == pytest.approx(ends, rel=2e-4)
 
 
-# ---- what the rows do not say
+# ---- parameters that the rows do not determine, and doubtful records
 
 
-def test_exact_static_and_load_are_known_by_their_product(tmp_path):
+def test_exact_inseparable_parameters_are_reported(tmp_path):
+    """The friction coefficient and the load are reported as inseparable; only their product is determined."""
     found = fit_loop(
-        scene_of(tmp_path, "elastic-plastic"),
-        table(tmp_path / "loop.csv", *noisy("elastic-plastic", 3, 0.1, 24)),
-        free_of("friction.static", "friction.bond_length", "normal.load"),
+        load_scene(tmp_path, "elastic-plastic"),
+        write_loop(tmp_path / "loop.csv", *noisy_loop("elastic-plastic", 3, 0.1, 24)),
+        free_ranges("friction.static", "friction.bond_length", "normal.load"),
     )
     static, _, load_ = found.keys.fit.values
     assert static * load_ == pytest.approx(31, rel=5e-3)
@@ -318,51 +356,61 @@ def test_exact_static_and_load_are_known_by_their_product(tmp_path):
     )
 
 
-def test_exact_keys_without_effect_are_named(tmp_path):
-    time, slide = rows(24, 1)
-    loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
+def test_exact_parameters_without_effect_are_reported(tmp_path):
+    """A parameter without effect on the loop and a value at its bound are reported as warnings."""
+    time, slide = sine_path(24, 1)
+    loop = write_loop(
+        tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
+    )
     found = fit_loop(
-        scene_of(tmp_path, "elastic-plastic"),
+        load_scene(tmp_path, "elastic-plastic"),
         loop,
-        [*free_of("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"],
+        [*free_ranges("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"],
     )
     assert (
         "slide.cycles has no effect on the computed data, so its value is not determined"
         in found.keys.warnings
     )
-    found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
+    found = fit_loop(load_scene(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
     assert found.keys.fit.values[0] == 0.25 and "at its high bound 0.25" in found.keys.warnings[0]
 
 
-def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
-    """The second cycle reads twice the force: held out, it changes nothing but its own rms."""
-    time, slide = rows(40)
-    force = play(slide, 0.31, 2.3e-6)
+def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
+    """Rows excluded by `--hold` change nothing but their own rms.
+
+    The motion of the excluded cycle is computed, but its force, here twice the true one, is not
+    fitted.
+    """
+    time, slide = sine_path(40)
+    force = elastic_plastic_force(slide, 0.31, 2.3e-6)
     cycle = 1 + (np.arange(81) > 40)
-    wrong = table(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
-    scene = scene_of(tmp_path, "elastic-plastic")
+    wrong = write_loop(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
+    scene = load_scene(tmp_path, "elastic-plastic")
     found = fit_loop(
-        scene, wrong, free_of("friction.static", "friction.bond_length"), ["cycle=2.0"]
+        scene, wrong, free_ranges("friction.static", "friction.bond_length"), ["cycle=2.0"]
     )
     assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
     assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
     assert found.held_out.sum() == 40
     first = fit_loop(
         scene,
-        table(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
-        free_of("friction.static", "friction.bond_length"),
+        write_loop(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
+        free_ranges("friction.static", "friction.bond_length"),
         ["cycle=1"],
     )
     assert first.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
 
 
-def test_always_doubtful_records_are_named(tmp_path):
-    time, slide = rows(40)
-    late = play(slide, 0.31, 2.3e-6)[20:]
+def test_always_doubtful_records_give_warnings(tmp_path):
+    """Correlated rows, a nonzero first force and another amplitude than that of the scene give warnings."""
+    time, slide = sine_path(40)
+    late = elastic_plastic_force(slide, 0.31, 2.3e-6)[20:]
     found = fit_loop(
-        scene_of(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
-        table(tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)),
-        free_of("friction.static", "friction.bond_length"),
+        load_scene(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
+        write_loop(
+            tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)
+        ),
+        free_ranges("friction.static", "friction.bond_length"),
     )
     assert [
         any(text in one for one in found.keys.warnings)
@@ -374,76 +422,85 @@ def test_always_doubtful_records_are_named(tmp_path):
     ] == [True] * 3
 
 
-# ---- the pace of a record without time
+# ---- records without time
 
 
-def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
-    slide = rows(40)[1]
+def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
+    """A record without time is fitted with uniform time steps if the law is rate independent.
+
+    Rate-dependent laws need the times or a constant speed in the scene.
+    """
+    slide = sine_path(40)[1]
     text = "displacement [um],force [N]\n" + "\n".join(
-        f"{1e6 * q!r},{f!r}" for q, f in zip(slide.tolist(), play(slide, 0.31, 2.3e-6).tolist())
+        f"{1e6 * q!r},{f!r}"
+        for q, f in zip(slide.tolist(), elastic_plastic_force(slide, 0.31, 2.3e-6).tolist())
     )
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
     found = fit_loop(
-        scene_of(tmp_path, "elastic-plastic"),
+        load_scene(tmp_path, "elastic-plastic"),
         loop,
-        free_of("friction.static", "friction.bond_length"),
+        free_ranges("friction.static", "friction.bond_length"),
     )
     assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
     assert "evenly spaced" in found.keys.warnings[0]
     with pytest.raises(
         PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"
     ):
-        fit_loop(scene_of(tmp_path, "tanh"), loop, free_of("friction.static"))
-    pace = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
-    where = np.concatenate([np.linspace(0, 10, 11), np.linspace(9, -10, 20)])
+        fit_loop(load_scene(tmp_path, "tanh"), loop, free_ranges("friction.static"))
+    triangle = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
+    position = np.concatenate([np.linspace(0, 10, 11), np.linspace(9, -10, 20)])
     ratio = np.tanh(2 / 1.7)
-    both = np.concatenate([np.full(10, ratio), [0], np.full(20, -ratio)])
+    force = np.concatenate([np.full(10, ratio), [0], np.full(20, -ratio)])
     loop.write_text(
-        "displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both))
+        "displacement [um],force [N]\n"
+        + "\n".join(f"{q},{31 * s}" for q, s in zip(position, force))
     )
     found = fit_loop(
-        scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace),
+        load_scene(tmp_path, "tanh", "friction.static=0.31", slide=triangle),
         loop,
-        free_of("friction.reference_speed"),
+        free_ranges("friction.reference_speed"),
     )
     assert found.keys.fit.values == pytest.approx([1.7e-3], rel=1e-6)
     assert "computed from slide" in found.keys.warnings[0]
 
 
-# ---- the verb
+# ---- the fit command
 
 
 @pytest.fixture
-def asked(tmp_path):
-    table(tmp_path / "loop.csv", *noisy("elastic-plastic", 1, 0.1, 24), 1 + (np.arange(49) > 24))
-    scene_of(tmp_path, "elastic-plastic", slide='[slide]\nkind = "file"\nfile = "loop.csv"\n')
+def fit_command(tmp_path):
+    """Return the words of a fit command for a noisy loop, with its files written."""
+    write_loop(
+        tmp_path / "loop.csv", *noisy_loop("elastic-plastic", 1, 0.1, 24), 1 + (np.arange(49) > 24)
+    )
+    load_scene(tmp_path, "elastic-plastic", slide='[slide]\nkind = "file"\nfile = "loop.csv"\n')
     return ["fit", tmp_path / "scene.toml", "--to", tmp_path / "loop.csv", "-o", tmp_path / "out"]
 
 
-def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, asked):
-    """The path file of the scene is the measured loop, so a run of the fitted scene gives the fitted rows."""
+def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
+    """A run of the fitted scene gives the fitted rows within 1e-9 N. The path file of the scene is the measured loop."""
     free = "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
-    answer = run_cli(*asked, "--free", free, "--hold", "cycle=2", "--json")
+    answer = run_cli(*fit_command, "--free", free, "--hold", "cycle=2", "--json")
     assert answer.code == 0, answer.err
     found = json.loads(answer.out)
     assert found == json.loads((tmp_path / "out/fit.json").read_text())
-    one = found["values"]["friction.static"]
-    assert one["interval"][0] < 0.31 < one["interval"][1]
+    static = found["values"]["friction.static"]
+    assert static["interval"][0] < 0.31 < static["interval"][1]
     assert found["held"]["rows"] == 24 and found["unit"] == "N"
     page = (tmp_path / "out/report.html").read_text("utf-8")
-    value, _, (low, high) = format_fitted(one)
+    value, _, (low, high) = format_fitted(static)
     assert (
         find_accessibility_errors(page) == []
         and f"<b>friction.static = {value} ({low} to {high});" in page
     )
     scene = load(tmp_path / "out/scene.fitted.toml")
-    assert scene.friction.static == one["value"] and scene.slide.file == "../loop.csv"
-    ran = bench.run(build(scene), None, 400)
+    assert scene.friction.static == static["value"] and scene.slide.file == "../loop.csv"
+    run = bench.run(build(scene), None, 400)
     written = read_loop(tmp_path / "out/fit.csv")
-    at = [np.argmin(np.abs(ran.time - t)) for t in written.time]
+    at = [np.argmin(np.abs(run.time - t)) for t in written.time]
     fitted = np.array(written.labels["fitted"], float)
-    assert ran.force[at] == pytest.approx(fitted, abs=1e-9)
+    assert run.force[at] == pytest.approx(fitted, abs=1e-9)
     measured, model = (
         format_quantity(np.trapezoid(force, written.displacement), "J", 4)
         for force in (written.reading, fitted)
@@ -451,13 +508,14 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
     assert f"work over the record   {measured} measured, {model} fitted" in page
 
 
-def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
+def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_path):
+    """A fit that reaches its limit of evaluations exits with code 3 and states that it did not converge."""
     from patchfem.identify import least_squares
 
     monkeypatch.setattr(least_squares, "MAX_EVALUATIONS", 1)
     assert (
         run_cli(
-            *asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
+            *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
         ).code
         == 3
     )
@@ -477,8 +535,9 @@ def test_always_a_fit_cut_short_ends_with_3(asked, monkeypatch, tmp_path):
     ("friction.static=0..1,friction.static=0..2", "friction.static: is given twice"),
     ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
 ])  # fmt: skip
-def test_refuses_a_bad_range(asked, free, says, tmp_path):
-    answer = run_cli(*asked, "--free", free)
+def test_refuses_invalid_range_of_parameter(fit_command, free, says, tmp_path):
+    """An invalid range of `--free` is refused with the reason, and no file is written."""
+    answer = run_cli(*fit_command, "--free", free)
     assert answer.code == 2 and says in answer.err and not (tmp_path / "out").exists()
 
 
@@ -499,10 +558,11 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
     (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
     (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "only 2 rows are used"),
 ])  # fmt: skip
-def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
+def test_refuses_invalid_loop_with_line_number(fit_command, text, says, tmp_path):
+    """An invalid table of a measured loop is refused with its file, line and reason."""
     (tmp_path / "loop.csv").write_text(text)
     answer = run_cli(
-        *asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
+        *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
     )
     assert answer.code == 2 and "loop.csv" in answer.err and says in answer.err, answer.err
 
@@ -511,32 +571,36 @@ def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
     ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-6"),
     ("time [s],displacement [m],wobble [N]\n0,0,0\n0.1,2e-6,5\n", "slide.csv:1: a header like"),
 ])  # fmt: skip
-def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
-    """The reason was lost on the way: an internal fault, for the scene itself was right."""
+def test_refuses_invalid_path_file_with_message_of_check(tmp_path, table, says):
+    """An invalid path file is refused by `run` and `fit` with the message of `check`.
+
+    The fit used to report an internal error instead, because the scene itself was valid.
+    """
     (tmp_path / "slide.csv").write_text(table)
     scene = tmp_path / "bench.toml"
     loop = tmp_path / "loop.csv"
     scene.write_text(POINT + LAWS["coulomb"] + '[slide]\nkind = "file"\nfile = "slide.csv"\n')
-    time, slide = rows(8, 1)
+    time, slide = sine_path(8, 1)
     np.savetxt(
         loop,
-        np.c_[time, slide, play(slide, 0.3, 1e-6)],
+        np.c_[time, slide, elastic_plastic_force(slide, 0.3, 1e-6)],
         delimiter=",",
         comments="",
         header="time [s],displacement [m],force [N]",
     )
-    told = [
+    answers = [
         run_cli("check", scene),
         run_cli("run", scene, "-o", tmp_path / "out"),
         run_cli(
             "fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit"
         ),
     ]
-    assert f"{scene}:8: slide.file: " in told[0].err and says in told[0].err
-    assert told[1:] == told[:1] * 2 and told[0].code == 2
+    assert f"{scene}:8: slide.file: " in answers[0].err and says in answers[0].err
+    assert answers[1:] == answers[:1] * 2 and answers[0].code == 2
 
 
-def test_refuses_other_requests(asked, tmp_path):
+def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
+    """Invalid options of `--hold`, missing files and unsuitable scenes are refused."""
     free = ["--free", "friction.static=0.1..0.7"]
     for words, code, says in (
         (["--hold", "cycle=3"], 2, "no row of"),
@@ -544,13 +608,13 @@ def test_refuses_other_requests(asked, tmp_path):
         (["--hold", "cycle"], 2, "column=value,value"),
         (["--hold", "cycle=1,2"], 2, "only 0 rows are"),
     ):
-        answer = run_cli(*asked, *free, *words)
+        answer = run_cli(*fit_command, *free, *words)
         assert answer.code == code and says in answer.err, answer.err
-    assert run_cli(*asked[:3], tmp_path / "none.csv", *free).code == 4
+    assert run_cli(*fit_command[:3], tmp_path / "none.csv", *free).code == 4
     (tmp_path / "scene.toml").write_text(
         POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8"
     )
-    assert "friction.static: must be >= 0" in run_cli(*asked, *free).err
+    assert "friction.static: must be >= 0" in run_cli(*fit_command, *free).err
     with pytest.raises(SceneError, match="but this is a patch scene"):
         text = (
             '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
@@ -559,17 +623,22 @@ def test_refuses_other_requests(asked, tmp_path):
         fit_loop(loads(text), tmp_path / "loop.csv", ["contact.load=1 N..2 N"])
 
 
-def test_exact_the_rest_speed_of_the_measured_motion_is_written_out(tmp_path):
-    """Where the scene leaves v_h to the motion, the measured motion sets it, and the fitted scene says so."""
-    time, slide = rows(24, 1)
-    scene = scene_of(tmp_path, "growth", "friction.rest_speed=1 m/s")
+def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
+    """The fitted scene states the rest speed, a thousandth of the largest measured speed.
+
+    The scene leaves the rest speed v_h out, so that it follows from the motion.
+    """
+    time, slide = sine_path(24, 1)
+    scene = load_scene(tmp_path, "growth", "friction.rest_speed=1 m/s")
     scene = loads(
         scene.text.replace('rest_speed = "0.01 mm/s"\n', ""),
         tmp_path / "scene.toml",
         ["accuracy.steps_per_cycle=24"],
     )
-    loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
-    found = fit_loop(scene, loop, free_of("friction.static"))
+    loop = write_loop(
+        tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
+    )
+    found = fit_loop(scene, loop, free_ranges("friction.static"))
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
     text = fitted_scene_text(found.keys, loop.name, tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)

@@ -5,7 +5,18 @@ import json
 import numpy as np
 import pytest
 from command_line import run_cli
-from test_fit import LAWS, LOAD, POINT, SINE, dahl, free_of, play, rows, scene_of, table
+from test_fit import (
+    LAWS,
+    LOAD,
+    POINT,
+    SINE,
+    dahl_force,
+    elastic_plastic_force,
+    free_ranges,
+    load_scene,
+    sine_path,
+    write_loop,
+)
 
 from patchfem.campaigns import LoopOptions, fit_loop
 from patchfem.campaigns.fits.loop_path import count_whole_cycles, prepend_warm_up
@@ -21,28 +32,28 @@ def test_exact_offset_of_force_is_recovered_from_steady_loop(tmp_path):
 
     Without warm-up and offset the fit is poor and proposes `--warm-up`.
     """
-    time, slide = rows(80, 4)
-    force = dahl(slide, *TRUTH) + 7.0
+    time, slide = sine_path(80, 4)
+    force = dahl_force(slide, *TRUTH) + 7.0
     cut = slice(93, 280)
-    loop = table(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
-    scene = scene_of(tmp_path, "bonds")
-    found = fit_loop(scene, loop, free_of(*NAMES), options=LoopOptions(("force",), True))
+    loop = write_loop(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
+    scene = load_scene(tmp_path, "bonds")
+    found = fit_loop(scene, loop, free_ranges(*NAMES), options=LoopOptions(("force",), True))
     assert found.keys.fit.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
     assert found.rms < 1e-5 * LOAD and found.keys.warnings == []
-    plain = fit_loop(scene, loop, free_of(*NAMES))
+    plain = fit_loop(scene, loop, free_ranges(*NAMES))
     assert plain.rms > 1.0 and any("--warm-up" in one for one in plain.keys.warnings)
 
 
 def test_exact_offset_of_displacement_is_recovered(tmp_path):
     """The offset of a record that begins 1.1 um from the unstressed position is recovered within 1e-5."""
-    time, slide = rows(80, 1)
+    time, slide = sine_path(80, 1)
     position = 1.1e-6 + slide
-    force = play(np.concatenate([[0.0], position]), *TRUTH)[1:]
-    loop = table(tmp_path / "loop.csv", time, slide, force)
+    force = elastic_plastic_force(np.concatenate([[0.0], position]), *TRUTH)[1:]
+    loop = write_loop(tmp_path / "loop.csv", time, slide, force)
     found = fit_loop(
-        scene_of(tmp_path, "elastic-plastic"),
+        load_scene(tmp_path, "elastic-plastic"),
         loop,
-        free_of(*NAMES),
+        free_ranges(*NAMES),
         options=LoopOptions(("displacement",)),
     )
     assert found.keys.fit.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
@@ -53,9 +64,9 @@ def test_exact_warm_up_path_ends_at_first_row(tmp_path):
 
     One period lies between a row of the warm-up and the same row of the record.
     """
-    time, slide = rows(50, 2)
+    time, slide = sine_path(50, 2)
     position = slide[3:] - slide[3]
-    loop = read_loop(table(tmp_path / "loop.csv", time[3:], position, np.ones(position.size)))
+    loop = read_loop(write_loop(tmp_path / "loop.csv", time[3:], position, np.ones(position.size)))
     warm_up_rows = count_whole_cycles(loop)
     assert warm_up_rows == 50 or warm_up_rows == 51
     times, path, before = prepend_warm_up(loop.time, loop.displacement, warm_up_rows, 2e-6)
@@ -66,20 +77,26 @@ def test_exact_warm_up_path_ends_at_first_row(tmp_path):
 
 def test_refuses_warm_up_of_record_without_full_cycle(tmp_path):
     """A warm-up of a record that is shorter than one cycle is refused, as is an unknown offset."""
-    time, slide = rows(80, 1)
-    loop = table(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
+    time, slide = sine_path(80, 1)
+    loop = write_loop(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
     with pytest.raises(PatchfemError, match="returns to its first value and passes it"):
-        fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions((), True))
+        fit_loop(
+            load_scene(tmp_path, "bonds"), loop, free_ranges(*NAMES), options=LoopOptions((), True)
+        )
     with pytest.raises(
         PatchfemError, match="--offset time: not a possible offset; use force or displacement"
     ):
-        fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions(("time",)))
+        fit_loop(
+            load_scene(tmp_path, "bonds"), loop, free_ranges(*NAMES), options=LoopOptions(("time",))
+        )
 
 
 def test_always_fit_command_writes_offsets(tmp_path):
     """The command writes the fitted offset of the force and the effective number of rows."""
-    time, slide = rows(40, 4)
-    loop = table(tmp_path / "loop.csv", time[47:], slide[47:], dahl(slide, *TRUTH)[47:] - 3.0)
+    time, slide = sine_path(40, 4)
+    loop = write_loop(
+        tmp_path / "loop.csv", time[47:], slide[47:], dahl_force(slide, *TRUTH)[47:] - 3.0
+    )
     (tmp_path / "scene.toml").write_text(POINT + LAWS["bonds"] + SINE, "utf-8")
     done = run_cli(
         "fit",
@@ -87,7 +104,7 @@ def test_always_fit_command_writes_offsets(tmp_path):
         "--to",
         loop,
         "--free",
-        *free_of(*NAMES),
+        *free_ranges(*NAMES),
         "--offset",
         "force",
         "--warm-up",
