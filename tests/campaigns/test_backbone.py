@@ -1,4 +1,4 @@
-"""Backbones of scenes: three ways beside each other and beside closed forms."""
+"""Backbones of rigs by three methods, compared with each other and with closed forms."""
 
 import numpy as np
 import pytest
@@ -15,25 +15,30 @@ PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
 
 
-def model(law: str, **sets):
+def build_block(law: str, **sets):
+    """Return the Model of a shaken block with a friction law and changes of the scene."""
     return pf.build(make_shaken_block(law), **sets)
 
 
-def segalman(u):
-    """Force [N] and loss [J] of the joint IWAN by Segalman's closed form at slides below phi_max = 2.7 mm."""
+def segalman_loop(u):
+    """Return force [N] and loss per cycle [J] of the joint IWAN at amplitudes `u` below phi_max = 2.7 mm.
+
+    Closed form of Segalman (2005).
+    """
     r = u / 2.7e-3
     scale = 30 / (0.5 + 1 / 3)
     force = scale * (1.5 * r - r**1.5 / 1.5)
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
 
 
-def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
+def test_exact_quasi_static_curve_of_iwan_joint_agrees_with_segalman():
+    """Quasi-static frequency and damping of an Iwan joint agree with Segalman's closed form within 1e-9."""
     a = np.array([1e-5, 1e-4, 1e-3, 2.5e-3])
-    found = compute_backbone(model(IWAN), "", a, ("quasi-static",))
-    one, (force, loss) = found.curves["quasi-static"], segalman(a)
+    found = compute_backbone(build_block(IWAN), "", a, ("quasi-static",))
+    curve, (force, loss) = found.curves["quasi-static"], segalman_loop(a)
     omega = np.sqrt(OMEGA**2 + force / (0.5 * a))
-    assert one.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
-    assert one.damping == pytest.approx(
+    assert curve.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
+    assert curve.damping == pytest.approx(
         0.002 * OMEGA / omega + loss / (np.pi * (omega * a) ** 2), rel=1e-9
     )
     assert found.exponents.micro == pytest.approx(2.5, abs=1e-6) and found.exponents.gross is None
@@ -41,11 +46,15 @@ def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
     assert found.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
 
 
-def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
-    """In micro-slip one harmonic carries all: the balance has the static curve's loss. The decay is within its bar and
-    what the damping changes over one of its swings."""
+def test_balance_and_decay_of_iwan_joint_agree_within_errors():
+    """The damping of an Iwan joint by decay agrees with that by balance within their errors.
+
+    The difference may also contain the change of the damping over one cycle. In micro-slip a single
+    harmonic describes the motion, so the damping by balance agrees with the quasi-static one within
+    1e-3.
+    """
     a = np.geomspace(2e-5, 2e-3, 6)
-    found = compute_backbone(model(IWAN), "", a)
+    found = compute_backbone(build_block(IWAN), "", a)
     static, balance, decay = (found.curves[way] for way in ("quasi-static", "balance", "decay"))
     assert balance.damping[0] == pytest.approx(static.damping[0], rel=1e-3)
     inside = np.isin(a, decay.amplitude)
@@ -55,16 +64,19 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
     assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
 
 
-def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
-    """The largest of 4096 samples was taken for the amplitude, 3e-7 of it too small: the motion fell within a cycle."""
+def test_exact_balanced_motion_returns_to_its_amplitude_after_a_cycle():
+    """A motion with the damping of the balance returns to its amplitude after a cycle within 1e-9.
+
+    The amplitude was once the largest of 4096 samples, which is 3e-7 too small.
+    """
     found = compute_backbone(
-        model('law = "tanh"\nreference_speed = "0.5 m/s"'),
+        build_block('law = "tanh"\nreference_speed = "0.5 m/s"'),
         "",
         a := [6e-4, 8e-4, 1.2e-3],
         ("balance",),
     )
-    one = found.curves["balance"]
-    for start, f, zeta in zip(a, one.frequency, one.damping):
+    curve = found.curves["balance"]
+    for start, f, zeta in zip(a, curve.frequency, curve.damping):
         damping = 2 * (0.002 * OMEGA - zeta * 2 * np.pi * f)
         end = solve_ivp(
             lambda t, y, c=damping: (
@@ -79,11 +91,14 @@ def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
         assert end[0] / start == pytest.approx(1, abs=1e-9)
 
 
-def test_exact_rigid_friction_by_balance_and_by_decay():
-    """A block loses 2 h of every half swing, h = F/k: the decay reads ln(S/(S - 4 h)) at the mean of both swings, and
-    the balance has loss over 2 pi m omega^2 A^2 but for what one harmonic leaves out, of the order of the ratio."""
+def test_exact_rigid_friction_by_balance_and_decay_agrees_with_closed_form():
+    """The damping of a block on Coulomb friction agrees with closed forms within 2 %.
+
+    The amplitude falls by 2 h = 2 F/k per half cycle, and the balance has the loss over 2 pi m
+    omega^2 A^2; the higher harmonics that it leaves out are of the order of h/A.
+    """
     h = 30 / (0.5 * OMEGA**2)
-    found = compute_backbone(model('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
+    found = compute_backbone(build_block('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
     decay = found.curves["decay"]
     balance = found.curves["balance"]
     assert list(found.missing) == ["quasi-static"]
@@ -96,8 +111,11 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
     assert found.exponents.micro is None and found.exponents.gross == pytest.approx(1)
 
 
-def test_exact_a_cubic_spring_has_duffings_backbone():
-    """omega^2 = omega_0^2 + 3 k3 A^2/(4 m) to the first order of k3 A^2/k, and the damping of the structure alone."""
+def test_exact_backbone_of_cubic_spring_agrees_with_duffing():
+    """The backbone of a cubic spring agrees with Duffing's to first order within 1e-6.
+
+    It is omega^2 = omega_0^2 + 3 k3 A^2/(4 m), and the damping is that of the structure alone.
+    """
     scene = make_shaken_block(PLASTIC)
     scene = scene[scene.index("[structure]") :] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
     a = np.array([1e-5, 1e-4])
@@ -109,20 +127,20 @@ def test_exact_a_cubic_spring_has_duffings_backbone():
     assert found.curves["balance"].damping == pytest.approx(0.002 * OMEGA / omega, rel=1e-5)
 
 
-def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
-    """Where the balance falls through 0 is the limit cycle that does not last."""
-    one = pf.build(make_shaken_block(PLASTIC), **{"structure.mode.axial.damping": -0.01})
-    found = compute_backbone(one, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
+def test_flutter_amplitude_agrees_with_that_of_a_run():
+    """The amplitude at which the damping falls through 0 agrees with the flutter amplitude within 1 %."""
+    rig = pf.build(make_shaken_block(PLASTIC), **{"structure.mode.axial.damping": -0.01})
+    found = compute_backbone(rig, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
     free = make_shaken_block(PLASTIC).replace(
         'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
         'kind = "free"\ndisplacement = "1 mm"',
     )
-    told = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
-    assert found.flutter == pytest.approx(told.value, rel=0.01)
+    measure = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
+    assert found.flutter == pytest.approx(measure.value, rel=0.01)
 
 
-def test_two_modes_are_chosen_by_name_and_matched_by_shape():
-    """The held mode with most of the axial coordinate is the axial one, whatever its place among the frequencies."""
+def test_modes_are_selected_by_name_and_matched_by_shape():
+    """The stuck mode with the largest part of a named mode is selected, whatever its order in frequency."""
     scene = make_shaken_block('law = "elastic-plastic"\nbond_length = "1 um"').replace(
         "[drive]",
         """[[structure.mode]]
@@ -132,21 +150,22 @@ damping = 0.01
 slide = 0.1
 [drive]""",
     )
-    one = pf.build(scene)
-    found = compute_backbone(one, "axial", [1e-8], ("balance",))
+    rig = pf.build(scene)
+    found = compute_backbone(rig, "axial", [1e-8], ("balance",))
     k = np.diag([OMEGA**2, (160 * np.pi) ** 2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
     assert found.frequencies.stuck == pytest.approx(
         np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi)
     )
     assert found.curves["balance"].frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
-    low = compute_backbone(one, "yaw", [1e-9], ("quasi-static",))
+    low = compute_backbone(rig, "yaw", [1e-9], ("quasi-static",))
     first = np.sqrt(np.linalg.eigvalsh(k)[0]) / (2 * np.pi)
     assert low.curves["quasi-static"].frequency == pytest.approx(first, rel=1e-6)
     with pytest.raises(pf.PatchfemError, match="the modes of the rig are axial, yaw"):
-        compute_backbone(one, "pitch")
+        compute_backbone(rig, "pitch")
 
 
-def test_refuses_what_has_no_backbone():
+def test_refuses_scenes_without_a_rig():
+    """A scene without a rig is refused, and a method that does not apply to the law states the reason."""
     with pytest.raises(pf.PatchfemError, match="needs the scene of a rig"):
         compute_backbone(
             pf.build(
@@ -154,7 +173,9 @@ def test_refuses_what_has_no_backbone():
                 'amplitude = "1 mm"\nfrequency = "10 Hz"\n'
             )
         )
-    found = compute_backbone(model('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2])
+    found = compute_backbone(
+        build_block('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2]
+    )
     assert "sliding speed" in found.missing["quasi-static"] and set(found.curves) >= {"balance"}
 
 
@@ -178,7 +199,8 @@ def test_refuses_what_has_no_backbone():
         ),
     ],
 )
-def test_refuses_a_mode_without_an_answer(scene, said):
+def test_refuses_modes_without_a_backbone(scene, said):
+    """Zero load with a cubic spring, an output that does not move and a mode at 0 Hz are refused."""
     with pytest.raises(pf.PatchfemError, match=said):
         compute_backbone(pf.build(scene))
 
@@ -190,7 +212,8 @@ def test_refuses_a_mode_without_an_answer(scene, said):
         make_shaken_block('law = "coulomb"').replace("100 N", "0 N"),
     ],
 )
-def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
+def test_exact_rig_without_friction_has_constant_curves(scene):
+    """Frequency and damping of a rig without friction do not depend on the amplitude, within 1e-9."""
     found = compute_backbone(pf.build(scene))
     for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
         assert found.curves[way].frequency == pytest.approx(f, rel=1e-12)
@@ -200,8 +223,11 @@ def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
     assert len(found.notes) == ("coulomb" in scene)
 
 
-def test_exact_a_damper_between_masses_has_the_damping_that_keeps_a_motion_up():
-    """det((k - m w^2) + i w (c - 2 zeta w m)) = 0 at the frequency and the ratio of the balance."""
+def test_exact_damper_between_masses_agrees_with_eigenvalues():
+    """The curves of two masses with a damper satisfy their characteristic equations within 1e-9.
+
+    For the balance it is det((k - m w^2) + i w (c - 2 zeta w m)) = 0.
+    """
     scene = """[structure]
 masses = ["0.5 kg", "0.3 kg"]
 [[structure.spring]]
@@ -214,31 +240,36 @@ stiffness = "100 kN/m"
 between = [1, 0]
 coefficient = "40 N s/m"
 """ + make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[drive]") :]
-    one = compute_backbone(pf.build(scene), "2", [1e-4]).curves
+    curves = compute_backbone(pf.build(scene), "2", [1e-4]).curves
     k = np.array([[3e5, -1e5], [-1e5, 1e5]])
     m = np.diag([0.5, 0.3])
     c = np.diag([40.0, 0])
-    w = 2 * np.pi * one["balance"].frequency[0]
-    zeta = one["balance"].damping[0]
+    w = 2 * np.pi * curves["balance"].frequency[0]
+    zeta = curves["balance"].damping[0]
     assert abs(
         np.linalg.det(k - m * w**2 + 1j * w * (c - 2 * zeta * w * m))
     ) < 1e-9 * np.linalg.det(k)
-    s = 2j * np.pi * one["decay"].frequency[0]
-    s -= s.imag * one["decay"].damping[0] / np.sqrt(1 - one["decay"].damping[0] ** 2)
+    s = 2j * np.pi * curves["decay"].frequency[0]
+    s -= s.imag * curves["decay"].damping[0] / np.sqrt(1 - curves["decay"].damping[0] ** 2)
     assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
 
 
-def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
-    """50 cycles of the held mode, 76 times as fast as the free one, were no swing in slip: the curve had no value."""
+def test_decay_with_stiff_contact_includes_cycles_of_slip():
+    """The damping by decay with a stiff contact agrees with that of Coulomb friction within 2 %.
+
+    The duration was once 50 cycles of the stuck mode, which is 76 times as fast as the free one,
+    and contained no cycle of slip.
+    """
     found = compute_backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
     assert found.amplitude.tolist() == [2e-2, 3e-2]
     assert (found.frequency_error < 1e-3 * found.frequency).all()
-    # of Coulomb friction in gross slip
+    # Damping of Coulomb friction in gross slip.
     lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)
     assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
-def test_amplitudes_stay_within_the_stop():
+def test_amplitudes_stay_within_travel():
+    """The default amplitudes stay within the travel of the structure, and larger ones are refused."""
     stopped = pf.build(
         make_shaken_block(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass')
     )
@@ -251,8 +282,12 @@ def test_amplitudes_stay_within_the_stop():
         compute_backbone(stopped, "", [1e-4, 3e-4])
 
 
-def test_a_curve_that_bends_back_is_kept_as_far_as_it_goes():
-    """Two masses, of which the second slides on the first mode's coordinate: another motion takes over on the way."""
+def test_curve_ends_where_another_motion_takes_over():
+    """A curve with results at small amplitudes only is returned there, with a note on the others.
+
+    The friction force of the second of two masses acts on the first mode, and another motion
+    replaces that mode.
+    """
     structure = """masses = ["0.5 kg", "0.3 kg"]
 [[structure.spring]]
 between = [1, 0]
@@ -272,8 +307,8 @@ load = "100 N"
     found = compute_backbone(
         pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]), "", a, ("balance",)
     )
-    one = found.curves["balance"]
-    assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(
+    curve = found.curves["balance"]
+    assert curve.amplitude == pytest.approx(a[:2]) and curve.frequency == pytest.approx(
         found.frequencies.stuck, rel=1e-6
     )
     assert "without a result" in found.notes[0]
@@ -306,16 +341,18 @@ base = 0.1
 )
 
 
-def test_beyond_a_fold_the_curve_goes_on():
-    """A blade with a damper: its curve folds near 26 um, beyond which these were left out. Asked for
-    alone, the motions beyond have the same frequency, damping and loss."""
+def test_curve_continues_beyond_a_fold():
+    """The curve of a blade with a damper continues beyond its fold near 26 um.
+
+    Frequency and damping there agree with a computation of these amplitudes alone.
+    """
     a = np.array([25e-6, 28e-6, 40e-6])
-    found, alone = (
+    found, found_alone = (
         compute_backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
         for one in (a, a[1:])
     )
     whole = found.curves["balance"]
-    beyond = alone.curves["balance"]
+    beyond = found_alone.curves["balance"]
     assert whole.amplitude == pytest.approx(a) and beyond.amplitude == pytest.approx(a[1:])
     assert not any("left out" in note for note in found.notes)
     assert (np.diff(whole.frequency) < 0).all()
@@ -335,9 +372,12 @@ output = 0.6
 )
 
 
-def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
-    """The decay of two modes is that of the output: 4 F/(2 pi k A) and the structure's own, less than 2 % apart where
-    the damping is small; the static curve is at the amplitudes asked for."""
+def test_gross_slip_damping_of_two_modes_agrees_with_closed_form():
+    """The gross-slip damping of two modes agrees with the closed form within 2 %.
+
+    The closed form is 4 F/(2 pi k A) plus the damping of the structure, for decay and balance; the
+    quasi-static curve has the requested amplitudes.
+    """
     a = np.array([2e-3, 4e-3])
     curves = compute_backbone(pf.build(TWO), "", a).curves
     plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * a)
@@ -351,9 +391,11 @@ def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
 
 
 @pytest.mark.parametrize("two", [False, True])
-def test_exact_a_decay_goes_on_where_the_contact_holds(two):
-    """A contact that holds on a spring is no end: where nothing slips the decay is that of the held modes, zeta
-    omega/omega_held of one mode. Of 13 points there were 7, of two modes 3."""
+def test_exact_decay_continues_in_stick(two):
+    """A decay continues where the contact sticks, with the damping of the stuck modes within its errors.
+
+    The stuck damping of a single mode is zeta omega/omega_stuck.
+    """
     a = np.geomspace(1e-7, 2e-3, 13)
     text = (
         TWO.replace("1 um", "0.1 mm")
@@ -361,15 +403,15 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
         else make_shaken_block(PLASTIC.replace("1 mm", "10 um"))
     )
     found = compute_backbone(pf.build(text), "", a, ("decay",))
-    one = found.curves["decay"]
-    assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
-    # the other mode rings there: up to 2e-4 of the damping ratio
-    still = one.amplitude < (1e-4 if two else 2e-6)
+    curve = found.curves["decay"]
+    assert curve.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
+    # The other mode changes the damping ratio by up to 2e-4 there.
+    still = curve.amplitude < (1e-4 if two else 2e-6)
     if two:
-        own = np.array([1, 4.7]) * OMEGA
+        omegas = np.array([1, 4.7]) * OMEGA
         shape = np.diag([0.004, 0.006 * 4.7]) * OMEGA
         phi = np.array([1, 0.8])
-        stiff = np.diag(own**2) + 3e5 / 0.5 * np.outer(phi, phi)
+        stiff = np.diag(omegas**2) + 3e5 / 0.5 * np.outer(phi, phi)
         roots = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiff, -shape]]))
         root = roots[np.argmin(np.abs(roots))]
         zeta = -root.real / abs(root)
@@ -380,11 +422,11 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
         omega *= np.sqrt(1 - zeta**2)
     assert still.sum() >= 3
     for value, error, truth in (
-        (one.damping, one.damping_error, zeta),
-        (one.frequency, one.frequency_error, omega / (2 * np.pi)),
+        (curve.damping, curve.damping_error, zeta),
+        (curve.frequency, curve.frequency_error, omega / (2 * np.pi)),
     ):
         assert (np.abs(value - truth) <= error + 1e-6 * truth)[still].all()
-    assert (one.damping_error < (1e-4 if two else 0.2) * one.damping)[still].all()
+    assert (curve.damping_error < (1e-4 if two else 0.2) * curve.damping)[still].all()
 
 
 NEAR = make_shaken_block(PLASTIC.replace("1 mm", "0.1 mm")).replace(
@@ -398,9 +440,12 @@ slide = 0.4
 )
 
 
-def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode():
-    """Of two modes 2 % apart that slide together, a release of one turns into the other: 32 times the damping ratio of
-    the free motion stood there, with an error of 15 %, and only the loss of a cycle was given as the reason."""
+def test_decay_with_motion_of_another_mode_is_rejected():
+    """A decay with more than 10 % motion of another mode is no result, and the reason is stated.
+
+    Two modes 2 % apart exchange their energy after a release; the damping by decay was once 32
+    times that of the free motion, with an error estimate of 15 %.
+    """
     found = compute_backbone(
         pf.build(NEAR), "axial", np.geomspace(1e-3, 1e-2, 5), ("balance", "decay")
     )
@@ -437,26 +482,33 @@ static = 0.3
 """ + make_shaken_block("")[make_shaken_block("").index("[structure]") :]
 
 
-def test_always_the_mesh_is_in_the_bars_of_micro_slip():
-    """Below the yield slide of its first node neither a mesh nor one of half its nodes slips; the finer mesh does."""
+def test_always_errors_of_micro_slip_include_the_mesh():
+    """The errors in micro-slip cover the difference from a finer mesh at 95 % of the amplitudes.
+
+    Below the yield displacement of its first node neither a mesh nor one with half its nodes slips,
+    but a finer mesh does.
+    """
     coarse, fine = (
         compute_backbone(
-            pf.build(CROWNED, **{"accuracy.tolerance": one}),
+            pf.build(CROWNED, **{"accuracy.tolerance": tolerance}),
             "",
             np.geomspace(1e-9, 1e-5, 25),
             ("quasi-static",),
         )
-        for one in (1e-2, 2e-4)
+        for tolerance in (1e-2, 2e-4)
     )
-    one = coarse.curves["quasi-static"]
-    other = fine.curves["quasi-static"]
+    coarse_curve = coarse.curves["quasi-static"]
+    fine_curve = fine.curves["quasi-static"]
     for name in ("frequency", "damping"):
-        off = abs(getattr(one, name) - getattr(other, name))
-        bar = getattr(one, f"{name}_error")
-        assert np.mean(off <= bar + getattr(other, f"{name}_error")) >= 0.95, name
-    own = one.damping[0] * one.frequency[0] / 100
-    # no slip is seen
-    assert own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]
+        difference = abs(getattr(coarse_curve, name) - getattr(fine_curve, name))
+        error = getattr(coarse_curve, f"{name}_error")
+        assert np.mean(difference <= error + getattr(fine_curve, f"{name}_error")) >= 0.95, name
+    viscous = coarse_curve.damping[0] * coarse_curve.frequency[0] / 100
+    # No node of this mesh slips.
+    assert (
+        viscous == pytest.approx(0.002, rel=1e-9)
+        and coarse_curve.damping_error[0] > 1e-6 * coarse_curve.damping[0]
+    )
     assert fine.exponents.micro == pytest.approx(3, abs=0.3) and fine.exponents.micro_theory == 3
     assert coarse.exponents.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
@@ -472,15 +524,18 @@ BEHIND_BONDS = (
 FEW = "[contact.shear]", 'element_size = "6 mm"\n[contact.shear]'
 
 
-def test_errors_say_what_they_leave_out_of_the_mesh():
-    """Bonds behind pieces that give way have no steady loop: their errors hold the change on a coarser mesh, and where
-    there is none, no error of the mesh."""
+def test_notes_state_which_mesh_errors_are_left_out():
+    """Notes state which errors of the mesh the errors of a decay leave out.
+
+    Bonds on elastic pieces have no known steady loop: their errors contain the change on a coarser
+    mesh, and no error of the mesh if there is none.
+    """
     a = [1e-6, 2e-6]
     found, few = (
         compute_backbone(pf.build(one), "", a, ("decay",))
         for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW))
     )
-    (said,), (unmeshed, bare) = (
+    (said,), (unmeshed, few_note) = (
         [note for note in one.notes if "the errors of" in note] for one in (found, few)
     )
     assert said.startswith(
@@ -490,7 +545,7 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
         "because the hysteresis loop of this friction law is not known without a computation in time"
     )
     assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
-    assert bare.startswith(
+    assert few_note.startswith(
         "the errors of method decay include no error of the mesh, because the hysteresis loop of"
     )
     assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
@@ -500,34 +555,41 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
     assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
-def test_the_stuck_frequency_follows_from_the_stiffness_of_a_run():
+def test_stuck_frequency_follows_from_tangential_stiffness():
+    """The stuck frequency agrees with the tangential stiffness of a run within their errors."""
     found = compute_backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
-    told = pf.run(
+    stiffness = pf.run(
         CROWNED[: CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
         'frequency = "1 Hz"\n'
     ).measures["tangential_stiffness"]
-    stuck = np.sqrt(OMEGA**2 + told.value / 0.5) / (2 * np.pi)
-    error = found.frequencies.stuck_error + stuck * told.error / told.value / 2
+    stuck = np.sqrt(OMEGA**2 + stiffness.value / 0.5) / (2 * np.pi)
+    error = found.frequencies.stuck_error + stuck * stiffness.error / stiffness.value / 2
     assert abs(found.frequencies.stuck - stuck) <= error < 1e-3 * stuck
     assert "above the range of micro-slip" in " ".join(found.notes)
 
 
 @pytest.mark.parametrize("slide", [1.0, 0.01])
-def test_amplitudes_unless_given_end_where_the_mode_is_nearly_free(slide):
-    """A contact that slides by a hundredth of the output: the default ended at 7 m, not 0.7 mm, where `travel` did not
-    stop it."""
-    one = pf.build(make_shaken_block(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
-    found = compute_backbone(one, "", None, ("quasi-static",))
-    deflected = 30 * slide / (0.5 * OMEGA**2)  # by the largest friction
-    top = max(deflected, 1.5e-3 / slide)
-    assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(15 * top, rel=1e-6)
+def test_default_amplitudes_end_where_mode_is_nearly_free(slide):
+    """The default amplitudes end where the frequency is within 5 % of the free one.
+
+    For a relative displacement of a hundredth of the output they once ended at 7 m instead of 0.7
+    mm if no `travel` was given.
+    """
+    rig = pf.build(make_shaken_block(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
+    found = compute_backbone(rig, "", None, ("quasi-static",))
+    deflected = 30 * slide / (0.5 * OMEGA**2)  # displacement by the friction limit [m]
+    max_amplitude = max(deflected, 1.5e-3 / slide)
+    assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(15 * max_amplitude, rel=1e-6)
     assert found.curves["quasi-static"].frequency[-1] < 1.05 * found.frequencies.free
 
 
-def test_a_loop_that_remembers_is_read_when_it_has_settled():
-    """Three cycles of bonds of order 2 are not their loop yet: the curve is that of thirty, within both bars."""
+def test_loop_of_law_with_memory_is_evaluated_in_steady_state():
+    """The secant stiffness of bonds of order 2 is evaluated in the steady state, within 2e-3.
+
+    After three cycles it still differs from that after 96 cycles by more than 1e-3.
+    """
     bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'
-    joint = build_joint(model(bonds), "")
+    joint = build_joint(build_block(bonds), "")
     few, many = (
         run_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values for cycles in (3.0, 96.0)
     )
@@ -537,15 +599,19 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
     assert abs(found.run.values[name] / many[name] - 1) < 2e-3
 
 
-def test_bonds_without_a_closed_loop_name_the_method_that_works():
-    bonds = model('law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"')
-    (said,) = compute_backbone(bonds, "", [3e-7], ("balance",)).missing.values()
-    assert said.endswith("; use --method quasi-static")
+def test_bonds_without_closed_loop_state_the_method_to_use():
+    """For bonds without a closed loop the reason names the method that works, and it does work."""
+    bonds = build_block('law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"')
+    (reason,) = compute_backbone(bonds, "", [3e-7], ("balance",)).missing.values()
+    assert reason.endswith("; use --method quasi-static")
     assert not compute_backbone(bonds, "", [3e-7], ("quasi-static",)).missing
 
 
-def test_a_static_curve_ends_where_its_force_falls():
-    """An interlock gives way at a quarter of its wave: 20 um of 80."""
+def test_quasi_static_curve_ends_at_maximum_force():
+    """The quasi-static curve ends where the force of an interlock is largest.
+
+    This is at a quarter of its wavelength of 80 um.
+    """
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
     scene = make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :].replace(
         "[[structure.mode]]", bonded, 1
@@ -558,7 +624,8 @@ def test_a_static_curve_ends_where_its_force_falls():
     assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 
-def test_python_gives_a_dataset():
+def test_python_interface_returns_dataset():
+    """The Python interface returns a dataset with sorted amplitudes and units, and refuses invalid arguments."""
     found = pf.backbone(make_shaken_block(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
     assert found["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
     assert found["quasi_static_frequency"].attrs["units"] == "Hz" and found.attrs["mode"] == "axial"
@@ -571,6 +638,6 @@ def test_python_gives_a_dataset():
 def test_exact_error_of_cells_follows_largest_change():
     """The error due to the cells of an Iwan law follows from the largest change by merged cells."""
     values = iter([1.0, 1.01, 0.98, 1.005, 1.0])
-    joint = build_joint(model(IWAN), "")
+    joint = build_joint(build_block(IWAN), "")
     error = joint.spatial_discretization_errors(lambda group: next(values))
     assert error == pytest.approx(error_of_change(0.02, ratio=4.0, order=2.0), rel=1e-9)

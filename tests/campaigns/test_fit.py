@@ -64,7 +64,7 @@ def sine_path(count=80, cycles=2):
 
 
 def elastic_plastic_force(slide, mu, eps):
-    """Return the elastic-plastic friction force (n,) [N] along straight legs, by the play operator."""
+    """Return the elastic-plastic friction force (n,) [N] along a piecewise linear path, by the play operator."""
     out = [0.0]
     for dq in np.diff(slide):
         out.append(min(max(out[-1] + mu * LOAD * dq / eps, -mu * LOAD), mu * LOAD))
@@ -72,9 +72,9 @@ def elastic_plastic_force(slide, mu, eps):
 
 
 def dahl_force(slide, mu, eps):
-    """Return the friction force (n,) [N] of bonds of constant length along straight legs.
+    """Return the friction force (n,) [N] of bonds of constant length on a piecewise linear path.
 
-    It solves F' = mu N (sgn v - F/mu N) |v|/eps in closed form on each leg.
+    It solves F' = mu N (sgn v - F/mu N) |v|/eps in closed form on each segment of the path.
     """
     out = [0.0]
     for dq in np.diff(slide):
@@ -84,7 +84,7 @@ def dahl_force(slide, mu, eps):
 
 
 def growing_bond_force(time, slide, mu, kinetic, eps0, rest, slip, floor=1e-5):
-    """Return the friction force (n,) [N] of bonds whose length grows at rest, along straight legs.
+    """Return the friction force (n,) [N] of bonds that grow at rest, along a piecewise linear path.
 
     It integrates z' = v - |v| z/eps and equation 2.10 by a Runge-Kutta method of order 8.
     """
@@ -124,7 +124,7 @@ def reference_force(law, time, slide, truth):
         return growing_bond_force(time, slide, *values)
     speed = np.diff(slide) / np.diff(time)
     side = np.sign(speed) if law == "coulomb" else np.tanh(speed / values[1])
-    # The force of a row is the mean of the two adjacent legs.
+    # The force at a row is the mean of those of the two adjacent segments.
     both = np.concatenate([side[:1], (side[1:] + side[:-1]) / 2, side[-1:]])
     return values[0] * LOAD * both
 
@@ -247,9 +247,9 @@ def test_order_of_bond_growth_fit_is_two(tmp_path):
 
 
 def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
-    """A column of friction ratios gives the same parameters for a point and a rigidly sliding patch of elements.
+    """A column of friction ratios gives the same parameters for a point and for a patch.
 
-    The resultant of a rigid patch is that of a single point.
+    The resultant of a patch in rigid sliding is the friction force of a single point.
     """
     time, slide = sine_path(24)
     ratio = reference_force("bonds", time, slide, TRUTH["bonds"]) / LOAD
@@ -479,7 +479,7 @@ def fit_command(tmp_path):
 
 
 def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
-    """A run of the fitted scene gives the fitted rows within 1e-9 N. The path file of the scene is the measured loop."""
+    """A run of the fitted scene, whose path file is the measured loop, agrees with the fitted rows."""
     free = "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
     answer = run_cli(*fit_command, "--free", free, "--hold", "cycle=2", "--json")
     assert answer.code == 0, answer.err
