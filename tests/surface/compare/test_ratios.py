@@ -6,6 +6,7 @@ from pairs import UM, make_worn_pair
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
+from patchfem.export.surfaces.compare import comparison_data
 from patchfem.surface import Profile, Quantity, divide_sizes, measure_size
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import (
@@ -139,6 +140,11 @@ def test_always_pairs_of_two_directions_are_compared():
     found = compare_directions(parts)
     assert [entry[0] for entry in found] == ["before", "after"]
     assert found[0][1].low < 1 < found[0][1].high
+    data = comparison_data(parts, compose_verdict(parts, found), found)
+    ratios = {
+        state: entry["amplitude_ratio"]["value"] for state, entry in data["anisotropy"].items()
+    }
+    assert ratios == {entry[0]: entry[1].value for entry in found}
 
 
 def test_always_traces_are_compared_at_coarser_step():
