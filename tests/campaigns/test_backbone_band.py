@@ -1,4 +1,4 @@
-"""One answer of a backbone: the recommended curve, its band and the advice, from any scene of a joint."""
+"""Recommended curve of a backbone, its band and the advice, for scenes of a joint."""
 
 import json
 import re
@@ -54,27 +54,34 @@ AMPLITUDES = np.geomspace(1e-5, 2e-3, 19)
 
 
 @pytest.fixture(scope="module")
-def all_methods():
-    """All three curves of two modes that were given beside the scene of a bench."""
+def three_curves():
+    """Curves of two modes by all three methods, with the modes given beside the scene of a bench."""
     return pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="all")
 
 
-def test_exact_modes_beside_a_bench_are_those_of_the_scene_of_a_rig(all_methods):
+def test_exact_modes_as_argument_and_in_scene_give_same_curves(three_curves):
+    """Modes given as an argument and modes in the scene of a rig give the same curve within 1e-9.
+
+    Notes state which tables of the scene are ignored and that a modal mass is assumed.
+    """
     found = pf.backbone(LAW + STRUCTURE, amplitudes=AMPLITUDES)
-    assert found.balance_frequency.values == pytest.approx(all_methods.balance_frequency, rel=1e-9)
+    assert found.balance_frequency.values == pytest.approx(three_curves.balance_frequency, rel=1e-9)
     assert found.attrs["stuck_frequency"] == pytest.approx(100)
-    assert "[slide] is ignored" in all_methods.attrs["notes"]
-    assert "modal mass is assumed" in all_methods.attrs["notes"]
+    assert "[slide] is ignored" in three_curves.attrs["notes"]
+    assert "modal mass is assumed" in three_curves.attrs["notes"]
     assert "[drive] is ignored" in found.attrs["notes"]
     assert not any(name.startswith("decay") for name in found)
 
 
-def test_the_band_contains_all_three_methods(all_methods):
-    """The decay read up to 30 % more damping than the motion of the same loss."""
-    found = all_methods
+def test_band_contains_curves_of_all_methods(three_curves):
+    """The band contains the curves of all three methods, and the advice states their largest difference.
+
+    The damping by decay is up to 30 % larger than that by balance.
+    """
+    found = three_curves
     assert found.attrs["method"] == "balance"
     advice = found.attrs["advice"]
-    # The run of the decay replaces the predicted ring-down, with the number of the note.
+    # The computed decay replaces the predicted ring-down, with the figures of the note.
     stated = re.search(r"The ring-down .*? reads (\S+ %) more damping at (\S+ um)", advice)
     assert (
         f"of damping by decay and by balance differ most at the amplitude {stated[2]}, by {stated[1]}"
@@ -92,28 +99,36 @@ def test_the_band_contains_all_three_methods(all_methods):
             assert (found[f"band_{name}_high"].values[here] >= value).all()
 
 
-def test_the_band_contains_a_ring_down_that_was_not_run(all_methods):
+def test_band_by_balance_contains_curve_of_decay(three_curves):
+    """The band computed by the balance alone contains more than 90 % of the curve of the decay.
+
+    The advice predicts the damping that a ring-down would show.
+    """
     found = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="balance")
     assert set(found.data_vars) & {"decay_damping", "quasi_static_damping"} == set()
     assert "is predicted to read" in found.attrs["advice"]
-    amplitude = all_methods.decay_amplitude.values
+    amplitude = three_curves.decay_amplitude.values
     high = np.interp(amplitude, found.band_amplitude, found.band_damping_high)
     low = np.interp(amplitude, found.band_amplitude, found.band_damping_low)
-    error = all_methods.decay_damping_error.values
-    inside = (low - error <= all_methods.decay_damping) & (
-        all_methods.decay_damping <= high + error
+    error = three_curves.decay_damping_error.values
+    inside = (low - error <= three_curves.decay_damping) & (
+        three_curves.decay_damping <= high + error
     )
     assert inside.mean() > 0.9
     curve = found.balance_damping.values
     width = (found.band_damping_high.values - found.band_damping_low.values) / curve
     assert width[-1] < 0.1
-    excess = all_methods.decay_damping.values / np.interp(
+    excess = three_curves.decay_damping.values / np.interp(
         amplitude, found.band_amplitude, found.balance_damping
     )
     assert excess.max() > 1.05
 
 
-def test_the_band_of_one_mode_is_narrow_but_at_the_onset_of_slip():
+def test_band_of_single_mode_is_narrow_except_at_onset_of_slip():
+    """The band of the damping of a single mode is below 3 % wide at the largest amplitude.
+
+    Its median width is below 10 %; only at the onset of slip it is wider.
+    """
     found = pf.backbone(
         LAW + SLIDE, modes="100 Hz:0.005:0.5", amplitudes=AMPLITUDES, method="balance"
     )
@@ -123,16 +138,16 @@ def test_the_band_of_one_mode_is_narrow_but_at_the_onset_of_slip():
     assert (found.band_damping_low.values > 0.0049).all()
 
 
-def test_a_single_method_claims_nothing_about_the_others():
+def test_advice_for_single_method_omits_other_methods():
+    """The advice for a single method does not state that all methods agree."""
     modes = "100 Hz:0.005:0.5"
     advice = pf.backbone(LAW + SLIDE, modes=modes, method="quasi-static").attrs["advice"]
     assert "all methods agree" not in advice.lower() and "other kinds of test" not in advice
 
 
 @pytest.mark.parametrize(("cubic", "start"), [(4e10, 6.5e-3), (-2e10, 2.75e-3)])
-def test_exact_the_predicted_ring_down_of_a_cubic_spring_is_that_of_the_duffing_oscillator(
-    cubic, start
-):
+def test_exact_predicted_ring_down_agrees_with_duffing_oscillator(cubic, start):
+    """The predicted damping of a ring-down with a cubic spring agrees with an integration within 5e-3."""
     omega = 2 * np.pi * 100
 
     def rates(t, y):
@@ -150,14 +165,16 @@ def test_exact_the_predicted_ring_down_of_a_cubic_spring_is_that_of_the_duffing_
     assert found[::-1] == pytest.approx(damping[:12:4], rel=5e-3)
 
 
-def test_static_curve_of_two_modes_tends_to_the_mode_without_contact():
+def test_quasi_static_curve_tends_to_free_frequency():
+    """The quasi-static frequency tends to the stuck and the free frequency at the ends, within 1e-3."""
     found = pf.backbone(LAW + STRUCTURE, amplitudes=[1e-6, 1.0], method="quasi-static")
     assert found.quasi_static_frequency.values == pytest.approx(
         [100, found.attrs["free_frequency"]], rel=1e-3
     )
 
 
-def test_the_scene_of_a_new_joint_has_a_backbone_as_it_is(tmp_path, monkeypatch, capsys):
+def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
+    """The unchanged scene of `new joint` has a backbone with a band and advice."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "joint.toml").write_text(pf.new("joint"), "utf-8")
     for options, stuck in (((), 100), (("--modes", "120 Hz:0.01, 170 Hz:0.02"), 120)):
@@ -181,7 +198,7 @@ def test_the_scene_of_a_new_joint_has_a_backbone_as_it_is(tmp_path, monkeypatch,
         assert answer["stuck_frequency"] == pytest.approx(stuck, rel=1e-4)
         assert set(answer["curves"]) == {"balance", "quasi-static"}
         assert answer["advice"].startswith("Use method balance, the bold curve of the page")
-        # a patch that slips part by part loses energy at every amplitude
+        # A patch in partial slip dissipates energy at each amplitude.
         assert "dissipates nothing" not in answer["advice"]
         assert any("[slide] is ignored" in note for note in answer["notes"])
         assert any("`slide` is assumed such" in note for note in answer["notes"])
@@ -201,6 +218,7 @@ def test_the_scene_of_a_new_joint_has_a_backbone_as_it_is(tmp_path, monkeypatch,
         (pf.build(LAW + STRUCTURE), "9 Hz:0.01", "cannot be given with a Model"),
     ],
 )  # fmt: skip
-def test_refuses_modes_that_do_not_fit(scene, modes, said):
+def test_refuses_invalid_modes(scene, modes, said):
+    """Modes with invalid text, units, slide or beside a structure of masses are refused."""
     with pytest.raises(pf.PatchfemError, match=f"(?s){said}"):
         pf.backbone(scene, modes=modes)

@@ -1,4 +1,4 @@
-"""Cost curves: what they state is what a run states, and the sentence follows from the runs."""
+"""Curves of error against computing time: values, tables and summaries."""
 
 import csv
 import json
@@ -62,11 +62,13 @@ jumps = 1
 )
 
 
-def model(keys="", tolerance=0.05):
+def build_model(keys="", tolerance=0.05):
+    """Return the Model of a tilted patch with additional keys and a tolerance."""
     return build(TEXT.format(keys=keys, tolerance=tolerance))
 
 
-def made(label, seconds, error, distance=None, value=1.0):
+def make_cost(label, seconds, error, distance=None, value=1.0):
+    """Return the Cost of a synthetic run with two measures of equal error."""
     return Cost(
         label,
         value,
@@ -83,30 +85,36 @@ def made(label, seconds, error, distance=None, value=1.0):
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("keys, own", [('element_size = "0.25 mm"', "249 um"), ("", "0.03")])
-def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, own, monkeypatch):
+def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch):
+    """Values and errors at the setting of the scene agree with those of its run within 1e-9."""
     monkeypatch.setattr(numerical_settings, "TOLERANCES", (1e-1, 1e-2))
-    mine = model(keys, 0.03)
-    # of equal runs one names them all
-    found = next(one for one in setting_curve(mine, "element_size") if own in one.label)
-    stated = run(mine, fresh=True).measures
-    assert found.errors == pytest.approx({name: m.error for name, m in stated.items()}, rel=1e-9)
-    assert found.values == pytest.approx({name: m.value for name, m in stated.items()}, rel=1e-9)
+    patch = build_model(keys, 0.03)
+    # The label of a row lists all settings with equal runs.
+    row = next(one for one in setting_curve(patch, "element_size") if own in one.label)
+    measures = run(patch, fresh=True).measures
+    assert row.errors == pytest.approx({name: m.error for name, m in measures.items()}, rel=1e-9)
+    assert row.values == pytest.approx({name: m.value for name, m in measures.items()}, rel=1e-9)
 
 
-def test_exact_the_table_has_every_value_its_error_and_its_distance_to_the_best(tmp_path):
+def test_exact_table_contains_values_errors_and_distances(tmp_path):
+    """The table contains the errors of each run and its distances from the best run."""
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
-    said = run_cli("cost", scene, "--over", "element_size", "-o", tmp_path / "out", "--json", "-q")
-    assert said.code == 0, said.err
-    answer = json.loads(said.out)["element_size"]
-    *even, chosen = answer["runs"]
-    assert [one["value"] for one in even] == pytest.approx([LENGTH / n for n in (12, 25, 50, 100)])
-    assert chosen["value"] is None
-    assert chosen["distances"] == {}
+    process = run_cli(
+        "cost", scene, "--over", "element_size", "-o", tmp_path / "out", "--json", "-q"
+    )
+    assert process.code == 0, process.err
+    answer = json.loads(process.out)["element_size"]
+    *uniform, adaptive = answer["runs"]
+    assert [one["value"] for one in uniform] == pytest.approx(
+        [LENGTH / n for n in (12, 25, 50, 100)]
+    )
+    assert adaptive["value"] is None
+    assert adaptive["distances"] == {}
     assert {one["timings"] for one in answer["runs"]} == {3}
-    for one in even:
-        gap = abs(one["values"]["normal_stiffness"] - chosen["values"]["normal_stiffness"])
-        assert one["distances"]["normal_stiffness"] == pytest.approx(gap)
+    for one in uniform:
+        distance = abs(one["values"]["normal_stiffness"] - adaptive["values"]["normal_stiffness"])
+        assert one["distances"]["normal_stiffness"] == pytest.approx(distance)
     with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for row, one in zip(rows, answer["runs"], strict=True):
@@ -119,12 +127,13 @@ def test_exact_the_table_has_every_value_its_error_and_its_distance_to_the_best(
     assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
 
 
-def test_exact_the_cheapest_run_is_confirmed_by_finer_ones():
+def test_exact_fastest_run_is_confirmed_by_finer_runs():
+    """The fastest run of a measure meets the tolerance together with all finer runs."""
     runs = [
-        made("lucky", 1, 1e-6, 1e-6),
-        made("bad", 2, 1e-1, 1e-1),
-        made("good", 3, 1e-3, 1e-3),
-        made("best", 9, 1e-5),
+        make_cost("lucky", 1, 1e-6, 1e-6),
+        make_cost("bad", 2, 1e-1, 1e-1),
+        make_cost("good", 3, 1e-3, 1e-3),
+        make_cost("best", 9, 1e-5),
     ]
     assert fastest_by_measure(runs, 1e-2) == {"a": "good"} and fastest_by_measure(runs, 1e-6) == {
         "a": None
@@ -132,32 +141,42 @@ def test_exact_the_cheapest_run_is_confirmed_by_finer_ones():
     assert fastest_by_measure(runs, 0.2) == {"a": "lucky"}
 
 
-def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
-    runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
+def test_exact_summary_states_fastest_run_or_worst_measure():
+    """The summary states the fastest run within the tolerance, or else the measure with the largest error."""
+    runs = [make_cost("2", 1, 4e-2, 3e-2), make_cost("4", 2, 8e-3, 6e-3), make_cost("8", 5, 2e-3)]
     within = "a knob at 4: 2 CPU s per run, with every measure within the tolerance 0.01"
     assert cost_sentence(runs, 1e-2) == within
     assert cost_sentence(runs, 1e-3) == (
         "no setting meets the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and takes 5 "
         "CPU s"
     )
-    still = [made("2", 1, 2.22), made("4", 2, 2.22), made("8", 5, 2.22)]
+    constant = [make_cost("2", 1, 2.22), make_cost("4", 2, 2.22), make_cost("8", 5, 2.22)]
     assert (
-        cost_sentence(still, 1e-2)
+        cost_sentence(constant, 1e-2)
         == "no setting meets the tolerance 0.01: with every setting the error of a is 2.2"
     )
-    bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
-    assert cost_sentence(bold, 1e-2) == within
+    # The stated error of the first run is below its distance from the best run.
+    optimistic = [make_cost("2", 1, 1e-3, 3e-2), *runs[1:]]
+    assert cost_sentence(optimistic, 1e-2) == within
 
 
-def test_exact_of_settings_of_equal_cost_the_smallest_is_named():
-    """1600 steps per cycle at 0.042 CPU s were named where 100 at 0.040 s met the tolerance, with the same results."""
+def test_exact_smallest_of_equally_fast_settings_is_proposed():
+    """Of settings with nearly equal time the smallest that meets the tolerance is proposed.
+
+    Once 1600 steps per cycle at 0.042 CPU s were proposed instead of 100 at 0.040 s with the same
+    results.
+    """
     seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
-    still = [made(label, each, 1e-3, 0.0) for label, each in seconds.items()]
-    assert fastest_run(still, 1e-2).label == "100" and cost_sentence(still, 1e-2) == (
+    equal = [make_cost(label, each, 1e-3, 0.0) for label, each in seconds.items()]
+    assert fastest_run(equal, 1e-2).label == "100" and cost_sentence(equal, 1e-2) == (
         "this setting changes no result by more than the tolerance 0.01; fastest in these timings: a knob at 100, 0.04 "
         "CPU s per run"
     )
-    slow = [made("2", 1.0, 8e-3, 6e-3), made("4", 0.96, 2e-3, 1e-3), made("8", 1.2, 1e-3)]
+    slow = [
+        make_cost("2", 1.0, 8e-3, 6e-3),
+        make_cost("4", 0.96, 2e-3, 1e-3),
+        make_cost("8", 1.2, 1e-3),
+    ]
     assert fastest_run(slow, 1e-2).label == "2" and fastest_run(slow, 5e-3).label == "4"
     assert cost_sentence(slow, 1e-2).endswith(
         "fastest in these timings: a knob at 2, 1 CPU s per run"
@@ -165,8 +184,11 @@ def test_exact_of_settings_of_equal_cost_the_smallest_is_named():
     assert cost_sentence(slow, 5e-3).endswith("within the tolerance 0.005")
 
 
-def test_exact_a_line_says_which_tolerance_is_missed_and_with_which_steps_it_is_met():
-    """Rows of a tolerance of 1e-4 had errors of 2.7e-4 to 9.5e-3 and did not say that they missed it."""
+def test_exact_missed_tolerance_is_stated_with_sufficient_steps():
+    """A row whose run misses its tolerance states so, with the number of steps that meets it.
+
+    Rows of a tolerance of 1e-4 once had errors of 2.7e-4 to 9.5e-3 without a remark.
+    """
 
     def run_at(tolerance, error, steps, remedies=()):
         label = (
@@ -175,48 +197,58 @@ def test_exact_a_line_says_which_tolerance_is_missed_and_with_which_steps_it_is_
             else f"{tolerance:g}, {steps} steps per cycle"
         )
         return replace(
-            made(label, steps / 800, error), tolerance=tolerance, steps=steps, remedies=remedies
+            make_cost(label, steps / 800, error),
+            tolerance=tolerance,
+            steps=steps,
+            remedies=remedies,
         )
 
     met = run_at(1e-2, 2e-3, 800)
     missed = run_at(1e-4, 4e-4, 800, ("set accuracy.steps_per_cycle = 3200",))
-    cured = replace(run_at(1e-4, 8e-5, 3200), label="0.0001, 3200 steps per cycle")
-    stays = replace(
+    sufficient = replace(run_at(1e-4, 8e-5, 3200), label="0.0001, 3200 steps per cycle")
+    insufficient = replace(
         run_at(1e-4, 2e-4, 6400, ("use the value",)), label="0.0001, 6400 steps per cycle"
     )
-    assert format_cost(TOLERANCE, [met, missed, cured], 1e-2) == [
+    assert format_cost(TOLERANCE, [met, missed, sufficient], 1e-2) == [
         "tolerance   CPU s     error  worst measure",
         "0.01            1     0.002  a",
         "0.0001          1    0.0004  a; not with 800 steps per cycle, but with 3200 steps per cycle (4 CPU s)",
     ]
-    assert format_cost(TOLERANCE, [met, missed, stays], 1e-2)[2:] == [
+    assert format_cost(TOLERANCE, [met, missed, insufficient], 1e-2)[2:] == [
         "0.0001          1    0.0004  a; not with 800 steps per cycle, nor with 6400 steps per cycle (8 CPU s): 0.0002 "
         "in a",
         "tolerance 0.0001: use the value",
     ]
 
 
-def test_exact_a_bench_with_few_steps_meets_tight_tolerances_with_the_steps_that_are_tried(
+def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
     tmp_path,
 ):
-    """What a line says of a tolerance is what a run of its own with these steps says."""
+    """A run with the proposed number of steps meets the tolerance of the row."""
     text = BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
     text += "[accuracy]\nsteps_per_cycle = 100\n" if "[accuracy]" not in text else ""
     scene = tmp_path / "bench.toml"
     scene.write_text(text, "utf-8")
-    said = run_cli("cost", scene, "-o", tmp_path / "out", "-q")
-    assert said.code == 0, said.err
-    head, *rows = said.out.splitlines()
+    process = run_cli("cost", scene, "-o", tmp_path / "out", "-q")
+    assert process.code == 0, process.err
+    head, *rows = process.out.splitlines()
     assert head.split() == ["tolerance", "CPU", "s", "error", "worst", "measure"]
-    cured = re.findall(r"not with 100 steps per cycle, but with (\d+) steps per cycle", said.out)
-    assert [row.split()[0] for row in rows[:4]] == ["0.1", "0.01", "0.001", "0.0001"] and cured
+    proposed_steps = re.findall(
+        r"not with 100 steps per cycle, but with (\d+) steps per cycle", process.out
+    )
+    assert [row.split()[0] for row in rows[:4]] == [
+        "0.1",
+        "0.01",
+        "0.001",
+        "0.0001",
+    ] and proposed_steps
     result = pf.run(
-        text, **{"accuracy.tolerance": 1e-4, "accuracy.steps_per_cycle": int(cured[-1])}
+        text, **{"accuracy.tolerance": 1e-4, "accuracy.steps_per_cycle": int(proposed_steps[-1])}
     )
     assert not any("the tolerance is" in one for one in result.warnings)
     with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
         settings = [(row["knob"], row["setting"]) for row in csv.DictReader(file)]
-    assert ("tolerance", f"0.0001, {cured[-1]} steps per cycle") in settings
+    assert ("tolerance", f"0.0001, {proposed_steps[-1]} steps per cycle") in settings
     assert "<svg" in (tmp_path / "out" / "cost.svg").read_text("utf-8")
 
 
@@ -227,23 +259,27 @@ def test_exact_a_bench_with_few_steps_meets_tight_tolerances_with_the_steps_that
         (["--over", "steps_per_cycle"], "possible settings: element_size"),
     ],
 )
-def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
+def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, said):
+    """Settings that do not apply to the scene are refused with a list of those that do."""
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = run_cli("cost", scene, *words)
     assert answer.code == 2 and said in answer.err
 
 
-def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
-    """A law with a memory and one without; settings that gave the same run would be one."""
+def test_exact_steps_are_the_only_setting_of_a_point_scene():
+    """The steps per cycle are the only setting of a single point, for a law with and without memory."""
     for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
         found = build(text)
         assert numerical_settings.applicable_settings(found) == ["steps_per_cycle"]
     assert len(setting_curve(found, "steps_per_cycle")) > 2
 
 
-def test_always_a_setting_of_one_has_each_value_once(monkeypatch):
-    """A quarter and a half of one jump are one jump: it is run once, and one value that runs is no curve."""
+def test_always_each_value_of_a_setting_runs_once(monkeypatch):
+    """Each value of a setting runs once, and fewer than three values are no curve.
+
+    A quarter and a half of a jump both give a single jump.
+    """
     worn = build(WORN)
     labels = [one.label for one in numerical_settings.list_settings(worn, "jumps")]
     assert labels == ["1", "2", "4"]
