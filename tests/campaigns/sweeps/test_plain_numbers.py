@@ -1,4 +1,4 @@
-"""Models of cases that differ in plain numbers, made from the first of them, beside those built from their text."""
+"""Models of sweep cases derived from the first model, compared with models built from text."""
 
 from dataclasses import fields, is_dataclass
 from functools import partial
@@ -68,33 +68,33 @@ PATCHES = {
 HELD = TILTED + '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 
 
-def same(a, b) -> bool:
-    """Whether two parts of models are equal in all they hold, to the bit."""
+def are_identical(a, b) -> bool:
+    """Return whether two parts of models are equal to the bit in all their fields."""
     if type(a) is not type(b):
         return False
     if isinstance(a, np.ndarray):
         return a.dtype == b.dtype and np.array_equal(a, b)
     if isinstance(a, tuple):
-        return len(a) == len(b) and all(map(same, a, b))
+        return len(a) == len(b) and all(map(are_identical, a, b))
     if is_dataclass(a):
         return all(
-            same(getattr(a, one.name), getattr(b, one.name))
+            are_identical(getattr(a, one.name), getattr(b, one.name))
             for one in fields(a)
             if one.name != "write"
         ) and (not hasattr(a, "resolved") or a.resolved == b.resolved)
     return a == b and repr(a) == repr(b)
 
 
-def told(asked: SweepScene, sets: tuple, values: tuple):
-    """The model of a case, or the sentence why there is none."""
+def model_or_reason(sweep_scene: SweepScene, sets: tuple, values: tuple):
+    """Return the model of a case, or the message of the error that prevents it."""
     try:
-        return asked.model(sets, values)
+        return sweep_scene.model(sets, values)
     except PatchfemError as error:
         return str(error)
 
 
-def cases_of(seed: int, count: int):
-    """(sets, values) of random cases over random keys, some with values that no scene takes or that a rule sees."""
+def random_cases(seed: int, count: int):
+    """Yield (sets, values) of random cases over random keys, some of them invalid."""
     r = np.random.default_rng(seed)
     while count > 0:
         keys = list(r.choice(KEYS, r.integers(1, 5), replace=False))
@@ -129,38 +129,47 @@ RARELY_DERIVED = ("weakening", "two loads", "bonded")
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_exact_models_made_from_the_first_are_those_built_from_text(name):
+def test_exact_derived_models_equal_models_built_from_text(name):
+    """Models of rigs derived from the first model equal those built from text, to the bit."""
     count = 150 if name in RARELY_DERIVED else 50
-    asked = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",))
-    alike = 0
-    for sets, values in cases_of(len(name), count):
-        found = told(asked, sets, values)
-        built = told(asked, sets, ())
-        assert same(found, built), sets
-        alike += asked._derive_model(sets, values) is not None if not isinstance(built, str) else 0
-    assert alike == 0 if name == "duration" else alike > 5
+    sweep_scene = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",))
+    n_derived = 0
+    for sets, values in random_cases(len(name), count):
+        found = model_or_reason(sweep_scene, sets, values)
+        built = model_or_reason(sweep_scene, sets, ())
+        assert are_identical(found, built), sets
+        n_derived += (
+            sweep_scene._derive_model(sets, values) is not None if not isinstance(built, str) else 0
+        )
+    assert n_derived == 0 if name == "duration" else n_derived > 5
 
 
 @pytest.mark.parametrize("name", PATCHES)
-def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
-    asked = SweepScene(Path("a.toml"), PATCHES[name])
+def test_exact_derived_patches_equal_patches_built_from_text(name):
+    """Models of patches derived from the first model equal those built from text, to the bit.
+
+    A patch with a holder or a bonded interface is not derived.
+    """
+    sweep_scene = SweepScene(Path("a.toml"), PATCHES[name])
     r = np.random.default_rng(len(name))
     keys = ["contact.load", "contact.tilt.angle"]
     keys += ["friction.static", "drive.acceleration"] if "friction" in PATCHES[name] else []
     for _ in range(20):
-        some = list(r.choice(keys, r.integers(1, len(keys) + 1), replace=False))
-        values = 10.0 ** r.uniform(-6, 0, (1, len(some)))
-        sets = written(some, values, 0)
+        chosen_keys = list(r.choice(keys, r.integers(1, len(keys) + 1), replace=False))
+        values = 10.0 ** r.uniform(-6, 0, (1, len(chosen_keys)))
+        sets = format_case(chosen_keys, values, 0)
         values = tuple(values[0].tolist())
-        made = "friction.static" not in some or "kinetic" not in PATCHES[name]
-        assert (asked._derive_model(sets, values) is not None) == made
-        assert same(told(asked, sets, values), told(asked, sets, ())), sets
+        is_derived = "friction.static" not in chosen_keys or "kinetic" not in PATCHES[name]
+        assert (sweep_scene._derive_model(sets, values) is not None) == is_derived
+        assert are_identical(
+            model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
+        ), sets
     for sets, values in (
         (("contact.load=-1 N",), (-1.0,)),
         (("contact.tilt.angle=-1 mrad",), (-1e-3,)),
     ):
-        assert asked._derive_model(sets, values) is None and same(
-            told(asked, sets, values), told(asked, sets, ())
+        assert sweep_scene._derive_model(sets, values) is None and are_identical(
+            model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
         )
     for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
         assert SweepScene(Path("b.toml"), text)._derive_model(("contact.load=3 N",), (3.0,)) is None
@@ -185,15 +194,15 @@ LUMPED = {
 }
 
 
-def written(keys: list, values: np.ndarray, case: int) -> list:
-    """The case as `key=value` strings."""
+def format_case(keys: list, values: np.ndarray, case: int) -> list:
+    """Return a case as strings `key=value`."""
     return [
         f"{key}={value!r} {UNITS.get(key.rpartition('.')[2], '')}".strip()
         for key, value in zip(keys, values[case].tolist())
     ]
 
 
-def numbers_of_rig(model) -> tuple:
+def collect_rig_numbers(model) -> tuple:
     """Return the numbers of mode, drive and start that a scene can set."""
     rig = model.rig
     modes = rig.modes
@@ -217,48 +226,69 @@ def numbers_of_rig(model) -> tuple:
     )
 
 
-def numbers_of_contact(model) -> tuple:
+def collect_contact_numbers(model) -> tuple:
     """Return the load and the limits of the friction force."""
     return (model.point.load, *model.friction_limits(model.point.load))
 
 
-def stretch_law(model) -> list:
-    """Numbers of a law whose force follows from one stretch."""
+def collect_stretch_numbers(model) -> list:
+    """Return the numbers of a law whose force follows from a single stretch."""
     law = lane_numbers.collect_law_numbers(model)
     return [*law.numbers, law.length]
 
 
 @pytest.mark.parametrize("name", LUMPED)
-def test_exact_columns_of_models_are_the_numbers_of_each(name):
-    """Of models as one, with an array in place of each number that differs: what lanes and measures take of them."""
+def test_exact_columns_of_similar_models_agree_with_each_model(name):
+    """The columns of similar models contain the numbers of each single model.
+
+    Similar models are stored as a single model with an array for each number that differs; lanes
+    and measures use these columns.
+    """
     r = np.random.default_rng(len(name))
-    asked = SweepScene(Path("a.toml"), LUMPED[name])
+    sweep_scene = SweepScene(Path("a.toml"), LUMPED[name])
     for _ in range(20):
         keys = list(
             r.choice([key for key in KEYS if ".1." not in key], r.integers(1, 5), replace=False)
         )
         keys = [key for key in keys if name in OF_LAW.get(key.rpartition(".")[2], name)] or KEYS[:1]
         values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
-        alike = asked.similar_models(keys, values, partial(written, keys, values), np.arange(7))
-        single = list(alike)
+        models = sweep_scene.similar_models(
+            keys, values, partial(format_case, keys, values), np.arange(7)
+        )
+        single_models = list(models)
         smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
-        for row in (numbers_of_rig, numbers_of_contact, *([stretch_law] if smooth else [])):
-            np.testing.assert_array_equal(collect_columns(alike, row), collect_columns(single, row))
-        for mine, theirs in zip(columns.collect_scales(alike), columns.collect_scales(single)):
-            np.testing.assert_array_equal(mine, theirs)
-        few = collect_columns(alike.select([4, 2]), numbers_of_contact)
-        np.testing.assert_array_equal(few, collect_columns(single, numbers_of_contact)[:, [4, 2]])
+        for collect in (
+            collect_rig_numbers,
+            collect_contact_numbers,
+            *([collect_stretch_numbers] if smooth else []),
+        ):
+            np.testing.assert_array_equal(
+                collect_columns(models, collect), collect_columns(single_models, collect)
+            )
+        for scales, single_scales in zip(
+            columns.collect_scales(models), columns.collect_scales(single_models)
+        ):
+            np.testing.assert_array_equal(scales, single_scales)
+        selected = collect_columns(models.select([4, 2]), collect_contact_numbers)
+        np.testing.assert_array_equal(
+            selected, collect_columns(single_models, collect_contact_numbers)[:, [4, 2]]
+        )
 
 
-def test_exact_models_made_from_the_first_see_what_a_new_key_does_to_the_load(monkeypatch):
-    """A key of [normal] that doubles the load, as a later version may have it, acts in a sweep as well."""
+def test_exact_derived_models_follow_a_changed_load(monkeypatch):
+    """A change of how [normal] sets the load acts on derived models as well.
+
+    Here the load is doubled.
+    """
     from patchfem.model import load
 
     point = load.PointLoad
     monkeypatch.setattr(load, "PointLoad", lambda force, *others: point(2 * force, *others))
-    asked = SweepScene(Path("a.toml"), SCENES["coulomb"])
+    sweep_scene = SweepScene(Path("a.toml"), SCENES["coulomb"])
     sets = ("normal.load=3 N",)
     values = (3.0,)
-    assert asked._derive_model(sets, values) is not None
-    assert asked.model(sets, values).point.load == 6.0
-    assert same(told(asked, sets, values), told(asked, sets, ()))
+    assert sweep_scene._derive_model(sets, values) is not None
+    assert sweep_scene.model(sets, values).point.load == 6.0
+    assert are_identical(
+        model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
+    )

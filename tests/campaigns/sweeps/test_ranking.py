@@ -1,4 +1,4 @@
-"""Shares of keys in the variance of a measure, against functions whose shares are known."""
+"""Sobol indices of the keys of a sweep, compared with functions of known indices."""
 
 import numpy as np
 import pytest
@@ -6,34 +6,38 @@ from scipy.stats import qmc
 
 from patchfem.campaigns import compute_sobol_indices
 
-# Ishigami and Homma 1990, a = 7, b = 0.1: closed forms
+# Closed forms for a = 7, b = 0.1 (Ishigami and Homma 1990).
 WHOLE = 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5 + 49 / 8
 FIRST = np.array([0.5 * (1 + 0.1 * np.pi**4 / 5) ** 2, 49 / 8, 0.0]) / WHOLE
 TOTAL = FIRST + np.array([1, 0, 1]) * 8 * 0.01 * np.pi**8 / 225 / WHOLE
 
 
-def ishigami(x):
+def evaluate_ishigami(x):
+    """Return the Ishigami function (n,) of points (n, 3) in the unit cube."""
     x = 2 * np.pi * x - np.pi
     return np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
 
 
-def stuck(x):
-    """Nothing below a limit, as an interface that holds."""
+def evaluate_threshold(x):
+    """Return a discontinuous function (n,) of points (n, 3), zero where the interface sticks."""
     return np.where(x[:, 0] + 0.3 * x[:, 1] > 0.6, x[:, 0] + x[:, 2], 0.0)
 
 
-def drawn(count, keys, seed):
+def draw_points(count, keys, seed):
+    """Return `count` scrambled Sobol points in the unit cube, (count, keys)."""
     return qmc.Sobol(keys, rng=np.random.default_rng(seed)).random(count)
 
 
-def ranks(x, values, errors=0.0, shape=None):
+def compute_indices(x, values, errors=0.0, shape=None):
+    """Return the Sobol indices of a measure, or None if they cannot be determined."""
     keys = [(f"k{k}", column) for k, column in enumerate(x.T)]
     return compute_sobol_indices(
         keys, {"loop_area": (values, np.broadcast_to(errors, values.shape))}, shape
     ).get("loop_area")
 
 
-def of(found):
+def collect_indices(found):
+    """Return first-order and total indices and the ends of their intervals, sorted by key."""
     return {
         name: np.array([getattr(one, name) for one in sorted(found)])
         for name in ("first", "total", "low", "high")
@@ -41,8 +45,16 @@ def of(found):
 
 
 @pytest.mark.parametrize("count", [128, 256, 1024])
-def test_exact_the_shares_of_ishigami_lie_in_their_intervals(count):
-    found = of(ranks(drawn(count, 3, count), ishigami(drawn(count, 3, count))))
+def test_exact_intervals_cover_sobol_indices_of_ishigami(count):
+    """The intervals cover the total indices of the Ishigami function.
+
+    The estimates agree with the closed forms within 0.03.
+    """
+    found = collect_indices(
+        compute_indices(
+            draw_points(count, 3, count), evaluate_ishigami(draw_points(count, 3, count))
+        )
+    )
     assert np.all((found["low"] <= TOTAL) & (TOTAL <= found["high"]))
     assert np.abs(found["total"] - TOTAL).max() < 0.03
     assert np.abs(found["first"] - FIRST).max() < 0.03
@@ -50,42 +62,54 @@ def test_exact_the_shares_of_ishigami_lie_in_their_intervals(count):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_always_a_jump_is_within_the_interval(seed):
+def test_always_intervals_cover_indices_of_discontinuous_function(seed):
+    """The intervals cover the total indices of a discontinuous function."""
     rng = np.random.default_rng(9)
     a, b = rng.random((2, 200_000, 3))
     truth = []
     for k in range(3):
         c = a.copy()
         c[:, k] = b[:, k]
-        truth.append(np.mean((stuck(a) - stuck(c)) ** 2) / 2 / stuck(a).var())
+        truth.append(
+            np.mean((evaluate_threshold(a) - evaluate_threshold(c)) ** 2)
+            / 2
+            / evaluate_threshold(a).var()
+        )
     x = np.random.default_rng(seed).random((200, 3))
-    found = of(ranks(x, stuck(x)))
+    found = collect_indices(compute_indices(x, evaluate_threshold(x)))
     assert np.all((found["low"] <= truth) & (truth <= found["high"]))
 
 
-def test_exact_a_grid_has_the_shares_of_its_own_cases():
-    """y = 2 a + b + a b with a, b of mean 0: parts 4 V(a), V(b), V(a) V(b)."""
+def test_exact_indices_of_grid_agree_with_its_variances():
+    """The indices of a full grid agree with the variances of its cases within 1e-12.
+
+    For y = 2 a + b + a b with a and b of mean 0 the parts are 4 V(a), V(b) and V(a) V(b).
+    """
     a, b = np.meshgrid([-1.0, 0.0, 1.0], [-3.0, 1.0, 1.0, 1.0], indexing="ij")
     x = np.stack([a.ravel(), b.ravel()], axis=1)
     values = (2 * a + b + a * b).ravel()
     parts = np.array([4 * 2 / 3, 3.0, 2.0])
-    found = of(ranks(x, values, shape=(3, 4)))
+    found = collect_indices(compute_indices(x, values, shape=(3, 4)))
     np.testing.assert_allclose(found["first"], parts[:2] / parts.sum(), rtol=1e-12)
     np.testing.assert_allclose(found["total"], (parts[:2] + 2) / parts.sum(), rtol=1e-12)
     values[3] = np.nan
-    assert ranks(x, values, shape=(3, 4)) is None  # a grid with holes
+    assert compute_indices(x, values, shape=(3, 4)) is None  # a grid with a missing value
 
 
-def test_always_what_the_cases_do_not_tell_is_not_ranked():
-    x = drawn(128, 3, 1)
+def test_always_undetermined_indices_are_omitted():
+    """Indices that the cases do not determine are omitted."""
+    x = draw_points(128, 3, 1)
     rng = np.random.default_rng(1)
-    assert ranks(x, rng.random(128)) is None  # nothing but noise
-    assert ranks(x, np.full(128, 3.0)) is None and ranks(x[:20], ishigami(x[:20])) is None
-    assert ranks(x, x[:, 0], errors=1.0) is None  # below its numerical error
-    assert ranks(x[:, :1], x[:, 0]) is None  # one key alone
-    # who has a value is no fair draw
-    assert ranks(x, np.where(x[:, 0] < 0.3, np.nan, x[:, 1])) is None
-    found = ranks(x, 3 * x[:, 0] + x[:, 1])
+    assert compute_indices(x, rng.random(128)) is None  # a measure without dependence on the keys
+    assert (
+        compute_indices(x, np.full(128, 3.0)) is None
+        and compute_indices(x[:20], evaluate_ishigami(x[:20])) is None
+    )
+    assert compute_indices(x, x[:, 0], errors=1.0) is None  # variation below the numerical error
+    assert compute_indices(x[:, :1], x[:, 0]) is None  # a single key
+    # The points with a value are no uniform sample.
+    assert compute_indices(x, np.where(x[:, 0] < 0.3, np.nan, x[:, 1])) is None
+    found = compute_indices(x, 3 * x[:, 0] + x[:, 1])
     assert [one.key for one in found] == ["k0", "k1", "k2"] and found[0].total == pytest.approx(
         0.9, abs=0.01
     )

@@ -1,4 +1,4 @@
-"""The scripts for Slurm, with a stand-in for sbatch that runs at once what it is given."""
+"""Sweeps by scripts for Slurm, with a substitute for sbatch that runs its commands at once."""
 
 import os
 import subprocess
@@ -34,8 +34,8 @@ OVER = ("friction.static=0.1,0.2,0.3", "slide.amplitude=5 um,10 um")
 
 
 @pytest.fixture
-def slurm(tmp_path, monkeypatch) -> Path:
-    """The log of what was submitted; commands `sbatch`, `scancel` and `patchfem` are found first."""
+def submission_log(tmp_path, monkeypatch) -> Path:
+    """Path of the log of submitted jobs; substitutes of sbatch, scancel and patchfem come first in PATH."""
     place = tmp_path / "bin"
     log = tmp_path / "submitted"
     place.mkdir()
@@ -53,8 +53,9 @@ def slurm(tmp_path, monkeypatch) -> Path:
     return log
 
 
-def asked(tmp_path) -> tuple:
-    scene = tmp_path / "a scene.toml"  # a path to be quoted
+def run_sweep(tmp_path) -> tuple:
+    """Run the sweep in a single process and return its scene, options and folder."""
+    scene = tmp_path / "a scene.toml"  # a path with a space, which the scripts must quote
     scene.write_text(BENCH, encoding="utf-8")
     words = [word for one in OVER for word in ("--over", one)]
     assert run_cli("sweep", scene, *words, "-o", tmp_path / "whole").code == 0
@@ -62,17 +63,18 @@ def asked(tmp_path) -> tuple:
 
 
 @pytest.mark.slow
-def test_exact_a_job_array_gives_the_files_of_one_sweep(slurm, tmp_path):
-    scene, words, want = asked(tmp_path)
+def test_exact_job_array_writes_files_of_single_sweep(submission_log, tmp_path):
+    """A job array of two tasks writes the same files as a single sweep, to the byte."""
+    scene, words, expected = run_sweep(tmp_path)
     out = tmp_path / "parts"
-    done = subprocess.run(
+    process = subprocess.run(
         [ROOT / "cluster" / "array.sh", scene, out, "2", *words], capture_output=True, text=True
     )
-    assert done.returncode == 0, done.stderr
-    first, second = slurm.read_text().splitlines()
+    assert process.returncode == 0, process.stderr
+    first, second = submission_log.read_text().splitlines()
     assert "--array=1-2" in first and "--dependency=afterany:7 " in second
     for name in ("sweep.csv", "sweep.nc"):
-        assert (out / name).read_bytes() == (want / name).read_bytes()
+        assert (out / name).read_bytes() == (expected / name).read_bytes()
     assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
-        one.name for one in (want / "cases").iterdir()
+        one.name for one in (expected / "cases").iterdir()
     )

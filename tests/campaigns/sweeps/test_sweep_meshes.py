@@ -1,4 +1,4 @@
-"""Cases of a sweep share their meshes whichever of them are done here, and in which chunks."""
+"""Meshes that the cases of a sweep share, for any division into chunks and processes."""
 
 from pathlib import Path
 
@@ -19,24 +19,30 @@ WORK = Work(
 )
 
 
-def test_exact_meshes_are_made_once_and_travel_with_the_work():
+def test_exact_meshes_are_chosen_once_for_all_cases():
+    """The mesh of a sweep is chosen once and stored with its work."""
     work = choose_meshes(WORK)
     assert choose_meshes(work) is work and len(work.meshes.meshes) == 1
 
 
 @pytest.mark.slow
-def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
-    here = join_case_results(
+def test_exact_early_processes_use_the_chosen_meshes():
+    """Processes that start before the meshes are chosen use these meshes.
+
+    Their results agree with those of a single process within 1e-9.
+    """
+    local = join_case_results(
         4, [part[:2] for part in iterate_chunks(WORK, range(4), LocalExecutor())]
     )
     pool = Pool(2)
     found = join_case_results(4, [part[:2] for part in iterate_chunks(WORK, range(4), pool)])
-    assert pool.ready == [] and found.numerics == here.numerics
-    for name, values in here.values.items():
+    assert pool.ready == [] and found.numerics == local.numerics
+    for name, values in local.values.items():
         np.testing.assert_allclose(found.values[name], values, rtol=1e-9)
 
 
-def test_exact_no_more_processes_begin_than_cases():
+def test_exact_processes_are_at_most_as_many_as_cases():
+    """A pool starts at most as many processes as there are cases."""
     pool = Pool(3)
     pool.begin(WORK, 2)
     assert len(pool.ready) == 2

@@ -1,25 +1,27 @@
-"""Cases from a file: a column per key, a case per row."""
+"""Cases of a sweep from a table with a column per key and a row per case."""
 
 import pytest
 
 from patchfem.campaigns.sweeps.table import read_case_table
 
 
-def written(tmp_path, text):
+def write_table(tmp_path, text):
+    """Write a table of cases and return its path."""
     path = tmp_path / "cases.csv"
     path.write_text(text, encoding="utf-8")
     return path
 
 
-def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
-    cases, wrong = read_case_table(
-        written(
+def test_exact_units_in_header_or_cells_are_read(tmp_path):
+    """Units in the header and units in the cells give the same quantities; empty rows are skipped."""
+    cases, mistakes = read_case_table(
+        write_table(
             tmp_path,
             "contact.load [lbf], contact.tilt.angle,friction.static,friction.law\n"
             "26,1 mrad,0.3,coulomb\n\n10,2e-3 rad,0.3,tanh\n",
         )
     )
-    assert wrong == [] and cases.rows and len(cases) == 2
+    assert mistakes == [] and cases.rows and len(cases) == 2
     assert cases.texts(0) == ("26 lbf", "1 mrad", "0.3", "coulomb")
     load, tilt, static, law = cases.axes
     assert load.values == (115.653761996773, 44.482216152605) and load.unit == "N"
@@ -28,24 +30,28 @@ def test_exact_units_stand_in_the_header_or_in_the_cells(tmp_path):
     assert law.values == ("coulomb", "tanh")
 
 
-def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
+def test_exact_keys_of_list_items_are_read_in_both_notations(tmp_path):
+    """Keys of list items are read from the header with brackets and with dots."""
     for key in ("structure.interface[1].load", "structure.interface.0.load"):
-        cases, wrong = read_case_table(
-            written(tmp_path, f"{key} [N],{key.replace('load', 'bond_length')}[um]\n2,0.3\n5,0.7\n")
+        cases, mistakes = read_case_table(
+            write_table(
+                tmp_path, f"{key} [N],{key.replace('load', 'bond_length')}[um]\n2,0.3\n5,0.7\n"
+            )
         )
-        assert wrong == [] and cases.axes[0].key == key and cases.texts(1) == ("5 N", "0.7 um")
+        assert mistakes == [] and cases.axes[0].key == key and cases.texts(1) == ("5 N", "0.7 um")
         assert cases.axes[0].values == (2.0, 5.0) and cases.axes[1].unit == "m"
 
 
-def test_exact_the_answers_of_another_sweep_are_left_out(tmp_path):
-    cases, wrong = read_case_table(
-        written(
+def test_exact_result_columns_of_a_sweep_are_ignored(tmp_path):
+    """Columns with results of an earlier sweep are ignored."""
+    cases, mistakes = read_case_table(
+        write_table(
             tmp_path,
             "contact.load,friction.law,outcome,loop_area,message,case\n"
             '26 lbf,tanh,failed,,"a, b",1f\n10 lbf,coulomb,steady,0.1,,2f\n',
         )
     )
-    assert wrong == [] and [axis.key for axis in cases.axes] == ["contact.load", "friction.law"]
+    assert mistakes == [] and [axis.key for axis in cases.axes] == ["contact.load", "friction.law"]
     assert cases.texts(1) == ("10 lbf", "coulomb")
 
 
@@ -83,8 +89,9 @@ def test_exact_the_answers_of_another_sweep_are_left_out(tmp_path):
         ("contact.load [N]\n", ["a header such as"]),
     ],
 )
-def test_refuses_each_mistake_with_its_line(tmp_path, text, says):
-    cases, wrong = read_case_table(written(tmp_path, text))
-    assert cases is None and len(wrong) == len(says)
-    for line, want in zip(wrong, says):
-        assert want in line
+def test_refuses_invalid_tables_with_line_number(tmp_path, text, says):
+    """Each mistake in a table of cases is refused with its line."""
+    cases, mistakes = read_case_table(write_table(tmp_path, text))
+    assert cases is None and len(mistakes) == len(says)
+    for line, expected in zip(mistakes, says):
+        assert expected in line
