@@ -21,9 +21,8 @@ def test_exact_friction_against_velocity_is_a_lorentzian(tmp_path):
     """The steady friction coefficient is a Lorentzian of velocity / characteristic velocity."""
     rows = load_study("bench/stribeck.py").main((1.0,), (0.1,), tmp_path / "picture.svg")
     check_speeds(rows)
-    assert rows[0]["stretch"] == pytest.approx(
-        0.51, rel=1e-12
-    )  # half of the drop at v_c = sqrt(a_s l_k)
+    # half of the drop at v_c = sqrt(a_s l_k)
+    assert rows[0]["stretch"] == pytest.approx(0.51, rel=1e-12)
     assert "<svg" in (tmp_path / "picture.svg").read_text()
 
 

@@ -1,4 +1,4 @@
-"""The ten conclusions of the report: the numbers of the study against closed forms and other computations."""
+"""The ten conclusions of the report: figures of the study against closed forms."""
 
 import numpy as np
 import pytest
@@ -9,16 +9,19 @@ import patchfem as pf
 ten = make_study_fixture("report/conclusions.py")
 
 
-def test_exact_the_phases_of_the_block(ten):
-    """Event-driven closed form at D = .828: slip from 42.69 to 164.09 degrees, a jump of .704, the knee at 1.2792."""
+def test_exact_slip_phases_and_jump_of_the_block(ten):
+    """Slip from 42.69 to 164.09 degrees, a jump of 0.704 and the knee at 1.2792 agree with closed forms."""
     assert ten.phases(4.14 / 0.82802 * 1.0) == pytest.approx((42.69, 164.09), abs=0.02)
     assert ten.jump() == pytest.approx(0.7039, abs=0.02) and ten.knee() / 4.14 == pytest.approx(
         1.2792, abs=1e-3
     )
 
 
-def test_exact_the_first_harmonic_lags(ten):
-    """By the Fourier integral over the last cycle; a positive lag is one behind the input."""
+def test_exact_lag_of_the_first_harmonic(ten):
+    """The lag stated in conclusion 8 is that of the Fourier integral over the last cycle.
+
+    A positive lag means that the block is behind the input.
+    """
     w = ten.block(5.0)[0].window
     last = w.time >= w.time[-1] - 1 / 143 - 1e-12
     turn = np.exp(-2j * np.pi * 143 * w.time[last])
@@ -28,8 +31,8 @@ def test_exact_the_first_harmonic_lags(ten):
     assert f"lags by {-np.degrees(np.angle(ratio)):.0f} degrees" in ten.eighth().found
 
 
-def test_always_what_is_written_is_what_is_computed(ten):
-    """The rows of conclusions.md that cost least; the sentence has their numbers."""
+def test_always_inexpensive_conclusions_have_computed_figures(ten):
+    """The inexpensive rows of conclusions.md and figures of the answer have the computed values."""
     text = (ten.FOLDER / "conclusions.md").read_text("utf-8")
     for one in (ten.first, ten.fourth, ten.sixth, ten.seventh, ten.ninth):
         found = one()
@@ -39,12 +42,13 @@ def test_always_what_is_written_is_what_is_computed(ten):
     assert f"to {value / ten.MIL:.0f} mil" in ten.ANSWER
     own = 2 * np.pi * 143
     force = 4 / np.pi * 4.14 * ten.G
-    # a square wave of friction
+    # friction as a square wave
     assert value == pytest.approx((8 * ten.G - force) / (2 * 0.003 * own**2), rel=1e-3)
 
 
 @pytest.mark.slow
-def test_the_sentence_and_the_file(ten, tmp_path, capsys):
+def test_all_conclusions_have_computed_figures(ten, tmp_path, capsys):
+    """The complete study writes conclusions.md again, with six conclusions that hold fully."""
     found = ten.main(tmp_path / "x.md")
     assert (tmp_path / "x.md").read_text("utf-8") == (ten.FOLDER / "conclusions.md").read_text(
         "utf-8"
@@ -58,7 +62,8 @@ def test_the_sentence_and_the_file(ten, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_flexures_as_stiff_as_conclusion_2_says_limit_the_block_at_10_mil(ten):
+def test_stiffening_flexures_limit_the_block_at_10_mil(ten):
+    """A cubic stiffness as in conclusion 2 limits the amplitude at 8 g to 254 um within 1 %."""
     text = (ten.FOLDER / "block.toml").read_text("utf-8")
     text = text.replace('"coulomb"', '"elastic-plastic"\nbond_length = "0.243 um"')
     push = np.sqrt(8**2 - (4 * 4.14 / np.pi) ** 2) * ten.G * 0.8546

@@ -1,4 +1,4 @@
-"""What the studies of the report's figures say, recomputed."""
+"""The studies of the report's figures: their stated figures, computed again."""
 
 import json
 
@@ -10,18 +10,20 @@ from study_module import assert_contains, load_study
 from vibration_forms import bounded_input, decay_rest, sliding_amplitude
 
 
-def test_figures_2_and_3_motions_of_one_block(capsys):
+def test_figures_2_and_3_amplitudes_of_one_block(capsys):
+    """The amplitudes agree with the closed form of sliding and with independent computations."""
     one = load_study("report/figures_2_3.py")
     rows, stopped = one.main(None)
     at = {(r.onset, r.level): r for r in rows}
-    for onset in one.ONSETS:  # sliding without a stop has a closed form
+    for onset in one.ONSETS:  # closed form of sliding without a stop
         for level in (6.0, 7.0, 8.0):
             assert at[onset, level].q == pytest.approx(
                 sliding_amplitude(1.0, onset / level, 0.003), rel=1e-9
             )
         assert at[onset, 4.0].outcome == "stuck" and at[onset, 4.0].q == 0
-    assert at[4.0, 5.0].q == pytest.approx(0.28704671337871602, rel=1e-9)  # 40-digit marching
-    # half-cycle shooting with D = 0.828
+    # from a time march with 40 digits
+    assert at[4.0, 5.0].q == pytest.approx(0.28704671337871602, rel=1e-9)
+    # from shooting over half a cycle with D = 0.828
     assert at[4.14, 5.0].q == pytest.approx(0.150075, abs=2e-6)
     five = at[4.14, 5.0]
     eight = at[4.14, 8.0]
@@ -46,7 +48,8 @@ def test_figures_2_and_3_motions_of_one_block(capsys):
     assert one.ANSWER in capsys.readouterr().out
 
 
-def test_figures_2_and_3_where_the_stops_end_and_what_jumps():
+def test_figures_2_and_3_last_stop_and_jump_of_acceleration():
+    """Stops end at 5.3 g; the exact motion jumps in acceleration and the report's in velocity."""
     one = load_study("report/figures_2_3.py")
     assert one.steady(4.14, 5.28).stuck > 0 == one.steady(4.14, 5.31).stuck
     assert_contains(one.ANSWER, "from 5.3 g on")
@@ -63,18 +66,19 @@ def test_figures_2_and_3_where_the_stops_end_and_what_jumps():
     ) and stopped.friction.max() == pytest.approx(0.8)
 
 
-def frame_rubs(time, state):
-    """2.4 and 2.5 with the report's numbers, the frame at sin 0.1 t: rates of displacement and velocity."""
+def rates_with_moving_frame(time, state):
+    """Return the rates of displacement and velocity by equations 2.4 and 2.5, with the frame at sin 0.1 t."""
     x, v = state
     return np.array([v, -x - 0.04 * v + 0.1 * np.tanh((0.1 * np.cos(0.1 * time) - v) / 0.01)])
 
 
-def test_figure_5_ringing_of_the_block():
+def test_figure_5_ringing_agrees_with_integrated_equations():
+    """The motions agree with LSODA and with Euler's method written out; the answer has their peaks."""
     one = load_study("report/figure_5.py")
     exact, euler = one.main((0.04, 0.1, 0.2), path=None)
     span = 16 * np.pi * 10
     far = solve_ivp(
-        frame_rubs,
+        rates_with_moving_frame,
         (0, span),
         [0.0, 0.0],
         method="LSODA",
@@ -87,7 +91,7 @@ def test_figure_5_ringing_of_the_block():
     np.testing.assert_allclose(exact.frame, np.sin(0.1 * exact.time), atol=2e-7)
     steps = round(20 * np.pi / 0.1)
     (x, v, frame), track, h = (0.0, 0.0, 0.1), [0.0], 20 * np.pi / steps
-    for k in range(8 * steps):  # Euler's steps in plain Python, of block and frame
+    for k in range(8 * steps):  # Euler's method for block and frame
         rub = 0.1 * np.tanh((frame - v) / 0.01)
         x, v, frame = (
             x + h * v,
@@ -106,16 +110,17 @@ def test_figure_5_ringing_of_the_block():
         f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0",
     )
     assert_contains(one.__doc__, f"for {100 * one.carried_time_fraction(exact):.0f} % of the time")
-    # nothing is left of 2 %
+    # the damping of 2 % is cancelled by Euler's method
     assert one.swings(euler[0.04])[2] == pytest.approx(one.swings(euler[0.04])[1], rel=3e-3)
     assert one.turns(exact).size == 18 and one.VERDICT == "yes"
 
 
-def test_figures_10_to_12_ringing_of_two_masses():
+def test_figures_10_to_12_amplitudes_of_two_masses():
+    """At resonance and above it, two masses agree with a single harmonic; the docstring has the figures."""
     one = load_study("report/figures_10_12.py")
     rows = {r.ratio: r for r in one.main((0.3, 0.4, 0.5), path=None)}
     slow, resonant, fast = (rows[ratio] for ratio in one.FIGURES.values())
-    # one harmonic
+    # closed form with a single harmonic
     assert resonant.amplitude == pytest.approx(
         (0.4 / np.pi / 0.04, (1 - 0.4 / np.pi) / 0.04), rel=1e-3
     )
@@ -138,16 +143,17 @@ def test_figures_10_to_12_ringing_of_two_masses():
     assert all(rows[ratio].turns == (2, 2) for ratio in (0.5, 1.0, 5.0)) and one.VERDICT == "yes"
 
 
-def test_figure_15_rest_of_a_released_block():
+def test_figure_15_time_of_rest_agrees_with_closed_form():
+    """The time and the position at which a released block comes to rest agree with the closed form."""
     one = load_study("report/figure_15.py")
     rows, (time, x, failed) = one.main(None)
-    # a few units in the last place of x0, by where a processor rounds
+    # limit of a few units in the last place, since rounding depends on the processor
     assert max(r.error for r in rows) <= 1e-15
     for r in rows:
         assert (r.stop, r.place) == pytest.approx(
             decay_rest(1.0, 1 / r.ratio, r.omega), rel=1e-12, abs=1e-12
         )
-        # every turn loses 2 F/k, until the spring pulls with less than F
+        # the amplitude falls by 2 F/k at each reversal until the spring force is below F
         sizes = 1 - 2 * np.arange(30) / r.ratio
         count = np.argmax(sizes <= 1 / r.ratio)
         assert r.stop == pytest.approx(np.pi * count / r.omega)
@@ -179,7 +185,8 @@ def test_figure_15_rest_of_a_released_block():
 
 
 @pytest.mark.slow
-def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
+def test_figures_30_and_31_few_sets_of_traces(tmp_path):
+    """Four sets of traces have the stated amplitude ratios, and `patchfem compare` gives the same."""
     one = load_study("report/figures_30_31.py")
     ((sets, row),) = one.main((2,), 4, None).values()
     assert_contains(one.ANSWER, f"{row.after[0]:.2f} along x and {row.after[1]:.2f} along y")
@@ -192,7 +199,7 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
     )
     for way in (0, 1):
         before, after = one.totals(sets, way)
-        # Pt: from highest to lowest about the line of least squares
+        # Pt is the total height about the least-squares line
         new = [each.traces[way][0] for each in sets]
         total = [
             np.ptp(trace.z - np.polyval(np.polyfit(trace.x, trace.z, 1), trace.x)) for trace in new
@@ -209,7 +216,8 @@ def test_figures_30_and_31_a_share_of_the_traces(tmp_path):
 
 
 @pytest.mark.slow
-def test_figures_30_and_31_counts_of_all_sets(tmp_path):
+def test_figures_30_and_31_counts_over_all_sets(tmp_path):
+    """The counts and ranges over all sets of traces are those stated in the study."""
     one = load_study("report/figures_30_31.py")
     six, twelve = one.main(path=tmp_path / "x.svg").values()
     x, y, less, earlier = one.counts(six[0])

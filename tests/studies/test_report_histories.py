@@ -1,4 +1,4 @@
-"""Figs 28 and 29: what the study says of the runs, recomputed."""
+"""Figures 28 and 29: the stated figures of the time histories, computed again."""
 
 import numpy as np
 import pytest
@@ -10,14 +10,14 @@ figures = make_study_fixture("report/figures_28_29.py")
 
 
 @pytest.fixture(scope="module")
-def drawn(figures, tmp_path_factory):
-    """The two cases that cost least, and their picture."""
+def runs_and_picture(figures, tmp_path_factory):
+    """Runs of the two least expensive cases, and their picture."""
     path = tmp_path_factory.mktemp("histories") / "x.svg"
     return figures.main(path, [figures.CASES[2], figures.CASES[4]]), path.read_text()
 
 
-def held(figures, name, run):
-    """The peaks of a run stand in the sentence beside those of the rig."""
+def check_peaks(figures, name, run):
+    """Check that the answer states the peaks of a run beside those of the rig."""
     read = {
         "Fig. 28: 135 Hz, 5 g": "8.4 g and 0.44 mil",
         "Fig. 28 (text): 135 Hz, 6 g": "9.5 g and 0.30 mil",
@@ -30,9 +30,10 @@ def held(figures, name, run):
 
 
 @pytest.mark.slow
-def test_figure_29_stable_at_5_g_and_unstable_at_8(figures, drawn):
-    (stable, unstable), text = drawn
-    held(figures, stable.title, stable)
+def test_figure_29_block_is_stable_at_5_g_and_unstable_at_8_g(figures, runs_and_picture):
+    """The block is stable at 5 g and runs away at 8 g after the stated number of cycles."""
+    (stable, unstable), text = runs_and_picture
+    check_peaks(figures, stable.title, stable)
     assert not unstable.stays
     assert np.abs(unstable.seen.output).max() > 50e-6 > np.abs(stable.seen.output).max()
     assert_contains(
@@ -43,9 +44,9 @@ def test_figure_29_stable_at_5_g_and_unstable_at_8(figures, drawn):
     assert ">runs away<" in text
 
 
-def test_exact_the_block_that_stays_obeys_newton(drawn):
-    """m a + K x + c v + F = 0, a absolute, x and v on the base, F the force that the histories tell."""
-    seen = drawn[0][0].seen
+def test_exact_stable_motion_satisfies_the_equation_of_motion(runs_and_picture):
+    """The histories satisfy m a + K x + c v + F = 0, with a absolute and x, v relative to the base."""
+    seen = runs_and_picture[0][0].seen
     mass = 1.123
     omega = 2 * np.pi * 143
     pull = seen.acceleration + omega**2 * seen.output + 0.006 * omega * seen.output_rate
@@ -53,11 +54,12 @@ def test_exact_the_block_that_stays_obeys_newton(drawn):
 
 
 @pytest.mark.slow
-def test_figures_28_and_29_all_that_is_drawn(figures, tmp_path, capsys):
+def test_figures_28_and_29_all_runs_have_stated_figures(figures, tmp_path, capsys):
+    """All five runs have the stated peaks and distortion."""
     runs = figures.main(tmp_path / "x.svg")
     assert [run.stays for run in runs] == [True, True, True, True, False]
     for run in runs[:3]:
-        held(figures, run.title, run)
+        check_peaks(figures, run.title, run)
     more = runs[3]
     assert_contains(
         figures.ANSWER, f"friction the amplitude stays at {more.displacement:.2f} mil at 8 g"
@@ -67,7 +69,8 @@ def test_figures_28_and_29_all_that_is_drawn(figures, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_figures_28_and_29_where_the_block_leaves(figures):
+def test_figures_28_and_29_level_of_runaway(figures):
+    """The block runs away at the stated levels, from rest and released beside its valley."""
     at = figures.run_block("", 143, 7.9, {})
     assert at.stays
     assert_contains(
@@ -80,8 +83,11 @@ def test_figures_28_and_29_where_the_block_leaves(figures):
     assert [figures.let_go(40, level) for level in (6.5, 7.0)] == [True, False]
 
 
-def test_figures_28_and_29_what_the_other_models_do_at_8_g(figures):
-    """A rigid block slides without a stop above 1.2792 of its onset, 4.14 g; the second path bounds it."""
+def test_figures_28_and_29_second_path_limits_the_motion_at_8_g(figures):
+    """With a second load path the motion at 8 g is steady, at the stated amplitude.
+
+    A rigid block slides without a stop above 1.2792 times its onset of 4.14 g.
+    """
     scene = (
         load_study("report/figure_27.py")
         .scene("second path")

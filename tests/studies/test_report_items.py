@@ -1,17 +1,19 @@
-"""The items of the report: every path is there, every verdict is one, and the page is what the list says."""
+"""The list of the report's items: files, verdicts and the page made from it."""
 
 from study_module import ROOT, make_study_fixture
 
 items = make_study_fixture("report/items.py")
 
 
-def test_always_the_page_is_the_list(items):
+def test_always_items_page_agrees_with_the_list(items):
+    """items.md is the table that items.py writes."""
     assert (items.FOLDER / "items.md").read_text("utf-8") == items.table(), (
         "run python studies/report/items.py"
     )
 
 
-def test_always_every_path_is_there_and_every_item_that_works_is_tested(items):
+def test_always_items_have_files_verdicts_and_tests(items):
+    """Every item has a known verdict and existing files; every item that works has a test."""
     assert len(items.ITEMS) == 79
     for one in items.ITEMS:
         verdict, _, lack = one.verdict.partition(": ")
@@ -21,7 +23,8 @@ def test_always_every_path_is_there_and_every_item_that_works_is_tested(items):
         assert one.scene or one.study or verdict == "nothing", one
 
 
-def test_always_the_docstring_counts_what_the_list_holds(items):
+def test_always_docstring_states_the_counts_of_items(items):
+    """The docstring states how many items work, work in part or are missing."""
     counts = [
         sum(one.verdict.split(":")[0] == verdict for one in items.ITEMS)
         for verdict in items.VERDICTS

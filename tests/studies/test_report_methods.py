@@ -1,4 +1,4 @@
-"""The numerical methods of the report: exact maps, orders of convergence, and the numbers of the report's problems."""
+"""The report's numerical methods: exact maps, orders of convergence, and its problems."""
 
 from dataclasses import replace
 from functools import cache
@@ -40,8 +40,8 @@ def free_motion(modes, drive: SineDrive, time: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("omega, zeta", [(0.0, 0.0), (0.3, 0.5), (1.0, 1.0), (7.0, 0.01)])
-def test_exact_maps_of_duhamel_are_those_of_the_equation_of_motion(omega, zeta):
-    """z'' + 2 zeta omega z' + omega^2 z = f0 + (f1 - f0) t/h holds at every step h, from any start."""
+def test_exact_duhamel_maps_satisfy_the_equation_of_motion(omega, zeta):
+    """The maps satisfy z'' + 2 zeta omega z' + omega^2 z = f0 + (f1 - f0) t/h at the end of a step."""
     modes = problems.basis([omega], [zeta], [1.0], [1.0])
     start = np.array([0.2, -0.4, 0.3, -0.8])  # z, z', f0, f1
     h = 0.7
@@ -67,7 +67,8 @@ def test_exact_maps_of_duhamel_are_those_of_the_equation_of_motion(omega, zeta):
         (solve_euler, (3200, 6400), 1),
     ],
 )
-def test_order_without_friction(solve, steps, order):
+def test_order_of_time_integrators_without_friction(solve, steps, order):
+    """Without friction each method converges with its order to a matrix exponential."""
     law = (NO_FRICTION, 1.0) if solve is solve_euler else (coulomb(NO_FRICTION),)
     errors = []
     for n in steps:
@@ -78,7 +79,8 @@ def test_order_without_friction(solve, steps, order):
     assert errors[0] < {1: 0.1, 2: 1e-3}[order]
 
 
-def test_exact_a_free_mass_slides_under_a_constant_force():
+def test_exact_free_mass_under_constant_force():
+    """A free mass under a constant force has constant acceleration beyond the friction limit."""
     drive = RecordedDrive(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
     start = InitialState(np.zeros(1), np.array([0.1]))
     found = solve_newmark(FREE, drive, coulomb(1.0), (10.0, 50), start=start)
@@ -87,8 +89,8 @@ def test_exact_a_free_mass_slides_under_a_constant_force():
     assert found.accelerations(FREE)[-1] == pytest.approx([2.0])
 
 
-def test_exact_a_stuck_mass_is_held_from_the_start():
-    """2 kg under 0.5 m/s^2: friction of 1 N holds the mass, and a limit of 0.9 N lets it go."""
+def test_exact_mass_sticks_up_to_the_friction_limit():
+    """Under 0.5 m/s^2 a mass of 2 kg sticks by a friction force of 1 N, and slips at a limit of 0.9 N."""
     modes = replace(FREE, mass=2.0)
     drive = RecordedDrive(np.array([0.0, 1.0]), np.array([0.5, 0.5]), 1.0, False)
     for limit, force, speed in ((3.0, 1.0, 0.0), (0.9, 0.9, 0.05)):
@@ -98,16 +100,22 @@ def test_exact_a_stuck_mass_is_held_from_the_start():
 
 
 @pytest.mark.parametrize("needs_force, release_at", [(False, 3.0), (True, 1.0)])
-def test_exact_a_stick_speed_adds_to_the_friction(needs_force, release_at):
-    """A force that grows by 1 N/s against 1 N: with v_th = 0.01 m/s the step of 0.01 s holds the mass up to 3 N."""
+def test_exact_stick_speed_delays_the_release(needs_force, release_at):
+    """A stick speed of 0.01 m/s delays the slip of a mass under 1 N/s to 3 N, three times the limit.
+
+    With the criterion on the force it slips at the limit of 1 N.
+    """
     drive = RecordedDrive(np.array([0.0, 4.0]), np.array([0.0, 4.0]), 4.0, False)
     found = solve_newmark(FREE, drive, coulomb(1.0, 0.01), (4.0, 400), needs_force=needs_force)
     assert found.time[np.argmax(found.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
 
 
 @pytest.mark.parametrize("needs_force, order", [(True, 2), (False, 1)])
-def test_order_of_the_first_slide(needs_force, order):
-    """Released at 11.5 F/k: 1 + 10.5 cos t until t = pi. By speed alone the first step has no acceleration."""
+def test_order_of_newmark_in_the_first_slip(needs_force, order):
+    """Newmark's method is of order 2 up to the first reversal, and of order 1 without a force criterion.
+
+    The closed form is 1 + 10.5 cos t for t < pi.
+    """
     start = InitialState(np.array([11.5]), np.zeros(1))
     errors = []
     for steps in (200, 400):
@@ -137,8 +145,8 @@ LAWS = {
 
 
 @cache
-def two_masses(law: str, h: float, **how):
-    """Return the motion of Fig 16 (m = k = P0 = 1, omega = 1.14) in steps of h."""
+def solve_two_masses(law: str, h: float, **how):
+    """Return the motion of Figure 16 (m = k = P0 = 1, omega = 1.14) with steps of h."""
     drive = PiecewiseDrive((DriveSegment(0.0, 0.0, 1.0, 1.14),), 1000 * h, False)
     return solve_duhamel(problems.TWO, drive, LAWS[law], (40.0, 1000), **how)
 
@@ -153,9 +161,9 @@ def two_masses(law: str, h: float, **how):
         ("as printed", 0.01, VELOCITY, 0.03, None, None, -91.0),
     ],
 )
-def test_exact_two_masses_by_duhamel(law, h, how, early, moves, force, at_20):
-    """The largest displacement before friction is overcome, when and under which force it passes 0.05."""
-    found = two_masses(law, h, **how)
+def test_exact_early_motion_of_two_masses_by_duhamel(law, h, how, early, moves, force, at_20):
+    """The displacement before slip, and the time and force of the first slip, are the expected ones."""
+    found = solve_two_masses(law, h, **how)
     x = found.z @ problems.TWO.slide
     assert np.abs(x[found.time < 8]).max() == pytest.approx(
         early, rel=0.05, abs=0.03 * (early == 0)
@@ -168,13 +176,13 @@ def test_exact_two_masses_by_duhamel(law, h, how, early, moves, force, at_20):
         assert np.interp(20, found.time, x) == pytest.approx(at_20, rel=6e-3, abs=6e-3)
 
 
-def test_exact_the_criterion_says_whether_the_law_is_met():
-    """A criterion on the displacement accepts a wrong force; sgn v has no force that holds a mass at rest."""
-    loose = two_masses("sgn v", 0.05, **DISPLACEMENT)
+def test_exact_convergence_criterion_controls_the_force_error():
+    """A criterion on displacement accepts wrong forces; one on velocity reports failed steps."""
+    loose = solve_two_masses("sgn v", 0.05, **DISPLACEMENT)
     assert loose.n_failed == 0 and np.abs(loose.residual).max() > 3
-    tight = two_masses("sgn v", 0.02, **VELOCITY)
+    tight = solve_two_masses("sgn v", 0.02, **VELOCITY)
     assert tight.n_failed > 0.2 * tight.time.size and np.abs(tight.residual).max() > 5
-    assert two_masses("elastic", 0.01, **VELOCITY).n_failed == 0
+    assert solve_two_masses("elastic", 0.01, **VELOCITY).n_failed == 0
 
 
 @pytest.mark.parametrize(
@@ -190,7 +198,8 @@ def test_exact_the_criterion_says_whether_the_law_is_met():
         (0.2, 500, True, 0.172, 2e-3),
     ],
 )
-def test_exact_a_block_at_resonance_by_newmark(speed, steps, needs_force, peak, within):
+def test_exact_peak_of_a_block_at_resonance_by_newmark(speed, steps, needs_force, peak, within):
+    """The peak of the last cycle at resonance agrees with the expected value."""
     duration = 200 * problems.SDOF_DRIVE.period
     found = solve_newmark(
         problems.SDOF,
@@ -204,7 +213,8 @@ def test_exact_a_block_at_resonance_by_newmark(speed, steps, needs_force, peak, 
 
 
 @pytest.mark.parametrize("steps, error", [(100, 0.33), (1000, 1.0), (10000, 21.0)])
-def test_exact_newmark_in_free_decay(steps, error):
+def test_exact_error_of_newmark_in_free_decay(steps, error):
+    """The error of Newmark's method against equation 3.11 grows with the number of steps."""
     start = InitialState(np.array([11.5]), np.zeros(1))
     found = solve_newmark(
         problems.UNDAMPED_MASS,
@@ -220,8 +230,8 @@ def test_exact_newmark_in_free_decay(steps, error):
 
 
 @pytest.mark.parametrize("h, peak, within", [(0.01, 0.1373, 1e-4), (0.2, 0.1895, 6e-4)])
-def test_exact_figure_5_by_euler(h, peak, within):
-    """A block on a plate that moves by sin(omega t): steps of 0.2 make its ringing a third too large.
+def test_exact_ringing_of_figure_5_by_euler(h, peak, within):
+    """Euler's method with steps of 0.2/w0 overestimates the ringing of a block on a moving plate by a third.
 
     The spring and the damper are held to the ground (2.5), so in coordinates of the plate a'' + c a' + a drives it.
     """

@@ -1,4 +1,4 @@
-"""What the rig did: the sweep below 5 g, the levels with their gauge, the ringing loop, the ways to run away."""
+"""The tests of the rig: sweeps below 5 g, stepped levels, ringing loops and runaway."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,11 @@ from study_module import assert_contains, load_study
 import patchfem as pf
 
 
-def test_figure_8_the_piece_swings_as_its_closed_form():
-    """Up to 20 Hz it breaks away from rest; the piece's friction is Coulomb's, the cell's the spring's."""
+def test_figure_8_peak_spring_force_agrees_with_closed_form():
+    """Up to 20 Hz the peak force in the load cell agrees with the closed form within 0.2 %.
+
+    The friction force on the piece stays at Coulomb's limit.
+    """
     figure = load_study("report/figure_8.py")
     for frequency in (5.0, 10.0, 20.0):
         one = figure.loop(frequency)
@@ -20,8 +23,8 @@ def test_figure_8_the_piece_swings_as_its_closed_form():
         )
 
 
-def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
-    """Over a cycle the fixture stores nothing and its damper takes little: both loops have the area of the ledger."""
+def test_figure_8_loop_area_equals_the_friction_work():
+    """The loop area equals the friction work per cycle and agrees with the closed form."""
     figure = load_study("report/figure_8.py")
     one = figure.loop(10.0)
     area = abs(np.trapezoid(one.friction, one.slip)) / (4 * figure.LIMIT * figure.STROKE)
@@ -30,7 +33,8 @@ def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
 
 
 @pytest.mark.slow
-def test_figure_8_the_sentence(tmp_path, capsys):
+def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
+    """Peaks, static friction coefficient and length from the loops are those stated in the study."""
     figure = load_study("report/figure_8.py")
     loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
     assert_contains(
@@ -56,7 +60,8 @@ def test_figure_8_the_sentence(tmp_path, capsys):
     assert "load cell" in (tmp_path / "x.svg").read_text()
 
 
-def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
+def test_exact_stuck_block_in_a_sweep_moves_with_the_base():
+    """A stuck block in a sweep has the acceleration of the base and no relative displacement."""
     sweeps = load_study("report/sweeps.py")
     one = sweeps.sweep_level("rigid block", 4.0)
     assert one.displacement.max() < 1e-9 and one.distortion.max() < 2e-3
@@ -65,7 +70,8 @@ def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
 
 
 @pytest.mark.slow
-def test_sweeps_the_sentence(tmp_path, capsys):
+def test_sweeps_give_stated_critical_levels(tmp_path, capsys):
+    """The critical levels and accelerations of the three models are those stated in the study."""
     sweeps = load_study("report/sweeps.py")
     found = sweeps.main(tmp_path / "x.svg")
     told = {
@@ -92,8 +98,8 @@ def test_sweeps_the_sentence(tmp_path, capsys):
     assert sweeps.ANSWER in capsys.readouterr().out
 
 
-def test_always_a_level_ends_in_its_steady_motion():
-    """The series of levels, marched, against the harmonic balance of each level alone."""
+def test_always_stepped_levels_reach_the_steady_motion():
+    """The time march through increasing levels ends each level in the steady motion of harmonic balance."""
     steps = load_study("report/steps.py")
     for one in steps.steps(143.0, steps.raise_levels(143.0))[1:]:
         found = pf.run(
@@ -108,7 +114,8 @@ def test_always_a_level_ends_in_its_steady_motion():
 
 
 @pytest.mark.slow
-def test_steps_the_sentence(tmp_path, capsys):
+def test_steps_give_stated_gain_and_scores(tmp_path, capsys):
+    """The gain, its interval and the scores of the stepped levels are those stated in the study."""
     steps = load_study("report/steps.py")
     found, fits = steps.main(tmp_path / "x.svg")
     every = [one for row in found.values() for one in row]
@@ -131,15 +138,18 @@ def test_steps_the_sentence(tmp_path, capsys):
     assert steps.ANSWER in capsys.readouterr().out
 
 
-def test_always_friction_far_off_the_axis_lets_go_at_135_hz_first():
-    """At 7.25 g grooves hold at 135 and 143 Hz; with 0.30 of yaw they let go at 135 Hz alone."""
+def test_always_friction_off_the_axis_causes_runaway_at_135_hz():
+    """At 7.25 g grooves alone are stable; with 0.30 radii of gyration of yaw they run away at 135 Hz."""
     ways = load_study("report/runaways.py")
     for name, left in (("grooves", [False, False]), ("grooves, yaw 0.30", [True, False])):
         assert [ways.motion(name, f, 7.25)[0] for f in (135.0, 143.0)] == left
 
 
-def test_exact_friction_alone_slides_without_a_stop_from_den_hartogs_level_on():
-    """Without a stop from 1.2792 times the limit on at 143 Hz: at 1.2 it stays, at 1.4 it does not."""
+def test_exact_friction_alone_runs_away_above_den_hartogs_level():
+    """Friction alone is stable at 1.2 times its limit and runs away at 1.4.
+
+    Den Hartog's level of motion without stops is 1.2792 times the limit.
+    """
     ways = load_study("report/runaways.py")
     limit = 0.4 * 26 * 4.4482216 / 1.123 / ways.G
     stays, leaves = (ways.motion("friction alone", 143.0, share * limit) for share in (1.2, 1.4))
@@ -147,7 +157,8 @@ def test_exact_friction_alone_slides_without_a_stop_from_den_hartogs_level_on():
 
 
 @pytest.mark.slow
-def test_runaways_the_sentence(tmp_path, capsys):
+def test_runaways_have_stated_levels(tmp_path, capsys):
+    """The levels of runaway of all load paths are those stated in the study."""
     ways = load_study("report/runaways.py")
     rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
     near = rows["grooves, yaw 0.25"]
@@ -185,13 +196,14 @@ def test_runaways_the_sentence(tmp_path, capsys):
     assert min(aside) == aside[2] == 4.0
     assert not ways.motion("grooves", 135.0, 8.0)[0]
     assert not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
-    for level, left in ((5.75, False), (6.25, True)):  # 400 cycles do not change it
+    for level, left in ((5.75, False), (6.25, True)):  # the levels are the same after 400 cycles
         assert ways.motion("grooves, yaw 0.30", 135.0, level, **{"drive.cycles": 400})[0] == left
     assert ways.ANSWER in capsys.readouterr().out
 
 
 @pytest.mark.slow
-def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
+def test_always_patch_suppresses_rotation_of_a_stuck_block():
+    """A patch reduces the rotation of a stuck block to below 0.2 % of that on a single point."""
     engaged = load_study("report/engaged.py")
     for mode, touches in engaged.CASES.items():
         peak = {
@@ -202,8 +214,8 @@ def test_always_a_held_block_turns_about_one_point_and_not_on_a_patch():
         assert patches and max(patches) < 2e-3 * peak["one point on the axis"]
 
 
-def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
-    """H1 of the yaw mode below a tenth of its frequency's width: share/(omega0^2 - omega^2) of the base."""
+def test_exact_point_on_the_axis_does_not_damp_yaw():
+    """With one contact point on the axis, H1 of the yaw mode agrees with the closed form within 1 %."""
     engaged = load_study("report/engaged.py")
     one = engaged.random_turn("yaw", "one point on the axis", engaged.SLIDING_LEVEL, 16.0)
     part = (one.f >= 40) & (one.f <= 110)
@@ -214,7 +226,8 @@ def test_exact_a_point_on_the_axis_leaves_the_other_mode_free():
 
 
 @pytest.mark.slow
-def test_engaged_the_sentence(tmp_path, capsys):
+def test_engaged_contact_gives_stated_peaks_and_coherence(tmp_path, capsys):
+    """Peaks of yaw and rocking and the mean coherence are those stated in the study."""
     engaged = load_study("report/engaged.py")
     turns, tests = engaged.main(tmp_path / "x.svg")
     peak = {(one.mode, one.touch, one.level): one.peak for one in turns}
@@ -265,7 +278,7 @@ def test_engaged_the_sentence(tmp_path, capsys):
         f"{min(f):.0f} to {max(f):.0f} Hz and {min(damping):.2f} to {max(damping):.2f} of critical",
         f"a coherence of {coherent[engaged.SPRING]:.2f}",
     )
-    # spring and yaw of studies/table_1, over the flexures
+    # stiffness of "spring and yaw" in studies/table_1, divided by that of the flexures
     fitted = 5.1e6 / (1.19396625 * (2 * np.pi * 143) ** 2)
     assert fitted / engaged.SHARE == pytest.approx(
         7, abs=0.2

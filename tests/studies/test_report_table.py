@@ -1,4 +1,4 @@
-"""The table of all studies: it says what the studies say."""
+"""The table of all studies agrees with the docstrings of the studies."""
 
 import json
 
@@ -7,8 +7,8 @@ from study_module import ROOT, load_study, make_study_fixture
 page = make_study_fixture("report/table.py")
 
 
-def test_always_the_page_is_what_the_studies_say(page):
-    """Another answer, another study: `python studies/report/table.py` writes the page anew."""
+def test_always_table_of_studies_is_up_to_date(page):
+    """README.md of the studies is the table that `python studies/report/table.py` writes."""
     seconds = json.loads(page.SECONDS_FILE.read_text("utf-8"))
     assert (page.FOLDER / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), (
         "run python studies/report/table.py"
@@ -16,8 +16,8 @@ def test_always_the_page_is_what_the_studies_say(page):
     assert set(seconds) <= {one.path for one in page.studies()}
 
 
-def test_always_every_study_of_a_figure_has_a_word_on_it(page):
-    """VERDICT is "yes", or says what is missing and why."""
+def test_always_figure_studies_have_a_verdict(page):
+    """The VERDICT of a study of a figure is "yes", or begins with "in part: " or "no: "."""
     found = {one.path: one for one in page.studies()}
     assert len(found) == len(page.studies()) > 40 and all(
         one.question.endswith(("?", ".")) for one in found.values()
@@ -28,7 +28,8 @@ def test_always_every_study_of_a_figure_has_a_word_on_it(page):
         assert said == "yes" or said.startswith(("in part: ", "no: ")), path.name
 
 
-def test_exact_the_words_of_a_module_without_running_it(page):
+def test_exact_study_texts_are_read_without_import(page):
+    """Question, answer and verdict are read from the source and equal those of the imported module."""
     module = load_study("report/figures_28_29.py")
     one = next(one for one in page.studies() if one.path == "report/figures_28_29.py")
     assert one[1:] == (

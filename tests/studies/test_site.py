@@ -1,4 +1,4 @@
-"""The site: every effect has a scene that names it, every measure a line, every link of a page a target; built slow."""
+"""The site: scenes of all effects, the glossary, links of the pages, and a complete build."""
 
 import ast
 import json
@@ -22,24 +22,26 @@ check, examples, made = (__import__(name) for name in ("check", "examples", "mad
 
 
 @pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    """The folder of the files that the scenes of the effects read."""
+def scene_folder(tmp_path_factory):
+    """Folder with the files that the scenes of the effects read."""
     folder = tmp_path_factory.mktemp("files")
     for name, text in examples.FILES.items():
         (folder / name).write_text(text, "utf-8")
     return folder
 
 
-def test_always_every_effect_has_a_scene_that_names_it(files):
+def test_always_every_effect_has_an_example_scene(scene_folder):
+    """Every effect has an example scene, and `patchfem plan` lists the effect for it."""
     assert sorted(examples.EXAMPLES) == sorted(made.SHOWN_EFFECTS)
     for name in set(made.SHOWN_EFFECTS) - {"sweep"}:
-        (files / "scene.toml").write_text(examples.scene(name), "utf-8")
-        assert name in pf.plan(files / "scene.toml").effects, name
+        (scene_folder / "scene.toml").write_text(examples.scene(name), "utf-8")
+        assert name in pf.plan(scene_folder / "scene.toml").effects, name
 
 
-def test_always_an_effect_is_told_from_its_records(files):
-    page = made.effect("contact.tilt", files)
-    assert (files / "contact-tilt.svg").read_text("utf-8").startswith("<?xml")
+def test_always_page_of_an_effect_shows_its_records(scene_folder):
+    """The page of contact.tilt shows its equations, its scene and results with and without tilt."""
+    page = made.effect("contact.tilt", scene_folder)
+    assert (scene_folder / "contact-tilt.svg").read_text("utf-8").startswith("<?xml")
     assert EFFECTS["contact.tilt"].equations in page
     assert '[contact.tilt]\nangle = "0.1 mrad"' in page
     with_it, without = re.search(
@@ -52,12 +54,14 @@ def test_always_an_effect_is_told_from_its_records(files):
     )
 
 
-def test_always_every_value_has_a_sentence():
+def test_always_every_effect_has_a_description():
+    """The description of every effect is a sentence."""
     said = [made.about(name) for name in made.SHOWN_EFFECTS]
     assert all(len(text) > 20 and text.endswith(".") for text in said)
 
 
-def test_always_the_glossary_has_every_measure_and_term_once():
+def test_always_glossary_lists_measures_and_terms_once():
+    """The glossary lists every measure and every term once."""
     heads = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
     assert len(heads) == len(set(heads)) > 90
     terms = made.glossary_terms()
@@ -67,21 +71,22 @@ def test_always_the_glossary_has_every_measure_and_term_once():
     assert terms["slide"] != terms["slip"] and "Irreversible part" in terms["slip"]
 
 
-def test_always_every_folder_of_the_package_is_told():
+def test_always_every_package_folder_is_described():
+    """The page on the code describes the folders in the order of the package's docstring."""
     order = re.findall(r"^\d+\. `(\w+)`", pf.__doc__, re.M)
     assert re.findall(r"^## (\w+)$", made.code(), re.M) == order and len(order) > 20
 
 
-def sources() -> list:
-    """The pages of the repository that the site is built from, without those that a build makes."""
+def find_source_pages() -> list:
+    """Return the pages of the repository from which the site is built, without generated pages."""
     conf = (SITE / "conf.py").read_text("utf-8")
     wanted = ast.literal_eval(re.search(r"include_patterns = (\[.*?\])", conf, re.S)[1])
     found = {path for pattern in wanted for path in ROOT.glob(pattern.replace("**.md", "**/*.md"))}
     return sorted(path for path in found if "made" not in path.parts and path != SITE / "README.md")
 
 
-def text_of(page: Path) -> str:
-    """The Markdown of a page, of a notebook that of its cells."""
+def read_page_text(page: Path) -> str:
+    """Return the Markdown of a page or of a notebook's cells."""
     text = page.read_text("utf-8")
     if page.suffix != ".ipynb":
         return text
@@ -93,8 +98,8 @@ def text_of(page: Path) -> str:
     )
 
 
-def made_pages() -> set:
-    """Names of the pages that a build makes."""
+def generated_page_names() -> set:
+    """Return the names of the pages that a build generates."""
     return {
         "glossary.md",
         "messages.md",
@@ -106,18 +111,20 @@ def made_pages() -> set:
     }
 
 
-@pytest.mark.parametrize("page", sources(), ids=lambda page: str(page.relative_to(ROOT)))
-def test_always_a_page_leads_somewhere_and_its_python_is_python(page):
-    """Every link inside the repository has its file, of pages one of the site, and its heading; so has every list."""
-    text = text_of(page)
+@pytest.mark.parametrize("page", find_source_pages(), ids=lambda page: str(page.relative_to(ROOT)))
+def test_always_page_links_resolve_and_its_python_parses(page):
+    """Every link and list of a page leads to an existing page and heading; its Python code parses."""
+    text = read_page_text(page)
     prose = re.sub(r"^```.*?^```|`[^`\n]*`", "", text, flags=re.S | re.M)
     for link, name in re.findall(r"\]\(([^)#\s]*)#?([^)]*)\)", prose):
         if link.startswith(("http", "made/")):
-            assert link.startswith("http") or link.removeprefix("made/") in made_pages(), link
+            assert (
+                link.startswith("http") or link.removeprefix("made/") in generated_page_names()
+            ), link
             continue
         target = (page.parent / link).resolve() if link else page
         assert target.exists() and (
-            target.suffix not in (".md", ".ipynb") or target in sources()
+            target.suffix not in (".md", ".ipynb") or target in find_source_pages()
         ), link
         heads = (
             re.findall(r"^#+ (.*)$", target.read_text("utf-8"), re.M)
@@ -131,22 +138,24 @@ def test_always_a_page_leads_somewhere_and_its_python_is_python(page):
         for line in (line for line in listed.splitlines() if line and not line.startswith(":")):
             place = re.sub(r"^.*<(.*)>$", r"\1", line)
             assert (
-                f"{place.removeprefix('made/')}.md" in made_pages()
+                f"{place.removeprefix('made/')}.md" in generated_page_names()
                 if place.startswith("made/")
                 else any((page.parent / f"{place}{end}").exists() for end in (".md", ".ipynb"))
             ), line
     if page.name == "ADDING.md":
-        return  # tests/test_adding.py executes its blocks, some of which are single lines of a table
+        return  # tests/test_adding.py executes its blocks; some are single lines of a table
     for code in re.findall(r"^```(?:python|\{code-cell\} ipython3)\n(.*?)^```", text, re.S | re.M):
         ast.parse(code)
 
 
-def test_always_the_commands_of_a_page_run():
+def test_always_commands_of_the_paraview_page_run():
+    """The nine commands of the page on ParaView run without error."""
     assert len(check.commands(SITE / "tasks" / "paraview.md")) == 9
     assert check.faults(SITE / "tasks" / "paraview.md") == []
 
 
-def test_always_a_dead_link_a_mute_picture_and_a_failing_command_are_found(tmp_path):
+def test_always_site_check_finds_broken_links_and_commands(tmp_path):
+    """The check finds broken links, pictures without alternative text and commands that fail."""
     (tmp_path / "a.html").write_text(
         '<h1 id="top"></h1><a href="#top"><a href="b.html#no"><a href="c.html">'
     )
@@ -165,9 +174,8 @@ def test_always_a_dead_link_a_mute_picture_and_a_failing_command_are_found(tmp_p
 @pytest.mark.skipif(
     find_spec("myst_nb") is None, reason="the site is built where patchfem[docs] is installed"
 )
-def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(
-    tmp_path, tmp_path_factory
-):
+def test_always_site_build_has_no_warnings_or_broken_links(tmp_path, tmp_path_factory):
+    """The site is built without warnings, broken links, failing commands or errors in the browser."""
     words = [
         sys.executable,
         "-m",
@@ -186,11 +194,11 @@ def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(
     assert dead == check.mute(tmp_path) == [] and tried > 1000
     assert [text for page in check.PAGES for text in check.faults(page)] == []
     if find_chromium() is not None:
-        assert console_errors(tmp_path, tmp_path_factory.mktemp("chromium")) == []
+        assert find_browser_errors(tmp_path, tmp_path_factory.mktemp("chromium")) == []
 
 
-def console_errors(site: Path, home: Path) -> list:
-    """Return what the console says on the first page of a visit, and the words that are broken at 390 px."""
+def find_browser_errors(site: Path, home: Path) -> list:
+    """Return console messages of four pages and words broken at a width of 390 px."""
     browser = Chromium(home)
     wrong = []
     for name in ("README", "studies/README", "studies/site/start", "patchfem/scene/MEASURES"):

@@ -1,4 +1,4 @@
-"""Pictures of README and site show the numbers of today's runs; a stale picture is named."""
+"""Pictures of README and site show the results of current runs; an outdated picture is reported."""
 
 import struct
 import sys
@@ -13,12 +13,13 @@ sys.path.insert(0, str(SITE))
 pictures = __import__("pictures")
 
 
-def loop_of(friction: str):
+def draw_loop_at(friction: str):
     """Return the picture of a friction loop at a friction coefficient."""
     return pictures.draw_loop(pf.run(pf.new("bench"), **{"friction.static": friction}))
 
 
-def test_always_the_committed_pictures_belong_to_their_numbers():
+def test_always_committed_pictures_match_their_numbers():
+    """Every committed picture belongs to its stored numbers and has the stated width and size."""
     assert pictures.find_foreign() == []
     for path in pictures.FOLDER.glob("*.png"):
         content = path.read_bytes()
@@ -26,17 +27,19 @@ def test_always_the_committed_pictures_belong_to_their_numbers():
         assert struct.unpack(">II", content[16:24])[0] == round(pictures.WIDTH * pictures.DPI)
 
 
-def test_always_a_picture_of_other_numbers_is_stale():
-    first = pictures.read_numbers(loop_of("0.3"))
-    assert pictures.find_changes(first, pictures.read_numbers(loop_of("0.3"))) == []
-    changes = pictures.find_changes(first, pictures.read_numbers(loop_of("0.302")))
+def test_always_changed_curves_make_a_picture_stale():
+    """A friction coefficient of 0.302 instead of 0.3 makes a picture outdated."""
+    first = pictures.read_numbers(draw_loop_at("0.3"))
+    assert pictures.find_changes(first, pictures.read_numbers(draw_loop_at("0.3"))) == []
+    changes = pictures.find_changes(first, pictures.read_numbers(draw_loop_at("0.302")))
     assert "a curve differs by 0.67 % of its largest value" in changes  # 0.302 for 0.3
     assert any("is no longer shown" in change for change in changes)
-    assert pictures.find_stale([("loop", loop_of("0.3"))])  # the committed loop is that of the rig
+    # the committed loop belongs to the rig, not to the bench
+    assert pictures.find_stale([("loop", draw_loop_at("0.3"))])
 
 
-def test_always_a_curve_of_round_off_does_not_make_a_picture_stale():
-    """A picture with one large curve and a second curve that changes by a factor of two."""
+def test_always_round_off_does_not_make_a_picture_stale():
+    """A curve at the size of round-off may change by a factor of two without making a picture outdated."""
     figure, (axis,) = pictures.new_figure(2)
     large = axis.plot([0, 1, 2], [0, 1, 2])
     (small,) = axis.plot([0, 1, 2], [0, 1e-10, 2e-10])
@@ -50,5 +53,6 @@ def test_always_a_curve_of_round_off_does_not_make_a_picture_stale():
 
 
 @pytest.mark.slow
-def test_always_no_committed_picture_is_stale():
+def test_always_committed_pictures_are_up_to_date():
+    """All committed pictures show the curves of current runs."""
     assert pictures.find_stale(pictures.figures()) == []

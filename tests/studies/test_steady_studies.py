@@ -1,4 +1,4 @@
-"""What the studies of steady motions say, from their cheap share; the whole campaigns are slow."""
+"""The studies of steady motions: their inexpensive cases; complete studies are marked slow."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,8 @@ march = make_study_fixture("steady/against_march.py")
         ("patch of 41 elements", 150.0, 3e-3),
     ],
 )
-def test_exact_the_march_ends_in_the_steady_motion(march, contact, frequency, near):
+def test_exact_time_march_agrees_with_steady_state_solver(march, contact, frequency, near):
+    """The time march agrees with the steady-state solver within the stated relative difference."""
     one = march.row(contact, frequency, 800, 300, 400)
     for name in march.MEASURES:
         assert one.miss(name) < near
@@ -26,8 +27,11 @@ def test_exact_the_march_ends_in_the_steady_motion(march, contact, frequency, ne
     assert one.multiplier < 1 and one.regime != "stuck"
 
 
-def test_order_of_a_march_that_reverses_between_its_steps(march):
-    """No stop at 129 Hz: reversals are found inside the steps, so the error falls with their square at least."""
+def test_order_of_the_time_march_with_reversals_inside_steps(march):
+    """The error falls at least with the square of the step.
+
+    At 129 Hz the motion has no stops, and reversals are located inside the steps.
+    """
     coarse, fine = (march.row("Coulomb", 129.0, steps, 300, 400) for steps in (400, 1600))
     name = march.MEASURES[0]
     assert coarse.regime == "sliding" and coarse.miss(name, "run") < 1e-12
@@ -35,7 +39,8 @@ def test_order_of_a_march_that_reverses_between_its_steps(march):
 
 
 @pytest.mark.slow
-def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
+def test_exact_time_march_at_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
+    """The largest differences between time march and steady state are those stated, contact by contact."""
     table = march.main(path=tmp_path / "x.svg")
     worst = {
         name: {m: max(r.miss(m) for r in rows) for m in march.MEASURES}
@@ -62,17 +67,20 @@ fold = make_study_fixture("steady/fold.py")
 
 
 @pytest.mark.slow
-def test_exact_a_sweep_jumps_beyond_the_fold(fold):
+def test_exact_swept_motion_jumps_beyond_the_fold(fold):
+    """A sweep upwards jumps 0.1 to 0.5 Hz beyond the fold of the steady curve."""
     steady = fold.curve(145.5, 148.2)
     assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
     up = fold.sweep(steady, True, 0.4, 200, 145.5, 148.4)
     assert steady.folds[0] + 0.1 < up.jump < steady.folds[0] + 0.5 and up.miss < 0.02
     assert not steady.stable.all() and steady.multiplier.max() > 1.02
-    assert np.isnan(fold.sweep(steady, False, 0.8, 100, 147.5, 148.8).jump)  # ends before the fold
+    # the sweep ends before the fold
+    assert np.isnan(fold.sweep(steady, False, 0.8, 100, 147.5, 148.8).jump)
 
 
 @pytest.mark.slow
-def test_exact_jumps_bracket_the_folds(fold, tmp_path):
+def test_exact_jumps_of_both_sweeps_approach_the_folds(fold, tmp_path):
+    """The jumps in both directions lie beyond the folds and approach them with a slower sweep."""
     steady, sweeps = fold.main((0.4, 0.1), path=tmp_path / "x.svg")
     by = {(s.up, s.rate): s for s in sweeps}
     assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
@@ -93,15 +101,18 @@ backbone = make_study_fixture("steady/backbone.py")
 
 
 @pytest.mark.slow
-def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
+def test_exact_backbone_of_one_harmonic_agrees_with_bench_loop(backbone, tmp_path):
+    """The backbone from one harmonic agrees with the bench loop; many harmonics differ at large amplitude."""
     rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
     sharp, soft = rows
-    # the bench takes 400 steps a cycle
+    # limits of errors at 400 steps per cycle of the bench
     assert max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3
-    assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)  # held: sqrt((k + mu N/eps)/m)
+    # frequency of the stuck contact, sqrt((k + mu N/eps)/m)
+    assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)
     held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi) ** 2)
     assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
-    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)  # nothing slips
+    # damping ratio without slip
+    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)
     assert (
         abs(sharp.many[0][1] / sharp.bench[0][1] - 1)
         < 0.02

@@ -1,4 +1,4 @@
-"""The sentences of the studies, checked by running them."""
+"""Statements of the studies, checked by running them."""
 
 import re
 from pathlib import Path
@@ -12,8 +12,11 @@ STUDIES = Path(__file__).parents[2] / "studies"
 
 
 @pytest.mark.slow
-def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
-    """Of a motion of one cycle: what is said of the pressed patch does not hang on it."""
+def test_exact_tilt_docstring_states_the_patch_measures():
+    """The docstring states the contact fraction, shear stiffness and thresholds of the tilted patch.
+
+    One cycle of motion suffices, since these results do not depend on the motion.
+    """
     module = load_study("rig/tilt.py")
     said = " ".join(module.__doc__.split())
     rows = module.main((0.0, 1e-4, 1e-3), 1)
@@ -35,7 +38,8 @@ def test_exact_the_docstring_of_tilt_holds_the_figures_of_the_patch():
 
 
 @pytest.mark.slow
-def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
+def test_always_tilt_reduces_stiffness_and_slightly_the_motion():
+    """A tilt of 1 mrad reduces the patch stiffness much more than amplitude and loop area of the rig."""
     flat, tilted = load_study("rig/tilt.py").main((0.0, 1e-3))
     assert flat["contact_fraction"][0] == 1 and tilted["contact_fraction"][0] < 0.03
     assert tilted["tangential_stiffness"][0] == pytest.approx(1.197e8, rel=0.005)
@@ -45,7 +49,8 @@ def test_always_tilt_softens_the_patch_and_hardly_changes_the_rig():
         assert b / a == pytest.approx(low, abs=0.005) and a - b > 5 * (da + db)
 
 
-def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
+def test_always_report_law_gives_a_smaller_amplitude(tmp_path):
+    """The law as printed in the report gives a smaller amplitude than the law by stretch."""
     found = load_study("rig/readings.py").main(5, tmp_path / "x.svg")
     for elastic in (False, True):
         (report, a), (stretch, b) = (
@@ -57,7 +62,8 @@ def test_always_the_printed_law_holds_the_block_tighter(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_sentence_on_the_printed_law_on_elastic_pieces():
+def test_report_law_gives_stated_amplitudes():
+    """The amplitudes of both laws on rigid and elastic pieces, and the energy created, are those stated."""
     found = load_study("rig/readings.py").main(200, None)
     name = "relative_displacement_amplitude"
     more = "energy_created"
@@ -73,7 +79,8 @@ def test_the_sentence_on_the_printed_law_on_elastic_pieces():
     assert found["report", True][more][0] == pytest.approx(6.04e-6, rel=1e-3)
 
 
-def test_always_the_fixture_decides_the_contact_fraction():
+def test_always_fixture_stiffness_controls_the_contact_fraction():
+    """The softer the fixture, the larger the tilt at which half of the patch is in contact."""
     fixtures = load_study("misalignment/fixtures.py")
     for spring, half in ((None, 2.95e-5), (1e4, 7.55e-5), (1e3, 4.89e-4)):
         assert fixtures.tilt_for(0.5, spring, 14) == pytest.approx(half, rel=0.03)
@@ -81,7 +88,8 @@ def test_always_the_fixture_decides_the_contact_fraction():
     assert fixtures.case(1e-3, None)["contact_fraction"] < 0.03
 
 
-def test_figure_13_curves_of_the_study(tmp_path):
+def test_figure_13_curves_have_stated_peaks(tmp_path):
+    """The distributions of bond lengths have the peaks and quantiles stated in the answer."""
     one = load_study("report/figure_13.py")
     rows = {row["order"]: row for row in one.main(tmp_path / "figure.svg")}
     assert list(rows) == [-0.5, 0.0, 1.0, 2.0]
@@ -98,7 +106,8 @@ def test_figure_13_curves_of_the_study(tmp_path):
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 
 
-def test_figure_14_curve_of_the_study(tmp_path):
+def test_figure_14_curve_has_stated_values(tmp_path):
+    """The normal distribution of Figure 14 has the values stated in the answer."""
     one = load_study("report/figure_14.py")
     rows = one.main(tmp_path / "figure.svg")
     assert [weight for _, weight, _ in rows] == pytest.approx([0.3989, 0.2420, 0.0540, 0], abs=5e-5)
@@ -109,8 +118,8 @@ def test_figure_14_curve_of_the_study(tmp_path):
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("words", [(), ("--set", "contact.element_size=64 um")])
-def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path, monkeypatch):
-    """Errors to every digit printed; seconds hang on the machine, and their ratios to a third or three times.
+def test_exact_cost_table_in_the_readme_is_reproduced(words, tmp_path, monkeypatch):
+    """`patchfem cost` prints the errors of the table in the README, and CPU times in similar ratios.
 
     Round-off moves these errors by less than 1e-4 of themselves, except with cells of order 4 (tolerances of 1e-4 and
     1e-5): there a node at the edge of the contact bears or not by round-off, and with three sets of BLAS kernels the
@@ -133,7 +142,7 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
         r"(?s)```text\n(element_size .*?)```", (STUDIES / "speed/README.md").read_text("utf-8")
     )
     (names, ours, said), (printed, theirs, sentence) = (
-        table(one) for one in (said.out.split("results:")[0], blocks[bool(words)])
+        parse_cost_table(one) for one in (said.out.split("results:")[0], blocks[bool(words)])
     )
     assert names == printed and re.sub(r"[\d.]+ CPU s", "", said) == re.sub(
         r"[\d.]+ CPU s", "", sentence
@@ -156,8 +165,8 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     assert (np.abs(np.log(ratios / np.median(ratios))) < np.log(3)).all()
 
 
-def table(text: str) -> tuple:
-    """(names of the measures, rows (label, CPU seconds, errors), last line) of a table that `cost` prints."""
+def parse_cost_table(text: str) -> tuple:
+    """Return the measures, the rows (label, CPU seconds, errors) and the last line of a table of `cost`."""
     (_, *first), _, *rows, last = (
         re.split("  +", line.strip()) for line in text.rstrip().split("\n")
     )

@@ -1,4 +1,4 @@
-"""Two rungs of the ladder from the equations of motion alone, marched by Runge-Kutta, with no code of the program."""
+"""Two models of Table 1, integrated by Runge-Kutta independently of patchfem."""
 
 import csv
 
@@ -7,14 +7,20 @@ import pytest
 from study_module import ROOT, load_study
 
 G, MIL, LBF = 9.80665, 25.4e-6, 4.4482216152605
-MASS, LOAD, STRETCH = 1.19396625, 26 * LBF, 0.243e-6  # kg, N, m by which the point gives way
+# Mass [kg], load [N] and elastic displacement of the contact point at the friction limit [m].
+MASS, LOAD, STRETCH = 1.19396625, 26 * LBF, 0.243e-6
 AXIAL, YAW, RATIO = 2 * np.pi * 143.0, 2 * np.pi * 129.0, 0.003
 
 
-def marched(conditions, friction, stiffness, damping, arm, seen, cycles=500, steps=600) -> tuple:
-    """(peak, first harmonic) of the accelerometer [m/s2] and half the range of the gage [m] in the last of so many
-    cycles, (c,) each: x'' + 2 D w x' + w^2 x = -a - T/m, q'' likewise = -arm T/m, T = F + k s + c s', s = x + arm q,
-    F' = K s' between -mu N and mu N, K = mu N/STRETCH; the accelerometer reads x'' + a + seen q''."""
+def integrate_rig(
+    conditions, friction, stiffness, damping, arm, seen, cycles=500, steps=600
+) -> tuple:
+    """Return the peak and the first harmonic of the accelerometer [m/s^2] and half the gage's range [m].
+
+    Each has the shape (n_conditions,) and belongs to the last cycle. The equations of motion are
+    x'' + 2 D w x' + w^2 x = -a - T/m, likewise q'' with -arm T/m, T = F + k s + c s', s = x + arm q,
+    F' = K s' between -mu N and mu N, and K = mu N/STRETCH. The accelerometer has x'' + a + seen q''.
+    """
     omega = 2 * np.pi * conditions[:, 0]
     level = conditions[:, 1]
     limit = friction * LOAD
@@ -51,12 +57,12 @@ def marched(conditions, friction, stiffness, damping, arm, seen, cycles=500, ste
     return np.abs(felt).max(axis=0), np.abs(2 / steps * turn @ felt), np.ptp(shown, axis=0) / 2
 
 
-def scores(values: dict, gain: float, fundamental: bool) -> dict:
-    """{whether at 143 Hz: [all, acceleration, displacement]} of Table 1, read from its file."""
+def compute_scores(values: dict, gain: float, fundamental: bool) -> dict:
+    """Return {at 143 Hz or not: [all, acceleration, displacement]} for the rows of Table 1."""
     with open(ROOT / "rig" / "table1.csv", encoding="utf-8") as file:
         rows = [row for row in list(csv.reader(file))[1:] if row[2] or row[3]]
     conditions = np.array(sorted({(float(row[0]), float(row[1]) * G) for row in rows}))
-    peak, first, gage = marched(conditions, **values)
+    peak, first, gage = integrate_rig(conditions, **values)
     place = {tuple(one): k for k, one in enumerate(conditions)}
     logs = {here: ([], []) for here in (True, False)}
     for row in rows:
@@ -80,8 +86,11 @@ def scores(values: dict, gain: float, fundamental: bool) -> dict:
     "rung, reading",
     [("spring and yaw", "fundamental x sqrt2"), ("path of Fig. 27", "peak x stuck")],
 )
-def test_table_1_scores_of_a_rung_from_its_equations_alone(rung, reading):
-    """Both within 1e-3 of what the program answers at the same numbers; Fig. 27: a critically damped mode at 148 Hz."""
+def test_table_1_scores_agree_with_independent_integration(rung, reading):
+    """The scores agree with those of patchfem at the same parameters within 1e-3.
+
+    The path of Figure 27 is a critically damped mode at 148 Hz.
+    """
     row = load_study("table_1/fitting.py").read_records()[rung, reading, "143", ""]
     given = dict(zip((key.rpartition(".")[2] for key in row["keys"]), row["values"]))
     stiff = {
@@ -93,7 +102,7 @@ def test_table_1_scores_of_a_rung_from_its_equations_alone(rung, reading):
         "arm": given["slide"],
         "seen": given.get("accelerometer", 0.0),
     }
-    found = scores(friction | stiff, row["gain"] or np.sqrt(2), "fundamental" in reading)
+    found = compute_scores(friction | stiff, row["gain"] or np.sqrt(2), "fundamental" in reading)
     for here, name in ((True, "fitted"), (False, "others")):
         assert found[here] == pytest.approx(
             [row[name][kind] for kind in ("all", "acceleration", "displacement")], abs=1e-3

@@ -1,5 +1,4 @@
-"""The ladder of Table 1: its recipe can be asked, what is left out of a fit is not seen by it, and its sentences follow
-from its records."""
+"""The models fitted to Table 1: parameters, training readings, records and stated results."""
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ ROOT2 = "fundamental x sqrt2"
 fitting = make_study_fixture("table_1/fitting.py")
 
 
-def test_always_every_rung_can_be_asked_under_every_reading(fitting):
-    """20 conditions each; the numbers of its scene lie between the ends that are searched, what is 0 there apart."""
+def test_always_every_model_has_conditions_and_ranges(fitting):
+    """Every model and kind of reading has 20 conditions and search ranges that are not empty."""
     cells = read_readings(fitting.TABLE)
     for rung in fitting.RUNGS.values():
         for reading in rung.readings:
@@ -29,9 +28,11 @@ def test_always_every_rung_can_be_asked_under_every_reading(fitting):
             assert not any(ends.get(f"structure.bonded.{key}") for key in ("stiffness", "damping"))
 
 
-def test_exact_what_a_protocol_fits_and_what_it_predicts(fitting):
-    """Table 1 counted by hand: 27 accelerations and 8 displacements, 13 readings at 143 Hz, 12 at 135, 5 at 150 and
-    155 Hz each; those left out in turn are all of them, once."""
+def test_exact_numbers_of_training_and_left_out_readings(fitting):
+    """The numbers of training and left-out readings are those counted in Table 1.
+
+    Over the four frequencies every reading is left out once.
+    """
     cells = read_readings(fitting.TABLE)
     assert int(cells.felt.sum()) == 27 and cells.row.size == 35
     assert int(fitting.training(cells, "143").sum()) == 13 and fitting.training(cells, "all").all()
@@ -39,8 +40,11 @@ def test_exact_what_a_protocol_fits_and_what_it_predicts(fitting):
     assert [int(one.sum()) for one in left] == [12, 13, 5, 5] and (np.sum(left, axis=0) == 1).all()
 
 
-def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fitting, monkeypatch):
-    """Where the map finds no motion, the balance answers, and the next numbers nearby are asked as from rest."""
+def test_always_next_solution_does_not_start_from_harmonic_balance(fitting, monkeypatch):
+    """If the steady-state solver fails, harmonic balance gives the readings.
+
+    The next parameters then start from rest.
+    """
     from patchfem.dynamics.events import steady
 
     asked = fitting.RUNGS["second path"].question("peak").condition_models([(143.0, 49.03)])
@@ -61,8 +65,12 @@ def test_always_a_motion_found_by_harmonics_is_no_start_for_the_map_of_yields(fi
     assert after == pytest.approx(np.array(ModelReadings(asked)(values * 1.0001, [0])), rel=1e-9)
 
 
-def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
-    """By hand: 4 g reads 5.0 and 4.9 at 143 Hz, 5.0 at 155 Hz, 5.1 at 150 Hz, 5.8 and 6.0 at 135 Hz."""
+def test_exact_gain_comes_from_training_readings_only(fitting):
+    """The gain is the mean ratio of the training readings at 4 g, where the block sticks.
+
+    At 4 g the accelerometer reads 5.0 and 4.9 g at 143 Hz, 5.0 at 155 Hz, 5.1 at 150 Hz, 5.8 and
+    6.0 at 135 Hz.
+    """
     cells = read_readings(fitting.TABLE)
     gains = {
         one: fitting.stuck_gain(cells, fitting.training(cells, one))
@@ -76,8 +84,8 @@ def test_exact_the_gain_of_a_fold_comes_from_its_own_readings(fitting):
     ] == pytest.approx(1.25, rel=1e-12)
 
 
-def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
-    """Without friction, per base acceleration at 150 Hz: block and tip of two masses, and by the modes of `rods`."""
+def test_exact_rods_are_equivalent_to_two_masses(fitting):
+    """Without friction at 150 Hz, the modes of `rods` give the motion of two masses within 1e-9."""
     derived = load_study("table_1/derived.py")
     share = 0.3
     mass = 0.05
@@ -101,8 +109,11 @@ def test_exact_rods_are_the_two_masses_that_they_stand_for(fitting):
     assert float(numbers["structure.moving_mass"].split()[0]) == pytest.approx(1.05 * 1.19396625)
 
 
-def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitting):
-    """Factor 1: the rows one after the other are those of "spring and yaw"; factor 2 doubles the friction per um."""
+def test_exact_wear_factor_one_gives_the_unworn_model(fitting):
+    """With a wear factor of 1 the rows are those of "spring and yaw".
+
+    A factor of 2 doubles the friction per um of depth.
+    """
     cells = read_readings(fitting.TABLE)
     rows = fitting.cells_for("spring and yaw, worn")
     seen = fitting.training(cells, "143")
@@ -123,9 +134,11 @@ def test_exact_friction_that_wear_does_not_change_gives_the_rung_beside_it(fitti
 
 
 @pytest.mark.slow
-def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
-    """One random start of the second path at 143 Hz, and its end with each of two numbers at 0: the record is whole,
-    and its scores are those of its own logarithms."""
+def test_always_fit_record_is_complete_with_consistent_scores(fitting):
+    """A fit at 143 Hz gives a complete record, whose scores follow from its logarithms.
+
+    It starts at one random point and at its optimum with each of two parameters set to zero.
+    """
     found = fitting.fit_rung("second path", "peak", "143", starts=1)
     assert found["keys"][0] == "friction.static"
     assert len(found["values"]) == 4
@@ -142,11 +155,12 @@ def test_always_a_fit_sees_nothing_but_its_training_readings(fitting):
 
 @pytest.fixture(scope="module")
 def records(fitting):
+    """Stored records of all fits."""
     return fitting.read_records()
 
 
-def test_exact_every_score_follows_from_the_cells_that_are_kept(fitting, records):
-    """ln(computed/measured) of every reading from its cell, four digits each, and the scores from these."""
+def test_exact_scores_follow_from_the_stored_cells(fitting, records):
+    """The stored logarithms ln(computed/measured) and scores follow from the stored cells of four digits."""
     for (rung, _, protocol, _), row in records.items():
         cells = fitting.cells_for(rung)
         both = np.array([[np.inf if one is None else one for one in part] for part in row["cells"]])
@@ -162,8 +176,8 @@ def test_exact_every_score_follows_from_the_cells_that_are_kept(fitting, records
                 )
 
 
-def test_always_a_cell_of_every_rung_is_what_its_numbers_give(fitting, records):
-    """143 Hz and 5 g, computed again from the fitted numbers; with wear, 135 Hz and 5 g, the second row."""
+def test_always_stored_cells_are_reproduced(fitting, records):
+    """The cell at 143 Hz and 5 g follows from the fitted parameters; with wear, that at 135 Hz and 5 g."""
     for (rung, reading, protocol, placebo), row in records.items():
         if protocol == "143" and not placebo and reading == fitting.RUNGS[rung].readings[-1]:
             cells = fitting.cells_for(rung)
@@ -173,21 +187,23 @@ def test_always_a_cell_of_every_rung_is_what_its_numbers_give(fitting, records):
             assert again == pytest.approx(np.array(row["cells"])[:, k], rel=2e-3), rung
 
 
-def test_always_the_readme_holds_what_the_scores_give(records):
-    """Sentences and tables between their marks; nothing else stands there."""
+def test_always_readme_has_the_tables_of_the_records(records):
+    """The README has the sentences and tables that follow from the records between its marks."""
     text = (ROOT / "table_1" / "README.md").read_text("utf-8")
     for name, lines in load_study("table_1/table.py").parts(records).items():
         assert "\n".join([f"<!-- {name} -->", *lines, "<!-- end -->"]) in text, name
 
 
-def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, records):
-    """What touches an end is marked, a gain is that of the training rows, and no fit is worse in training than one that
-    it contains, to half a per cent; a patch is not a point, and a damper alone lacks the spring of Fig. 27."""
+def test_always_records_have_consistent_bounds_gains_and_intervals(fitting, records):
+    """Bounds, gains, bootstrap intervals and numbers of equal optima of the records are consistent.
+
+    No fit is more than 0.5 % worse in training than a model that it contains.
+    """
     cells = read_readings(fitting.TABLE)
     for (rung, reading, protocol, placebo), row in records.items():
         question = fitting.RUNGS[rung].question(reading, *([placebo] if placebo else []))
         assert row["at_bound"] == fitting.bounds(question.ranges, row["values"])
-        left = (rung, reading, protocol) in (  # the last descent left all starts
+        left = (rung, reading, protocol) in (  # the last descent improved on all starts
             ("spring and yaw", fitting.STUCK_READING, "all"),
             ("rods, spring and yaw", ROOT2, "without 143"),
         )
@@ -213,9 +229,11 @@ def test_always_a_record_tells_its_valleys_gain_bounds_and_bootstrap(fitting, re
                 ), (rung, reading)
 
 
-def test_table_1_the_scores_that_the_study_tells(records, fitting):
-    """What the words of README.md say of the numbers beside them, and of ladder.py; spring and yaw within 0.002 of what
-    another program reached: .074 and .166."""
+def test_table_1_scores_support_the_conclusions(records, fitting):
+    """The scores support the statements of the README.
+
+    Spring and yaw agree with another program (0.074 and 0.166) within 0.002.
+    """
     table = load_study("table_1/table.py")
     one = {name: records[*key, "143", ""] for name, key in table.NAMED_FITS.items()}
     none = {name: (held, left) for name, _, _, held, left, _ in table.nulls()}
@@ -250,9 +268,8 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
         for key in ("spring", "path", "damped", "seen")
     }
     assert abs(every["damped"]["all"] - constant[1]["all"]) < 0.005
-    assert (
-        records[*table.NAMED_FITS["damped"], "without 143", ""]["at_bound"][3] == "low"
-    )  # its yaw
+    # the yaw of this fit is at its lower bound
+    assert records[*table.NAMED_FITS["damped"], "without 143", ""]["at_bound"][3] == "low"
     assert all(
         every[key]["displacement"] < 0.9 * constant[1]["displacement"]
         for key in ("spring", "path", "seen")
@@ -261,8 +278,8 @@ def test_table_1_the_scores_that_the_study_tells(records, fitting):
     assert min(found["acceleration"] for found in left) > strong[1]["acceleration"]
 
 
-def test_table_1_onset_runaway_and_slip_of_the_path_of_figure_27(records):
-    """README.md at 143 Hz: 4.2 g, no runaway, 49 degrees."""
+def test_table_1_onset_and_slip_phase_of_the_path_of_figure_27(records):
+    """At 143 Hz the model slips from 4.2 g, begins to slip at 49 degrees and does not run away."""
     values = records["path of Fig. 27", "peak x stuck", "143", ""]["values"]
     found = load_study("table_1/levels.py").row("path of Fig. 27", "peak x stuck", values, 143.0)
     assert (found["onset"], found["runaway"]) == (4.2, None) and found[
@@ -271,8 +288,11 @@ def test_table_1_onset_runaway_and_slip_of_the_path_of_figure_27(records):
 
 
 @pytest.mark.slow
-def test_table_1_the_grooves_run_away_first_where_the_rig_did_last(records):
-    """From 8.75 g at 135 Hz down to 8.25 g at 155 Hz; the rig was unstable at 135 Hz from 6 g."""
+def test_table_1_grooves_run_away_first_at_155_hz(records):
+    """The model with grooves runs away at 8.75 g at 135 Hz and at 8.25 g at 155 Hz.
+
+    The rig was unstable at 135 Hz from 6 g.
+    """
     levels = load_study("table_1/levels.py")
     fit = ("grooves, lift and yaw", "fundamental x gain")
     question = levels.RUNGS[fit[0]].question(fit[1])

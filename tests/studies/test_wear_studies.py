@@ -1,4 +1,4 @@
-"""What the studies of wear say, from their cheap share."""
+"""The wear studies: their stated figures, from inexpensive cases."""
 
 import re
 
@@ -9,8 +9,8 @@ from study_module import make_study_fixture
 bands = make_study_fixture("wear/bands.py")
 
 
-def sentence(bands, rows, within):
-    """The numbers of the docstring against rows of strokes 6.4 and 12.8 um."""
+def check_bands(bands, rows, within):
+    """Check the figures of the docstring against rows of strokes of 6.4 and 12.8 um."""
     new = rows[0]
     found = {(round(r.stroke / bands.STEP), round(r.worn / bands.UM)): r for r in rows[1:]}
     six = found[2, 6]
@@ -22,13 +22,14 @@ def sentence(bands, rows, within):
         [0.51, 1.30, 0.38, 1.09, 0.64, 1.55], abs=5 * within
     )
     assert [six.seen, twelve.seen] == pytest.approx([0.18, 0.45], abs=5 * within)
-    # what the sentence rests on
+    # these inequalities support the stated conclusion
     assert six.interval[1] > 1 and twelve.interval[1] > 1 and six.after_interval[0][1] < 1
 
 
-def test_always_the_sentence_on_bands(bands, tmp_path, capsys):
+def test_always_few_bands_give_stated_ratios(bands, tmp_path, capsys):
+    """Two surfaces give the stated amplitude ratios within 0.03."""
     rows = bands.main(strokes=(2, 4), seeds=2, bite=0.03e-6, path=tmp_path / "x.svg")
-    sentence(bands, rows, 0.03)
+    check_bands(bands, rows, 0.03)
     text = (tmp_path / "x.svg").read_text()
     assert all(
         each in text
@@ -38,9 +39,10 @@ def test_always_the_sentence_on_bands(bands, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_always_the_sentence_on_bands_in_full(bands):
+def test_always_all_bands_give_stated_ratios(bands):
+    """The complete study gives the stated amplitude ratios within 0.006."""
     rows = bands.main(path=None)
-    sentence(bands, rows, 0.006)
+    check_bands(bands, rows, 0.006)
     six = {round(r.stroke / bands.STEP): r.ratio for r in rows if r.worn > 5e-6}
     assert min(six, key=six.get) == 8 and six[8] == pytest.approx(0.53, abs=0.006)
     assert all(r.scatter < 0.03 for r in rows)
@@ -49,8 +51,8 @@ def test_always_the_sentence_on_bands_in_full(bands):
 story = make_study_fixture("wear/rig_story.py")
 
 
-def told(story, rows, within):
-    """The numbers of the docstring against the rows: new, then each coefficient."""
+def check_worn_rig(story, rows, within):
+    """Check the figures of the docstring against the new rig and each wear coefficient."""
     new, ten, hundred = (
         next(r for r in rows if r.coefficient == kappa) for kappa in (0.0, 1e-14, 1e-13)
     )
@@ -71,17 +73,18 @@ def told(story, rows, within):
 
 
 @pytest.mark.slow
-def test_always_the_sentence_on_the_worn_rig(story, tmp_path):
-    """Short marches and a loose tolerance: the patch is the same to some percent."""
+def test_always_short_run_of_the_worn_rig_gives_stated_figures(story, tmp_path):
+    """Short time marches with a loose tolerance give the stated figures within 15 %."""
     rows = story.main((1e-14, 1e-13), motion=60, tolerance="3e-2", path=tmp_path / "x.svg")
-    told(story, rows, 0.15)
+    check_worn_rig(story, rows, 0.15)
     assert "friction loop, change" in (tmp_path / "x.svg").read_text()
 
 
 @pytest.mark.slow
-def test_always_the_sentence_on_the_worn_rig_in_full(story):
+def test_always_complete_run_of_the_worn_rig_gives_stated_figures(story):
+    """The complete study gives the stated figures within 1 %."""
     rows = story.main(path=None)
-    told(story, rows, 0.01)
+    check_worn_rig(story, rows, 0.01)
     motion = [
         [r.values["relative_displacement_amplitude"] * 1e6, r.values["loop_area"] * 1e3]
         for r in rows
