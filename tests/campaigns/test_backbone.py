@@ -31,19 +31,22 @@ def segalman_loop(u):
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
 
 
-def test_exact_quasi_static_curve_of_iwan_joint_agrees_with_segalman():
+def test_exact_quasi_static_iwan_curve_agrees_with_segalman():
     """Quasi-static frequency and damping of an Iwan joint agree with Segalman's closed form within 1e-9."""
-    a = np.array([1e-5, 1e-4, 1e-3, 2.5e-3])
-    found = compute_backbone(build_block(IWAN), "", a, ("quasi-static",))
-    curve, (force, loss) = found.curves["quasi-static"], segalman_loop(a)
-    omega = np.sqrt(OMEGA**2 + force / (0.5 * a))
+    amplitudes = np.array([1e-5, 1e-4, 1e-3, 2.5e-3])
+    backbone = compute_backbone(build_block(IWAN), "", amplitudes, ("quasi-static",))
+    curve, (force, loss) = backbone.curves["quasi-static"], segalman_loop(amplitudes)
+    omega = np.sqrt(OMEGA**2 + force / (0.5 * amplitudes))
     assert curve.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
     assert curve.damping == pytest.approx(
-        0.002 * OMEGA / omega + loss / (np.pi * (omega * a) ** 2), rel=1e-9
+        0.002 * OMEGA / omega + loss / (np.pi * (omega * amplitudes) ** 2), rel=1e-9
     )
-    assert found.exponents.micro == pytest.approx(2.5, abs=1e-6) and found.exponents.gross is None
-    assert found.frequencies.free == pytest.approx(100)
-    assert found.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
+    assert (
+        backbone.exponents.micro == pytest.approx(2.5, abs=1e-6)
+        and backbone.exponents.gross is None
+    )
+    assert backbone.frequencies.free == pytest.approx(100)
+    assert backbone.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
 
 
 def test_balance_and_decay_of_iwan_joint_agree_within_errors():
@@ -53,30 +56,37 @@ def test_balance_and_decay_of_iwan_joint_agree_within_errors():
     harmonic describes the motion, so the damping by balance agrees with the quasi-static one within
     1e-3.
     """
-    a = np.geomspace(2e-5, 2e-3, 6)
-    found = compute_backbone(build_block(IWAN), "", a)
-    static, balance, decay = (found.curves[way] for way in ("quasi-static", "balance", "decay"))
+    amplitudes = np.geomspace(2e-5, 2e-3, 6)
+    backbone = compute_backbone(build_block(IWAN), "", amplitudes)
+    static, balance, decay = (
+        backbone.curves[method] for method in ("quasi-static", "balance", "decay")
+    )
     assert balance.damping[0] == pytest.approx(static.damping[0], rel=1e-3)
-    inside = np.isin(a, decay.amplitude)
-    change = np.gradient(balance.damping, np.log(a))[inside] * 2 * np.pi * balance.damping[inside]
+    inside = np.isin(amplitudes, decay.amplitude)
+    change = (
+        np.gradient(balance.damping, np.log(amplitudes))[inside]
+        * 2
+        * np.pi
+        * balance.damping[inside]
+    )
     off = np.abs(decay.damping - balance.damping[inside])
     assert inside.sum() >= 4 and (off < decay.damping_error + 2 * change).all()
     assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
 
 
-def test_exact_balanced_motion_returns_to_its_amplitude_after_a_cycle():
+def test_exact_balanced_motion_repeats_after_a_cycle():
     """A motion with the damping of the balance returns to its amplitude after a cycle within 1e-9.
 
     The amplitude was once the largest of 4096 samples, which is 3e-7 too small.
     """
-    found = compute_backbone(
+    backbone = compute_backbone(
         build_block('law = "tanh"\nreference_speed = "0.5 m/s"'),
         "",
-        a := [6e-4, 8e-4, 1.2e-3],
+        amplitudes := [6e-4, 8e-4, 1.2e-3],
         ("balance",),
     )
-    curve = found.curves["balance"]
-    for start, f, zeta in zip(a, curve.frequency, curve.damping):
+    curve = backbone.curves["balance"]
+    for start, f, zeta in zip(amplitudes, curve.frequency, curve.damping):
         damping = 2 * (0.002 * OMEGA - zeta * 2 * np.pi * f)
         end = solve_ivp(
             lambda t, y, c=damping: (
@@ -91,24 +101,24 @@ def test_exact_balanced_motion_returns_to_its_amplitude_after_a_cycle():
         assert end[0] / start == pytest.approx(1, abs=1e-9)
 
 
-def test_exact_rigid_friction_by_balance_and_decay_agrees_with_closed_form():
+def test_exact_rigid_friction_damping_agrees_with_closed_form():
     """The damping of a block on Coulomb friction agrees with closed forms within 2 %.
 
     The amplitude falls by 2 h = 2 F/k per half cycle, and the balance has the loss over 2 pi m
     omega^2 A^2; the higher harmonics that it leaves out are of the order of h/A.
     """
     h = 30 / (0.5 * OMEGA**2)
-    found = compute_backbone(build_block('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
-    decay = found.curves["decay"]
-    balance = found.curves["balance"]
-    assert list(found.missing) == ["quasi-static"]
-    assert "has no finite stiffness" in found.missing["quasi-static"]
+    backbone = compute_backbone(build_block('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
+    decay = backbone.curves["decay"]
+    balance = backbone.curves["balance"]
+    assert list(backbone.missing) == ["quasi-static"]
+    assert "has no finite stiffness" in backbone.missing["quasi-static"]
     first = 2 * h / (np.pi * balance.amplitude) + 0.002
     assert balance.damping == pytest.approx(first, rel=2e-2)
     assert decay.damping == pytest.approx(
         np.interp(decay.amplitude, balance.amplitude, balance.damping), rel=2e-2
     )
-    assert found.exponents.micro is None and found.exponents.gross == pytest.approx(1)
+    assert backbone.exponents.micro is None and backbone.exponents.gross == pytest.approx(1)
 
 
 def test_exact_backbone_of_cubic_spring_agrees_with_duffing():
@@ -118,25 +128,27 @@ def test_exact_backbone_of_cubic_spring_agrees_with_duffing():
     """
     scene = make_shaken_block(PLASTIC)
     scene = scene[scene.index("[structure]") :] + '[structure.stiffening]\ncubic = "1e9 N/m^3"\n'
-    a = np.array([1e-5, 1e-4])
-    found = compute_backbone(pf.build(scene), "", a, ("balance", "quasi-static"))
-    omega = np.sqrt(OMEGA**2 + 0.75e9 * a**2 / 0.5)
-    assert found.curves["balance"].frequency == pytest.approx(omega / (2 * np.pi), rel=1e-6)
-    static = np.sqrt(OMEGA**2 + 1e9 * a**2 / 0.5)
-    assert found.curves["quasi-static"].frequency == pytest.approx(static / (2 * np.pi), rel=1e-9)
-    assert found.curves["balance"].damping == pytest.approx(0.002 * OMEGA / omega, rel=1e-5)
+    amplitudes = np.array([1e-5, 1e-4])
+    backbone = compute_backbone(pf.build(scene), "", amplitudes, ("balance", "quasi-static"))
+    omega = np.sqrt(OMEGA**2 + 0.75e9 * amplitudes**2 / 0.5)
+    assert backbone.curves["balance"].frequency == pytest.approx(omega / (2 * np.pi), rel=1e-6)
+    static = np.sqrt(OMEGA**2 + 1e9 * amplitudes**2 / 0.5)
+    assert backbone.curves["quasi-static"].frequency == pytest.approx(
+        static / (2 * np.pi), rel=1e-9
+    )
+    assert backbone.curves["balance"].damping == pytest.approx(0.002 * OMEGA / omega, rel=1e-5)
 
 
 def test_flutter_amplitude_agrees_with_that_of_a_run():
     """The amplitude at which the damping falls through 0 agrees with the flutter amplitude within 1 %."""
     rig = pf.build(make_shaken_block(PLASTIC), **{"structure.mode.axial.damping": -0.01})
-    found = compute_backbone(rig, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
+    backbone = compute_backbone(rig, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
     free = make_shaken_block(PLASTIC).replace(
         'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
         'kind = "free"\ndisplacement = "1 mm"',
     )
     measure = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
-    assert found.flutter == pytest.approx(measure.value, rel=0.01)
+    assert backbone.flutter == pytest.approx(measure.value, rel=0.01)
 
 
 def test_modes_are_selected_by_name_and_matched_by_shape():
@@ -151,12 +163,14 @@ slide = 0.1
 [drive]""",
     )
     rig = pf.build(scene)
-    found = compute_backbone(rig, "axial", [1e-8], ("balance",))
+    backbone = compute_backbone(rig, "axial", [1e-8], ("balance",))
     k = np.diag([OMEGA**2, (160 * np.pi) ** 2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
-    assert found.frequencies.stuck == pytest.approx(
+    assert backbone.frequencies.stuck == pytest.approx(
         np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi)
     )
-    assert found.curves["balance"].frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
+    assert backbone.curves["balance"].frequency == pytest.approx(
+        backbone.frequencies.stuck, rel=1e-6
+    )
     low = compute_backbone(rig, "yaw", [1e-9], ("quasi-static",))
     first = np.sqrt(np.linalg.eigvalsh(k)[0]) / (2 * np.pi)
     assert low.curves["quasi-static"].frequency == pytest.approx(first, rel=1e-6)
@@ -173,10 +187,12 @@ def test_refuses_scenes_without_a_rig():
                 'amplitude = "1 mm"\nfrequency = "10 Hz"\n'
             )
         )
-    found = compute_backbone(
+    backbone = compute_backbone(
         build_block('law = "tanh"\nreference_speed = "1 mm/s"'), "", [1e-2, 2e-2]
     )
-    assert "sliding speed" in found.missing["quasi-static"] and set(found.curves) >= {"balance"}
+    assert "sliding speed" in backbone.missing["quasi-static"] and set(backbone.curves) >= {
+        "balance"
+    }
 
 
 @pytest.mark.parametrize(
@@ -214,13 +230,17 @@ def test_refuses_modes_without_a_backbone(scene, said):
 )
 def test_exact_rig_without_friction_has_constant_curves(scene):
     """Frequency and damping of a rig without friction do not depend on the amplitude, within 1e-9."""
-    found = compute_backbone(pf.build(scene))
-    for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
-        assert found.curves[way].frequency == pytest.approx(f, rel=1e-12)
-        assert found.curves[way].damping == pytest.approx(0.002, rel=1e-9)
-    assert not found.missing
-    assert found.exponents.micro is None
-    assert len(found.notes) == ("coulomb" in scene)
+    backbone = compute_backbone(pf.build(scene))
+    for method, f in (
+        ("balance", 100.0),
+        ("decay", 100 * np.sqrt(1 - 4e-6)),
+        ("quasi-static", 100.0),
+    ):
+        assert backbone.curves[method].frequency == pytest.approx(f, rel=1e-12)
+        assert backbone.curves[method].damping == pytest.approx(0.002, rel=1e-9)
+    assert not backbone.missing
+    assert backbone.exponents.micro is None
+    assert len(backbone.notes) == ("coulomb" in scene)
 
 
 def test_exact_damper_between_masses_agrees_with_eigenvalues():
@@ -260,12 +280,12 @@ def test_decay_with_stiff_contact_includes_cycles_of_slip():
     The duration was once 50 cycles of the stuck mode, which is 76 times as fast as the free one,
     and contained no cycle of slip.
     """
-    found = compute_backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
-    assert found.amplitude.tolist() == [2e-2, 3e-2]
-    assert (found.frequency_error < 1e-3 * found.frequency).all()
+    backbone = compute_backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
+    assert backbone.amplitude.tolist() == [2e-2, 3e-2]
+    assert (backbone.frequency_error < 1e-3 * backbone.frequency).all()
     # Damping of Coulomb friction in gross slip.
     lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)
-    assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
+    assert backbone.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
 def test_amplitudes_stay_within_travel():
@@ -273,9 +293,9 @@ def test_amplitudes_stay_within_travel():
     stopped = pf.build(
         make_shaken_block(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass')
     )
-    found = compute_backbone(stopped, methods=("decay", "quasi-static"))
-    assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
-    assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
+    backbone = compute_backbone(stopped, methods=("decay", "quasi-static"))
+    assert backbone.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
+    assert 1.5e-4 < backbone.curves["decay"].amplitude[-1] < 0.2e-3
     with pytest.raises(
         pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"
     ):
@@ -303,16 +323,19 @@ static = 0.3
 load = "100 N"
 """
     rig = make_shaken_block(PLASTIC)
-    a = np.array([2e-6, 9e-6, 12e-6, 30e-6])
-    found = compute_backbone(
-        pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]), "", a, ("balance",)
+    amplitudes = np.array([2e-6, 9e-6, 12e-6, 30e-6])
+    backbone = compute_backbone(
+        pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]),
+        "",
+        amplitudes,
+        ("balance",),
     )
-    curve = found.curves["balance"]
-    assert curve.amplitude == pytest.approx(a[:2]) and curve.frequency == pytest.approx(
-        found.frequencies.stuck, rel=1e-6
+    curve = backbone.curves["balance"]
+    assert curve.amplitude == pytest.approx(amplitudes[:2]) and curve.frequency == pytest.approx(
+        backbone.frequencies.stuck, rel=1e-6
     )
-    assert "without a result" in found.notes[0]
-    assert "did not converge at these amplitudes; the curve" in found.notes[0]
+    assert "without a result" in backbone.notes[0]
+    assert "did not converge at these amplitudes; the curve" in backbone.notes[0]
 
 
 FOLDED = make_shaken_block('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace(
@@ -346,15 +369,17 @@ def test_curve_continues_beyond_a_fold():
 
     Frequency and damping there agree with a computation of these amplitudes alone.
     """
-    a = np.array([25e-6, 28e-6, 40e-6])
-    found, found_alone = (
+    amplitudes = np.array([25e-6, 28e-6, 40e-6])
+    backbone, found_alone = (
         compute_backbone(pf.build(FOLDED, **{"accuracy.tolerance": 0.1}), "", one, ("balance",))
-        for one in (a, a[1:])
+        for one in (amplitudes, amplitudes[1:])
     )
-    whole = found.curves["balance"]
+    whole = backbone.curves["balance"]
     beyond = found_alone.curves["balance"]
-    assert whole.amplitude == pytest.approx(a) and beyond.amplitude == pytest.approx(a[1:])
-    assert not any("left out" in note for note in found.notes)
+    assert whole.amplitude == pytest.approx(amplitudes) and beyond.amplitude == pytest.approx(
+        amplitudes[1:]
+    )
+    assert not any("left out" in note for note in backbone.notes)
     assert (np.diff(whole.frequency) < 0).all()
     assert whole.frequency[1:] == pytest.approx(beyond.frequency, rel=1e-6)
     assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
@@ -378,16 +403,16 @@ def test_gross_slip_damping_of_two_modes_agrees_with_closed_form():
     The closed form is 4 F/(2 pi k A) plus the damping of the structure, for decay and balance; the
     quasi-static curve has the requested amplitudes.
     """
-    a = np.array([2e-3, 4e-3])
-    curves = compute_backbone(pf.build(TWO), "", a).curves
-    plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * a)
+    amplitudes = np.array([2e-3, 4e-3])
+    curves = compute_backbone(pf.build(TWO), "", amplitudes).curves
+    plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * amplitudes)
     assert curves["balance"].damping == pytest.approx(plain, rel=0.02)
     assert curves["decay"].damping == pytest.approx(
-        np.interp(curves["decay"].amplitude, a, plain), rel=0.02
+        np.interp(curves["decay"].amplitude, amplitudes, plain), rel=0.02
     )
     assert curves["decay"].amplitude.size == 2 and curves[
         "quasi-static"
-    ].amplitude == pytest.approx(a, rel=1e-6)
+    ].amplitude == pytest.approx(amplitudes, rel=1e-6)
 
 
 @pytest.mark.parametrize("two", [False, True])
@@ -396,17 +421,19 @@ def test_exact_decay_continues_in_stick(two):
 
     The stuck damping of a single mode is zeta omega/omega_stuck.
     """
-    a = np.geomspace(1e-7, 2e-3, 13)
+    amplitudes = np.geomspace(1e-7, 2e-3, 13)
     text = (
         TWO.replace("1 um", "0.1 mm")
         if two
         else make_shaken_block(PLASTIC.replace("1 mm", "10 um"))
     )
-    found = compute_backbone(pf.build(text), "", a, ("decay",))
-    curve = found.curves["decay"]
-    assert curve.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
+    backbone = compute_backbone(pf.build(text), "", amplitudes, ("decay",))
+    curve = backbone.curves["decay"]
+    assert curve.amplitude.size == 13 and not any(
+        "have a result" in note for note in backbone.notes
+    )
     # The other mode changes the damping ratio by up to 2e-4 there.
-    still = curve.amplitude < (1e-4 if two else 2e-6)
+    sticks = curve.amplitude < (1e-4 if two else 2e-6)
     if two:
         omegas = np.array([1, 4.7]) * OMEGA
         shape = np.diag([0.004, 0.006 * 4.7]) * OMEGA
@@ -420,13 +447,13 @@ def test_exact_decay_continues_in_stick(two):
         omega = np.sqrt(OMEGA**2 + 3e6 / 0.5)
         zeta = 0.002 * OMEGA / omega
         omega *= np.sqrt(1 - zeta**2)
-    assert still.sum() >= 3
+    assert sticks.sum() >= 3
     for value, error, truth in (
         (curve.damping, curve.damping_error, zeta),
         (curve.frequency, curve.frequency_error, omega / (2 * np.pi)),
     ):
-        assert (np.abs(value - truth) <= error + 1e-6 * truth)[still].all()
-    assert (curve.damping_error < (1e-4 if two else 0.2) * curve.damping)[still].all()
+        assert (np.abs(value - truth) <= error + 1e-6 * truth)[sticks].all()
+    assert (curve.damping_error < (1e-4 if two else 0.2) * curve.damping)[sticks].all()
 
 
 NEAR = make_shaken_block(PLASTIC.replace("1 mm", "0.1 mm")).replace(
@@ -446,23 +473,25 @@ def test_decay_with_motion_of_another_mode_is_rejected():
     Two modes 2 % apart exchange their energy after a release; the damping by decay was once 32
     times that of the free motion, with an error estimate of 15 %.
     """
-    found = compute_backbone(
+    backbone = compute_backbone(
         pf.build(NEAR), "axial", np.geomspace(1e-3, 1e-2, 5), ("balance", "decay")
     )
-    assert "decay" not in found.curves
-    assert "no longer a motion of this mode alone" in found.missing["decay"]
-    assert found.curves["balance"].damping[:3] == pytest.approx(0.002, rel=1e-3)
-    found = compute_backbone(
-        pf.build(NEAR), "axial", a := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay")
+    assert "decay" not in backbone.curves
+    assert "no longer a motion of this mode alone" in backbone.missing["decay"]
+    assert backbone.curves["balance"].damping[:3] == pytest.approx(0.002, rel=1e-3)
+    backbone = compute_backbone(
+        pf.build(NEAR), "axial", amplitudes := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay")
     )
-    balance = found.curves["balance"]
-    decay = found.curves["decay"]
-    assert balance.amplitude.size == a.size and decay.amplitude == pytest.approx(a[4:])
+    balance = backbone.curves["balance"]
+    decay = backbone.curves["decay"]
+    assert balance.amplitude.size == amplitudes.size and decay.amplitude == pytest.approx(
+        amplitudes[4:]
+    )
     assert decay.damping == pytest.approx(balance.damping[4:], rel=0.04)
     assert (decay.other_modes > 0.01).all()
     assert any(
         "fallen to 11 mm, the motion of other modes is more than 10 % of its am" in one
-        for one in found.notes
+        for one in backbone.notes
     )
 
 
@@ -530,13 +559,13 @@ def test_notes_state_which_mesh_errors_are_left_out():
     Bonds on elastic pieces have no known steady loop: their errors contain the change on a coarser
     mesh, and no error of the mesh if there is none.
     """
-    a = [1e-6, 2e-6]
-    found, few = (
-        compute_backbone(pf.build(one), "", a, ("decay",))
+    amplitudes = [1e-6, 2e-6]
+    backbone, few = (
+        compute_backbone(pf.build(one), "", amplitudes, ("decay",))
         for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW))
     )
     (said,), (unmeshed, few_note) = (
-        [note for note in one.notes if "the errors of" in note] for one in (found, few)
+        [note for note in one.notes if "the errors of" in note] for one in (backbone, few)
     )
     assert said.startswith(
         "the errors of method decay include the change on a coarser mesh, but not the energy that"
@@ -548,24 +577,24 @@ def test_notes_state_which_mesh_errors_are_left_out():
     assert few_note.startswith(
         "the errors of method decay include no error of the mesh, because the hysteresis loop of"
     )
-    assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
+    assert (backbone.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
     plain = compute_backbone(
-        pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",)
+        pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", amplitudes, ("balance",)
     )
     assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
 def test_stuck_frequency_follows_from_tangential_stiffness():
     """The stuck frequency agrees with the tangential stiffness of a run within their errors."""
-    found = compute_backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
+    backbone = compute_backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
     stiffness = pf.run(
         CROWNED[: CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
         'frequency = "1 Hz"\n'
     ).measures["tangential_stiffness"]
     stuck = np.sqrt(OMEGA**2 + stiffness.value / 0.5) / (2 * np.pi)
-    error = found.frequencies.stuck_error + stuck * stiffness.error / stiffness.value / 2
-    assert abs(found.frequencies.stuck - stuck) <= error < 1e-3 * stuck
-    assert "above the range of micro-slip" in " ".join(found.notes)
+    error = backbone.frequencies.stuck_error + stuck * stiffness.error / stiffness.value / 2
+    assert abs(backbone.frequencies.stuck - stuck) <= error < 1e-3 * stuck
+    assert "above the range of micro-slip" in " ".join(backbone.notes)
 
 
 @pytest.mark.parametrize("slide", [1.0, 0.01])
@@ -576,11 +605,13 @@ def test_default_amplitudes_end_where_mode_is_nearly_free(slide):
     mm if no `travel` was given.
     """
     rig = pf.build(make_shaken_block(IWAN).replace("slide = 1.0", f"slide = {slide}\noutput = 1.0"))
-    found = compute_backbone(rig, "", None, ("quasi-static",))
+    backbone = compute_backbone(rig, "", None, ("quasi-static",))
     deflected = 30 * slide / (0.5 * OMEGA**2)  # displacement by the friction limit [m]
     max_amplitude = max(deflected, 1.5e-3 / slide)
-    assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(15 * max_amplitude, rel=1e-6)
-    assert found.curves["quasi-static"].frequency[-1] < 1.05 * found.frequencies.free
+    assert backbone.curves["quasi-static"].amplitude[-1] == pytest.approx(
+        15 * max_amplitude, rel=1e-6
+    )
+    assert backbone.curves["quasi-static"].frequency[-1] < 1.05 * backbone.frequencies.free
 
 
 def test_loop_of_law_with_memory_is_evaluated_in_steady_state():
@@ -593,10 +624,10 @@ def test_loop_of_law_with_memory_is_evaluated_in_steady_state():
     few, many = (
         run_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values for cycles in (3.0, 96.0)
     )
-    found = settle_loop(joint.model, joint.patch, 3e-7, 400.0)
+    backbone = settle_loop(joint.model, joint.patch, 3e-7, 400.0)
     name = "secant_stiffness"
     assert abs(few[name] / many[name] - 1) > 1e-3
-    assert abs(found.run.values[name] / many[name] - 1) < 2e-3
+    assert abs(backbone.run.values[name] / many[name] - 1) < 2e-3
 
 
 def test_bonds_without_closed_loop_state_the_method_to_use():
@@ -616,19 +647,22 @@ def test_quasi_static_curve_ends_at_maximum_force():
     scene = make_shaken_block(PLASTIC)[make_shaken_block(PLASTIC).index("[structure]") :].replace(
         "[[structure.mode]]", bonded, 1
     )
-    found = compute_backbone(
+    backbone = compute_backbone(
         pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",)
     )
-    assert found.curves["quasi-static"].amplitude.size == 3
-    assert "curve does not reach these" in found.notes[0]
-    assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
+    assert backbone.curves["quasi-static"].amplitude.size == 3
+    assert "curve does not reach these" in backbone.notes[0]
+    assert backbone.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 
 def test_python_interface_returns_dataset():
     """The Python interface returns a dataset with sorted amplitudes and units, and refuses invalid arguments."""
-    found = pf.backbone(make_shaken_block(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
-    assert found["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
-    assert found["quasi_static_frequency"].attrs["units"] == "Hz" and found.attrs["mode"] == "axial"
+    backbone = pf.backbone(make_shaken_block(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
+    assert backbone["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
+    assert (
+        backbone["quasi_static_frequency"].attrs["units"] == "Hz"
+        and backbone.attrs["mode"] == "axial"
+    )
     with pytest.raises(pf.PatchfemError, match="one of balance"):
         pf.backbone(make_shaken_block(IWAN), method="static")
     with pytest.raises(pf.PatchfemError, match="above 0"):

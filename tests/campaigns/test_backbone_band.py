@@ -64,13 +64,15 @@ def test_exact_modes_as_argument_and_in_scene_give_same_curves(three_curves):
 
     Notes state which tables of the scene are ignored and that a modal mass is assumed.
     """
-    found = pf.backbone(LAW + STRUCTURE, amplitudes=AMPLITUDES)
-    assert found.balance_frequency.values == pytest.approx(three_curves.balance_frequency, rel=1e-9)
-    assert found.attrs["stuck_frequency"] == pytest.approx(100)
+    backbone = pf.backbone(LAW + STRUCTURE, amplitudes=AMPLITUDES)
+    assert backbone.balance_frequency.values == pytest.approx(
+        three_curves.balance_frequency, rel=1e-9
+    )
+    assert backbone.attrs["stuck_frequency"] == pytest.approx(100)
     assert "[slide] is ignored" in three_curves.attrs["notes"]
     assert "modal mass is assumed" in three_curves.attrs["notes"]
-    assert "[drive] is ignored" in found.attrs["notes"]
-    assert not any(name.startswith("decay") for name in found)
+    assert "[drive] is ignored" in backbone.attrs["notes"]
+    assert not any(name.startswith("decay") for name in backbone)
 
 
 def test_band_contains_curves_of_all_methods(three_curves):
@@ -78,25 +80,25 @@ def test_band_contains_curves_of_all_methods(three_curves):
 
     The damping by decay is up to 30 % larger than that by balance.
     """
-    found = three_curves
-    assert found.attrs["method"] == "balance"
-    advice = found.attrs["advice"]
+    backbone = three_curves
+    assert backbone.attrs["method"] == "balance"
+    advice = backbone.attrs["advice"]
     # The computed decay replaces the predicted ring-down, with the figures of the note.
     stated = re.search(r"The ring-down .*? reads (\S+ %) more damping at (\S+ um)", advice)
     assert (
         f"of damping by decay and by balance differ most at the amplitude {stated[2]}, by {stated[1]}"
-        in found.attrs["notes"]
+        in backbone.attrs["notes"]
     )
     assert "predicted" not in advice and "Up to 105 um friction dissipates nothing" in advice
     assert "A contact that sticks reaches its friction limit at 120 um" in advice
     for method in ("balance", "quasi_static", "decay"):
-        amplitude = found[f"{method}_amplitude"].values
-        here = np.isin(found.band_amplitude, amplitude)
+        amplitude = backbone[f"{method}_amplitude"].values
+        here = np.isin(backbone.band_amplitude, amplitude)
         assert here.sum() >= 8
         for name in ("frequency", "damping"):
-            value = found[f"{method}_{name}"].values[np.isin(amplitude, found.band_amplitude)]
-            assert (found[f"band_{name}_low"].values[here] <= value).all()
-            assert (found[f"band_{name}_high"].values[here] >= value).all()
+            value = backbone[f"{method}_{name}"].values[np.isin(amplitude, backbone.band_amplitude)]
+            assert (backbone[f"band_{name}_low"].values[here] <= value).all()
+            assert (backbone[f"band_{name}_high"].values[here] >= value).all()
 
 
 def test_band_by_balance_contains_curve_of_decay(three_curves):
@@ -104,22 +106,22 @@ def test_band_by_balance_contains_curve_of_decay(three_curves):
 
     The advice predicts the damping that a ring-down would show.
     """
-    found = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="balance")
-    assert set(found.data_vars) & {"decay_damping", "quasi_static_damping"} == set()
-    assert "is predicted to read" in found.attrs["advice"]
+    backbone = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="balance")
+    assert set(backbone.data_vars) & {"decay_damping", "quasi_static_damping"} == set()
+    assert "is predicted to read" in backbone.attrs["advice"]
     amplitude = three_curves.decay_amplitude.values
-    high = np.interp(amplitude, found.band_amplitude, found.band_damping_high)
-    low = np.interp(amplitude, found.band_amplitude, found.band_damping_low)
+    high = np.interp(amplitude, backbone.band_amplitude, backbone.band_damping_high)
+    low = np.interp(amplitude, backbone.band_amplitude, backbone.band_damping_low)
     error = three_curves.decay_damping_error.values
     inside = (low - error <= three_curves.decay_damping) & (
         three_curves.decay_damping <= high + error
     )
     assert inside.mean() > 0.9
-    curve = found.balance_damping.values
-    width = (found.band_damping_high.values - found.band_damping_low.values) / curve
+    curve = backbone.balance_damping.values
+    width = (backbone.band_damping_high.values - backbone.band_damping_low.values) / curve
     assert width[-1] < 0.1
     excess = three_curves.decay_damping.values / np.interp(
-        amplitude, found.band_amplitude, found.balance_damping
+        amplitude, backbone.band_amplitude, backbone.balance_damping
     )
     assert excess.max() > 1.05
 
@@ -129,13 +131,15 @@ def test_band_of_single_mode_is_narrow_except_at_onset_of_slip():
 
     Its median width is below 10 %; only at the onset of slip it is wider.
     """
-    found = pf.backbone(
+    backbone = pf.backbone(
         LAW + SLIDE, modes="100 Hz:0.005:0.5", amplitudes=AMPLITUDES, method="balance"
     )
-    assert "changes its shape" not in found.attrs["advice"]
-    width = (found.band_damping_high - found.band_damping_low).values / found.balance_damping.values
+    assert "changes its shape" not in backbone.attrs["advice"]
+    width = (
+        backbone.band_damping_high - backbone.band_damping_low
+    ).values / backbone.balance_damping.values
     assert width[0] < 1e-3 and width[-1] < 0.03 and np.median(width) < 0.1
-    assert (found.band_damping_low.values > 0.0049).all()
+    assert (backbone.band_damping_low.values > 0.0049).all()
 
 
 def test_advice_for_single_method_omits_other_methods():
@@ -161,15 +165,15 @@ def test_exact_predicted_ring_down_agrees_with_duffing_oscillator(cubic, start):
     amplitudes = middles[1:-1][:12:4]
     scene = DUFFING + f'[structure.stiffening]\ncubic = "{cubic} N/m^3"\n'
     curves = compute_backbone(pf.build(scene), "", amplitudes, ("balance",))
-    found = curves.answer.band.ring_down.damping
-    assert found[::-1] == pytest.approx(damping[:12:4], rel=5e-3)
+    backbone = curves.answer.band.ring_down.damping
+    assert backbone[::-1] == pytest.approx(damping[:12:4], rel=5e-3)
 
 
 def test_quasi_static_curve_tends_to_free_frequency():
     """The quasi-static frequency tends to the stuck and the free frequency at the ends, within 1e-3."""
-    found = pf.backbone(LAW + STRUCTURE, amplitudes=[1e-6, 1.0], method="quasi-static")
-    assert found.quasi_static_frequency.values == pytest.approx(
-        [100, found.attrs["free_frequency"]], rel=1e-3
+    backbone = pf.backbone(LAW + STRUCTURE, amplitudes=[1e-6, 1.0], method="quasi-static")
+    assert backbone.quasi_static_frequency.values == pytest.approx(
+        [100, backbone.attrs["free_frequency"]], rel=1e-3
     )
 
 

@@ -48,21 +48,21 @@ cycles = 20
     )
 
 
-def write_page(found) -> str:
+def write_page(backbone) -> str:
     """Return the page of a backbone after writing its picture, its table and its netCDF contents."""
-    if found.curves:
-        pictures.draw_charts(backbone_files.backbone_charts(found.curves))
-    backbone_files.backbone_contents(found)
-    backbone_files.format_backbone(found)
-    return backbone_files.page_html(found, "title")
+    if backbone.curves:
+        pictures.draw_charts(backbone_files.backbone_charts(backbone.curves))
+    backbone_files.backbone_contents(backbone)
+    backbone_files.format_backbone(backbone)
+    return backbone_files.page_html(backbone, "title")
 
 
-def check_curve_or_reason(law: str, damping: float, way: str, other_mode: str) -> None:
+def check_curve_or_reason(law: str, damping: float, method: str, other_mode: str) -> None:
     """Check that a method gives either a curve with errors or a reason, and that the page can be written."""
-    found = compute_backbone(make_rig(law, damping, other_mode), "", AMPLITUDES, (way,))
-    assert "<html" in write_page(found)
-    assert (way in found.curves) != (way in found.missing)
-    for curve in found.curves.values():
+    backbone = compute_backbone(make_rig(law, damping, other_mode), "", AMPLITUDES, (method,))
+    assert "<html" in write_page(backbone)
+    assert (method in backbone.curves) != (method in backbone.missing)
+    for curve in backbone.curves.values():
         for error in (curve.frequency_error, curve.damping_error):
             assert np.isfinite(error).all() and (error >= 0).all()
         assert (curve.frequency > 0).all() and np.isfinite(curve.damping).all()
@@ -97,10 +97,10 @@ def test_damping_is_zero_at_limit_cycle_of_a_run(law):
 
     The run without a drive computes the limit cycle from its own equations, without a backbone.
     """
-    found = compute_backbone(make_rig(law, -0.02), "", AMPLITUDES, ("balance",))
+    backbone = compute_backbone(make_rig(law, -0.02), "", AMPLITUDES, ("balance",))
     free = pf.run(make_rig(law, -0.02, drive='kind = "free"\ndisplacement = "0.1 mm"'))
-    assert found.flutter == pytest.approx(free.measures["flutter_amplitude"].value, rel=1e-4)
-    assert "the mode gains energy" in write_page(found)
+    assert backbone.flutter == pytest.approx(free.measures["flutter_amplitude"].value, rel=1e-4)
+    assert "the mode gains energy" in write_page(backbone)
 
 
 def test_decay_is_evaluated_below_an_unstable_limit_cycle():
@@ -111,13 +111,13 @@ def test_decay_is_evaluated_below_an_unstable_limit_cycle():
 
     One swing loses up to 40 % of the amplitude here, so both agree to a few percent only.
     """
-    found = compute_backbone(
+    backbone = compute_backbone(
         make_rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay")
     )
-    decay = found.curves["decay"]
-    balance = found.curves["balance"]
-    assert decay.amplitude[-1] < found.flutter < balance.amplitude[-1]
+    decay = backbone.curves["decay"]
+    balance = backbone.curves["balance"]
+    assert decay.amplitude[-1] < backbone.flutter < balance.amplitude[-1]
     assert decay.damping == pytest.approx(
         balance.damping[balance.amplitude <= decay.amplitude[-1]], rel=0.05
     )
-    assert any("grows, because the negative damping" in note for note in found.notes)
+    assert any("grows, because the negative damping" in note for note in backbone.notes)

@@ -171,13 +171,13 @@ def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, reference_force(law, time, slide, TRUTH[law])
     )
-    found = fit_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
-    assert found.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
-    assert found.rms < 1e-7 * LOAD and found.held_rms is None and found.step_error == 0
+    result = fit_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
+    assert result.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
+    assert result.rms < 1e-7 * LOAD and result.held_rms is None and result.step_error == 0
     assert (
-        found.keys.fit.intervals.ends[:, 0] <= found.keys.fit.values
-    ).all() and found.keys.warnings == []
-    assert np.ptp(found.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
+        result.keys.fit.intervals.ends[:, 0] <= result.keys.fit.values
+    ).all() and result.keys.warnings == []
+    assert np.ptp(result.keys.fit.intervals.ends, axis=1) == pytest.approx(0, abs=1e-6)
 
 
 def test_exact_parameters_of_bond_growth_are_recovered(tmp_path):
@@ -203,13 +203,13 @@ def test_exact_parameters_of_bond_growth_are_recovered(tmp_path):
         ],
     )
     force = bench.run(build(true_scene), None, 4, path=(time, slide, 0, 0.0)).force
-    found = fit_loop(
+    result = fit_loop(
         scene, write_loop(tmp_path / "loop.csv", time, slide, force), free_ranges(*names)
     )
-    assert found.keys.fit.values == pytest.approx(
+    assert result.keys.fit.values == pytest.approx(
         [TRUTH["growth"][name] for name in names], rel=1e-6
     )
-    assert found.pieces == 1 and found.rms < 1e-6
+    assert result.pieces == 1 and result.rms < 1e-6
 
 
 def test_order_of_bond_growth_fit_is_two(tmp_path):
@@ -233,11 +233,11 @@ def test_order_of_bond_growth_fit_is_two(tmp_path):
     results = []
     for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
         scene = load_scene(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
-        found = fit_loop(scene, loop, free_ranges("friction.static"))
-        assert found.step_error <= 0.1 * tolerance * 31
-        assert found.rms < 1.4 * found.step_error
-        assert pieces is None or found.pieces == pieces
-        results.append((found.pieces, found.rms))
+        result = fit_loop(scene, loop, free_ranges("friction.static"))
+        assert result.step_error <= 0.1 * tolerance * 31
+        assert result.rms < 1.4 * result.step_error
+        assert pieces is None or result.pieces == pieces
+        results.append((result.pieces, result.rms))
     (few_pieces, coarse_rms), (many_pieces, fine_rms) = results
     assert (
         np.log(coarse_rms / fine_rms) / np.log(many_pieces / few_pieces)
@@ -260,8 +260,8 @@ def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
     )
     (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
     for scene in (load_scene(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
-        found = fit_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
-        assert found.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+        result = fit_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
+        assert result.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
 
 
 def test_exact_loop_of_tilted_patch_is_independent_of_earlier_trials(tmp_path):
@@ -302,15 +302,15 @@ def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
     The design matrix is computed from the reference force of this file at the fitted values.
     """
     time, slide, force = noisy_loop(law, 0)
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, law),
         write_loop(tmp_path / "loop.csv", time, slide, force),
         free_ranges(*TRUTH[law]),
     )
-    best = found.keys.fit.values
+    best = result.keys.fit.values
     names = list(TRUTH[law])
 
-    def at(k, share):
+    def compute_force(k, share):
         return reference_force(
             law,
             time,
@@ -319,8 +319,11 @@ def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
         )
 
     # Derivatives with respect to the logarithm of a value.
-    design = np.stack([(at(k, 1e-5) - at(k, -1e-5)) / 2e-5 for k in range(best.size)], axis=1)
-    residual = at(-1, 0.0) - force
+    design = np.stack(
+        [(compute_force(k, 1e-5) - compute_force(k, -1e-5)) / 2e-5 for k in range(best.size)],
+        axis=1,
+    )
+    residual = compute_force(-1, 0.0) - force
     assert design.T @ residual == pytest.approx(
         0, abs=2e-3 * np.linalg.norm(design) * np.linalg.norm(residual) / 9
     )
@@ -331,8 +334,8 @@ def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
     ends = np.stack([best * (1 - half), best * (1 + half)], axis=1)
     if law == "elastic-plastic":  # the bond length is fitted on a logarithmic scale
         ends[1] = best[1] * np.exp([-half[1], half[1]])
-    assert found.keys.fit.intervals.methods == ("linear",) * best.size
-    assert found.keys.fit.intervals.ends == pytest.approx(ends, rel=2e-4)
+    assert result.keys.fit.intervals.methods == ("linear",) * best.size
+    assert result.keys.fit.intervals.ends == pytest.approx(ends, rel=2e-4)
 
 
 # ---- parameters that the rows do not determine, and doubtful records
@@ -340,19 +343,19 @@ def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
 
 def test_exact_inseparable_parameters_are_reported(tmp_path):
     """The friction coefficient and the load are reported as inseparable; only their product is determined."""
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, "elastic-plastic"),
         write_loop(tmp_path / "loop.csv", *noisy_loop("elastic-plastic", 3, 0.1, 24)),
         free_ranges("friction.static", "friction.bond_length", "normal.load"),
     )
-    static, _, load_ = found.keys.fit.values
+    static, _, load_ = result.keys.fit.values
     assert static * load_ == pytest.approx(31, rel=5e-3)
-    assert np.isnan(found.keys.fit.intervals.ends[[0, 2]]).all()
-    assert np.isfinite(found.keys.fit.intervals.ends[1]).all()
+    assert np.isnan(result.keys.fit.intervals.ends[[0, 2]]).all()
+    assert np.isfinite(result.keys.fit.intervals.ends[1]).all()
     assert any(
         "friction.static and normal.load cannot be determined separately" in text
         and "only their product is known" in text
-        for text in found.keys.warnings
+        for text in result.keys.warnings
     )
 
 
@@ -362,17 +365,17 @@ def test_exact_parameters_without_effect_are_reported(tmp_path):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
     )
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         [*free_ranges("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"],
     )
     assert (
         "slide.cycles has no effect on the computed data, so its value is not determined"
-        in found.keys.warnings
+        in result.keys.warnings
     )
-    found = fit_loop(load_scene(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
-    assert found.keys.fit.values[0] == 0.25 and "at its high bound 0.25" in found.keys.warnings[0]
+    result = fit_loop(load_scene(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
+    assert result.keys.fit.values[0] == 0.25 and "at its high bound 0.25" in result.keys.warnings[0]
 
 
 def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
@@ -386,12 +389,12 @@ def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
     cycle = 1 + (np.arange(81) > 40)
     wrong = write_loop(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = load_scene(tmp_path, "elastic-plastic")
-    found = fit_loop(
+    result = fit_loop(
         scene, wrong, free_ranges("friction.static", "friction.bond_length"), ["cycle=2.0"]
     )
-    assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
-    assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
-    assert found.held_out.sum() == 40
+    assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and result.rms < 1e-6
+    assert result.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
+    assert result.held_out.sum() == 40
     first = fit_loop(
         scene,
         write_loop(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
@@ -405,7 +408,7 @@ def test_always_doubtful_records_give_warnings(tmp_path):
     """Correlated rows, a nonzero first force and another amplitude than that of the scene give warnings."""
     time, slide = sine_path(40)
     late = elastic_plastic_force(slide, 0.31, 2.3e-6)[20:]
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
         write_loop(
             tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)
@@ -413,7 +416,7 @@ def test_always_doubtful_records_give_warnings(tmp_path):
         free_ranges("friction.static", "friction.bond_length"),
     )
     assert [
-        any(text in one for one in found.keys.warnings)
+        any(text in one for one in result.keys.warnings)
         for text in (
             "rows are correlated",
             "the force in the first row is",
@@ -437,13 +440,13 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
     )
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         free_ranges("friction.static", "friction.bond_length"),
     )
-    assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
-    assert "evenly spaced" in found.keys.warnings[0]
+    assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
+    assert "evenly spaced" in result.keys.warnings[0]
     with pytest.raises(
         PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"
     ):
@@ -456,13 +459,13 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
         "displacement [um],force [N]\n"
         + "\n".join(f"{q},{31 * s}" for q, s in zip(position, force))
     )
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, "tanh", "friction.static=0.31", slide=triangle),
         loop,
         free_ranges("friction.reference_speed"),
     )
-    assert found.keys.fit.values == pytest.approx([1.7e-3], rel=1e-6)
-    assert "computed from slide" in found.keys.warnings[0]
+    assert result.keys.fit.values == pytest.approx([1.7e-3], rel=1e-6)
+    assert "computed from slide" in result.keys.warnings[0]
 
 
 # ---- the fit command
@@ -483,11 +486,11 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     free = "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
     answer = run_cli(*fit_command, "--free", free, "--hold", "cycle=2", "--json")
     assert answer.code == 0, answer.err
-    found = json.loads(answer.out)
-    assert found == json.loads((tmp_path / "out/fit.json").read_text())
-    static = found["values"]["friction.static"]
+    result = json.loads(answer.out)
+    assert result == json.loads((tmp_path / "out/fit.json").read_text())
+    static = result["values"]["friction.static"]
     assert static["interval"][0] < 0.31 < static["interval"][1]
-    assert found["held"]["rows"] == 24 and found["unit"] == "N"
+    assert result["held"]["rows"] == 24 and result["unit"] == "N"
     page = (tmp_path / "out/report.html").read_text("utf-8")
     value, _, (low, high) = format_fitted(static)
     assert (
@@ -638,8 +641,8 @@ def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
     )
-    found = fit_loop(scene, loop, free_ranges("friction.static"))
+    result = fit_loop(scene, loop, free_ranges("friction.static"))
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
-    text = fitted_scene_text(found.keys, loop.name, tmp_path)
+    text = fitted_scene_text(result.keys, loop.name, tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)
     assert text.startswith("# friction.static fitted to loop.csv: ")

@@ -37,9 +37,9 @@ def test_exact_offset_of_force_is_recovered_from_steady_loop(tmp_path):
     cut = slice(93, 280)
     loop = write_loop(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
     scene = load_scene(tmp_path, "bonds")
-    found = fit_loop(scene, loop, free_ranges(*NAMES), options=LoopOptions(("force",), True))
-    assert found.keys.fit.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
-    assert found.rms < 1e-5 * LOAD and found.keys.warnings == []
+    result = fit_loop(scene, loop, free_ranges(*NAMES), options=LoopOptions(("force",), True))
+    assert result.keys.fit.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
+    assert result.rms < 1e-5 * LOAD and result.keys.warnings == []
     plain = fit_loop(scene, loop, free_ranges(*NAMES))
     assert plain.rms > 1.0 and any("--warm-up" in one for one in plain.keys.warnings)
 
@@ -50,13 +50,13 @@ def test_exact_offset_of_displacement_is_recovered(tmp_path):
     position = 1.1e-6 + slide
     force = elastic_plastic_force(np.concatenate([[0.0], position]), *TRUTH)[1:]
     loop = write_loop(tmp_path / "loop.csv", time, slide, force)
-    found = fit_loop(
+    result = fit_loop(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         free_ranges(*NAMES),
         options=LoopOptions(("displacement",)),
     )
-    assert found.keys.fit.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
+    assert result.keys.fit.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
 
 
 def test_exact_warm_up_path_ends_at_first_row(tmp_path):

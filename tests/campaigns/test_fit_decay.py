@@ -49,11 +49,11 @@ def test_exact_parameters_are_recovered_from_computed_decay(tmp_path):
     The fitted scene has the same values.
     """
     path = write_decay(tmp_path / "decay.csv", IWAN)
-    found = pf.fit(START, to=path, free=FREE, starts=2, out=tmp_path / "out")
-    values = {name: fitted["value"] for name, fitted in found["values"].items()}
+    result = pf.fit(START, to=path, free=FREE, starts=2, out=tmp_path / "out")
+    values = {name: fitted["value"] for name, fitted in result["values"].items()}
     assert values["friction.stiffness"] == pytest.approx(1e6, rel=1e-5)
     assert values["friction.chi"] == pytest.approx(-0.35, abs=1e-5)
-    assert found["outcome"] == "done" and found["rms"]["damping"] < 1e-5
+    assert result["outcome"] == "done" and result["rms"]["damping"] < 1e-5
     assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(
         -0.35, abs=1e-5
     )
@@ -78,7 +78,7 @@ def test_exact_overdamped_trials_are_skipped(tmp_path):
     """
     path = write_decay(tmp_path / "decay.csv", FLUID, amplitudes=np.geomspace(1e-4, 1e-3, 3))
     free = {"friction.reference_speed": ("0.01 m/s", "3 m/s")}
-    found = pf.fit(
+    result = pf.fit(
         FLUID,
         to=path,
         free=free,
@@ -86,8 +86,10 @@ def test_exact_overdamped_trials_are_skipped(tmp_path):
         starts=1,
         **{"friction.reference_speed": "20 mm/s"},
     )
-    assert found["method"] == "balance" and found["rms"]["damping"] < 1e-4 and found["failures"] > 0
-    assert found["values"]["friction.reference_speed"]["value"] == pytest.approx(0.3, rel=1e-5)
+    assert (
+        result["method"] == "balance" and result["rms"]["damping"] < 1e-4 and result["failures"] > 0
+    )
+    assert result["values"]["friction.reference_speed"]["value"] == pytest.approx(0.3, rel=1e-5)
     with pytest.raises(
         PatchfemError,
         match=r"no curve of frequency and damping.*balance: the mode does not oscillate.*"

@@ -53,9 +53,9 @@ def test_exact_parameters_of_each_law_are_recovered_from_its_loops(law, keys):
     true_law = Friction.model_construct(law=law, static=0.3, **keys)
     amplitudes = np.geomspace(2e-7, 6e-5, 20)
     target = Curves(*steady_loop(true_law, 100.0, amplitudes))
-    found = LawProblem(law, 0.3, 100.0, amplitudes, target, 5e6).solve()
-    assert found.values == pytest.approx(keys, rel=1e-6)
-    assert np.abs(found.deviations).max() < 1e-6
+    result = LawProblem(law, 0.3, 100.0, amplitudes, target, 5e6).solve()
+    assert result.values == pytest.approx(keys, rel=1e-6)
+    assert np.abs(result.deviations).max() < 1e-6
 
 
 def test_mesh_is_refined_until_micro_slip_exponent_is_accurate():
@@ -67,10 +67,10 @@ def test_mesh_is_refined_until_micro_slip_exponent_is_accurate():
     pinned = fit_patch(pf.load(JOINT + SLIDE))
     assert "energy loss has an error" in pinned.warnings[0]
     assert "leave contact.element_size out" in pinned.warnings[0]
-    found = fit_patch(pf.load(JOINT.replace('element_size = "0.2 mm"\n', "") + SLIDE))
-    assert found.laws["iwan"].values["chi"] > -0.02 and not found.warnings
-    assert found.patch.nodes > 2 * pinned.patch.nodes
-    assert np.sqrt(np.mean(found.patch.mesh_change[1] ** 2)) < 0.1
+    result = fit_patch(pf.load(JOINT.replace('element_size = "0.2 mm"\n', "") + SLIDE))
+    assert result.laws["iwan"].values["chi"] > -0.02 and not result.warnings
+    assert result.patch.nodes > 2 * pinned.patch.nodes
+    assert np.sqrt(np.mean(result.patch.mesh_change[1] ** 2)) < 0.1
 
 
 def test_exact_rough_wedge_is_fitted_by_an_iwan_law():
@@ -79,11 +79,11 @@ def test_exact_rough_wedge_is_fitted_by_an_iwan_law():
     The pressure falls linearly to zero, so that the yield displacements of the nodes are uniformly
     distributed.
     """
-    found = fit_patch(pf.load(WINKLER), np.geomspace(5e-8, 1e-6, 12))
-    iwan = found.laws["iwan"]
+    result = fit_patch(pf.load(WINKLER), np.geomspace(5e-8, 1e-6, 12))
+    iwan = result.laws["iwan"]
     assert iwan.values["chi"] == 0.0 and iwan.values["beta"] == pytest.approx(0.0, abs=2e-2)
     assert iwan.values["stiffness"] == pytest.approx(0.8e12 * 12.7e-3**2, rel=1e-3)
-    assert np.abs(iwan.deviations).max() < 2e-3 and found.best == "iwan"
+    assert np.abs(iwan.deviations).max() < 2e-3 and result.best == "iwan"
 
 
 def test_rig_with_fitted_law_has_backbone_of_the_patch(tmp_path):
@@ -95,13 +95,13 @@ def test_rig_with_fitted_law_has_backbone_of_the_patch(tmp_path):
     slides = np.geomspace(*answer["amplitudes"], answer["rows"])
     method = {"method": "quasi-static", "amplitudes": slides}
     patch = pf.backbone(RIG, **method)
-    for law, one in answer["laws"].items():
+    for law, fit in answer["laws"].items():
         point = pf.backbone(tmp_path / f"out/scene.{law}.toml", **method)
         f, zeta = (
             point[f"quasi_static_{name}"].values / patch[f"quasi_static_{name}"].values - 1
             for name in ("frequency", "damping")
         )
-        stiffness, loss = (abs(one[part]["largest"]) for part in ("stiffness", "dissipation"))
+        stiffness, loss = (abs(fit[part]["largest"]) for part in ("stiffness", "dissipation"))
         assert np.abs(f).max() <= 1 - np.sqrt(1 - stiffness)
         assert np.abs(zeta).max() <= (1 + loss) / (1 - stiffness) - 1
         # The stiffness of the contact has a large effect on the frequency of the mode.
@@ -127,13 +127,13 @@ def test_rig_with_fitted_law_has_backbone_of_the_patch(tmp_path):
 )
 def test_exact_slip_force_is_friction_coefficient_times_load(table):
     """The slip force of a patch and of each fitted law is mu N, also with strips or a holder."""
-    found = fit_patch(
+    result = fit_patch(
         pf.load(RIG.replace("[contact.shear]\n", "[contact.shear]\n" + table)), [1e-8, 1e-6, 1e-4]
     )
-    assert found.patch.slip_force == pytest.approx(0.3 * found.patch.load, rel=1e-9)
+    assert result.patch.slip_force == pytest.approx(0.3 * result.patch.load, rel=1e-9)
     assert all(
-        one.curves.force[-1] == pytest.approx(found.patch.slip_force, rel=1e-6)
-        for one in found.laws.values()
+        one.curves.force[-1] == pytest.approx(result.patch.slip_force, rel=1e-6)
+        for one in result.laws.values()
     )
 
 

@@ -19,6 +19,7 @@ FREE = ("--free", "wear.coefficient=1e-16 m^2/N..1e-13 m^2/N")
 
 @pytest.fixture
 def scene(tmp_path):
+    """Path of the scene of a tilted patch that wears."""
     path = tmp_path / "worn.toml"
     path.write_text(WORN)
     return path
@@ -68,24 +69,25 @@ def test_exact_interval_of_depth_scales_interval_of_coefficient(scene, tmp_path)
 def test_refuses_unsuitable_depths_and_parameters(scene, tmp_path):
     """Depths outside the bounds, other quantities, other parameters and scenes without a patch are refused."""
 
-    def said(*words):
+    def fit_error(*words):
+        """Return the error message of a refused fit."""
         answer = run_cli("fit", scene, *words)
         assert answer.code == 2
         assert "Traceback" not in answer.err
         assert not (tmp_path / "out").exists()
         return answer.err
 
-    assert "raise the high bound" in said("--to", "worn_depth_max=1 mm", *FREE)
-    assert "below the low bound" in said("--to", "worn_depth_max=1e-3 nm", *FREE)
-    assert "only wear.coefficient" in said(
+    assert "raise the high bound" in fit_error("--to", "worn_depth_max=1 mm", *FREE)
+    assert "below the low bound" in fit_error("--to", "worn_depth_max=1e-3 nm", *FREE)
+    assert "only wear.coefficient" in fit_error(
         "--to", "worn_depth_max=1 um", "--free", "friction.static=0.1..0.6"
     )
-    assert "is not a possible quantity; use" in said("--to", "depth=1 um", *FREE)
+    assert "is not a possible quantity; use" in fit_error("--to", "depth=1 um", *FREE)
     (tmp_path / "nothing.json").write_text('{"worn_depth_mean": null}')
-    assert "no worn depth" in said("--to", tmp_path / "nothing.json", *FREE)
+    assert "no worn depth" in fit_error("--to", tmp_path / "nothing.json", *FREE)
     (tmp_path / "nothing.json").write_text("[" * 100_000)
-    assert "not the JSON" in said("--to", tmp_path / "nothing.json", *FREE)
+    assert "not the JSON" in fit_error("--to", tmp_path / "nothing.json", *FREE)
     scene.write_text(POINT + COULOMB + SINE + WEAR)
-    assert "use [contact]" in said("--to", "worn_depth_max=1 um", *FREE)
+    assert "use [contact]" in fit_error("--to", "worn_depth_max=1 um", *FREE)
     with pytest.raises(PatchfemError, match="above zero"):
         read_depth("worn_depth_max=0 um")

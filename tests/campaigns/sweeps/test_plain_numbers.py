@@ -135,9 +135,9 @@ def test_exact_derived_models_equal_models_built_from_text(name):
     sweep_scene = SweepScene(Path("a.toml"), SCENES[name], ("normal.load=20 N",))
     n_derived = 0
     for sets, values in random_cases(len(name), count):
-        found = model_or_reason(sweep_scene, sets, values)
+        derived = model_or_reason(sweep_scene, sets, values)
         built = model_or_reason(sweep_scene, sets, ())
-        assert are_identical(found, built), sets
+        assert are_identical(derived, built), sets
         n_derived += (
             sweep_scene._derive_model(sets, values) is not None if not isinstance(built, str) else 0
         )

@@ -36,10 +36,10 @@ def compute_indices(x, values, errors=0.0, shape=None):
     ).get("loop_area")
 
 
-def collect_indices(found):
+def collect_indices(indices):
     """Return first-order and total indices and the ends of their intervals, sorted by key."""
     return {
-        name: np.array([getattr(one, name) for one in sorted(found)])
+        name: np.array([getattr(one, name) for one in sorted(indices)])
         for name in ("first", "total", "low", "high")
     }
 
@@ -50,15 +50,15 @@ def test_exact_intervals_cover_sobol_indices_of_ishigami(count):
 
     The estimates agree with the closed forms within 0.03.
     """
-    found = collect_indices(
+    indices = collect_indices(
         compute_indices(
             draw_points(count, 3, count), evaluate_ishigami(draw_points(count, 3, count))
         )
     )
-    assert np.all((found["low"] <= TOTAL) & (TOTAL <= found["high"]))
-    assert np.abs(found["total"] - TOTAL).max() < 0.03
-    assert np.abs(found["first"] - FIRST).max() < 0.03
-    assert np.all(found["high"] - found["low"] < {128: 1, 256: 0.6, 1024: 0.2}[count])
+    assert np.all((indices["low"] <= TOTAL) & (TOTAL <= indices["high"]))
+    assert np.abs(indices["total"] - TOTAL).max() < 0.03
+    assert np.abs(indices["first"] - FIRST).max() < 0.03
+    assert np.all(indices["high"] - indices["low"] < {128: 1, 256: 0.6, 1024: 0.2}[count])
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -76,8 +76,8 @@ def test_always_intervals_cover_indices_of_discontinuous_function(seed):
             / evaluate_threshold(a).var()
         )
     x = np.random.default_rng(seed).random((200, 3))
-    found = collect_indices(compute_indices(x, evaluate_threshold(x)))
-    assert np.all((found["low"] <= truth) & (truth <= found["high"]))
+    indices = collect_indices(compute_indices(x, evaluate_threshold(x)))
+    assert np.all((indices["low"] <= truth) & (truth <= indices["high"]))
 
 
 def test_exact_indices_of_grid_agree_with_its_variances():
@@ -89,9 +89,9 @@ def test_exact_indices_of_grid_agree_with_its_variances():
     x = np.stack([a.ravel(), b.ravel()], axis=1)
     values = (2 * a + b + a * b).ravel()
     parts = np.array([4 * 2 / 3, 3.0, 2.0])
-    found = collect_indices(compute_indices(x, values, shape=(3, 4)))
-    np.testing.assert_allclose(found["first"], parts[:2] / parts.sum(), rtol=1e-12)
-    np.testing.assert_allclose(found["total"], (parts[:2] + 2) / parts.sum(), rtol=1e-12)
+    indices = collect_indices(compute_indices(x, values, shape=(3, 4)))
+    np.testing.assert_allclose(indices["first"], parts[:2] / parts.sum(), rtol=1e-12)
+    np.testing.assert_allclose(indices["total"], (parts[:2] + 2) / parts.sum(), rtol=1e-12)
     values[3] = np.nan
     assert compute_indices(x, values, shape=(3, 4)) is None  # a grid with a missing value
 
@@ -109,7 +109,7 @@ def test_always_undetermined_indices_are_omitted():
     assert compute_indices(x[:, :1], x[:, 0]) is None  # a single key
     # The points with a value are no uniform sample.
     assert compute_indices(x, np.where(x[:, 0] < 0.3, np.nan, x[:, 1])) is None
-    found = compute_indices(x, 3 * x[:, 0] + x[:, 1])
-    assert [one.key for one in found] == ["k0", "k1", "k2"] and found[0].total == pytest.approx(
+    indices = compute_indices(x, 3 * x[:, 0] + x[:, 1])
+    assert [one.key for one in indices] == ["k0", "k1", "k2"] and indices[0].total == pytest.approx(
         0.9, abs=0.01
     )

@@ -35,10 +35,10 @@ def test_exact_early_processes_use_the_chosen_meshes():
         4, [part[:2] for part in iterate_chunks(WORK, range(4), LocalExecutor())]
     )
     pool = Pool(2)
-    found = join_case_results(4, [part[:2] for part in iterate_chunks(WORK, range(4), pool)])
-    assert pool.ready == [] and found.numerics == local.numerics
+    joined = join_case_results(4, [part[:2] for part in iterate_chunks(WORK, range(4), pool)])
+    assert pool.ready == [] and joined.numerics == local.numerics
     for name, values in local.values.items():
-        np.testing.assert_allclose(found.values[name], values, rtol=1e-9)
+        np.testing.assert_allclose(joined.values[name], values, rtol=1e-9)
 
 
 def test_exact_processes_are_at_most_as_many_as_cases():

@@ -30,7 +30,7 @@ def test_exact_units_in_header_or_cells_are_read(tmp_path):
     assert law.values == ("coulomb", "tanh")
 
 
-def test_exact_keys_of_list_items_are_read_in_both_notations(tmp_path):
+def test_exact_list_item_keys_have_two_notations(tmp_path):
     """Keys of list items are read from the header with brackets and with dots."""
     for key in ("structure.interface[1].load", "structure.interface.0.load"):
         cases, mistakes = read_case_table(
