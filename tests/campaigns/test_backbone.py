@@ -196,7 +196,7 @@ def test_refuses_scenes_without_a_rig():
 
 
 @pytest.mark.parametrize(
-    "scene, said",
+    "scene, message",
     [
         (
             make_shaken_block(PLASTIC).replace("100 N", "0 N")
@@ -215,9 +215,9 @@ def test_refuses_scenes_without_a_rig():
         ),
     ],
 )
-def test_refuses_modes_without_a_backbone(scene, said):
+def test_refuses_modes_without_a_backbone(scene, message):
     """Zero load with a cubic spring, an output that does not move and a mode at 0 Hz are refused."""
-    with pytest.raises(pf.PatchfemError, match=said):
+    with pytest.raises(pf.PatchfemError, match=message):
         compute_backbone(pf.build(scene))
 
 
@@ -564,13 +564,13 @@ def test_notes_state_which_mesh_errors_are_left_out():
         compute_backbone(pf.build(one), "", amplitudes, ("decay",))
         for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW))
     )
-    (said,), (unmeshed, few_note) = (
+    (message,), (unmeshed, few_note) = (
         [note for note in one.notes if "the errors of" in note] for one in (backbone, few)
     )
-    assert said.startswith(
+    assert message.startswith(
         "the errors of method decay include the change on a coarser mesh, but not the energy that"
     )
-    assert said.endswith(
+    assert message.endswith(
         "because the hysteresis loop of this friction law is not known without a computation in time"
     )
     assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")

@@ -209,7 +209,7 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize(
-    "scene, modes, said",
+    "scene, modes, message",
     [
         (LAW + SLIDE, "120", "'120': .*FREQUENCY:DAMPING"),
         (LAW + SLIDE, "120 mm:0.01", "120 mm.*frequency"),
@@ -222,7 +222,7 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
         (pf.build(LAW + STRUCTURE), "9 Hz:0.01", "cannot be given with a Model"),
     ],
 )  # fmt: skip
-def test_refuses_invalid_modes(scene, modes, said):
+def test_refuses_invalid_modes(scene, modes, message):
     """Modes with invalid text, units, slide or beside a structure of masses are refused."""
-    with pytest.raises(pf.PatchfemError, match=f"(?s){said}"):
+    with pytest.raises(pf.PatchfemError, match=f"(?s){message}"):
         pf.backbone(scene, modes=modes)

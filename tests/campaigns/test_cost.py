@@ -253,18 +253,18 @@ def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         (["--over", "colour"], "use one of element_size"),
         (["--over", "steps_per_cycle"], "possible settings: element_size"),
     ],
 )
-def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, said):
+def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, message):
     """Settings that do not apply to the scene are refused with a list of those that do."""
     scene = tmp_path / "a.toml"
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = run_cli("cost", scene, *words)
-    assert answer.code == 2 and said in answer.err
+    assert answer.code == 2 and message in answer.err
 
 
 def test_exact_steps_are_the_only_setting_of_a_point_scene():

@@ -525,7 +525,7 @@ def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_
     assert json.loads((tmp_path / "out/fit.json").read_text())["outcome"] == "not_converged"
 
 
-@pytest.mark.parametrize("free, says", [
+@pytest.mark.parametrize("free, message", [
     ("friction.static=0.6..0.1", "friction.static: the low bound 0.6 must lie below the high bound 0.1"),
     ("friction.static=0.1..0.1", "must lie below"), ("friction.static=0.1..nan", "a plain number is needed, not nan"),
     ("friction.static=-0.1..1", "friction.static: must be >= 0, not -0.1"), ("friction.law=1..2", "is not a number "
@@ -538,17 +538,17 @@ def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_
     ("friction.static=0..1,friction.static=0..2", "friction.static: is given twice"),
     ("friction.bond_length=1 um..1e999 um", "too large"), ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
 ])  # fmt: skip
-def test_refuses_invalid_range_of_parameter(fit_command, free, says, tmp_path):
+def test_refuses_invalid_range_of_parameter(fit_command, free, message, tmp_path):
     """An invalid range of `--free` is refused with the reason, and no file is written."""
     answer = run_cli(*fit_command, "--free", free)
-    assert answer.code == 2 and says in answer.err and not (tmp_path / "out").exists()
+    assert answer.code == 2 and message in answer.err and not (tmp_path / "out").exists()
 
 
 HEAD = "time [s],displacement [um],force [N]\n"
 BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
 
 
-@pytest.mark.parametrize("text, says", [
+@pytest.mark.parametrize("text, message", [
     ("", ":1: a header like"), (HEAD, ":1: a measured loop needs at least two rows"),
     ("time [s],displacement [um]\n" + "0,0\n1,1\n", ":1: no column force"),
     ("time [s],displacement [um],force\n" + BODY, ":1: a header like `time [s],displacement [um],force [N]` is needed"),
@@ -561,20 +561,20 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
     (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
     (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "only 2 rows are used"),
 ])  # fmt: skip
-def test_refuses_invalid_loop_with_line_number(fit_command, text, says, tmp_path):
+def test_refuses_invalid_loop_with_line_number(fit_command, text, message, tmp_path):
     """An invalid table of a measured loop is refused with its file, line and reason."""
     (tmp_path / "loop.csv").write_text(text)
     answer = run_cli(
         *fit_command, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um"
     )
-    assert answer.code == 2 and "loop.csv" in answer.err and says in answer.err, answer.err
+    assert answer.code == 2 and "loop.csv" in answer.err and message in answer.err, answer.err
 
 
-@pytest.mark.parametrize("table, says", [
+@pytest.mark.parametrize("table, message", [
     ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-6"),
     ("time [s],displacement [m],wobble [N]\n0,0,0\n0.1,2e-6,5\n", "slide.csv:1: a header like"),
 ])  # fmt: skip
-def test_refuses_invalid_path_file_with_message_of_check(tmp_path, table, says):
+def test_refuses_invalid_path_file_with_message_of_check(tmp_path, table, message):
     """An invalid path file is refused by `run` and `fit` with the message of `check`.
 
     The fit used to report an internal error instead, because the scene itself was valid.
@@ -598,21 +598,21 @@ def test_refuses_invalid_path_file_with_message_of_check(tmp_path, table, says):
             "fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit"
         ),
     ]
-    assert f"{scene}:8: slide.file: " in answers[0].err and says in answers[0].err
+    assert f"{scene}:8: slide.file: " in answers[0].err and message in answers[0].err
     assert answers[1:] == answers[:1] * 2 and answers[0].code == 2
 
 
 def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
     """Invalid options of `--hold`, missing files and unsuitable scenes are refused."""
     free = ["--free", "friction.static=0.1..0.7"]
-    for words, code, says in (
+    for words, code, message in (
         (["--hold", "cycle=3"], 2, "no row of"),
         (["--hold", "run=3"], 2, "has no column of labels"),
         (["--hold", "cycle"], 2, "column=value,value"),
         (["--hold", "cycle=1,2"], 2, "only 0 rows are"),
     ):
         answer = run_cli(*fit_command, *free, *words)
-        assert answer.code == code and says in answer.err, answer.err
+        assert answer.code == code and message in answer.err, answer.err
     assert run_cli(*fit_command[:3], tmp_path / "none.csv", *free).code == 4
     (tmp_path / "scene.toml").write_text(
         POINT + LAWS["coulomb"].replace("0.5", "-1") + SINE, "utf-8"

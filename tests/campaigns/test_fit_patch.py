@@ -170,7 +170,7 @@ def test_fit_command_prints_largest_differences_of_the_loops(tmp_path, monkeypat
 
 
 @pytest.mark.parametrize(
-    "text, said, mended",
+    "text, message, valid_text",
     [
         (POINT + make_friction_table("iwan") + SLIDE, "[contact]", JOINT + SLIDE),
         (CROWN, "[friction]", JOINT + SLIDE),
@@ -199,17 +199,17 @@ def test_fit_command_prints_largest_differences_of_the_loops(tmp_path, monkeypat
         ),
     ],
 )
-def test_refuses_unsuitable_patch_and_names_remedy(text, said, mended):
+def test_refuses_unsuitable_patch_and_names_remedy(text, message, valid_text):
     """A scene whose patch has no single-point law is refused, and the stated remedy makes the fit possible."""
     with pytest.raises(pf.PatchfemError) as error:
         fit_patch(pf.load(text))
-    assert said in str(error.value)
-    assert fit_patch(pf.load(mended), [1e-8, 5e-8, 2e-7]).laws
+    assert message in str(error.value)
+    assert fit_patch(pf.load(valid_text), [1e-8, 5e-8, 2e-7]).laws
 
 
 def test_refuses_incompatible_options_of_fit():
     """Options that exclude each other, and ranges of amplitudes that are too short, are refused."""
-    for given, said in (
+    for given, message in (
         ({}, "from_patch alone"),
         ({"from_patch": True, "to": "a.csv"}, "from_patch alone"),
         ({"from_patch": True, "amplitudes": "1 um,2 um"}, "at least three"),
@@ -217,5 +217,5 @@ def test_refuses_incompatible_options_of_fit():
         ({"amplitudes": "1 um..2 um:4"}, "applies only to"),
         ({"from_patch": True, "hold": "a=1"}, "hold"),
     ):
-        with pytest.raises(pf.PatchfemError, match=said):
+        with pytest.raises(pf.PatchfemError, match=message):
             pf.fit(JOINT + SLIDE, **given)

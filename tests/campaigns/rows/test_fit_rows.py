@@ -359,8 +359,8 @@ def test_exact_fit_command_writes_documented_json(tmp_path):
         "-o",
         str(out),
     ]
-    code, text, said = run_cli(*given)
-    assert code == 0, said
+    code, text, message = run_cli(*given)
+    assert code == 0, message
     answer = json.loads((out / "fit.json").read_text())
     one = answer["values"]["structure.mode.axial.frequency"]
     assert one["low"] < one["value"] < one["high"] and one["unit"] == "Hz"
@@ -443,7 +443,7 @@ def test_exact_placebos_are_complete_fits(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "words, said",
+    "words, message",
     [
         (["--offset", "force"], "applies only to fits to a loop"),
         (["--starts", "0"], "at least one"),
@@ -456,7 +456,7 @@ def test_exact_placebos_are_complete_fits(tmp_path):
         (["--unstable", "maybe"], "unstable"),
     ],
 )
-def test_refuses_unsuitable_rows_options(tmp_path, words, said):
+def test_refuses_unsuitable_rows_options(tmp_path, words, message):
     """Options that do not apply to a fit to rows are refused before any file is written."""
     given = [
         "fit",
@@ -470,7 +470,7 @@ def test_refuses_unsuitable_rows_options(tmp_path, words, said):
         *words,
     ]
     code, _, err = run_cli(*given)
-    assert code == 2 and said in err
+    assert code == 2 and message in err
     assert not (tmp_path / "out").exists() and not (tmp_path / "out.partial").exists()
 
 

@@ -75,15 +75,15 @@ def test_always_worker_differences_are_named():
     """The error message names the packages and files in which a worker differs from this machine."""
     here = Cluster.__new__(Cluster)
     here.name, mine = "--executor dask:tcp://x:1", environment_versions(make_work(Path("a.toml")))
-    said = str(
+    message = str(
         here._worker_error(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine)
     )
     assert (
         "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem "
         + mine["patchfem"]
-        in said
+        in message
     )
-    assert "numpy" not in said and "files" not in said
+    assert "numpy" not in message and "files" not in message
     assert "numpy 1.0" in str(here._worker_error(mine | {"numpy": "1.0"}, mine))
     assert "differ between a worker" in str(here._worker_error(mine | {"files": "other"}, mine))
     assert "is not installed on a worker" in str(
@@ -107,7 +107,7 @@ def test_refuses_worker_with_other_version(monkeypatch):
     """A worker with another version of patchfem is refused, before the sweep or at its first chunk."""
     import distributed
 
-    said = r"a worker has patchfem 0.\d, but this machine has patchfem 0.\d; install the same version on all"
+    message = r"a worker has patchfem 0.\d, but this machine has patchfem 0.\d; install the same version on all"
     with distributed.LocalCluster(
         1,
         processes=False,
@@ -119,9 +119,9 @@ def test_refuses_worker_with_other_version(monkeypatch):
         ready = Cluster(one.scheduler.address)
         left = [[0], [1]]
         monkeypatch.setattr(cluster, "environment_versions", changing_versions)
-        with pytest.raises(Missing, match=said):
+        with pytest.raises(Missing, match=message):
             Cluster(one.scheduler.address)
-        with pytest.raises(Missing, match=said):
+        with pytest.raises(Missing, match=message):
             list(
                 ready.run(make_work(Path("a.toml")), lambda idle=True: left.pop() if left else None)
             )
@@ -173,11 +173,11 @@ def test_always_lost_scheduler_keeps_finished_cases(tmp_path):
             pass
     finally:
         server.kill()
-    _, said = running.communicate(timeout=60)
-    assert running.returncode == 4, said
-    assert "the connection to the scheduler is lost; " in said
-    assert "of 3000 cases are kept; continue with: patchfem sweep" in said
-    assert "Traceback" not in said and "CommClosed" not in said
+    _, message = running.communicate(timeout=60)
+    assert running.returncode == 4, message
+    assert "the connection to the scheduler is lost; " in message
+    assert "of 3000 cases are kept; continue with: patchfem sweep" in message
+    assert "Traceback" not in message and "CommClosed" not in message
 
 
 @pytest.mark.slow

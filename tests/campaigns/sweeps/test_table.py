@@ -56,7 +56,7 @@ def test_exact_result_columns_of_a_sweep_are_ignored(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "text, says",
+    "text, messages",
     [
         ("outcome,loop_area\nsteady,1\n", ["the first line must be a header such as"]),
         (
@@ -89,9 +89,9 @@ def test_exact_result_columns_of_a_sweep_are_ignored(tmp_path):
         ("contact.load [N]\n", ["a header such as"]),
     ],
 )
-def test_refuses_invalid_tables_with_line_number(tmp_path, text, says):
+def test_refuses_invalid_tables_with_line_number(tmp_path, text, messages):
     """Each mistake in a table of cases is refused with its line."""
     cases, mistakes = read_case_table(write_table(tmp_path, text))
-    assert cases is None and len(mistakes) == len(says)
-    for line, expected in zip(mistakes, says):
+    assert cases is None and len(mistakes) == len(messages)
+    for line, expected in zip(mistakes, messages):
         assert expected in line
