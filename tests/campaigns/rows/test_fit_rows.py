@@ -244,9 +244,9 @@ def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert (
         np.abs(cells.logs(*cold)).max() < 1e-6
-    )  # the remaining transient of the rows after 400 cycles
+    )  # The tolerance is the remaining transient of the rows after 400 cycles.
     computed([0.46, 2.5e6], range(6))
-    # started from motions at nearby values
+    # These motions start from those at nearby values.
     assert np.array(computed([0.45, 2.4e6], range(6))) == pytest.approx(cold, rel=1e-9)
 
 

@@ -28,9 +28,9 @@ def test_exact_table_1_has_readings_of_report():
     assert (np.count_nonzero(cells.felt), np.count_nonzero(~cells.felt)) == (27, 8)
     assert len(cells.conditions) == 20 and cells.empty == [
         8
-    ]  # the condition 143 Hz, 8 g is unstable and has no reading
+    ]  # The condition 143 Hz, 8 g is unstable and has no reading.
     assert np.count_nonzero(cells.unstable) == 4
-    assert len(set(cells.runs)) == 6  # four frequencies, two of them with repeats
+    assert len(set(cells.runs)) == 6  # four frequencies, two of which are repeated
 
 
 def test_exact_repeated_conditions_are_separate_readings(tmp_path):

@@ -17,21 +17,21 @@ THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm
 
 def make_cases(*texts) -> Cases:
     """Return the cases of axes given as texts."""
-    found, wrong = read_axes(texts)
+    axes, wrong = read_axes(texts)
     assert wrong == []
-    return Cases(tuple(found))
+    return Cases(tuple(axes))
 
 
 def test_exact_cases_are_all_combinations():
     """The cases are all combinations of the values, and the last key varies fastest."""
-    found = make_cases(*THREE)
+    cases = make_cases(*THREE)
     want = list(combinations(("1 N", "2 N"), ("0.1", "0.2", "0.3"), ("1 mm/s", "2 mm/s")))
-    assert [found.texts(number) for number in range(len(found))] == want and found.shape == (
+    assert [cases.texts(number) for number in range(len(cases))] == want and cases.shape == (
         2,
         3,
         2,
     )
-    assert found.sets(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
+    assert cases.sets(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
 
 
 def test_exact_combined_cases_equal_direct_product():
@@ -43,9 +43,9 @@ def test_exact_combined_cases_equal_direct_product():
 def test_exact_rows_are_combined_with_axes():
     """Rows of a table are combined with every value of an axis."""
     rows = replace(make_cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), rows=True)
-    found = combine_cases([rows, make_cases("slide.speed=1 mm/s,2 mm/s")])
-    assert found.rows and found.shape == (4,)
-    assert [found.texts(number) for number in range(4)] == [
+    cases = combine_cases([rows, make_cases("slide.speed=1 mm/s,2 mm/s")])
+    assert cases.rows and cases.shape == (4,)
+    assert [cases.texts(number) for number in range(4)] == [
         ("1 N", "0.3", "1 mm/s"),
         ("1 N", "0.3", "2 mm/s"),
         ("2 N", "0.4", "1 mm/s"),
@@ -55,27 +55,27 @@ def test_exact_rows_are_combined_with_axes():
 
 def test_exact_case_name_depends_on_values_only():
     """The name of a case depends on its values, not on their order, their units or the other cases."""
-    asked = SweepScene(Path("a.toml"), BENCH)
-    one = make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(asked).tolist()
-    assert len(set(one)) == 4
-    other = make_cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(asked)
-    assert other.tolist() == [one[0], one[2], one[1], one[3]]
-    assert set(make_cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(asked)) & set(
-        one
-    ) == set(one[:2])
+    scene = SweepScene(Path("a.toml"), BENCH)
+    names = make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(scene).tolist()
+    assert len(set(names)) == 4
+    reordered = make_cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(scene)
+    assert reordered.tolist() == [names[0], names[2], names[1], names[3]]
+    assert set(make_cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(scene)) & set(
+        names
+    ) == set(names[:2])
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
     assert (
         make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2")
         .names(SweepScene(Path("a.toml"), swept))
         .tolist()
-        == one
+        == names
     )
 
 
 def test_exact_cases_with_same_pieces_are_neighbours():
     """Cases with the same pieces are computed one after another."""
-    found = make_cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
-    assert found.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
+    cases = make_cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
+    assert cases.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
     assert make_cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [
         0,
         1,
@@ -83,10 +83,11 @@ def test_exact_cases_with_same_pieces_are_neighbours():
         3,
     ]
     assert make_cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
-    found = make_cases(
+    cases = make_cases(
         "drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm"
     )
-    assert found.neighbours(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]  # those of one patch side by side
+    # Cases with the same patch are adjacent.
+    assert cases.neighbours(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]
     assert replace(make_cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours(
         [2, 0, 1]
     ) == [
@@ -113,7 +114,7 @@ def test_exact_cases_with_shared_mesh_are_named_by_sweep():
     sizes = [
         make_cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)
     ]
-    assert sizes[0] == sizes[1]  # each case pins its own
+    assert sizes[0] == sizes[1]  # each case sets its own element size
 
 
 def test_exact_case_name_depends_on_file_content(tmp_path):
@@ -121,13 +122,13 @@ def test_exact_case_name_depends_on_file_content(tmp_path):
     path = tmp_path / "path.csv"
     path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")
     text = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
-    asked = SweepScene(tmp_path / "a.toml", text)
-    found = make_cases("normal.load=1 N")
+    scene = SweepScene(tmp_path / "a.toml", text)
+    cases = make_cases("normal.load=1 N")
     asked_beside = SweepScene(tmp_path / "a.toml", BENCH)
     beside = make_cases("slide.file=path.csv")
-    before = found.names(asked), beside.names(asked_beside)
+    before = cases.names(scene), beside.names(asked_beside)
     path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
-    assert found.names(asked)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
+    assert cases.names(scene)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
 
 
 def test_exact_case_equals_scene_with_settings():
@@ -138,23 +139,23 @@ def test_exact_case_equals_scene_with_settings():
         BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n',
     ):
         for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
-            found = SweepScene(Path("a.toml"), text).scene(sets)
+            case = SweepScene(Path("a.toml"), text).scene(sets)
             want = loads(BENCH, "a.toml", sets)
-            assert found.tables() == want.tables() and found.sweep == () and found.kind == want.kind
+            assert case.tables() == want.tables() and case.sweep == () and case.kind == want.kind
 
 
 def test_always_spread_cases_contain_axis_ends():
     """A selection of at most 100 cases contains the first and the last value of every axis."""
-    found = make_cases(
+    cases = make_cases(
         "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
     )
-    some = found.spread_cases(100)
+    some = cases.spread_cases(100)
     assert len(set(some)) == len(some)
     assert 50 < len(some) <= 100
-    assert all(0 <= one < len(found) for one in some)
-    for axis, size in enumerate(found.shape):
-        assert {0, size - 1} <= {found.places(one)[axis] for one in some}
-    assert found.spread_cases(720) == list(range(720))
+    assert all(0 <= one < len(cases) for one in some)
+    for axis, size in enumerate(cases.shape):
+        assert {0, size - 1} <= {cases.places(one)[axis] for one in some}
+    assert cases.spread_cases(720) == list(range(720))
 
 
 def test_exact_common_mistake_is_reported_once():

@@ -47,10 +47,10 @@ def scene_path(tmp_path):
 def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
     """A worker in another folder reads the files of the scene, gives the same results, and stays in its folder."""
     monkeypatch.chdir(scene_path.parent)
-    asked = make_work(Path("bench.toml"), BY_FILE)
-    want, _ = compute_chunk(asked, [0, 1, 2])
+    work = make_work(Path("bench.toml"), BY_FILE)
+    want, _ = compute_chunk(work, [0, 1, 2])
     there = make_work(scene_path, BY_FILE)
-    mine = environment_versions(asked)
+    mine = environment_versions(work)
     monkeypatch.chdir(scene_path.parents[1] / "there")
     _, (found, _) = _answer(there, [0, 1, 2], (mine, Path("bench.toml")))
     assert found.messages == want.messages and len(want.messages) == 1
@@ -97,10 +97,10 @@ def test_always_worker_differences_are_named():
 SEEN = []
 
 
-def changing_versions(asked=None) -> dict:
+def changing_versions(work=None) -> dict:
     """Return the versions of this environment with another version of patchfem at each call."""
-    SEEN.append(asked)
-    return environment_versions(asked) | {"patchfem": f"0.{len(SEEN)}"}
+    SEEN.append(work)
+    return environment_versions(work) | {"patchfem": f"0.{len(SEEN)}"}
 
 
 def test_refuses_worker_with_other_version(monkeypatch):

@@ -21,29 +21,31 @@ def test_exact_sweep_time_is_sum_of_cases(text, over):
 
     The memory is that of the largest case.
     """
-    asked = SweepScene(Path("a.toml"), text)
-    cases = read_cases(asked, Request([over]))
-    told = estimate_sweep(asked, cases)
-    plans = [plan(asked.model(cases.sets(number))) for number in range(3)]
-    # margin [s] for the work that no plan contains
+    scene = SweepScene(Path("a.toml"), text)
+    cases = read_cases(scene, Request([over]))
+    estimate = estimate_sweep(scene, cases)
+    plans = [plan(scene.model(cases.sets(number))) for number in range(3)]
     seconds = [one.seconds for one in plans]
-    least = 0.05
-    assert max(seconds) <= told["seconds"] + least and told["seconds"] <= sum(seconds) + least
-    assert sum(seconds) - 3 * SWEEP_SECONDS <= told["seconds"] + least
-    assert told["bytes"] == max(one.bytes for one in plans) > min(one.bytes for one in plans)
+    margin = 0.05  # time [s] for the work that no plan contains
+    assert (
+        max(seconds) <= estimate["seconds"] + margin
+        and estimate["seconds"] <= sum(seconds) + margin
+    )
+    assert sum(seconds) - 3 * SWEEP_SECONDS <= estimate["seconds"] + margin
+    assert estimate["bytes"] == max(one.bytes for one in plans) > min(one.bytes for one in plans)
 
 
 def test_always_disk_space_estimate_is_within_factor_two(tmp_path):
     """The estimated disk space of a sweep is right within a factor of two."""
-    asked = SweepScene(Path("a.toml"), POINT + COULOMB + SHORT)
-    cases = read_cases(asked, Request(["friction.static=0.05..0.6:40lin"]))
-    sweep_into(asked, cases, SweepTarget(tmp_path / "a"), LocalExecutor())
+    scene = SweepScene(Path("a.toml"), POINT + COULOMB + SHORT)
+    cases = read_cases(scene, Request(["friction.static=0.05..0.6:40lin"]))
+    sweep_into(scene, cases, SweepTarget(tmp_path / "a"), LocalExecutor())
     files = [
         one.stat().st_size
         for one in (tmp_path / "a").rglob("*")
         if one.is_file() and one.suffix != ".html"
     ]
-    assert 0.5 < estimate_sweep(asked, cases)["disk_bytes"] / sum(files) < 2
+    assert 0.5 < estimate_sweep(scene, cases)["disk_bytes"] / sum(files) < 2
 
 
 def test_always_estimate_distinguishes_batched_and_single_cases():
@@ -52,20 +54,20 @@ def test_always_estimate_distinguishes_batched_and_single_cases():
     Both figures were measured.
     """
     path = Path(__file__).parents[3] / "studies/rig/rig.toml"
-    asked = SweepScene(path, path.read_text("utf-8"))
+    scene = SweepScene(path, path.read_text("utf-8"))
 
     def seconds_per_case(*over, count=64):
         """Return the estimated seconds per case of a sweep."""
-        return estimate_sweep(asked, read_cases(asked, Request(over, None, count, count > 0)))[
+        return estimate_sweep(scene, read_cases(scene, Request(over, None, count, count > 0)))[
             "seconds_per_case"
         ]
 
-    together = seconds_per_case("friction.static=0.25..0.35", "contact.load=20 lbf..30 lbf")
-    alone = seconds_per_case(
+    batched = seconds_per_case("friction.static=0.25..0.35", "contact.load=20 lbf..30 lbf")
+    single = seconds_per_case(
         "friction.static=0.25..0.35", "structure.mode.axial.damping=0.002..0.004"
     )
-    assert 0.03 < together < 0.13 and 0.25 < alone < 1.0  # measured: 0.055 and 0.47 s
-    # 0.47
+    assert 0.03 < batched < 0.13 and 0.25 < single < 1.0  # Measured 0.055 and 0.47 s.
+    # Cases with different tilt are computed one at a time.
     assert (
         0.25
         < seconds_per_case(
@@ -98,13 +100,13 @@ def test_exact_contradiction_in_part_of_range_is_reported(more, count, of, helps
 
     The estimate counts the failing cases and is still made.
     """
-    asked = SweepScene(Path("a.toml"), POINT + COULOMB + more + SHORT)
+    scene = SweepScene(Path("a.toml"), POINT + COULOMB + more + SHORT)
     cases = read_cases(
-        asked,
+        scene,
         Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
     )
-    said = contradictions(asked, cases)
-    assert said.startswith(f"{of} will fail: a.toml:" if of else "")
-    assert bool(said) == bool(of)
-    assert helps in said
-    assert estimate_sweep(asked, cases)["cases"] == count
+    message = contradictions(scene, cases)
+    assert message.startswith(f"{of} will fail: a.toml:" if of else "")
+    assert bool(message) == bool(of)
+    assert helps in message
+    assert estimate_sweep(scene, cases)["cases"] == count

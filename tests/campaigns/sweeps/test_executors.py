@@ -43,23 +43,23 @@ def make_work(text=BENCH, count=8, tell=None) -> Work:
     return Work(SweepScene(Path("a.toml"), text), Cases(tuple(axes)), tell)
 
 
-def run_all_cases(asked: Work, executor) -> tuple:
+def run_all_cases(work: Work, executor) -> tuple:
     """Return the results in the order of the cases, and the values reported by `tell` by case."""
-    count = len(asked.cases)
-    parts = list(iterate_chunks(asked, range(count), executor))
+    count = len(work.cases)
+    parts = list(iterate_chunks(work, range(count), executor))
     assert sorted(number for numbers, *_ in parts for number in numbers) == list(range(count))
     pairs = dict(pair for one in parts for pair in zip(one[0], one[2] or ()))
     return join_case_results(count, [part[:2] for part in parts]), pairs
 
 
-def assert_same_results(found: CaseResults, want: CaseResults, cases) -> None:
+def assert_same_results(results: CaseResults, expected: CaseResults, cases) -> None:
     """Assert that the results of the given cases are identical."""
     at = list(cases)
-    assert found.values.keys() == want.values.keys() >= {"loop_area"}
-    assert found.outcome[at].tolist() == want.outcome[at].tolist()
-    for name in want.values:
-        np.testing.assert_array_equal(found.values[name][at], want.values[name][at])
-        np.testing.assert_array_equal(found.errors[name][at], want.errors[name][at])
+    assert results.values.keys() == expected.values.keys() >= {"loop_area"}
+    assert results.outcome[at].tolist() == expected.outcome[at].tolist()
+    for name in expected.values:
+        np.testing.assert_array_equal(results.values[name][at], expected.values[name][at])
+        np.testing.assert_array_equal(results.errors[name][at], expected.errors[name][at])
 
 
 @pytest.fixture
@@ -81,20 +81,20 @@ def test_exact_killed_worker_loses_one_case(tmp_path, support_on_path, once):
 def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None:
     """Assert that only cases that always kill their worker fail."""
     deadly = (3, 5) if once else (3,)
-    asked = make_work(tell=KillingMeasure(deadly, tmp_path, once))
-    found, told = run_all_cases(asked, executor)
-    want, _ = run_all_cases(make_work(), LocalExecutor())
+    work = make_work(tell=KillingMeasure(deadly, tmp_path, once))
+    results, reported = run_all_cases(work, executor)
+    expected, _ = run_all_cases(make_work(), LocalExecutor())
     lost = [] if once else [3]
     rest = [number for number in range(8) if number not in lost]
-    assert_same_results(found, want, rest)
-    assert told == {number: number for number in rest}
+    assert_same_results(results, expected, rest)
+    assert reported == {number: number for number in rest}
     for number in deadly:
-        # the chunk is halved after each death
+        # The chunk is halved after each death of a worker.
         assert len((tmp_path / str(number)).read_text()) in (
             [1] if once else [MAX_DEATHS, MAX_DEATHS + 1]
         )
     for number in lost:
-        assert found.outcome[number] == FAILED_OUTCOME and "died" in found.messages[number]
+        assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
 
 
 def test_exact_chunks_contain_each_case_once():
@@ -114,17 +114,17 @@ def test_exact_chunk_size_follows_time_per_case():
     chunks.record_time([0], 0.02)
     assert len(chunks.take()) == 50  # chunks of one second
     chunks.record_time([0], 1e-6)
-    assert len(chunks.take()) == 238  # a quarter of the cases left, for two workers
+    assert len(chunks.take()) == 238  # a quarter of the remaining cases for two workers
 
 
 def test_exact_batched_cases_are_given_in_full_batches():
     """Cases that can be marched together are given to a worker in full batches."""
     few = make_work(RIG, 40)
     many = make_work(RIG, 300)
-    kept = replace(make_work(RIG, 300), keep=print)
+    with_kept_runs = replace(make_work(RIG, 300), keep=print)
     assert [
         len(next(iterate_chunks(one, range(len(one.cases)), IdleExecutor()))[0])
-        for one in (few, many, kept)
+        for one in (few, many, with_kept_runs)
     ] == [1, 300, 1]
     chunks = Chunks(range(200), 1, 64)
     chunks.take()
@@ -155,17 +155,17 @@ def test_exact_failed_case_is_retried_last():
 
 
 def test_exact_failed_chunk_is_bisected():
-    """A chunk of 1000 cases with one that kills its worker is bisected: the other 999 need at most 10 chunks."""
+    """A chunk of 1000 cases with a failing case is bisected into at most 10 chunks of the others."""
     chunks = Chunks(range(1000), 1, 1000)
-    tried = []
+    attempts = []
     lost = []
     while (chunk := chunks.take()) is not None:
-        tried.append(chunk)
+        attempts.append(chunk)
         lost += chunks.record_death(chunk) if 617 in chunk else []
-    assert lost == [617] and [617] in tried
-    fine = [chunk for chunk in tried if 617 not in chunk]
-    assert sorted(n for chunk in fine for n in chunk) == [n for n in range(1000) if n != 617]
-    assert len(fine) <= 10
+    assert lost == [617] and [617] in attempts
+    completed = [chunk for chunk in attempts if 617 not in chunk]
+    assert sorted(n for chunk in completed for n in chunk) == [n for n in range(1000) if n != 617]
+    assert len(completed) <= 10
 
 
 def test_exact_remaining_time_after_first_chunks():
@@ -173,7 +173,7 @@ def test_exact_remaining_time_after_first_chunks():
     clock = RemainingTime(4000, 2)
     assert (
         clock(1, 7.0) is None and clock(1, 9.0) is None
-    )  # the first chunk of each worker also loads code
+    )  # The first chunk of each worker also loads code.
     assert clock(998, 9.98) == pytest.approx(15.0)  # 3000 cases of 10 ms on two workers
     assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.left == 2000
 
@@ -181,9 +181,9 @@ def test_exact_remaining_time_after_first_chunks():
 def test_exact_cluster_equals_local_executor():
     """A Dask cluster gives the same results as a single process."""
     pytest.importorskip("distributed")
-    found, _ = run_all_cases(make_work(), Cluster("", 1))
-    want, _ = run_all_cases(make_work(), LocalExecutor())
-    assert_same_results(found, want, range(8))
+    results, _ = run_all_cases(make_work(), Cluster("", 1))
+    expected, _ = run_all_cases(make_work(), LocalExecutor())
+    assert_same_results(results, expected, range(8))
 
 
 def test_refuses_unknown_executors(monkeypatch):
@@ -252,16 +252,18 @@ def whole_sweep(tmp_path_factory):
 
 def assert_resumes_to_same_files(whole_sweep: tuple, out: Path) -> None:
     """Assert that stored cases are complete, and that the resumed sweep writes the files of a whole one."""
-    path, over, want = whole_sweep
-    there = [one for one in (out / "cases").iterdir() if not one.name.startswith(".")]
-    assert 0 < len(there) < len(file_names(want / "cases")) and not (out / "sweep.csv").exists()
-    assert all((one / "summary.json").read_text().endswith("}\n") for one in there)
+    path, over, expected = whole_sweep
+    stored = [one for one in (out / "cases").iterdir() if not one.name.startswith(".")]
+    assert (
+        0 < len(stored) < len(file_names(expected / "cases")) and not (out / "sweep.csv").exists()
+    )
+    assert all((one / "summary.json").read_text().endswith("}\n") for one in stored)
     assert run_cli("sweep", path, "--over", over, "-o", out, "--resume").code == 0
     for name in ("sweep.csv", "sweep.nc"):
-        assert (out / name).read_bytes() == (want / name).read_bytes()
-    assert file_names(out / "cases") == file_names(want / "cases") and file_names(
+        assert (out / name).read_bytes() == (expected / name).read_bytes()
+    assert file_names(out / "cases") == file_names(expected / "cases") and file_names(
         out
-    ) == file_names(want)
+    ) == file_names(expected)
 
 
 @pytest.mark.slow
@@ -269,9 +271,9 @@ def test_exact_killed_sweep_resumes_to_same_files(whole_sweep, tmp_path):
     """A sweep that is killed can be resumed to the same files."""
     path, over, _ = whole_sweep
     out = tmp_path / "swept"
-    done = subprocess.run([sys.executable, "-c", KILLED, path, out, over], timeout=120)
-    assert done.returncode == -signal.SIGKILL
-    half = out / "cases" / ".0123456789abcdef.1"  # as a process killed while it writes leaves it
-    half.mkdir()
-    (half / "summary.json").write_text('{"patchf')
+    process = subprocess.run([sys.executable, "-c", KILLED, path, out, over], timeout=120)
+    assert process.returncode == -signal.SIGKILL
+    incomplete = out / "cases" / ".0123456789abcdef.1"  # an incomplete case of a killed process
+    incomplete.mkdir()
+    (incomplete / "summary.json").write_text('{"patchf')
     assert_resumes_to_same_files(whole_sweep, out)
