@@ -27,12 +27,12 @@ from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
 HOLDS = tuple(10.0 ** np.linspace(-2, 1, 10))
-LENGTH = 2e-6  # [m] length of a bond that has aged without end
+LENGTH = 2e-6  # [m] length of a bond after unlimited ageing
 RATIO = 0.5  # kinetic friction / static friction
 STATIC = 0.3  # coefficient of static friction
 REST_GROWTH = 2e-6  # [m/s^2] growth of the bond length at rest
 FLOOR = 1e-6  # [m/s] smallest speed in the growth at rest
-SPEED = 1e-3  # [m/s] speed of the slide before and after the rest
+SPEED = 1e-3  # [m/s] sliding velocity before and after the rest
 SCENE = """
 [normal]
 load = "100 N"

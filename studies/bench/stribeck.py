@@ -24,8 +24,8 @@ from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
-SHARES = 10.0 ** np.linspace(-2, 2, 9)  # v/v_c
-LENGTH = 2e-6  # [m] length of a bond that has aged without end
+SHARES = 10.0 ** np.linspace(-2, 2, 9)  # velocity / characteristic velocity
+LENGTH = 2e-6  # [m] length of a bond after unlimited ageing
 RATIO = 0.7  # kinetic friction / static friction
 STATIC = 0.6  # coefficient of static friction
 REST_GROWTH = 10.0  # [m/s^2] growth of the bond length at rest

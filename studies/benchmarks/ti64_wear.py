@@ -36,9 +36,9 @@ from scipy.stats import t as student
 import patchfem as pf
 
 SCENE = Path(__file__).with_name("ti64_wear.toml")
-FRICTION = 0.65  # measured, peak of the friction force over the load
-AMPLITUDE = 75e-6  # [m] of the sliding in the tests of 2017
-PROFILE_DEPTH = 155e-6  # [m] of the track at 0.1 Hz, read from a figure to 3 to 5 um
+FRICTION = 0.65  # measured peak of the friction force / load
+AMPLITUDE = 75e-6  # [m] sliding amplitude in the tests of 2017
+PROFILE_DEPTH = 155e-6  # [m] depth of the track at 0.1 Hz, read from a figure within 3 to 5 um
 
 
 class Test(NamedTuple):
@@ -71,7 +71,7 @@ def large_test(name, frequency, cycles, work, volume) -> Test:
     return Test(name, 80e-3, 8e-3, 1.066e6, frequency, cycles, work, 1e-9 * volume)
 
 
-# Fouvry et al. (2017), Appendix A; f_4 has no volume there
+# Fouvry et al. (2017), Appendix A, which gives no volume for f_4
 LOW_FREQUENCY = (
     large_test("f_1", 0.05, 5000, 5660, 2.55),
     large_test("f_2", 0.11, 5000, 6020, 2.47),
@@ -112,7 +112,7 @@ EARLIER_FAST = (
     large_test("6", 5, 1000, 1130, 0.117),
     large_test("11", 5, 15000, 24500, 2.18),
 )
-# friction power per area of the track [W/m^2] of tests in which Appendix A gives it with a measured area
+# friction power / track area [W/m^2] of the tests for which Appendix A gives it with a measured area
 POWER = {
     "RP_f_15": 5.32e4,
     "RP_f_20": 5.14e3,

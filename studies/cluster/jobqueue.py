@@ -13,7 +13,7 @@ from dask_jobqueue import SLURMCluster
 
 import patchfem as pf
 
-# one job runs one worker
+# resources of a job, which runs one worker
 JOB = {"cores": 1, "processes": 1, "memory": "2GB", "walltime": "04:00:00"}
 
 
@@ -25,7 +25,7 @@ def main(scene: str, out: str, jobs: str, *over: str, **more):
     with SLURMCluster(**JOB | more) as cluster:
         cluster.scale(jobs=int(jobs))
         with cluster.get_client() as client:
-            # the sweep hands out as many chunks as there are workers when it begins
+            # the sweep makes as many chunks as there are workers at its start
             client.wait_for_workers(int(jobs))
             keys = dict(one.split("=", 1) for one in over)
             return pf.sweep(

@@ -49,7 +49,7 @@ def growth_factor(share, order=1.0) -> float:
     """
     if share < 0:
         raise ValueError(f"'share' must not be negative, got {share}")
-    weight_along(1.0, order)  # refuses the order
+    weight_along(1.0, order)  # raises ValueError for a wrong order
     if share == 0:
         return 1.0
     ends = [share * 4.0**k for k in range(-2, 30)] + [

@@ -112,11 +112,11 @@ def press_periodic(
     limit = int(50 * np.sqrt(gap.size) + 1000) if limit is None else limit
     waves = compliance_k.copy()
     waves[0] = 0.0  # a uniform motion changes no gap difference; it is added to the closing below
-    # kept apart: what a light load closes may be less than the digits of the heights
+    # subtracted, because a light load may close the gap by less than the round-off of the heights
     first = float(gap.min())
     pressure, closing, count = _polonsky_keer(waves, gap - first, mean, limit, tolerance)
     checks = residuals(waves, gap - first, pressure, closing, mean)
-    if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
+    if not all(value <= LIMIT for value in checks.values()):  # written so that NaN also raises
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
         raise NotConverged(
             f"contact: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e} after {count} iterations; "
@@ -139,7 +139,7 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
     pressure = np.full(n, mean)
     direction = np.zeros(n)
     sunk = None
-    # own: what a point sinks under its own pressure
+    # `own` is the displacement of a point under its own pressure
     old = 0.0
     own = irfft(waves, n)[0]
     for count in range(1, limit + 1):
@@ -154,7 +154,7 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
         if max(np.abs(opening[touching]).max(), -opening.min()) <= tolerance * depth:
             if not carried:
                 return pressure, float(closing), count
-            # confirmed from the pressure itself before it counts
+            # convergence is confirmed with displacements computed again from the pressure
             sunk = None
             old = 0.0
             continue
@@ -162,9 +162,9 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
         direction = np.where(touching, opening + (size / old if old > 0 else 0.0) * direction, 0.0)
         answer = irfft(waves * rfft(direction), n)
         bend = (answer[touching] - answer[touching].mean()) @ direction[touching]
-        if not bend > 0 and opening.min() >= 0:  # round-off: nothing left to gain
+        if not bend > 0 and opening.min() >= 0:  # only round-off is left
             return pressure, float(closing), count
-        # a lone touching point has no direction; its neighbours enter by their own compliance
+        # a single contact point gives no direction, so neighbours enter by their own compliance
         step = (opening[touching] @ direction[touching]) / bend if bend > 0 else 1 / own
         pressure = pressure - step * direction
         clipped = pressure.min() < 0
@@ -172,11 +172,12 @@ def _polonsky_keer(waves, gap, mean: float, limit: int, tolerance: float) -> tup
             np.maximum(pressure, 0.0, out=pressure)
         entering = (pressure == 0) & (opening < 0)
         enters = entering.any()
-        old = 0.0 if enters else size  # directions are conjugate on one touching set only
+        # directions are conjugate for a fixed set of contact points only
+        old = 0.0 if enters else size
         if enters:
             pressure[entering] -= step * opening[entering]
         scale = mean / pressure.mean()
         pressure *= scale
-        # carried on while the pressure moves along one direction; every 50 steps anew, as round-off adds up
+        # updated along the direction, and computed again every 50 steps, since round-off accumulates
         sunk = None if clipped or enters or count % 50 == 0 else (sunk - step * answer) * scale
     return pressure, float(closing), limit

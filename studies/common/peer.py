@@ -61,7 +61,7 @@ class Peer:
             self.child.stdin.write(json.dumps(request) + "\n")
             self.child.stdin.flush()
         except BrokenPipeError:
-            pass  # the reader says what happened
+            pass  # the reader reports the error
         return self._read()
 
     def __enter__(self):

@@ -29,16 +29,17 @@ def basis(omega, zeta, slide, base) -> ModalBasis:
 
 
 HALF = np.sqrt(0.5)
-# a block on its spring, m = k = 1, damping ratio 0.003, base acceleration sin t
+# block on a spring with m = k = 1, damping ratio 0.003 and base acceleration sin t
 SDOF = basis([1.0], [0.003], [1.0], [1.0])
 SDOF_DRIVE = SineDrive(1.0, 1.0)
-SDOF_LIMIT = 0.8  # friction [N]
-UNDAMPED_MASS = basis([1.0], [0.0], [1.0], [1.0])  # the same without damping
+SDOF_LIMIT = 0.8  # friction limit [N]
+# block on a spring with m = k = 1 without damping
+UNDAMPED_MASS = basis([1.0], [0.0], [1.0], [1.0])
 # two free masses and a spring, m = k = 1, the force sin 1.14 t on the first, friction under the second; the coordinates
 # are those of the motion together and of the relative motion
 TWO = basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF], [-HALF, -HALF])
 TWO_DRIVE = SineDrive(1.0, 1.14, False)
-TWO_LIMIT = 3.0  # friction [N]
+TWO_LIMIT = 3.0  # friction limit [N]
 
 
 def sample_motion(modes, drive, limit, cycles: float, times, start=None):

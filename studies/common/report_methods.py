@@ -130,7 +130,7 @@ def _set_up(
     arrays = (modes.omega, modes.damping_matrix, modes.slide, modes.base)
     rig = (*(np.array(array, float, order="C") for array in arrays), float(modes.mass))
     push = np.array(drive.values(step * np.arange(count)), float)
-    # the force that holds the interface at the start
+    # friction force that keeps the interface stuck at the start
     free = find_accelerations(modes, push[:1], z[:1], v[:1], np.zeros((1, n)))[0]
     hold = free @ modes.slide * modes.mass / (modes.slide @ modes.slide)
     force[0] = load_kernels().law_force(

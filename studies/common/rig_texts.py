@@ -37,5 +37,5 @@ TEXTS["Coulomb, two modes"] = TEXTS["Coulomb"].replace(*YAW)
 PATCH = (STUDIES / "integrators" / "patch.toml").read_text().partition("[accuracy]")[0]
 PATCH = PATCH.replace("[contact]", '[contact]\nelement_size = "0.2 mm"', 1)
 TEXTS["patch of 41 elements"] = PATCH
-# without its yaw
+# scene of the patch without the yaw mode
 ONE_MODE = PATCH[: PATCH.rindex("[[structure.mode]]")] + PATCH[PATCH.index("[drive]") :]

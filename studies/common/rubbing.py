@@ -8,8 +8,8 @@ from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
-MEAN_TOL = 1e-9  # the mean overlap is scaled to its target if it misses it by less
-# of the largest height; less is too near the round-off of heights to be taken off at once
+MEAN_TOL = 1e-9  # relative difference below which the mean overlap is scaled to its target
+# smallest depth per step / largest height; a smaller depth is near the round-off of heights
 FINEST = 1e-9
 
 
@@ -66,7 +66,7 @@ def rub(
         return Rubbed(frozen_array(low), frozen_array(up), 0)
     places = [0, *range(1, reach), reach, *range(reach - 1, 0, -1), 0] if reach else [0]
     visits = sum(2 if place else 1 for place in places)
-    # two flat surfaces lose all at once
+    # two flat surfaces are worn in one step
     bite = bite or BITE * np.hypot(low.std(), up.std()) or worn
     cycles = int(np.ceil(worn / (visits * bite)))
     depth = worn / (cycles * visits)
@@ -106,7 +106,8 @@ class _Pair:
             return
         self.overlap(place, 2 * depth, there)
         self.overlap(-place, 2 * depth, back)
-        there *= 0.5  # half of twice the depth: a point that touches in both places loses its overlap, not more
+        # half of twice the depth, so that a point in contact at both places loses its overlap only
+        there *= 0.5
         back *= 0.5
         _shifted_sum(there, back, -2 * place, self.sum)  # in the frame of the upper piece at -place
         there += back
@@ -115,7 +116,7 @@ class _Pair:
     def overlap(self, place: int, depth: float, out) -> None:
         """Write the overlap (m, n) [m] with the upper piece `place` steps away into `out`; its mean is `depth`."""
         _shifted_sum(self.up, self.low, place, self.sum)
-        # the approach sinks as evenly as the pieces wear
+        # the approach changes nearly evenly with wear, which gives a start for the next one
         last, sunk = self.approach.get(place, (None, 0.0))
         found = _find_approach(self.sum, depth, None if last is None else last - sunk, out)
         self.approach[place] = found, 0.0 if last is None else last - found
@@ -140,7 +141,7 @@ def _find_approach(
         over = (touching - approach).sum() - wanted
         if abs(over) <= MEAN_TOL * wanted:
             break
-        if over > 0:  # D lies above: no other point touches there
+        if over > 0:  # D is larger, so that no other point is in contact
             near = touching
         approach = approach + over / touching.size if touching.size else heights.max() - depth
     np.maximum(heights, approach, out=out)

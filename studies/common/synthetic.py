@@ -10,9 +10,10 @@ from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
 from patchfem.surface import Profile
 
-DOMINANT = 80e-6  # [m] the 80 micron scale of the report, 4.D
-SHORTEST = 8e-6  # [m] a stylus of 12.5 um traces no shorter waves
-SIGMA = 6.3e-6  # [m] of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, Rt is 31 um then
+DOMINANT = 80e-6  # [m] dominant wavelength, the 80 micron scale of the report, 4.D
+SHORTEST = 8e-6  # [m] shortest wave that a stylus of 12.5 um traces
+# [m] rms height of the larger swings of 13 to 18 um in 4.D; Fig. 30 prints a range of 30.6 um, for which Rt is 31 um
+SIGMA = 6.3e-6
 SWINGS = {"peak-to-valley": 2.5, "zero-to-peak": 1.25, "rms": 1.0}  # amplitude / sigma
 
 

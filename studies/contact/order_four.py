@@ -47,10 +47,11 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse.linalg import splu
 
 LENGTH = 12.7e-3  # [m] length and depth of the pieces
-HEIGHT = 6.35e-3  # [m]
+HEIGHT = 6.35e-3  # [m] height of each piece
 COATING = 152.4e-6  # [m] thickness of the coating
-LOAD = 26 * 4.4482216152605 / LENGTH  # N/m: 26 lbf over 12.7 mm
-LAYERS = ((250e9, 0.24), (121e9, 0.32))  # Pa, 1: WC-Co as sprayed on Ti-8Al-1Mo-1V
+LOAD = 26 * 4.4482216152605 / LENGTH  # [N/m] 26 lbf over 12.7 mm
+# Young's modulus [Pa] and Poisson's ratio of sprayed WC-Co and of Ti-8Al-1Mo-1V
+LAYERS = ((250e9, 0.24), (121e9, 0.32))
 
 
 class Case(NamedTuple):
@@ -66,8 +67,10 @@ class Case(NamedTuple):
 
 
 LEVELS = (1e-3, 1e-4, 1e-5)
-MOST_CELLS = 130_000  # cells of a bilinear grid, and of the finest of three nested grids
-CASES = {  # truths: elements of order 5 and 4 regraded to the edges, which agree to 5e-6 (peak) and 2e-6 (the others)
+# largest number of elements of a bilinear mesh and of the finest of three nested meshes
+MOST_CELLS = 130_000
+# reference values by two meshes of order 5 and 4 graded to the edges; they agree within 5e-6 (peak) and 2e-6
+CASES = {
     "1e-5 rad": Case(
         lambda x: 1e-5 * x, (-LENGTH / 2, 5.5332036e-3), (6.2530743e-8, 1.9217449e6, 1.437188893e11)
     ),
@@ -264,7 +267,7 @@ def face_compliance(
         node = place[
             iy[:, None] * order + local // (order + 1), ix[:, None] * order + local % (order + 1)
         ]
-        # the face's tangential displacements go before its normal ones: the factor ends with the normal block
+        # the tangential unknowns of the face precede the normal ones, so that the factor ends with the normal block
         dof_x = np.where(node >= count - face, node + count - face, 2 * node)
         dof_y = np.where(node >= count - face, node + count, 2 * node + 1)
         dof = np.where(np.tile(node, 2) < 0, -1, np.concatenate([dof_x, dof_y], axis=1))

@@ -65,7 +65,7 @@ def compliance(length: float, height: float, columns: int, young: float, poisson
     while sum(rows) < height:
         rows.append(rows[-1] * GROWTH)
     rows = np.array(rows) * height / sum(rows)
-    depth = rows.size  # free nodes of a column; the last one is bonded to the holder
+    depth = rows.size  # number of free nodes in a column; the last node is fixed to the holder
     band = 2 * depth + 4
     banded = np.zeros((band, 2 * depth * (columns + 1)))
     column = np.arange(columns)

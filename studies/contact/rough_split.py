@@ -51,15 +51,15 @@ from patchfem.core import Missing
 from patchfem.runs.patch.trace_split import split_trace
 from patchfem.surface import level
 
-LENGTH = 12.7e-3  # m
-HEIGHT = 6.35e-3  # m
-YOUNG = 206e9  # Pa
+LENGTH = 12.7e-3  # [m] length of the pieces
+HEIGHT = 6.35e-3  # [m] height of each piece
+YOUNG = 206e9  # [Pa] Young's modulus
 POISSON = 0.3
-MODULUS = YOUNG / (1 - POISSON**2) / 2  # Pa
+MODULUS = YOUNG / (1 - POISSON**2) / 2  # [Pa] combined modulus
 STEPS = 800  # number of steps of a trace
-SHORTEST = LENGTH / 40  # m
-ELEMENTS = (100, 200, 400)  # numbers of elements of the even meshes
-LOAD_FRACTION = 0.9  # the bearing length carries this fraction of the load
+SHORTEST = LENGTH / 40  # [m] shortest wave of the traces
+ELEMENTS = (100, 200, 400)  # numbers of elements of the uniform meshes
+LOAD_FRACTION = 0.9  # fraction of the load on the bearing length
 MEASURES = ("stiffness", "mean peak", "bearing length")
 SCENE = f"""
 [contact]
@@ -202,7 +202,7 @@ def ask_tamaas(trace: Trace, cutoff: float) -> list:
         "pip install tamaas",
     ) as peer:
         for z in (heights, short):
-            # more points on the Fourier series through the samples
+            # samples are refined by their Fourier series
             refined = np.fft.irfft(np.fft.rfft(z), points) * points / STEPS
             answers.append(peer.ask(heights=(refined - refined.mean()).tolist(), **request))
     return answers

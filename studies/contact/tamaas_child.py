@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-TOLERANCE = 1e-8  # the residual of the solver at which a solution is accepted
+TOLERANCE = 1e-8  # residual below which a solution is accepted
 PRESSURE_STEP = 0.02  # relative change of the mean pressure for the stiffness
 
 

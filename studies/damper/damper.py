@@ -28,7 +28,7 @@ from patchfem.inputs import read_loop
 from patchfem.scene import loads
 
 SOURCE = "ARTS-Laboratory, Dataset-Friction-Damper-with-Backlash, dataset-1, 1 Hz, 20 lb tension; CC BY-SA 4.0"
-LOAD = 10e3  # N, to which friction is referred; only load times friction is known
+LOAD = 10e3  # [N] assumed; only the product of load and friction coefficient is known
 SCENE = (
     '[normal]\nload = "10 kN"\n[friction]\n{}[slide]\nkind = "sine"\namplitude = "25.6 mm"\nfrequency = "1 Hz"\n'
     "cycles = 2\n"

@@ -15,9 +15,9 @@ from patchfem.friction import FirstOrderBonds, Quadrature, Step
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 LENGTH = ladder.LENGTH  # [m] bond length
-PERIOD = 1 / ladder.HERTZ  # [s] of a cycle
+PERIOD = 1 / ladder.HERTZ  # [s] duration of a cycle
 CREEP = 1e-3  # [m/s] reference speed of the law tanh
-SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway
+SHARES = (0.0, 0.1, 0.3, 0.5)  # breakaway force / friction limit
 CASES = {
     "force .5+-.1": ((0.6, 0.4), (1.0, 1.0)),
     "force .5+-.3": ((0.8, 0.2), (1.0, 1.0)),

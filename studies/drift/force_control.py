@@ -35,7 +35,7 @@ def slide_to_traction(
     """
 
     def after(dq):
-        # the sum over the bonds once, not at every Gauss point of the increment
+        # the sum over the bonds is computed once, not at every Gauss point of the increment
         if isinstance(engine, Quadrature):
             return engine.advance(state, dq, sigma, sigma, dt)
         return engine.step(state, dq, sigma, sigma, dt).state
@@ -53,7 +53,7 @@ def slide_to_traction(
         if far > 50:
             raise OutOfReach(f"the law cannot reach {target:g} from {now:g}")
     dq = brentq(miss, 0.0, way * far, xtol=1e-15 * length, rtol=1e-14)
-    if abs(miss(dq)) > 1e-6:  # a root of a force is as steep as |u|^p
+    if abs(miss(dq)) > 1e-6:  # loose, since the force may change as steeply as |u|^p
         raise OutOfReach(f"the law jumps over {target:g} from {now:g}")
     return dq, after(dq)
 

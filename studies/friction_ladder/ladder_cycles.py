@@ -22,8 +22,8 @@ HERTZ = 143.0  # [Hz] frequency of the loops
 LENGTH = 2e-6  # [m] bond length
 RATIO = 0.7  # kinetic friction / static friction
 GROWTH = {"ratio": RATIO, "rest_growth": 10.0, "slip_growth": 0.05 * LENGTH, "rest_speed": 1e-4}
-AMPLITUDES = (0.1, 0.3, 1.0, 3.0, 12.5, 50.0)  # bond lengths
-STEPS = 4800  # per cycle
+AMPLITUDES = (0.1, 0.3, 1.0, 3.0, 12.5, 50.0)  # amplitudes of the loops in bond lengths
+STEPS = 4800  # steps per cycle
 AT_ONCE = 1e4  # factor on both rates of 2.10 that leaves only its steady state
 
 

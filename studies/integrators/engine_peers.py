@@ -82,7 +82,8 @@ def siconos(peer, one: Problem, steps: int, theta: float = 0.5) -> tuple:
     return np.array(found["slide"]), found["seconds"]
 
 
-PEERS = {  # name: (callable, knobs, problems, script, variable of its interpreter, remedy)
+# {name: (callable, accuracy settings, problems, script, variable of its interpreter, remedy)}
+PEERS = {
     "SUNDIALS CVODE": (
         cvode,
         (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12),

@@ -21,9 +21,9 @@ from patchfem.scene import scene
 from patchfem.structure import make_release
 
 FOLDER = Path(__file__).parent
-POINTS = 20  # per cycle at which slides are compared
-TRUTH = 204800  # steps per cycle of the march that stands for the truth of the patch
-# as `switched` names them
+POINTS = 20  # points per cycle at which relative displacements are compared
+TRUTH = 204800  # steps per cycle of the reference solution of the patch, a time march
+# names of the problems in `switched`
 KIND = {
     "decay": "block",
     "block": "block",
@@ -86,7 +86,7 @@ def problem(name: str) -> Problem:
             last=16,
             start=rest,
         )
-        done = np.minimum(np.floor(made.times / half), 6)  # 3.11 with N0 rounded up
+        done = np.minimum(np.floor(made.times / half), 6)  # equation 3.11 with N0 rounded up
         return replace(
             made,
             truth=np.where(done < 6, (10.5 - 2 * done) * np.cos(made.times) + (-1) ** done, -0.5),

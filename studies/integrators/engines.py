@@ -150,7 +150,7 @@ def dop853(one: Problem, tolerance: float) -> np.ndarray:
 
 COARSE = (100, 200, 400, 800, 1600, 3200, 6400)
 FINE = (1000, 2000, 4000, 8000, 16000, 32000)
-OURS = {  # name: (callable, knobs, problems); one entry more for an engine more
+OURS = {  # {name: (callable, accuracy settings, problems)}; a further integrator is a further entry
     "exact": (exact, (0,), POINT),
     "march": (march, (*COARSE, 12800, 25600), ALL),
     "duhamel, report": (duhamel_report, COARSE, POINT),

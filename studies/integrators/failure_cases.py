@@ -14,16 +14,16 @@ from report_methods import Law, coulomb, elastic_plastic, solve_duhamel, solve_n
 from patchfem.core import DriveSegment
 from patchfem.structure.drives import PiecewiseDrive
 
-SLIDES = 8.079711463905416  # exact instant at which mass 2 moves first
+SLIDES = 8.079711463905416  # exact time at which mass 2 first moves
 END = 40.0  # end of a run in the unit of time of the report
-MOVED_DISTANCE = 0.05  # displacement from which the mass counts as moved
+MOVED_DISTANCE = 0.05  # displacement above which the mass counts as moved
 
 
 COULOMB_LAW = coulomb(TWO_LIMIT)
 BRANCH = coulomb(TWO_LIMIT, 0.01)
 ELASTIC = elastic_plastic(TWO_LIMIT, 0.01)
 PRINTED_LAW = elastic_plastic(TWO_LIMIT, 0.03, as_printed=True)
-CASES = (  # name, law, step, what must not change, by how much, relaxation
+CASES = (  # (name, law, step, quantity of the criterion, its tolerance, relaxation)
     ("Fig 17, 18: displacement 1e-2", COULOMB_LAW, 0.05, "displacement", 1e-2, 0.1),
     ("displacement 1e-3", COULOMB_LAW, 0.05, "displacement", 1e-3, 0.5),
     ("displacement 1e-6", COULOMB_LAW, 0.05, "displacement", 1e-6, 0.1),

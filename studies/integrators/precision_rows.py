@@ -16,7 +16,7 @@ from peer import Peer, interpolate_seconds, ratio_text
 
 from patchfem.core import Missing, PatchfemError
 
-EQUAL = (1e-2, 1e-3, 1e-4, 1e-6)  # errors at which times are compared
+EQUAL = (1e-2, 1e-3, 1e-4, 1e-6)  # errors at which CPU times are compared
 FLOOR = 1e-13  # smaller errors are drawn and compared as this error
 
 

@@ -24,10 +24,10 @@ from patchfem.contact.unilateral import solve_forces
 CARBIDE = (250e9, 0.24)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
 TITANIUM = (121e9, 0.32)  # Young's modulus [Pa] and Poisson's ratio in rig.toml
 COATING = 152.4e-6  # [m] thickness in rig.toml
-MEAN = 26 * 4.4482216152605 / 12.7e-3**2  # 0.717 MPa, the mean pressure of the rig
-WAVE = 80e-6  # [m] the 80 micron scale of the report, 4.D
-HEIGHT = 15.5e-6  # [m] mean of the 13 to 18 micron of the report, 4.D
-RADIUS = WAVE**2 / (4 * np.pi**2 * HEIGHT)  # 10.5 um, of a crest
+MEAN = 26 * 4.4482216152605 / 12.7e-3**2  # [Pa] mean pressure of the rig, 0.717 MPa
+WAVE = 80e-6  # [m] wavelength, the 80 micron scale of the report, 4.D
+HEIGHT = 15.5e-6  # [m] amplitude, mean of the 13 to 18 micron of the report, 4.D
+RADIUS = WAVE**2 / (4 * np.pi**2 * HEIGHT)  # [m] radius of a crest, 10.5 um
 LATTICE = -3.9002649  # sum of 1/r over a square lattice less its mean
 
 
@@ -93,7 +93,7 @@ def between_peaks(side: int, coat: tuple = CARBIDE, shells: int = 40) -> np.ndar
     step = 2 * np.pi / WAVE
     modulus = exact.combined_modulus(*coat)
     qx, qy = np.meshgrid(*[step * np.fft.fftfreq(side)] * 2, indexing="ij")
-    # of the waves beyond the shells
+    # contribution of the waves beyond the summed shells
     waves = np.pi * (qx**2 + qy**2) / (modulus * step**3 * (shells + 0.5))
     for i in range(-shells, shells + 1):
         for j in range(-shells, shells + 1):
@@ -145,7 +145,7 @@ def one_each(depth, round_peaks: bool = False, coat: tuple = CARBIDE, mean: floa
     force = np.full(count, mean * cell)
     last = 0.0
     total = np.array([mean * cell * count])
-    # secants of the peaks' own closing: at least 1/3 each time
+    # secant iteration of the force on each peak; each iteration reduces the error to a third or less
     while np.abs(force - last).max() > 1e-11 * force.max():
         last = force
         soft = np.maximum(force, 1e-9 * force.max())

@@ -39,8 +39,9 @@ from scipy.optimize import brentq
 from patchfem.runs.patch.press import press_patch
 
 PORTIONS = (0.9, 0.5, 0.2, 0.05)
-SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)  # N m/rad
-# rad; over 12.7 mm: 0.13, 1.3, 5, 25 (0.001 in) and 127 um
+# [N m/rad] rotational stiffnesses of the fixture; None is a rigid fixture
+SPRINGS = (None, 1e5, 1e4, 1e3, 300.0, 1e2)
+# misalignments [rad]; over 12.7 mm they are 0.13, 1.3, 5, 25 (0.001 in) and 127 um
 TOLERANCES = (
     1e-5,
     1e-4,
@@ -48,7 +49,7 @@ TOLERANCES = (
     2e-3,
     1e-2,
 )
-# N m/rad: report's 73 Hz, rig.toml's mass, its assumed gyration
+# rocking stiffness [N m/rad] from the report's 73 Hz, the mass of rig.toml and its assumed radius of gyration
 ROCKING = 0.884 * (40e-3 * 2 * np.pi * 73) ** 2
 
 

@@ -32,8 +32,9 @@ from patchfem.core import Measure
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 
-SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)  # N m/rad; None: a rigid fixture
-# of the load line of a free piece, in lengths
+# [N m/rad] rotational stiffnesses of the fixture; None is a rigid fixture
+SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)
+# offsets of the load line of a free piece / length of the piece
 OFFSETS = (
     0.05,
     0.1,

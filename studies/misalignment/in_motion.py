@@ -36,10 +36,10 @@ from patchfem.core import G_N as G
 FOLDER = Path(__file__).parent
 sys.path.insert(0, str(FOLDER.parent / "common"))
 RIG = FOLDER.parent / "rig" / "rig.toml"
-TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # rad
-LOADS = (13.0, 26.0, 52.0)  # [lbf]
+TILTS = tuple(10.0 ** np.linspace(-6, -2, 9))  # [rad] tilts
+LOADS = (13.0, 26.0, 52.0)  # [lbf] contact loads
 LEVELS = (3.0, 5.0, 10.0)  # [g] of the base acceleration
-# of 4 g per 26 lbf: levels between which the onset is looked for
+# levels that bracket the onset of slip, in units of 4 g per 26 lbf
 RELATIVE_LEVELS = (
     0.75,
     0.875,

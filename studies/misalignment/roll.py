@@ -26,9 +26,9 @@ from patchfem.runs import estimate_measures
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 
-FRICTION = 0.3  # rig.toml
+FRICTION = 0.3  # friction coefficient of rig.toml
 COUNTS = (8, 16)
-SLIDE = 0.095  # slide of the yaw mode as fitted to Table 1
+SLIDE = 0.095  # `slide` of the yaw mode as fitted to Table 1
 GYRATION = 40e-3  # [m] friction acts SLIDE * GYRATION off the axis
 
 

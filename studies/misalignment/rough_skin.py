@@ -57,7 +57,7 @@ def opening(stiffness: float | None, halvings: int = 2) -> float:
     load = tilted.case(0.0).loading.load
     x = pieces.interface.x
     flat = np.zeros(pieces.interface.x.size)
-    # both in contact
+    # at both tilts the whole length is in contact
     even, turn = (press(pieces, frozen_array(flat + by * x), load).sigma_n for by in (0.0, 1e-7))
     return float(1e-7 * (even / np.maximum(even - turn, 1e-300)).min())
 

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import fixtures
 import tilted
 
-SPRING = 1e3  # N m/rad
+SPRING = 1e3  # [N m/rad] rotational stiffness of the fixture
 OFFSETS = (1 / 6, 0.25, 1 / 3, 0.4, 0.45)
 
 

@@ -20,11 +20,11 @@ from patchfem.runs.patch.press import Patch, press_patch
 from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
-# [contact] alone: the patch at rest
+# text of the scene up to [contact], for the patch at rest
 TEXT = RIG.read_text(encoding="utf-8").partition("[friction]")[0]
 TILTS = tuple(10.0 ** np.arange(-6, -1.5, 0.5))
-RUBBED_FRACTION = 0.1  # share of the mean pressure from which a place counts as rubbed
-# peaks: those of `rough_skin`, 80 um apart, scattered by 0.2 um
+RUBBED_FRACTION = 0.1  # fraction of the mean pressure above which a point counts as rubbed
+# surface layers; "peaks" are those of `rough_skin`, 80 um apart, with heights scattered by 0.2 um
 SKINS = {
     "bare": (),
     "linear": ('law="linear"', "normal_stiffness=1e13 Pa/m", "tangential_ratio=0.8"),

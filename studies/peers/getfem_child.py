@@ -121,7 +121,7 @@ def main() -> None:
     gf.util_trace_level(0)
     gf.util_warning_level(0)
     out = sys.stdout
-    sys.stdout = sys.stderr  # the library may print
+    sys.stdout = sys.stderr  # messages of the library must not mix with the answer
     print(json.dumps({"version": version(gf)}), file=out, flush=True)
     for line in sys.stdin:
         try:

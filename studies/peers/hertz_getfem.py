@@ -42,7 +42,7 @@ from hertz_pair import (
 )
 from peer import Peer, interpolate_seconds, ratio_text, run
 
-FINENESS = (8, 16, 32)  # cells per half width
+FINENESS = (8, 16, 32)  # elements per half width of the contact
 PEERS = ("nodal", "gauss")
 
 
@@ -137,7 +137,8 @@ def main(fineness=FINENESS, repeats: int = 3, forms=tuple(FORMS), peers=PEERS) -
         ) as peer,
     ):
         print(f"GetFEM {peer.version}")
-        ours(4, "mirror"), theirs(peer, 4, "mirror", "nodal")  # first calls load and compile
+        # the first calls load and compile; they are not timed
+        ours(4, "mirror"), theirs(peer, 4, "mirror", "nodal")
         for form in forms:
             tries = {}
             for cells in (4, *fineness):

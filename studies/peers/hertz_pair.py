@@ -18,23 +18,21 @@ from patchfem.mesh import TensorGrid
 from patchfem.mesh.tensor import graded_rows
 
 HALF = 0.1e-3  # half width a of the contact [m]
-LOAD = 9107.0  # [N/m]
+LOAD = 9107.0  # [N/m] load
 MATERIAL = (121e9, 0.32)
 MODULUS = exact.combined_modulus(*MATERIAL)
 RADIUS = np.pi * MODULUS * HALF**2 / (4 * LOAD)
 PEAK = exact.hertz_peak(LOAD, RADIUS, MODULUS)
-LENGTH = (
-    40e-3  # [m] with 200 half widths to the nearest far face the half planes of Hertz hold to 1e-5
-)
-HEIGHT = 20e-3  # [m]
+LENGTH = 40e-3  # [m] 200 half widths, at which the half planes of Hertz are valid within 1e-5
+HEIGHT = 20e-3  # [m] height of each body
 GROWTH = 1.15
-# (load factor, tilt [rad]): the first cold, then warm
+# (load factor, tilt [rad]) of each step; later steps start from the previous solution
 STEPS = (
     (1.0, 0.0),
     (1.3, 0.0),
     (1.3, 0.1 * HALF / RADIUS),
 )
-FORMS = {"mirror": 1, "pair": 2}  # bodies that are assembled
+FORMS = {"mirror": 1, "pair": 2}  # number of bodies that are assembled
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -32,10 +32,11 @@ from patchfem.response import compute_harmonic
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = ""
-G = 9.80665  # [m/s^2]
-MIL = 25.4e-6  # [m]
+G = 9.80665  # [m/s^2] standard gravity
+MIL = 25.4e-6  # [m] one thousandth of an inch
 ONSET = 4.14  # [g] at which the block begins to slip
-ONSETS = {135: (3.8, 4.2), 143: (3.9, 4.0), 150: (4.0,), 155: (4.2,)}  # Table 1, both series [g]
+# [g] onsets of slip in both series of Table 1
+ONSETS = {135: (3.8, 4.2), 143: (3.9, 4.0), 150: (4.0,), 155: (4.2,)}
 HOLDS = "holds"  # verdict of a conclusion that holds
 PART = "in part"  # verdict of a conclusion that holds in part
 

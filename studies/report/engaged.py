@@ -51,13 +51,14 @@ PATCH = (
     'substrate = "Ti-8Al-1Mo-1V"\n'
 )
 STRIPS = PATCH + "[contact.strips]\ncount = {}\n"
-# report, 4.B; shares of the base as in free.toml
+# frequency of each mode (report, 4.B) and its base participation as in free.toml
 MODES = {
     "yaw": ("129 Hz", 0.05),
     "rocking": ("73 Hz", 0.1),
 }
 TURN = {"yaw": f'yaw = "{1 / ARM} rad/m"\n', "rocking": f'pitch = "{1 / ARM} rad/m"\n'}
-CASES = {  # mode -> how the pieces touch -> (contact, motion of the contact along x, whether they feel the turn)
+# {mode: {case: (contact, displacement of the contact along x, whether the contact rotates)}}
+CASES = {
     "yaw": {
         "one point on the axis": (POINT, 0.0, False),
         "one point off it": (POINT, 0.0932, False),
@@ -73,7 +74,7 @@ CASES = {  # mode -> how the pieces touch -> (contact, motion of the contact alo
 SHARE = 0.75  # stiffness of the engaged spring / stiffness K of the flexures
 SPRING = "a spring of 0.75 K"
 DAMPER = "a damper as in Fig. 27"
-# [g rms]
+# base acceleration [g rms] at which each model is critically damped
 CRITICAL = {
     "rigid block": 4.2,
     SPRING: 3.6,
@@ -163,12 +164,14 @@ def fit_damping(model: str, level: float, seconds: float = 20.0, seed: int = 1) 
     seed : int
     """
     text = scene({SPRING: "rigid block", DAMPER: "second path"}.get(model, model))
-    if model == SPRING:  # found by trying: it gives 148 Hz where it is critical
+    # this stiffness was found by trial; the mode is at 148 Hz where it is critically damped
+    if model == SPRING:
         stiffness = SHARE * 0.8546 * (2 * np.pi * 143) ** 2
         text = text.replace('"exact"', '"march"').replace(
             "[drive]", f'[structure.bonded]\nstiffness = "{stiffness!r} N/m"\n\n[drive]'
         )
-    if model == DAMPER:  # nothing of it fitted: 148 Hz and critical, beside the friction
+    # not fitted: a critically damped mode at 148 Hz in addition to the friction
+    if model == DAMPER:
         mass = 1.19396625
         w = 2 * np.pi
         spring = mass * w**2 * (148**2 - 143**2)

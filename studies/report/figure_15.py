@@ -40,7 +40,8 @@ VERDICT = (
     "in part: equation 3.11 holds with N0 rounded up. The equation as printed predicts rest too early for a "
     "block with w0 = 1"
 )
-READINGS = ((1.0, 8.0), (2.0, 14.5), (np.sqrt(2), 10.5))  # w0, k x0/F: three that give about 11
+# three pairs (w0, k x0/F) that give a time of about 11
+READINGS = ((1.0, 8.0), (2.0, 14.5), (np.sqrt(2), 10.5))
 END = 18.0
 
 

@@ -37,8 +37,8 @@ VERDICT = "yes"
 SCENE = FOLDER / "free.toml"
 SECONDS = 80.0  # [s] duration of the random test
 WINDOW = 16.0  # [s] window of the estimate
-RMS = 0.1  # [g] of the random base acceleration
-FIT_BAND = (140.0, 146.0)  # [Hz] the axial mode is fitted here
+RMS = 0.1  # [g] rms of the random base acceleration
+FIT_BAND = (140.0, 146.0)  # [Hz] band in which the axial mode is fitted
 
 
 class Free(NamedTuple):

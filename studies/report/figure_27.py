@@ -40,12 +40,12 @@ VERDICT = (
     "at 148 Hz is 1.3). "
     "With a single contact point yaw is not suppressed"
 )
-MIL = 25.4e-6  # [m]
+MIL = 25.4e-6  # [m] one thousandth of an inch
 ONSET = 4.14  # [g] at which the block of block.toml begins to slip
 POINT = (
     '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
 )
-# level [g rms]
+# (model, base acceleration [g rms])
 CASES = (
     ("rigid block", 1.0),
     ("rigid block", 4.2),
@@ -81,7 +81,7 @@ def scene(model: str) -> str:
             .read_text("utf-8")
             .replace('method = "harmonic"', 'method = "exact"')
         )
-    if model == "grooves":  # what lifts would leave them
+    if model == "grooves":  # without these lines the block cannot lift out of its grooves
         lines = (FOLDER / "grooved.toml").read_text("utf-8").splitlines()
         return "\n".join(line for line in lines if not line.startswith(("lifted_mass", "travel")))
     text = (FOLDER.parent / "table_1" / "second_path.toml").read_text("utf-8")

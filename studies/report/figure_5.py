@@ -37,7 +37,7 @@ from patchfem.scene import load as load_scene
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = "yes"
-# of Euler [1/w0]; friction itself shakes above 2 m v0/F0 = 0.2
+# time steps of Euler's method [1/w0]; above 2 m v0/F0 = 0.2 the friction force oscillates
 STEPS = (
     0.01,
     0.02,

@@ -49,7 +49,7 @@ DAMPING = 0.01  # damping ratio in figure_8.toml
 MASS = 1.0  # [kg] of the piece in figure_8.toml
 HEAVY = 1e6  # [kg] of the slider in figure_8.toml
 FREQUENCIES = (2.0, 5.0, 10.0, 20.0, 40.0)  # [Hz] frequencies of the slider
-LIMIT = 0.3 * 26 * 4.4482216152605  # N
+LIMIT = 0.3 * 26 * 4.4482216152605  # [N] friction limit of the piece
 STIFFNESS = MASS * (2 * np.pi * NATURAL_FREQUENCY) ** 2
 BENCH = """[normal]
 load = "26 lbf"
@@ -132,7 +132,7 @@ def ring(frequency: float) -> float:
     The piece breaks away at the speed of the slider and swings about the friction at its natural frequency, damped over
     a quarter of a swing.
     """
-    # of the stroke, until the spring has gone from one limit to the other
+    # fraction of the stroke in which the spring force goes from one limit to the other
     left = 2 * LIMIT / STIFFNESS / STROKE
     speed = STROKE * 2 * np.pi * frequency * np.sqrt(1 - (1 - left) ** 2)
     swing = speed * np.sqrt(STIFFNESS * MASS) / LIMIT
@@ -146,7 +146,7 @@ def read_as_rigid(one: Loop) -> tuple:
     """
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "cell.csv"
-        # a cycle and a quarter, for it must come back
+        # one cycle and a quarter, so that the loop is closed
         step = one.time[1]
         again = np.arange(0, 5001, 4)
         rows = np.column_stack(

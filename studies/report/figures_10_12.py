@@ -30,10 +30,10 @@ from patchfem.export.drawing.pictures import BLUE, ORANGE
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = "yes"
-FIGURES = {10: 0.1, 11: 1.0, 12: 5.0}  # drive over natural frequency
+FIGURES = {10: 0.1, 11: 1.0, 12: 5.0}  # figure: driving frequency / natural frequency
 OTHER_RATIOS = (0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 0.9, 1.1, 1.5, 2.0, 3.0)
 DAMPING = 0.04  # coefficient c of the damper
-TRANSIENT_TOL = 1e-5  # fraction of the start that may remain
+TRANSIENT_TOL = 1e-5  # fraction of the initial motion that may remain
 
 
 class Row(NamedTuple):

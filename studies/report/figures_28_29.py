@@ -37,8 +37,8 @@ VERDICT = (
     "in part: both records of 8 g at 143 Hz are reproduced, with friction coefficients that differ by 2 %. "
     "The unstable motion at 135 Hz from 6 g on is not reproduced"
 )
-G = 9.80665  # [m/s^2]
-MIL = 25.4e-6  # [m]
+G = 9.80665  # [m/s^2] standard gravity
+MIL = 25.4e-6  # [m] one thousandth of an inch
 MORE_FRICTION = {"friction.static": "0.408"}  # 2 % more friction
 CASES = (
     ("Fig. 28: 135 Hz, 5 g", 135, 5.0, {}),

@@ -37,13 +37,13 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = "in part: q is 0.15 only if slip begins at 4.14 g, and the large motion begins at 5.3 g instead of 8 g"
-G = 9.80665  # [m/s^2]
-MIL = 25.4e-6  # [m]
+G = 9.80665  # [m/s^2] standard gravity
+MIL = 25.4e-6  # [m] one thousandth of an inch
 LIMIT = 0.30 * 26 * 4.4482216152605  # [N] friction limit of block.toml
 ONSETS = (4.00, 4.14)  # [g] at which slip begins
 LEVELS = (4.0, 5.0, 6.0, 7.0, 8.0)  # [g] of the base acceleration
 STICK_SPEED = 0.2075  # stick speed / largest speed of the input
-CURVE = 401  # points of a drawn cycle, and steps per cycle of Newmark less one
+CURVE = 401  # points of a plotted cycle; Newmark's method takes one step fewer per cycle
 
 
 class Row(NamedTuple):

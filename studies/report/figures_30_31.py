@@ -55,7 +55,7 @@ VERDICT = (
     "in part: synthetic surfaces were compared with the four heights that are printed above the curves. The "
     "curves themselves could not be read, and four traces cannot prove everything that the report says"
 )
-# heads of Figs 30 and 31 [m]: first and second scan
+# heights printed above Figs 30 and 31 [m], first and second scan
 PRINTED_HEIGHTS = (
     (30.5626e-6, 21.5831e-6),
     (17.8602e-6, 14.8619e-6),
@@ -63,8 +63,8 @@ PRINTED_HEIGHTS = (
 STROKES = (2, 4)  # strokes in steps of 3.2 um
 SETS = 20  # number of sets of four traces
 LINES_BETWEEN = 160  # number of lines between the traces before and after
-UM = 1e-6  # [m]
-BITE = 0.03e-6  # [m] worn off by one pass
+UM = 1e-6  # [m] one micrometre
+BITE = 0.03e-6  # [m] depth worn off in one pass
 
 
 class Set(NamedTuple):

@@ -17,7 +17,7 @@ from patchfem.runs import choose_numerics, solve_with_coarser
 from patchfem.runs.rig.interface import make_contact
 from patchfem.structure.drives import RecordedDrive
 
-G = 9.80665  # [m/s^2]
+G = 9.80665  # [m/s^2] standard gravity
 RATE = 4000.0  # [1/s] rows of the record per second
 STEPS = 32  # rows that count as a cycle
 BAND = (20.0, 400.0)  # [Hz] band of the random base acceleration
@@ -83,7 +83,7 @@ def march_samples(scene, drive=None, steps: int = STEPS, seconds: float | None =
     if model.patch is not None:
         patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     contact = make_contact(model, choose_numerics(model), patch)
-    # 1e-6: a whole number stays one
+    # 1e-6 compensates round-off, so that a whole number of cycles is not reduced by one
     cycles = int((seconds or drive.duration) / drive.period + 1e-6)
     warm_up(modes, drive, contact)
     return march(modes, drive, contact, cycles, steps, cycles).window

@@ -46,7 +46,7 @@ ANSWER = read_answer(__doc__)
 VERDICT = ""
 SCENE = FOLDER / "repeats.toml"  # scene of the rig with wear
 TABLE = FOLDER.parent / "rig" / "table1.csv"  # readings of Table 1
-# report, Table 1 [g]: of its columns in the order of the print
+# onsets of slip [g] in the order of the columns of Table 1
 ONSETS = (
     3.8,
     3.9,
@@ -57,11 +57,11 @@ ONSETS = (
 )
 FITTED_ONSET = 3.951  # [g] onset of slip of the scene
 STATIC = 0.40  # coefficient of friction of the scene; the onset is proportional to it
-MINUTES = 10  # assumed: at each level; the report gives no time
-COEFFICIENT = 1e-14  # m2/N, assumed: sprayed carbide on itself
+MINUTES = 10  # [min] assumed duration of each level, since the report gives none
+COEFFICIENT = 1e-14  # [m^2/N] assumed wear coefficient of sprayed carbide on itself
 STEADY = {
     "accuracy.method": "auto",
-    "drive.cycles": 10,  # the second path settles it in ten cycles
+    "drive.cycles": 10,  # with a second path the motion is steady after ten cycles
     "wear.jumps": 1,
     "contact.element_size": "0.2 mm",
 }

@@ -40,11 +40,11 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = ""
-G = 9.80665  # [m/s^2]
-MIL = 25.4e-6  # [m]
-FREQUENCIES = (135.0, 143.0, 150.0, 155.0)  # [Hz]
+G = 9.80665  # [m/s^2] standard gravity
+MIL = 25.4e-6  # [m] one thousandth of an inch
+FREQUENCIES = (135.0, 143.0, 150.0, 155.0)  # [Hz] frequencies of Table 1
 LEVELS = [4 + 0.25 * k for k in range(33)]  # [g] of the base acceleration
-AWAY = 2 * MIL  # slip, half peak to peak, beyond which a block has left
+AWAY = 2 * MIL  # [m] amplitude of slip above which the motion counts as a runaway
 GROOVED_SCENE = (FOLDER / "grooved.toml").read_text("utf-8")
 LIFT = "normal.grooves.lifted_mass"
 YAW = "structure.mode.yaw.slide"
@@ -60,8 +60,9 @@ def block(friction: str, more: str = "") -> str:
     return f"{head}[friction]\n{friction}\n{tail[:yaw]}{more}{tail[tail.index('[drive]') :]}"
 
 
-SPRING = '[structure.bonded]\nstiffness = "5.1e6 N/m"\n'  # fitted to 143 Hz: studies/table_1
-SOFT = '[structure.stiffening]\ncubic = "-4.2e15 N/m^3"\n'  # assumed: spring and flexure hold up to 1.5 mil
+SPRING = '[structure.bonded]\nstiffness = "5.1e6 N/m"\n'  # fitted at 143 Hz in studies/table_1
+# assumed; spring and flexure stay stable up to 1.5 mil
+SOFT = '[structure.stiffening]\ncubic = "-4.2e15 N/m^3"\n'
 RIGID = 'law = "coulomb"\nstatic = 0.4\n'
 BONDS = (
     'law = "coulomb"',
@@ -88,7 +89,7 @@ static = 0.2
 load = "26 lbf"
 bond_length = "4.5 um"
 """ + GROOVED_SCENE[GROOVED_SCENE.index("[drive]") :]
-PATHS = {  # name -> (text, --set)
+PATHS = {  # {name: (text of the scene, values for --set)}
     "friction alone": (block(RIGID), {}),
     "friction alone, held to 8 g": (block(RIGID.replace("0.4", "0.583")), {}),
     "interlocking spring": (block(RIGID, SPRING + 'wavelength = "80 um"\n'), {}),

@@ -41,12 +41,12 @@ from patchfem.scene import loads, read_ranges
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = ""
-G = 9.80665  # [m/s^2]
-MIL = 25.4e-6  # [m]
+G = 9.80665  # [m/s^2] standard gravity
+MIL = 25.4e-6  # [m] one thousandth of an inch
 SCENE = FOLDER.parent / "table_1" / "second_path.toml"
 TABLE = FOLDER.parent / "rig" / "table1.csv"
 LEVELS = {135.0: (4, 5, 6, 7), 143.0: (4, 5, 6, 7, 8)}  # [g] of Table 1 at each frequency [Hz]
-CYCLES_PER_LEVEL = 200  # cycles of each level, which the report does not give
+CYCLES_PER_LEVEL = 200  # assumed number of cycles at each level, since the report gives none
 FREE = (
     "friction.static=0.2..0.8",
     "structure.bonded.stiffness=0 N/m..1e7 N/m",
@@ -58,7 +58,7 @@ READING = (
     "measured.reading=fundamental",
     "measured.acceleration_gain=1.4142135623730951",
 )
-HOLD = "frequency=135 Hz,150 Hz,155 Hz"  # predicted conditions; the model is fitted to 143 Hz
+HOLD = "frequency=135 Hz,150 Hz,155 Hz"  # conditions left out of the fit, which uses 143 Hz only
 STARTS = 8  # random starts of a fit
 SEED = 3  # seed of the random starts
 

@@ -33,15 +33,15 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
 VERDICT = ""
-G = 9.80665  # [m/s^2]
-MIL = 25.4e-6  # [m]
+G = 9.80665  # [m/s^2] standard gravity
+MIL = 25.4e-6  # [m] one thousandth of an inch
 DISTORTION_LIMIT = (
-    0.03  # third harmonic / first harmonic from which the acceleration counts as distorted
+    0.03  # third harmonic / first harmonic above which the acceleration counts as distorted
 )
 START_FREQUENCY = 130.0  # [Hz] at which the sweep begins
 END_FREQUENCY = 160.0  # [Hz] at which the sweep ends
 RATE = 15.0  # [Hz/s] of the sweep
-LEVELS = (3.0, 3.8, 4.0, 4.1, 4.2, 4.3, 4.4, 4.5, 4.75)  # report, 4.C: below 5 g
+LEVELS = (3.0, 3.8, 4.0, 4.1, 4.2, 4.3, 4.4, 4.5, 4.75)  # [g] levels below 5 g, report, 4.C
 SHOWN_LEVELS = (3.0, 4.2, 4.4, 4.75)
 MODELS = {
     "rigid block": "block.toml",

@@ -26,7 +26,7 @@ STUDIES = FOLDER.parent
 SECONDS_FILE = FOLDER / "seconds.json"
 ANSWER = read_answer(__doc__)
 VERDICT = ""
-# links from the gallery to a later section of its page
+# links from the gallery to a later section of the same page
 LINK_BELOW = re.compile(r",? see \[below\]\([^)]*\)|See \[below\]\([^)]*\)\.")
 LONGEST = 300  # CPU seconds after which a measurement ends
 LONG = 20  # CPU seconds beyond which a study is marked as long

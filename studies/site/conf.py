@@ -10,7 +10,7 @@ from pathlib import Path
 FOLDER = Path(__file__).parent
 ROOT = FOLDER.parents[1]
 sys.path[:0] = [str(ROOT), str(FOLDER), str(ROOT / "tests/support")]
-# of the notebooks too
+# the kernels of the notebooks import from the same folders
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
 
 import made  # noqa: E402
@@ -69,9 +69,10 @@ html_theme_options = {
     "footer_end": [],
     "logo": {"text": "patchfem"},
 }
-# without it the theme reports an invalid mode on the first page of a visit
+# without this value the theme reports an invalid mode on the first page of a visit
 html_context = {"default_mode": "auto"}
-suppress_warnings = ["myst.header"]  # a page of the repository may begin below its first heading
+# a page of the repository may begin without a first-level heading
+suppress_warnings = ["myst.header"]
 
 
 def setup(app) -> None:

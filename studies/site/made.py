@@ -49,7 +49,7 @@ GROUPS = {
 TABLES = {header.strip("[]"): model for header, model in keys_page.iterate_tables()}
 FENCE = "```"
 KINDS = {"patch": "pressure", "bench": "loop", "rig": "history", "linear": "history"}
-WITHOUT = 6  # rows of a table of changes
+WITHOUT = 6  # maximum number of rows in a table of changes
 
 
 def write(folder: Path) -> None:
@@ -82,7 +82,7 @@ def write(folder: Path) -> None:
     for name, text in pages.items():
         (folder / f"{name}.md").write_text(text, "utf-8")
     for path in (*folder.rglob("*.toml"), *folder.rglob("*.csv")):
-        # the scenes stand on their pages; a scene of the repository is one that people wrote
+        # the pages show these scenes; the files would look like scenes written by hand
         path.unlink()
     kept.write_text(state, "utf-8")
 

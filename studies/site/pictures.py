@@ -235,7 +235,7 @@ def figures() -> Iterator[tuple[str, Figure]]:
             film = make_film_settings(series)
             yield "pieces", draw_pieces(series, film)
             yield "film", draw_film(series, film)
-        os.chdir(place)  # a sweep writes its folder where it runs
+        os.chdir(place)  # a sweep writes its folder into the current directory
         yield "sweep", draw_sweep(pf.sweep(pf.new("misalignment")))
         os.chdir(ROOT)
         files = [wear / "before.csv", wear / "after.csv"]
@@ -325,7 +325,7 @@ def write_traces(folder: Path) -> None:
     """
     generator = np.random.default_rng(4)
     x = np.arange(0, 4e-3, 4e-6)
-    # amplitude, length [m], phase
+    # amplitude [m], wavelength [m] and phase [rad] of each wave
     waves = [
         (2e-6, 190e-6, 0.3),
         (1.2e-6, 83e-6, 1.1),

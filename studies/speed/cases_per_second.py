@@ -91,7 +91,7 @@ def loop(limit, turn, part, steps, cycles, out):
     out : (n,) array
         Amplitudes.
     """
-    # one array, so that a compiler knows all distances
+    # one array, so that the compiler knows all strides
     h = 2 * np.pi / steps
     n = LANES
     room = np.zeros(11 * LANES)
@@ -114,17 +114,17 @@ def loop(limit, turn, part, steps, cycles, out):
                 w = room[2 * n + i]
                 f = room[5 * n + i]
                 p = room[6 * n + i]
-                # beside the motion without friction
+                # deviation from the motion without friction
                 e = y - p * c0 + w * f
                 d = u + p * s0
                 y1 = room[7 * n + i] * e + room[8 * n + i] * d + p * c1 - w * f
                 u1 = room[9 * n + i] * e + room[10 * n + i] * d - p * s1
-                # where it stops, the speed a straight line
+                # the time of a stop follows from a linear velocity
                 t = u / (u - u1) if w * u1 < 0.0 else 1.0
                 ys = y + 0.5 * h * t * u if w * u1 < 0.0 else y1
                 rest = (1.0 - t) * h
                 need = -(s0 + t * (s1 - s0)) - ys
-                back = 1.0 if w * u1 < 0.0 and abs(need) > f else 0.0  # it turns without a stick
+                back = 1.0 if w * u1 < 0.0 and abs(need) > f else 0.0  # reversal without sticking
                 n0 = -s0 - y
                 n1 = -s1 - y
                 goes = 1.0 if w == 0.0 and abs(n1) > f else 0.0
@@ -279,7 +279,7 @@ JOINT = (
 )
 RIG = Path(__file__).parents[1] / "rig/rig.toml"
 BLOCK = {"friction.static": _even(0.1, 0.9), "structure.mode.block.damping": _log(0.003, 0.1)}
-# stiffer contacts of LuGre's law are run one by one, for seconds
+# stiffer contacts of LuGre's law take seconds each, since they are not integrated together
 SOFT = BLOCK | {"friction.stiffness": _log(3, 30)}
 STIFF = BLOCK | {"friction.stiffness": _log(3, 300)}
 LENGTHS = BLOCK | {"friction.bond_length": _log(3e-3, 0.1)}
@@ -291,7 +291,7 @@ UNITS = {
     "contact.tilt.angle": "rad",
     "contact.load": "N",
 }
-# of a family: its scene, the cases of a run, the keys that are drawn and from what, in SI units
+# {family: (scene, number of cases, distributions of the random keys in SI units)}
 FAMILIES = {
     "coulomb": (_block('law = "coulomb"'), 2000, BLOCK),
     "elastic-plastic": (_block('law = "elastic-plastic"\nbond_length = "10 mm"'), 1000, LENGTHS),

@@ -30,7 +30,7 @@ from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
 NAMES = tuple(TEXTS)
-FREQUENCIES = np.linspace(115.5, 174.0, 40)  # Hz, 1.5 apart, 144 among them
+FREQUENCIES = np.linspace(115.5, 174.0, 40)  # [Hz] in steps of 1.5, including 144
 MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area")
 STEPS = 1600  # steps per cycle of the march
 CYCLES = 600  # cycles of the march

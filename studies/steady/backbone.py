@@ -31,7 +31,7 @@ from patchfem.runs.rig.interface import make_single_contact
 from patchfem.scene import scene
 
 FOLDER = Path(__file__).parent
-# and the size [m] that amplitudes are counted in
+# {name: (text of the scene, unit of the amplitudes [m])}
 CASES = {
     "elastic-plastic": (TEXTS["elastic-plastic"], 1e-6),
     "bonds": (TEXTS["bonds"], 1e-6),

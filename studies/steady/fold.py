@@ -20,7 +20,7 @@ import steady_pictures
 from fold_sweeps import HIGH_END, LOW_END, at_rest, curve, sweep
 
 FOLDER = Path(__file__).parent
-RATES = (0.4, 0.1, 0.025)  # Hz/s
+RATES = (0.4, 0.1, 0.025)  # [Hz/s] sweep rates
 
 
 def main(rates=RATES, path: Path | None = FOLDER / "fold.svg", **how) -> tuple:

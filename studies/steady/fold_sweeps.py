@@ -11,13 +11,13 @@ from patchfem.scene import scene
 FOLDER = Path(__file__).parent
 LOW_END = 145.0  # [Hz] lower end of the sweeps
 HIGH_END = 149.0  # [Hz] upper end of the sweeps
-# Hz, of slow ones: just outside the folds, where one motion is left to settle on
+# start frequencies of slow sweeps [Hz], just outside the folds, where only one steady state exists
 SLOW_STARTS = (
     146.2,
     148.0,
 )
-SLOW = 0.05  # Hz/s: a sweep that is slower has settled 0.3 Hz from its start
-STEPS = 400  # per cycle
+SLOW = 0.05  # [Hz/s] a slower sweep is steady 0.3 Hz from its start
+STEPS = 400  # steps per cycle
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -14,7 +14,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 def against_march(table: dict, measure: str, path: Path) -> Path:
     """Plot amplitude against frequency by the direct method and by time stepping, and their difference."""
     names = list(table)
-    wide = min(len(names) + 1, 3)  # the last place is that of the legend
+    wide = min(len(names) + 1, 3)  # the last panel holds the legend
     tall = -(-(len(names) + 1) // wide)
     with drawing(path, (9.6, 4.2 * tall), 2 * tall, wide, sharex=True, squeeze=False) as (_, axes):
         pairs = [

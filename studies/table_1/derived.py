@@ -15,13 +15,13 @@ from patchfem.campaigns.rows.condition_models import ConditionModels
 from patchfem.core import frozen_array
 from patchfem.model import build
 
-MASS = 1.19396625  # [kg] block of every scene here
-AXIAL = 143.0  # [Hz] axial mode of every scene here
-COEFFICIENT = 1e-14  # [m^2/N] of wear, assumed as in studies/report/repeats.py
-AREA = 0.0127**2  # [m^2] of the patch
-MINUTES = 10  # duration of each level, assumed as in studies/report/repeats.py
-DEPTH = 1e-6  # m worn, at which the factor of `Worn` is read
-BOND = 0.243e-6  # m by which the point gives way before it slides
+MASS = 1.19396625  # [kg] mass of the block in all scenes
+AXIAL = 143.0  # [Hz] axial mode in all scenes
+COEFFICIENT = 1e-14  # [m^2/N] wear coefficient, assumed as in studies/report/repeats.py
+AREA = 0.0127**2  # [m^2] area of the patch
+MINUTES = 10  # [min] duration of each level, assumed as in studies/report/repeats.py
+DEPTH = 1e-6  # [m] worn depth at which friction has changed by the factor of `Worn`
+BOND = 0.243e-6  # [m] elastic displacement of the contact point before it slips
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def rods(share: float, mass: float) -> list:
     root = np.sqrt([1.0, mass])
     stiffness = np.array([[rod, -rod], [-rod, rod + flexure]]) / np.outer(root, root)
     square, turned = np.linalg.eigh(stiffness)
-    shapes = turned / root[:, None] * np.sqrt(1 + mass)  # (block and tip, mode)
+    shapes = turned / root[:, None] * np.sqrt(1 + mass)  # shape (2, 2): block and tip, modes
     shapes *= np.sign(shapes[0])
     base = (shapes[0] + mass * shapes[1]) / (1 + mass) * (1 - 1e-12)
     out = [f"structure.moving_mass={MASS * (1 + mass)!r} kg"]

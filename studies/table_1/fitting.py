@@ -35,16 +35,17 @@ from patchfem.identify.space import make_space
 MIL = 25.4e-6
 SCORES = FOLDER / "scores.json"
 SAME_VALLEY_FACTOR = (
-    1.01  # ends of one valley have at most this multiple of the smallest training score
+    1.01  # fits to one optimum have at most this multiple of the smallest training score
 )
 TIED_FACTOR = (
-    1.05  # times the smallest training score: valleys that the record names beside the best
+    # optima below this multiple of the smallest training score are in the record beside the best
+    1.05
 )
-# rms difference of the training logarithms of two ends from which they are two valleys
+# rms difference of the training logarithms above which two fits are different optima
 VALLEY_DISTANCE = 0.01
 DRAWS = 4000  # number of bootstrap draws of rows
 PERCENT = (5, 95)  # percentiles of the bootstrap intervals
-# of what a smaller rung does not have
+# start values of parameters that a smaller model does not have
 NEUTRAL = {
     "worn.factor": 1.0,
     "rods.share": 0.05,

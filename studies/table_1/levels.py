@@ -32,7 +32,7 @@ from patchfem.scene import loads
 
 FREQUENCIES = (135.0, 143.0, 150.0, 155.0)
 DISTORTION_LIMIT = (
-    0.03  # third harmonic / first harmonic from which the acceleration counts as distorted
+    0.03  # third harmonic / first harmonic above which the acceleration counts as distorted
 )
 RUNAWAY_AMPLITUDE = 2 * 25.4e-6  # [m] amplitude that counts as a runaway
 ONSETS = [round(2 + 0.05 * k, 2) for k in range(101)]  # g

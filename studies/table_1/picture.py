@@ -20,7 +20,7 @@ from patchfem.core import G_N
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 MIL = 25.4e-6
-SHOWN_MODELS = {  # (rung, reading) -> name, colour, line
+SHOWN_MODELS = {  # {(model, kind of reading): (name, colour, line style)}
     ("rigid Coulomb", "peak"): ("rigid Coulomb", GREY, ":"),
     ("spring and yaw", ROOT2): ("spring and yaw, √2 × fundamental", BLUE, "-"),
     ("path of Fig. 27", STUCK_READING): ("path of Fig. 27, 1.24 × peak", ORANGE, "-"),

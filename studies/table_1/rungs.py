@@ -35,20 +35,20 @@ TABLE = FOLDER.parent / "rig" / "table1.csv"
 PREDICTED_ROWS = "frequency=135 Hz,150 Hz,155 Hz"
 STARTS = 8  # random starts of a fit
 MAX_STARTS = 16  # largest number of random starts
-SCREEN = 8  # random points per start, of which the best begins a descent
+SCREEN = 8  # random points per start; the descent begins at the best of them
 SEED = 0  # seed of the random starts
 POINT = (
     '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'
 )
 GAIN = "measured.acceleration_gain=0.5..3"
 STUCK_READING = "peak x stuck"
-READINGS = {  # name -> (--set strings, free keys of the reading)
+READINGS = {  # {name: (values for --set, free keys of the kind of reading)}
     "peak": ((), ()),
     "peak x gain": ((), (GAIN,)),
     STUCK_READING: (
         ("measured.acceleration_gain=1.2375",),
         (),
-    ),  # that of 143 Hz; each fit puts its own in its place
+    ),  # gain at 143 Hz; each fit replaces it by that of its training readings
     "fundamental x gain": (("measured.reading=fundamental",), (GAIN,)),
     "fundamental x sqrt2": (
         ("measured.reading=fundamental", "measured.acceleration_gain=1.4142135623730951"),
@@ -56,7 +56,7 @@ READINGS = {  # name -> (--set strings, free keys of the reading)
     ),
 }
 ROOT2 = "fundamental x sqrt2"
-# in this order of the campaign
+# kinds of readings in the order of the campaign
 READING = (
     "peak",
     STUCK_READING,
@@ -73,15 +73,16 @@ LOAD = "normal.load=15 lbf..50 lbf"
 AMPLITUDE = ("normal.grooves.amplitude", "2 um..14 um")
 NO_SPRING = "structure.bonded.stiffness=0 N/m"
 NO_DAMPER = "structure.bonded.damping=0 N s/m"
-MASS = 1.19396625  # [kg] block
-OMEGA = 2 * pi * 143  # [rad/s] axial mode
+MASS = 1.19396625  # [kg] mass of the block
+OMEGA = 2 * pi * 143  # [rad/s] angular frequency of the axial mode
 AXIAL_DAMPING = 0.003  # damping ratio of the axial mode
-# 148 Hz, ratio 1
+# spring and damper of a critically damped mode at 148 Hz
 FIG_27 = (
     f"structure.bonded.stiffness={MASS * OMEGA**2 * ((148 / 143) ** 2 - 1)!r} N/m",
     f"structure.bonded.damping={2 * MASS * (2 * pi * 148 - AXIAL_DAMPING * OMEGA)!r} N s/m",
 )
-PENDULUM = f"structure.bonded.stiffness=0 N/m..{26 * 4.4482216152605 / 0.02!r} N/m"  # load over 20 mm or more of cable
+# load / length of a cable of 20 mm or more
+PENDULUM = f"structure.bonded.stiffness=0 N/m..{26 * 4.4482216152605 / 0.02!r} N/m"
 PROTOCOLS = ("all", "without 135", "without 143", "without 150", "without 155")
 FOUR = ("peak", "peak x gain", "fundamental x gain", ROOT2)
 FIVE = ("peak", "peak x gain", STUCK_READING, "fundamental x gain", ROOT2)
@@ -223,7 +224,7 @@ RUNGS = {
         each=("fundamental x gain",),
     ),
 }
-CONTAINS = {  # rung -> those that it is with some of its numbers kept
+CONTAINS = {  # {model: smaller models that it equals if some of its parameters are fixed}
     "second path": ("spring and yaw", "path of Fig. 27, yaw not seen"),
     "second path, patch": ("second path",),
     "spring and yaw": ("patch", "weight on its cable"),
@@ -238,12 +239,12 @@ CONTAINS = {  # rung -> those that it is with some of its numbers kept
         "damper, yaw seen",
     ),
 }
-# reading -> those that it is at one gain
+# {kind of reading: kinds that it equals at a fixed gain}
 CONTAINED_READINGS = {
     "peak x gain": ("peak", STUCK_READING),
     "fundamental x gain": (ROOT2,),
 }
-PLACEBOS = {  # (rung, reading, protocol) -> what is put in the place of what the report says
+PLACEBOS = {  # {(model, kind of reading, protocol): values that replace those of the report}
     ("yaw in the accelerometer", STUCK_READING, "all"): tuple(
         f"structure.mode.yaw.frequency={one} Hz" for one in (73, 110, 122, 138)
     ),
@@ -272,7 +273,7 @@ def variants() -> list:
     return sorted(found, key=_rank)
 
 
-# left out in this order
+# fits that are repeated with each frequency left out, in this order
 FOLDS = (
     ("spring and yaw", ROOT2),
     ("path of Fig. 27", STUCK_READING),
@@ -286,7 +287,7 @@ FOLDS = (
     ("yaw in the accelerometer", STUCK_READING),
     ("yaw in the accelerometer", "peak x gain"),
 )
-# what others contain goes first
+# models that others contain are fitted first
 FIRST_RUNGS = (
     "patch",
     "weight on its cable",

@@ -47,12 +47,12 @@ SHORT = {
     "mass": "tips",
     "factor": "worn",
 }
-# of models, as printed
+# printed names of models that differ from their keys
 TITLES = {
     "damper, yaw seen": "damper, yaw in the accelerometer",
     "path of Fig. 27, yaw not seen": "path of Fig. 27, yaw not in the accelerometer",
 }
-# (rung, reading), its scores in the earlier ladder at 143 Hz, at 135 to 155 Hz and left out, its starts
+# (model, kind of reading, earlier scores at 143 Hz, at 135 to 155 Hz and left out, number of starts)
 EARLIER_LADDER = (
     ("spring and yaw", ROOT2, ".074 / .082 / .051", ".166 / .138 / .255", ".179 / .132 / .287", 8),
     (

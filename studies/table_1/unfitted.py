@@ -25,7 +25,7 @@ from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig"
 MIL = 25.4e-6
-NULL = 1.43  # acceleration over input of the null model
+NULL = 1.43  # acceleration / input acceleration in the null model
 MEASURES = "absolute_acceleration_peak", "relative_displacement_amplitude"
 
 

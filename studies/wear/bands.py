@@ -33,8 +33,8 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 FOLDER = Path(__file__).parent
 STEP = 3.2e-6  # [m] spacing of the surface
 POINTS = 320  # points of the surface in each direction
-UM = 1e-6  # [m]
-# steps; Table 1: 0.08 to 0.55 mil, 2 to 14 um, of relative displacement
+UM = 1e-6  # [m] one micrometre
+# strokes in steps of 3.2 um; Table 1 has relative displacements of 2 to 14 um (0.08 to 0.55 mil)
 STROKES = (
     0,
     1,
@@ -44,7 +44,8 @@ STROKES = (
     16,
     32,
 )
-DEPTHS = (3 * UM, 6 * UM)  # assumed: mean wear of each piece; 6 um, one sigma, halves the amplitude
+# [m] assumed mean wear of each piece; 6 um, the rms height, halves the amplitude
+DEPTHS = (3 * UM, 6 * UM)
 INTERVAL = (0.05, 0.95)
 
 

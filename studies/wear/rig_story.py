@@ -37,8 +37,9 @@ from patchfem.scene import scene
 FOLDER = Path(__file__).parent
 SCENE = FOLDER.parent / "rig" / "rig.toml"
 RIG = SCENE.read_text()
-CYCLES = 135_723  # 16 minutes at 143 Hz
-COEFFICIENTS = (1e-15, 1e-14, 1e-13)  # m2/N, assumed: sprayed carbide on itself, mild to severe
+CYCLES = 135_723  # number of cycles in about 16 minutes at 143 Hz
+# [m^2/N] assumed wear coefficients of sprayed carbide on itself, mild to severe
+COEFFICIENTS = (1e-15, 1e-14, 1e-13)
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nbond_length = "1 um"\nstatic = 0.30\n'  # this law has a sharp onset of slip
 SHOWN_MEASURES = (
     "contact_fraction",
