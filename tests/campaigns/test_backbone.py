@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem.campaigns import compute_backbone
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
 from patchfem.campaigns.backbone.joint import build_joint
-from patchfem.response.errors import error_of_change
+from patchfem.response import error_of_change
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi

@@ -5,7 +5,7 @@ from modal_bases import make_modal_basis
 from scipy.linalg import expm
 
 from patchfem.dynamics.harmonic.laws import FlowLaw, SpeedLaw
-from patchfem.friction import Bonds, TanhLaw, points_element
+from patchfem.friction import Bonds, LuGre, TanhLaw, points_element
 
 
 def make_speed_law(limit, speed):
@@ -16,6 +16,11 @@ def make_speed_law(limit, speed):
 def make_bond_law(limit, length):
     """Return the law of bonds, F = limit u with du/dq = sgn(v) - u per unit of length."""
     return FlowLaw(points_element(Bonds(limit, length), np.ones(1), np.ones(1)))
+
+
+def make_lugre_law():
+    """Return a LuGre law with Stribeck effect and damping, whose memory depends on time."""
+    return FlowLaw(LuGre(0.8, 0.6, 8.0, 0.5, 0.02, 0.01).element(1.0))
 
 
 def make_sdof(xi=0.003, omega=1.0, mass=1.0):

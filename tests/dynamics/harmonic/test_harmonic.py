@@ -8,6 +8,7 @@ from harmonic_cases import (
     make_bond_law,
     make_elements,
     make_five_modes,
+    make_lugre_law,
     make_sdof,
     make_speed_law,
     march_exactly,
@@ -32,9 +33,9 @@ from patchfem.dynamics import (
     points_model,
 )
 from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
-from patchfem.dynamics.harmonic.laws import FlowLaw, Jenkins, SampledSlide
+from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
 from patchfem.dynamics.harmonic.point import make_group
-from patchfem.friction import Bonds, LuGre
+from patchfem.friction import Bonds
 from patchfem.friction.bonds.recursion import advance_bonds
 
 DRIVE = SineDrive(1.0, 1.0)
@@ -111,7 +112,7 @@ def test_always_bonds_agree_with_recursion(seed, count, scale):
         Spring(2.0, 5.0),
         Interlock(3.0, 0.5),
         make_speed_law(0.8, 0.3),
-        FlowLaw(LuGre(0.8, 0.6, 8.0, 0.5, 0.02, 0.01).element(1.0)),
+        make_lugre_law(),
     ],
     ids=["Jenkins", "Bonds", "Spring", "Interlock", "SpeedLaw", "LuGre"],
 )

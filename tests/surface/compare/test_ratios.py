@@ -6,7 +6,7 @@ from pairs import UM, make_worn_pair
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.export.surfaces.compare import comparison_data
+from patchfem.export import comparison_data
 from patchfem.surface import Profile, Quantity, divide_sizes, measure_size
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import (
