@@ -220,7 +220,7 @@ EFFECTS = {
     ),
     "friction.law=nonlocal": _make_law(
         "bonds.quadrature",
-        "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
+        "tau = mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
         (
             "bond_length",
             "kinetic reading order rest_growth slip_growth rest_speed "

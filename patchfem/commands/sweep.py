@@ -191,10 +191,11 @@ def sweep(
     if by.collect:
         _print_stored_results(run.collect_shards(sweep_scene, cases, target, not no_page), output)
         return
-    for text in () if quiet else axes.describe_ranges(what.over if what else ()):
-        note(text)
-    if not quiet and (wrong := parse_request.contradictions(sweep_scene, cases)):
-        note(wrong)
+    if not quiet:
+        for text in axes.describe_ranges(what.over if what else ()):
+            note(text)
+        if wrong := parse_request.contradictions(sweep_scene, cases):
+            note(wrong)
     line = Progress(quiet)
     try:
         place = run.SweepTarget(target, resume, keep or "", part, not no_page)

@@ -125,8 +125,8 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
         warnings = [_format_warning(finding, static, _static_remedy(at_rest, static, meshes))]
         if (
             isinstance(finding.patch, press.Patch)
-            and finding.patch.points is None
             and model.patch.gap.profile is not None
+            and (finding.patch.points is None or model.kind != "patch")
         ):
             from .patch import trace_split
 

@@ -171,7 +171,9 @@ def test_exact_compare_command_agrees_with_python(result_folders, tmp_path):
 
 
 STORY = re.search(
-    r"in three commands:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)", GUIDE.read_text(), re.S
+    r"Three commands compare[^\n]*:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)",
+    GUIDE.read_text(),
+    re.S,
 )
 QUICK = [
     "--set",
