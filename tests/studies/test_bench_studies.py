@@ -31,21 +31,21 @@ def test_exact_complete_velocity_study_agrees_with_lorentzian():
     """All velocities agree with the Lorentzian; the fastest depart by the figures of the study."""
     rows = load_study("bench/stribeck.py").main(path=None)
     check_speeds(rows)
-    fast = {
+    departure = {
         row["slip"]: {p: row[p][0] / row["promised"] - 1 for p in (0, 1)}
         for row in rows
         if row["share"] > 99
     }
-    assert fast[0.1] == pytest.approx({0: -0.027, 1: 0.021}, abs=6e-4)
-    assert fast[1.0] == pytest.approx({0: -0.63, 1: -0.15}, abs=6e-3)
+    assert departure[0.1] == pytest.approx({0: -0.027, 1: 0.021}, abs=6e-4)
+    assert departure[1.0] == pytest.approx({0: -0.63, 1: -0.15}, abs=6e-3)
 
 
-def integrate_peak_after_rest(part, start, before):
+def integrate_peak_after_rest(fraction, start, before):
     """Return the largest z/eps_0 of z' = 1 - z/eps, eps by equation 2.10, after a period at rest."""
-    rate = 2e-6 / 1e-6 + 1 / (part * 2e-6)
-    slow = before
-    found = solve_ivp(
-        lambda y, z: 1 - z / (slow + (start - slow) * np.exp(-rate * y * 2e-6)),
+    rate = 2e-6 / 1e-6 + 1 / (fraction * 2e-6)
+    steady = before
+    solution = solve_ivp(
+        lambda y, z: 1 - z / (steady + (start - steady) * np.exp(-rate * y * 2e-6)),
         (0, 20),
         [before],
         method="DOP853",
@@ -53,7 +53,7 @@ def integrate_peak_after_rest(part, start, before):
         atol=1e-14,
         t_eval=np.linspace(0, 20, 40_001),
     )
-    return found.y[0].max()
+    return solution.y[0].max()
 
 
 def test_exact_ageing_is_exponential_and_bounds_the_friction_peak(tmp_path):
@@ -63,23 +63,23 @@ def test_exact_ageing_is_exponential_and_bounds_the_friction_peak(tmp_path):
     )
     assert "<svg" in (tmp_path / "picture.svg").read_text()
     for row in (row for row in rows if row["reading"] == "stretch"):
-        slow = (1 + 0.5 * 1e-6 / (2e-6 * row["part"] * 2e-6)) / (
+        steady = (1 + 0.5 * 1e-6 / (2e-6 * row["part"] * 2e-6)) / (
             1 + 1e-6 / (2e-6 * row["part"] * 2e-6)
         )
-        assert row["before"] == pytest.approx(slow, rel=1e-9) and row["rested"] == row["before"]
-        assert row["aged"] == pytest.approx(1 - (1 - slow) * np.exp(-2 * row["hold"]), rel=1e-12)
+        assert row["before"] == pytest.approx(steady, rel=1e-9) and row["rested"] == row["before"]
+        assert row["aged"] == pytest.approx(1 - (1 - steady) * np.exp(-2 * row["hold"]), rel=1e-12)
         assert row["peak"] == pytest.approx(
             integrate_peak_after_rest(row["part"], row["aged"], row["before"]), rel=1e-4
         )
         assert row["before"] < row["peak"] < row["aged"]
-    shown = {
+    ageing_in_peak = {
         row["part"]: (row["peak"] - row["before"]) / (row["aged"] - row["before"])
         for row in rows
         if row["hold"] == 10 and row["reading"] == "stretch"
     }
-    assert shown == pytest.approx({0.5: 0.28, 5.0: 0.68}, abs=5e-3)
-    printed = [row for row in rows if row["reading"] == "report"]
-    assert printed[-1]["before"] == pytest.approx(0.517, abs=1e-3) and printed[-1][
+    assert ageing_in_peak == pytest.approx({0.5: 0.28, 5.0: 0.68}, abs=5e-3)
+    report_rows = [row for row in rows if row["reading"] == "report"]
+    assert report_rows[-1]["before"] == pytest.approx(0.517, abs=1e-3) and report_rows[-1][
         "rested"
     ] == pytest.approx(1, 1e-6)
 

@@ -21,10 +21,12 @@ def test_always_beam_study_gives_its_stated_scores(beam):
     """Frequencies and damping ratios of the bolted beam differ from the measured ones as stated."""
     rows = {test: [row for row in beam.main() if row.test == test] for test in ("hammer", "shaker")}
     ratio = {t: [r.damping / r.measured_damping for r in rows[t]] for t in rows}
-    miss = {t: [r.frequency - r.measured_frequency for r in rows[t]] for t in rows}
+    difference = {t: [r.frequency - r.measured_frequency for r in rows[t]] for t in rows}
     scores = [beam.damping_score(ratio[test], 1) for test in rows]
     assert scores == pytest.approx([0.016, 0.158], abs=5e-4)
-    assert [compute_rms(miss[test]) for test in rows] == pytest.approx([0.019, 0.394], abs=5e-4)
+    assert [compute_rms(difference[test]) for test in rows] == pytest.approx(
+        [0.019, 0.394], abs=5e-4
+    )
     assert [min(ratio["shaker"]), max(ratio["shaker"])] == pytest.approx([0.85, 1.30], abs=5e-3)
     first, last = rows["hammer"][0], rows["hammer"][-1]
     assert first.frequency - last.frequency == pytest.approx(0.195, abs=5e-4)
@@ -34,19 +36,19 @@ def test_always_beam_study_gives_its_stated_scores(beam):
     assert beam.damping_score(mean[2], beam.SHAKER[:, 3]) == pytest.approx(0.77, abs=5e-3)
     assert compute_rms(beam.SHAKER[:, 1] - mean[1]) == pytest.approx(0.19, abs=5e-3)
     assert compute_rms(beam.HAMMER[:, 1] - mean[1]) == pytest.approx(0.057, abs=5e-4)
-    every = [*rows["hammer"], *rows["shaker"]]
-    assert max(r.frequency_error for r in every) < 3e-5
-    assert max(r.damping_error / r.damping for r in every) < 3e-4
+    all_rows = [*rows["hammer"], *rows["shaker"]]
+    assert max(r.frequency_error for r in all_rows) < 3e-5
+    assert max(r.damping_error / r.damping for r in all_rows) < 3e-4
 
 
 @pytest.mark.slow
 def test_beam_fit_gives_the_values_of_its_scene(beam):
     """A fit to the damping ratios of the beam gives the values of its scene file."""
-    values, half = beam.fit_damping()
-    force = 100 * np.exp(values[0] + half[0] * np.array([0, -1, 1]))
+    values, half_widths = beam.fit_damping()
+    force = 100 * np.exp(values[0] + half_widths[0] * np.array([0, -1, 1]))
     assert force == pytest.approx([19.4, 12.7, 29.5], abs=0.1)
     assert values[1:] == pytest.approx([-0.03, 1.41], abs=0.01)
-    assert half[1:] == pytest.approx([0.26, 0.095], abs=0.01)
+    assert half_widths[1:] == pytest.approx([0.26, 0.095], abs=0.01)
 
 
 @pytest.mark.parametrize("index", [0, 1])
@@ -55,23 +57,23 @@ def test_exact_beam_tables_agree_with_the_measured_files(beam, index):
     file = FOLDER / beam.FILES[index]
     if not file.exists():
         pytest.skip(f"PATCHFEM_DATA names no folder with {file.name}")
-    read, typed = ((beam.read_hammer, beam.HAMMER), (beam.read_shaker, beam.SHAKER))[index]
-    assert read(file) == pytest.approx(typed, rel=1e-3, abs=1e-3 * index)
+    read, table = ((beam.read_hammer, beam.HAMMER), (beam.read_shaker, beam.SHAKER))[index]
+    assert read(file) == pytest.approx(table, rel=1e-3, abs=1e-3 * index)
 
 
 def test_always_titanium_study_gives_its_stated_depths_and_widths(wear):
     """Depths, widths and the fitted wear coefficient of the titanium tracks are those stated."""
     tracks = {track.name: track for track in wear.main()}
-    deep = tracks.pop("f_2")
-    assert [1e6 * deep.depth, 1e6 * deep.depth_error] == pytest.approx([67.8, 0.1], abs=0.05)
-    wide = [track.half_width / track.measured for track in tracks.values()]
-    assert [min(wide), max(wide)] == pytest.approx([1.56, 1.86], abs=5e-3)
+    deepest = tracks.pop("f_2")
+    assert [1e6 * deepest.depth, 1e6 * deepest.depth_error] == pytest.approx([67.8, 0.1], abs=0.05)
+    ratios = [track.half_width / track.measured for track in tracks.values()]
+    assert [min(ratios), max(ratios)] == pytest.approx([1.56, 1.86], abs=5e-3)
     measured = [1e3 * track.measured for track in tracks.values()]
     assert [min(measured), max(measured)] == pytest.approx([1.85, 2.46], abs=5e-3)
     assert max(track.half_width_error / track.half_width for track in tracks.values()) < 0.025
     fit = wear.fit_depth()
-    found = [fit[name] for name in ("value", "low", "high")]
-    assert found == pytest.approx([1.00e-12, 0.95e-12, 1.05e-12], abs=5e-15)
+    interval = [fit[name] for name in ("value", "low", "high")]
+    assert interval == pytest.approx([1.00e-12, 0.95e-12, 1.05e-12], abs=5e-15)
     by_volume = wear.LOW_FREQUENCY[1].volume / wear.compute_work(wear.LOW_FREQUENCY[1])
     assert fit["value"] / by_volume == pytest.approx(3.4, abs=0.05)
 
@@ -92,9 +94,11 @@ def test_exact_wear_coefficients_of_titanium_from_volumes(wear):
         "the score is {:.2f} (constant: {:.2f})".format(*scores["1 to 5 Hz"]),
     )
     tests = (*wear.LOW_FREQUENCY, *wear.REPEATED_TESTS, *wear.FASTER_TESTS, *wear.OTHER_CONTACTS)
-    works = [test.work / wear.compute_work(test) for test in tests]
-    assert len(works) == 19 and [min(works), max(works)] == pytest.approx([0.65, 1.08], abs=5e-3)
-    others = [fast[0] * test.work / test.volume for test in wear.OTHER_CONTACTS]
-    assert [min(others), max(others)] == pytest.approx([0.36, 1.28], abs=5e-3)
-    gap = 1.9e-3**2 / (2 * 80e-3)
-    assert [gap, wear.PROFILE_DEPTH - gap] == pytest.approx([23e-6, 132e-6], abs=0.6e-6)
+    ratios = [test.work / wear.compute_work(test) for test in tests]
+    assert len(ratios) == 19 and [min(ratios), max(ratios)] == pytest.approx([0.65, 1.08], abs=5e-3)
+    ratios_elsewhere = [fast[0] * test.work / test.volume for test in wear.OTHER_CONTACTS]
+    assert [min(ratios_elsewhere), max(ratios_elsewhere)] == pytest.approx([0.36, 1.28], abs=5e-3)
+    contact_depth = 1.9e-3**2 / (2 * 80e-3)
+    assert [contact_depth, wear.PROFILE_DEPTH - contact_depth] == pytest.approx(
+        [23e-6, 132e-6], abs=0.6e-6
+    )

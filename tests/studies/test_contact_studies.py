@@ -23,9 +23,9 @@ def test_exact_rigid_motion_of_an_element_causes_no_force(orders, order):
     # element of length 1 and height 2
     along, across = np.meshgrid(0.5 * orders.lobatto(order)[0], orders.lobatto(order)[0])
     stiffness = orders.cell_stiffness(order, np.array([2.0]), 1.0, 0.3)[0]
-    moves = [np.concatenate(pair) for pair in ((1 + 0 * along.ravel(), 0 * along.ravel()),
+    motions = [np.concatenate(pair) for pair in ((1 + 0 * along.ravel(), 0 * along.ravel()),
                                                (-across.ravel(), along.ravel()))]  # fmt: skip
-    assert max(abs(stiffness @ move).max() for move in moves) < 1e-12
+    assert max(abs(stiffness @ motion).max() for motion in motions) < 1e-12
 
 
 @pytest.mark.parametrize("order", [1, 4])
@@ -56,12 +56,12 @@ def test_order_four_needs_fewer_unknowns_than_bilinear_elements(orders):
     30 780 unknowns of bilinear elements have errors above 2.5e-4.
     """
     case = orders.CASES["1e-4 rad"]
-    fine = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.7, 0.8, 1e-3)), 4)
-    rough = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.125, 0.8, 1e-4)), 1)
+    fourth_order = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.7, 0.8, 1e-3)), 4)
+    bilinear = orders.solve_pair(case, *orders.grids(case, orders.Grading(0.125, 0.8, 1e-4)), 1)
     assert (
-        orders.errors(case, fine.values).max()
+        orders.errors(case, fourth_order.values).max()
         < 1e-4
         < 2.5e-4
-        < orders.errors(case, rough.values).max()
+        < orders.errors(case, bilinear.values).max()
     )
-    assert rough.unknowns > 5 * fine.unknowns
+    assert bilinear.unknowns > 5 * fourth_order.unknowns

@@ -17,10 +17,10 @@ FILE = Path(FOLDER or ".") / "friction-damper-1hz.csv"
 
 def test_exact_plateau_begins_half_a_stroke_after_reversal():
     """The plateau of the loop begins half a stroke after each reversal."""
-    slide = np.array([0.0, 1, 2, 1, 0, 1, 2])
-    assert damper.plateau(slide).tolist() == [False, True, True, True, True, True, True]
-    slide = np.array([0.0, 0.5, 2, 1.5, 0.5, 0, 0.5, 1.5])
-    assert damper.plateau(slide).tolist() == [False, False, True, False, True, True, False, True]
+    rel_disp = np.array([0.0, 1, 2, 1, 0, 1, 2])
+    assert damper.plateau(rel_disp).tolist() == [False, True, True, True, True, True, True]
+    rel_disp = np.array([0.0, 0.5, 2, 1.5, 0.5, 0, 0.5, 1.5])
+    assert damper.plateau(rel_disp).tolist() == [False, False, True, False, True, True, False, True]
 
 
 @pytest.mark.slow
@@ -51,10 +51,12 @@ def test_bond_law_fits_the_plateaus_but_not_the_backlash():
 def test_refuses_missing_measured_file(words):
     """Without its measured file the study stops with one line that names the source and the command."""
     script = Path(__file__).parents[2] / "studies" / "damper" / "damper.py"
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, str(script), *words], capture_output=True, text=True, check=False
     )
-    assert done.returncode == 1 and not done.stdout
-    (said,) = done.stderr.splitlines()
-    assert "ARTS-Laboratory" in said and "run: python studies/damper/damper.py FILE.csv" in said
-    assert said.startswith("nothing_here.csv is no file" if words else "the record is not part")
+    assert process.returncode == 1 and not process.stdout
+    (message,) = process.stderr.splitlines()
+    assert (
+        "ARTS-Laboratory" in message and "run: python studies/damper/damper.py FILE.csv" in message
+    )
+    assert message.startswith("nothing_here.csv is no file" if words else "the record is not part")

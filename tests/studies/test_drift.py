@@ -16,9 +16,11 @@ def test_exact_drift_of_the_bond_law_agrees_with_closed_form(table):
         if name.startswith("stretch"):
             for case in ("force .5+-.1", "force .5+-.3", "force .3+-.3"):
                 (high, low), _ = table.CASES[case]
-                found = table.row(name, engine, case, 3)
-                wanted = friction_forms.dither_drift(low, high, engine.law.breakaway)
-                assert (found.second, found.last) == pytest.approx((wanted, wanted), abs=1e-9), (
+                result = table.row(name, engine, case, 3)
+                expected = friction_forms.dither_drift(low, high, engine.law.breakaway)
+                assert (result.second, result.last) == pytest.approx(
+                    (expected, expected), abs=1e-9
+                ), (
                     name,
                     case,
                 )
@@ -56,29 +58,32 @@ def test_exact_drift_of_tanh_and_bouc_wen_agrees_with_integrals(table):
     """The creep of the tanh law and the drift of Bouc-Wen agree with integrals of their equations."""
     rows = {row.law: row.last for row in table.closed_form_rows("force .5+-.1")}
     time = (np.arange(4000) + 0.5) / 4000
-    slow = 1e-3 * np.arctanh(0.4 + 0.2 * time).mean() / 143 / 2e-6
+    mean_creep = 1e-3 * np.arctanh(0.4 + 0.2 * time).mean() / 143 / 2e-6
     assert (
-        rows["tanh, v_0 = 1 mm/s"] == pytest.approx(slow, rel=1e-6) == pytest.approx(1.93, abs=2e-3)
+        rows["tanh, v_0 = 1 mm/s"]
+        == pytest.approx(mean_creep, rel=1e-6)
+        == pytest.approx(1.93, abs=2e-3)
     )
     z = 0.4
-    up = 0.0
+    displacement = 0.0
     while z < 0.6:
-        z, up = z + 1e-5, up + 1e-5 / (1 - (z + 5e-6) ** 2)
-    assert rows["Bouc-Wen n = 2"] == pytest.approx(up - 0.2, abs=1e-4)
+        z, displacement = z + 1e-5, displacement + 1e-5 / (1 - (z + 5e-6) ** 2)
+    assert rows["Bouc-Wen n = 2"] == pytest.approx(displacement - 0.2, abs=1e-4)
 
 
 def test_always_bond_growth_needs_a_larger_elastic_range(table):
     """If bonds grow at rest, drift stops only at a larger elastic range, by the factor 1/0.7."""
 
-    def last(share, case):
+    def last_drift(share, case):
+        """Return the drift of the last cycle."""
         law = table.ladder.bonds(breakaway=share, **table.ladder.GROWTH)
         return table.row("", FirstOrderBonds(law), case, 4).last
 
-    assert last(0.1, "force .5+-.1") == pytest.approx(0.0014, abs=1e-4)
-    assert last(0.3, "force .3+-.3") == pytest.approx(0.033, abs=1e-3)
-    assert last(0.1 / 0.7, "force .5+-.1") == pytest.approx(0.0, abs=1e-12)
-    assert last(0.3 / 0.7, "force .3+-.3") == pytest.approx(0.0, abs=1e-12)
-    assert last(0.5, "force .5+-.3") is None  # the displacement grows without bound
+    assert last_drift(0.1, "force .5+-.1") == pytest.approx(0.0014, abs=1e-4)
+    assert last_drift(0.3, "force .3+-.3") == pytest.approx(0.033, abs=1e-3)
+    assert last_drift(0.1 / 0.7, "force .5+-.1") == pytest.approx(0.0, abs=1e-12)
+    assert last_drift(0.3 / 0.7, "force .3+-.3") == pytest.approx(0.0, abs=1e-12)
+    assert last_drift(0.5, "force .5+-.3") is None  # the displacement grows without bound
 
 
 def test_exact_drift_of_the_report_law_decays_with_the_square(table):
@@ -96,8 +101,8 @@ def test_exact_drift_of_the_report_law_decays_with_the_square(table):
 
 def test_exact_loop_area_lost_to_an_elastic_range(table):
     """The loop area lost to an elastic range agrees with the closed form."""
-    found = table.breakaway_cost((1.0, 3.0, 12.5))
-    for (b, amplitude), (area, _) in found.items():
+    costs = table.breakaway_cost((1.0, 3.0, 12.5))
+    for (b, amplitude), (area, _) in costs.items():
         loss = [
             friction_forms.stretch_loop(amplitude, 1.0, 1.0, share)[0] / (4 * amplitude)
             for share in (b, 0.0)
@@ -105,7 +110,7 @@ def test_exact_loop_area_lost_to_an_elastic_range(table):
         assert area == pytest.approx(loss[0] - loss[1], abs=1e-6)
         if amplitude == 12.5:
             assert area * amplitude == pytest.approx(-b * (1 - b), abs=1e-4)
-    assert found[0.3, 3.0] == pytest.approx((-0.069, 0.111), abs=1e-3)
+    assert costs[0.3, 3.0] == pytest.approx((-0.069, 0.111), abs=1e-3)
     assert [table.virgin_gap(b) for b in table.SHARES] == pytest.approx(
         [0, 0.0048, 0.0408, 0.1065], abs=5e-5
     )
@@ -117,9 +122,9 @@ def test_exact_loop_area_lost_to_an_elastic_range(table):
 @pytest.mark.slow
 def test_always_drift_table_has_the_stated_values(table, capsys):
     """The table of drift per cycle has the values stated in the study."""
-    found = table.main()
+    rows = table.main()
     cases = tuple(table.CASES)
-    wanted = {
+    expected = {
         "stretch p = 1, b = 0": (0.272, 0.981, 0.446, 0, 0, 0.289),
         "stretch p = 1, b = 0.1": (0, 0.811, 0.357, 0, 0, 0.0013),
         "stretch p = 1, b = 0.3": (0,) * 6,
@@ -135,7 +140,7 @@ def test_always_drift_table_has_the_stated_values(table, capsys):
         "Iwan, 10 elements": (0,) * 6,
         "Coulomb": (0,) * 6,
     }
-    for law, numbers in wanted.items():
-        assert [found[law, case].last for case in cases] == pytest.approx(numbers, abs=6e-4), law
-    assert found["stretch p = 1, b = 0, growing", "force .5+-.3"].last is None
+    for law, values in expected.items():
+        assert [rows[law, case].last for case in cases] == pytest.approx(values, abs=6e-4), law
+    assert rows["stretch p = 1, b = 0, growing", "force .5+-.3"].last is None
     assert "| away |" in capsys.readouterr().out

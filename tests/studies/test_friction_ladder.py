@@ -24,11 +24,13 @@ def today(ladder):
 def test_exact_loop_areas_without_bond_growth(ladder, amplitude):
     """Without growth of bonds, the loop areas of the Dahl and Jenkins laws agree with closed forms."""
     dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
-    sharp = ladder.elastic_plastic(amplitude)
+    elastic_plastic = ladder.elastic_plastic(amplitude)
     assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
-    assert sharp.area == pytest.approx(friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
-    miss = ladder.error(ladder.coulomb(dahl), dahl)[0]
-    assert miss == pytest.approx(np.tanh(amplitude) / amplitude, rel=2e-6)
+    assert elastic_plastic.area == pytest.approx(
+        friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12
+    )
+    difference = ladder.error(ladder.coulomb(dahl), dahl)[0]
+    assert difference == pytest.approx(np.tanh(amplitude) / amplitude, rel=2e-6)
 
 
 def test_exact_rms_error_of_coulomb_at_large_amplitude(ladder):
@@ -50,6 +52,7 @@ def test_exact_lugre_is_the_bond_law_with_instant_growth(ladder):
     slip = ladder.GROWTH["slip_growth"]
 
     def rate(t, z):
+        """Return the rate of the LuGre state."""
         v = amplitude * length * omega * np.cos(omega * t)
         return v - abs(v) * z / friction_forms.steady_bond_length(v, length, ratio, rest, slip)
 
@@ -60,19 +63,19 @@ def test_exact_lugre_is_the_bond_law_with_instant_growth(ladder):
         ).y[0]
         / length
     )
-    found = ladder.last_cycle(ladder.points(ladder.at_once()), amplitude)
-    assert found.force == pytest.approx((z[1:] + z[:-1]) / 2, abs=4e-6)
+    cycle = ladder.last_cycle(ladder.points(ladder.at_once()), amplitude)
+    assert cycle.force == pytest.approx((z[1:] + z[:-1]) / 2, abs=4e-6)
 
 
 def test_exact_bouc_wen_of_exponent_one_is_dahl(ladder, today):
     """Bouc-Wen with the exponent 1 equals the bond law of constant length on a random path."""
     path = np.random.default_rng(1).normal(0, 0.7, 200).cumsum()
     law = FirstOrderBonds(ladder.bonds())
-    one = np.ones(1)
-    state = law.start(one)
+    unit = np.ones(1)
+    state = law.start(unit)
     force = [0.0]
     for dq in np.diff(path):
-        state = law.step(state, dq * ladder.LENGTH, one, one, 1.0).state
+        state = law.step(state, dq * ladder.LENGTH, unit, unit, 1.0).state
         force.append(law.traction(state)[0])
     assert today.bouc_wen(path[:, None], 1, 1.0)[:, 0] == pytest.approx(force, abs=1e-14)
 
@@ -98,35 +101,38 @@ def test_exact_iwan_loop_area_is_short_by_four_bond_lengths(ladder, today, ampli
 
 def test_always_laws_with_bond_growth_differ_as_stated(ladder, table):
     """The laws with growing bonds differ from LuGre and from constant bonds by the stated rms values."""
-    for amplitude, wanted in ((0.3, (0.0, 0.001, 0.011)), (3.0, (0.0019, 0.22, 0.029))):
+    for amplitude, expected in ((0.3, (0.0, 0.001, 0.011)), (3.0, (0.0019, 0.22, 0.029))):
         stretch, lugre = (
             ladder.last_cycle(ladder.points(law), amplitude)
             for law in (ladder.bonds(**ladder.GROWTH), ladder.at_once())
         )
-        held = [
+        constant = [
             ladder.last_cycle(ladder.points(ladder.bonds(share)), amplitude)
             for share in (1.0, ladder.RATIO)
         ]
-        found = (ladder.error(lugre, stretch), *(ladder.error(one, lugre) for one in held))
-        assert [rms for _, rms in found] == pytest.approx(wanted, rel=0.05, abs=1e-4)
-        assert abs(found[0][0]) < 2e-4
+        differences = (
+            ladder.error(lugre, stretch),
+            *(ladder.error(one, lugre) for one in constant),
+        )
+        assert [rms for _, rms in differences] == pytest.approx(expected, rel=0.05, abs=1e-4)
+        assert abs(differences[0][0]) < 2e-4
     assert table.slow_path(3.0)[0].above == pytest.approx((-0.0098, 0.0152), rel=0.01)
 
 
 def test_always_best_velocity_scale_of_the_tanh_law(ladder):
     """The velocity scale of the tanh law that fits Dahl's loop best, and its rms error, are as stated."""
-    for amplitude, wanted, rms in ((1.0, 3.23, 0.520), (50.0, 0.257, 0.287)):
+    for amplitude, expected, rms in ((1.0, 3.23, 0.520), (50.0, 0.257, 0.287)):
         dahl = ladder.last_cycle(ladder.points(ladder.bonds()), amplitude)
-        share = dahl.dq / np.abs(dahl.dq).max()
-        assert ladder.today.best_rate(share, dahl.force) == pytest.approx(wanted, rel=0.01)
+        fraction = dahl.dq / np.abs(dahl.dq).max()
+        assert ladder.today.best_rate(fraction, dahl.force) == pytest.approx(expected, rel=0.01)
         assert ladder.error(ladder.rate(dahl), dahl)[1] == pytest.approx(rms, abs=2e-3)
 
 
 @pytest.mark.slow
 def test_always_table_of_friction_laws_has_the_stated_values(table, capsys):
     """The table of rms differences between friction laws has the values stated in the study."""
-    found = table.main()
-    known = {
+    rows = table.main()
+    expected_values = {
         ("off", "report p = 1"): (0.638, 0.512, 0.244, 0.106, 0.072, 0.050),
         ("off", "elastic-plastic"): (0.003, 0.027, 0.290, 0.139, 0.092, 0.065),
         ("off", "Coulomb"): (1.000, 1.000, 0.978, 0.814, 0.566, 0.400),
@@ -141,9 +147,9 @@ def test_always_table_of_friction_laws_has_the_stated_values(table, capsys):
         ("on", "constant eps_k, mu_k"): (0.001, 0.011, 0.051, 0.028, 0.008, 0.002),
         ("on", "Coulomb, mu_k"): (0.701, 0.708, 0.703, 0.544, 0.369, 0.258),
     }
-    for (growth, rung), wanted in known.items():
-        seen = [found[growth, rung, a].top[1] for a in table.AMPLITUDES]
-        assert seen == pytest.approx(wanted, abs=6e-4), rung
+    for (growth, law), expected in expected_values.items():
+        values = [rows[growth, law, a].top[1] for a in table.AMPLITUDES]
+        assert values == pytest.approx(expected, abs=6e-4), law
     assert "against the rung above" in capsys.readouterr().out
 
 

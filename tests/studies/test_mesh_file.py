@@ -17,9 +17,9 @@ def test_always_mesh_from_file_agrees_with_generated_mesh():
         if " mrad  " in line
     ]
     assert len(printed) == len(mesh_file.TILTS)
-    for (tilt, pairs, apart), (_, *numbers) in zip(mesh_file.rows(), printed):
-        assert all(abs(off) < bar for off, bar in pairs), tilt
-        assert apart < 2
+    for (tilt, pairs, difference), (_, *numbers) in zip(mesh_file.rows(), printed):
+        assert all(abs(departure) < bound for departure, bound in pairs), tilt
+        assert difference < 2
         assert numbers == pytest.approx(
-            [one for pair in pairs for one in pair] + [apart], abs=6e-3, rel=0.02
+            [value for pair in pairs for value in pair] + [difference], abs=6e-3, rel=0.02
         )

@@ -42,9 +42,9 @@ def asperities(rough):
 # ---- fixtures and skins
 
 
-def solve_coarse(tilted, found):
+def solve_coarse(tilted, pieces):
     """Return the measures of a pressed patch on the coarse meshes."""
-    return values(press_patch(found, tilted.pair(1)))
+    return values(press_patch(pieces, tilted.pair(1)))
 
 
 @pytest.mark.share(2)
@@ -60,9 +60,9 @@ def test_exact_fixture_table_has_the_computed_values(tilted, fixtures, tilt):
         "normal_stiffness",
         "tangential_stiffness",
     )
-    found = tilted.compute_measures(fixtures.held_pieces(float(tilt), None))
+    measures = tilted.compute_measures(fixtures.held_pieces(float(tilt), None))
     for name, cell in zip(names, re.sub(r" *± *[\d.]+", "", row).split(), strict=True):
-        value = found[name].value * fixtures.COLUMNS[name][1]
+        value = measures[name].value * fixtures.COLUMNS[name][1]
         last = 10.0 ** -len(cell.partition(".")[2])
         assert abs(value - float(cell)) <= 0.5001 * last, (name, value, cell)
 
@@ -71,16 +71,18 @@ def test_always_error_estimates_cover_an_independent_solution(tilted, fixtures):
     """The error estimates cover the solution of an independent program with elements of order 5."""
     from patchfem.runs import estimate_measures
 
-    found = fixtures.held_pieces(1e-3, None)
-    two = estimate_measures(press_patch(found, tilted.pair(1)), press_patch(found, tilted.pair(0)))
+    pieces = fixtures.held_pieces(1e-3, None)
+    measures = estimate_measures(
+        press_patch(pieces, tilted.pair(1)), press_patch(pieces, tilted.pair(0))
+    )
     # values of an independent program with elements of order 5
-    best = {
+    reference = {
         "contact_fraction": 0.0239193,
         "pressure_peak": 60.8446e6,
         "normal_stiffness": 169.882e6,
     }
-    for name, value in best.items():
-        assert abs(two[name].value - value) <= two[name].error <= 0.2 * value
+    for name, value in reference.items():
+        assert abs(measures[name].value - value) <= measures[name].error <= 0.2 * value
 
 
 @pytest.mark.slow
@@ -89,9 +91,9 @@ def test_always_two_mesh_gradings_agree_within_error_estimates(tilted, angle, sk
     """Solutions on two differently graded meshes differ by less than the sum of their error estimates."""
     from patchfem.runs import estimate_measures, solve_with_coarser
 
-    found = tilted.case(angle, skin)
-    ours = tilted.compute_measures(found)
-    other = estimate_measures(*solve_with_coarser(found, 1e-3), tolerance=1e-3)
+    pieces = tilted.case(angle, skin)
+    ours = tilted.compute_measures(pieces)
+    other = estimate_measures(*solve_with_coarser(pieces, 1e-3), tolerance=1e-3)
     for name in (
         "contact_fraction",
         "loaded_fraction",
@@ -106,9 +108,9 @@ def test_always_two_mesh_gradings_agree_within_error_estimates(tilted, angle, sk
 def test_always_free_piece_loses_contact_inside_the_kern(tilted, fixtures):
     """A load offset within the middle third opens the contact of elastic pieces, unlike rigid ones."""
     for offset, fraction in ((0.15, 1.0), (1 / 3, 0.445)):
-        found = solve_coarse(tilted, fixtures.free(offset))
-        assert found["contact_fraction"] == pytest.approx(fraction, abs=0.02)
-        assert found["pressure_centre"] == pytest.approx(-offset * LENGTH, rel=1e-9)
+        measures = solve_coarse(tilted, fixtures.free(offset))
+        assert measures["contact_fraction"] == pytest.approx(fraction, abs=0.02)
+        assert measures["pressure_centre"] == pytest.approx(-offset * LENGTH, rel=1e-9)
     assert (
         solve_coarse(tilted, fixtures.free(0.16))["contact_fraction"]
         < 1
@@ -118,24 +120,31 @@ def test_always_free_piece_loses_contact_inside_the_kern(tilted, fixtures):
 
 def test_always_soft_surface_layer_keeps_its_normal_stiffness(tilted, fixtures):
     """The softer the surface layer, the less normal stiffness is lost at a tilt of 10 mrad."""
-    even, tipped = (
+    aligned, inclined = (
         {
             skin: solve_coarse(tilted, fixtures.held_pieces(tilt, None, skin))
             for skin in tilted.SKINS
         }
         for tilt in (1e-6, 1e-2)
     )
-    for skin, left in (("bare", 0.052), ("linear", 0.05), ("peaks", 0.112), ("exponential", 0.824)):
-        ratio = tipped[skin]["normal_stiffness"] / even[skin]["normal_stiffness"]
-        assert ratio == pytest.approx(left, rel=0.03)
+    for skin, expected in (
+        ("bare", 0.052),
+        ("linear", 0.05),
+        ("peaks", 0.112),
+        ("exponential", 0.824),
+    ):
+        ratio = inclined[skin]["normal_stiffness"] / aligned[skin]["normal_stiffness"]
+        assert ratio == pytest.approx(expected, rel=0.03)
 
 
 def test_exact_soft_layer_is_a_rigid_wedge_on_asperities(tilted):
     """With a layer much softer than the pieces, the contact agrees with a rigid wedge on asperities."""
-    found = solve_coarse(tilted, tilted.case(5e-2, "exponential", "asperities.decay_length=500 um"))
+    measures = solve_coarse(
+        tilted, tilted.case(5e-2, "exponential", "asperities.decay_length=500 um")
+    )
     fraction, centre = exact.wedge_on_asperities(5e-2, LENGTH, 500e-6)
-    assert found["loaded_fraction"] == pytest.approx(fraction, rel=3e-4)
-    assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
+    assert measures["loaded_fraction"] == pytest.approx(fraction, rel=3e-4)
+    assert measures["pressure_centre"] == pytest.approx(centre, rel=3e-4)
     stiffer = solve_coarse(tilted, tilted.case(1e-3, "exponential"))["loaded_fraction"]
     assert stiffer / exact.wedge_on_asperities(1e-3, LENGTH, 2.5e-6)[0] == pytest.approx(
         1.04, abs=0.005
@@ -150,16 +159,16 @@ def test_exact_fixture_spring_adds_its_rotation(tilted, conclusion, fixtures):
     for skin in tilted.SKINS:
         for spring in (1e4, 300.0):
             angle = conclusion.neutral(0.5, skin, spring, 0)
-            found = press_patch(fixtures.held_pieces(angle, spring, skin), tilted.pair(0))
-            assert tilted.rubbed_portion(found) == pytest.approx(0.5, abs=1e-4)
-            assert found.pressure.rotation == pytest.approx(
+            patch = press_patch(fixtures.held_pieces(angle, spring, skin), tilted.pair(0))
+            assert tilted.rubbed_portion(patch) == pytest.approx(0.5, abs=1e-4)
+            assert patch.pressure.rotation == pytest.approx(
                 conclusion.rigid(0.5, skin, 0)[0], rel=1e-3
             )
 
 
 def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
     """The tilt and the moment at a given contact fraction are those stated in the study."""
-    wanted = {
+    expected = {
         ("bare", 0.5): (2.9e-5, 0.46),
         ("linear", 0.5): (7.4e-5, 0.48),
         ("peaks", 0.5): (1.07e-4, 0.53),
@@ -167,9 +176,9 @@ def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
         ("bare", 0.2): (1.13e-4, 0.63),
         ("linear", 0.2): (4.0e-4, 0.63),
     }
-    for (skin, portion), (tilt, moment) in wanted.items():
-        found = conclusion.rigid(portion, skin, 1)
-        assert found == (pytest.approx(tilt, rel=0.015), pytest.approx(moment, rel=0.015))
+    for (skin, portion), (tilt, moment) in expected.items():
+        result = conclusion.rigid(portion, skin, 1)
+        assert result == (pytest.approx(tilt, rel=0.015), pytest.approx(moment, rel=0.015))
     assert round(conclusion.ROCKING) == 298
     assert conclusion.neutral(0.5, "bare", conclusion.ROCKING, 1) == pytest.approx(
         1.57e-3, rel=0.01
@@ -178,8 +187,8 @@ def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
 
 def test_always_admissible_fixture_stiffness_has_stated_limits(conclusion):
     """The range of fixture stiffness that a misalignment of 2 mrad allows is that stated."""
-    least, most = conclusion.springs_for(2e-3, "bare", halvings=1)
-    assert (least, most) == (pytest.approx(125, rel=0.02), pytest.approx(480, rel=0.02))
+    lowest, highest = conclusion.springs_for(2e-3, "bare", halvings=1)
+    assert (lowest, highest) == (pytest.approx(125, rel=0.02), pytest.approx(480, rel=0.02))
     assert conclusion.springs_for(2e-3, "linear", halvings=1)[1] == np.inf
     assert conclusion.springs_for(4e-4, "exponential", halvings=1) is None
 
@@ -193,9 +202,9 @@ def test_exact_roll_by_strips_agrees_with_linear_foundation(tilted, roll):
     k = values(press_patch(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
     for angle in (5e-6, 1e-4):
         fraction, centre, _, _ = exact.wedge_on_linear_foundation(angle, LOAD, LENGTH, LENGTH, k)
-        found = values(press_patch(roll.rolled_pieces(angle, 128, "bare"), pair))
-        assert found["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
-        assert found["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
+        measures = values(press_patch(roll.rolled_pieces(angle, 128, "bare"), pair))
+        assert measures["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
+        assert measures["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
 
 
 def test_always_yaw_moment_of_a_rolled_patch(roll):
@@ -206,10 +215,10 @@ def test_always_yaw_moment_of_a_rolled_patch(roll):
         ("linear", 1e-5, 0.0346),
         ("exponential", 1e-3, 0.133),
     ):
-        found = roll.case(angle, 16, skin)
-        assert found["yaw"] == pytest.approx(moment, rel=0.01)
-        assert found["yaw"] == pytest.approx(
-            0.3 * LOAD * abs(found["pressure_centre_lateral"].value), rel=1e-9
+        measures = roll.case(angle, 16, skin)
+        assert measures["yaw"] == pytest.approx(moment, rel=0.01)
+        assert measures["yaw"] == pytest.approx(
+            0.3 * LOAD * abs(measures["pressure_centre_lateral"].value), rel=1e-9
         )
     assert roll.roll_for(3.8e-3, "bare") == pytest.approx(2.7e-5, rel=0.02)
 
@@ -224,15 +233,17 @@ def test_exact_stiffness_of_equal_ridges_and_peaks(asperities):
     closed = exact.westergaard_stiffness(
         asperities.MEAN, asperities.WAVE, asperities.HEIGHT, modulus
     )
-    found = asperities.one_each(flat)[0]
-    assert found == pytest.approx(closed, rel=1e-12) and found == pytest.approx(4.48e14, rel=2e-3)
+    stiffness = asperities.one_each(flat)[0]
+    assert stiffness == pytest.approx(closed, rel=1e-12) and stiffness == pytest.approx(
+        4.48e14, rel=2e-3
+    )
     assert asperities.one_each(flat, coat=(600e9, 0.22))[0] == pytest.approx(9.9e14, rel=2e-3)
     force = asperities.MEAN * asperities.WAVE**2
     slope = 2 / 3 * (9 / (16 * asperities.RADIUS * modulus**2 * force)) ** (1 / 3)
     lattice = asperities.LATTICE / (np.pi * modulus * asperities.WAVE)
-    found = asperities.one_each(flat, True)[0]
-    assert found == pytest.approx(1 / (slope + lattice) / asperities.WAVE**2, rel=1e-3)
-    assert found == pytest.approx(2.74e13, rel=2e-3)
+    stiffness = asperities.one_each(flat, True)[0]
+    assert stiffness == pytest.approx(1 / (slope + lattice) / asperities.WAVE**2, rel=1e-3)
+    assert stiffness == pytest.approx(2.74e13, rel=2e-3)
 
 
 @pytest.mark.parametrize("scatter", [1e-6, 5e-6])
@@ -247,26 +258,26 @@ def test_exact_one_force_per_ridge_agrees_with_resolved_ridges(asperities, scatt
 def test_always_height_scatter_for_a_stiffness_of_1e13(rough, asperities):
     """The stated scatter of ridge and peak heights gives a stiffness of 1e13 Pa/m."""
     for scatter, shape in ((4.5e-6, "uniform"), (0.2e-6, "gaussian")):
-        many = [
+        stiffnesses = [
             asperities.one_each(asperities.depths(160, scatter, shape, seed))[0]
             for seed in range(5)
         ]
-        assert np.median(many) == pytest.approx(1e13, rel=0.15)
+        assert np.median(stiffnesses) == pytest.approx(1e13, rel=0.15)
     for scatter, shape in ((0.68e-6, "uniform"), (0.127e-6, "gaussian")):
         assert asperities.separate(scatter, shape) == pytest.approx(1e13, rel=0.01)
-    found = rough.row(0.2e-6, "gaussian", side=16, seeds=1)
-    assert found["separate"] == pytest.approx(7.2e12, rel=2e-3)
-    assert found["peaks"] == pytest.approx(found["separate"], rel=0.02)
-    assert found["touching"] == pytest.approx(0.18, abs=0.01)
+    row = rough.row(0.2e-6, "gaussian", side=16, seeds=1)
+    assert row["separate"] == pytest.approx(7.2e12, rel=2e-3)
+    assert row["peaks"] == pytest.approx(row["separate"], rel=0.02)
+    assert row["touching"] == pytest.approx(0.18, abs=0.01)
 
 
 def test_always_opening_tilts_of_pieces_and_layer_add(rough):
     """The tilt at which contact opens is the sum of those of the pieces and of the surface layer."""
-    own = rough.opening(None, 1)
-    assert own == pytest.approx(9.28e-6, rel=3e-3)
+    pieces_alone = rough.opening(None, 1)
+    assert pieces_alone == pytest.approx(9.28e-6, rel=3e-3)
     for k in (1e15, 1e13, 5e11):
         rigid = exact.wedge_opening_tilt(LOAD, LENGTH, LENGTH, k)
-        assert own < rough.opening(k, 1) == pytest.approx(own + rigid, rel=0.01)
+        assert pieces_alone < rough.opening(k, 1) == pytest.approx(pieces_alone + rigid, rel=0.01)
 
 
 @pytest.mark.slow
@@ -308,12 +319,12 @@ def test_always_tolerated_tilt_changes_the_motion_by_under_five_percent(moving, 
     stuck = maps_at_one_load.isel(drive_acceleration=0)
     slipping = maps_at_one_load.isel(drive_acceleration=1)
     assert slipping["contact_fraction"].values == pytest.approx([1.0, 0.49, 0.219], rel=0.03)
-    for found, names in (
+    for results, names in (
         (stuck, ("equivalent_stiffness",)),
         (slipping, ("equivalent_stiffness", "loop_area", "relative_displacement_amplitude")),
     ):
         for name in names:
-            assert abs(found[name].values[1] / found[name].values[0] - 1) < 0.05, name
+            assert abs(results[name].values[1] / results[name].values[0] - 1) < 0.05, name
     for level, tilts, limit in (
         (5.0, (1e-6, 1e-4, 10**-3.5), "0.1"),
         (3.0, (1e-6, 10**-4.5, 1e-4), "0.053"),
@@ -355,9 +366,9 @@ def test_always_stuck_interface_is_softer_than_series_of_springs(maps_at_one_loa
     """
     stuck = maps_at_one_load.isel(drive_acceleration=0)
     bonds = 0.30 * LOAD / 1e-6
-    both = 1 / (1 / bonds + 1 / stuck["tangential_stiffness"].values)
-    assert stuck["equivalent_stiffness"].values[0] == pytest.approx(both[0], rel=0.06)
-    assert (stuck["equivalent_stiffness"].values < both).all()
+    series = 1 / (1 / bonds + 1 / stuck["tangential_stiffness"].values)
+    assert stuck["equivalent_stiffness"].values[0] == pytest.approx(series[0], rel=0.06)
+    assert (stuck["equivalent_stiffness"].values < series).all()
 
 
 @pytest.mark.slow

@@ -69,20 +69,22 @@ def kernel(tmp_path_factory):
 def test_always_notebook_runs_without_errors_or_warnings(name, kernel):
     """All cells of a notebook run, with their asserts; it shows its pictures and writes no warning."""
     manager, folder = kernel
-    book = nbformat.v4.new_notebook(
+    notebook = nbformat.v4.new_notebook(
         cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, BOOKS[name].cells)],
         metadata=BOOKS[name].metadata,
     )
-    book = nbformat.from_dict(book)
+    notebook = nbformat.from_dict(notebook)
     NotebookClient(
-        book, km=manager, timeout=120, resources={"metadata": {"path": str(folder)}}
+        notebook, km=manager, timeout=120, resources={"metadata": {"path": str(folder)}}
     ).execute()
-    outputs = [one for cell in book.cells for one in cell.get("outputs", ())]
-    shown = [
-        one for one in outputs if any(kind.startswith("image/") for kind in one.get("data", ()))
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    images = [
+        output
+        for output in outputs
+        if any(kind.startswith("image/") for kind in output.get("data", ()))
     ]
-    assert len(shown) == PICTURES[name]
-    assert [one.text for one in outputs if one.get("name") == "stderr"] == []
+    assert len(images) == PICTURES[name]
+    assert [output.text for output in outputs if output.get("name") == "stderr"] == []
     assert list(folder.glob("*.*")) == []
 
 
@@ -107,17 +109,17 @@ def test_always_notebook_law_exports_the_protocol_functions():
         cell for cell in cell_sources("own_law", "code") if "dahl_kernels.py" in cell
     ).split("'''")[1]
     tree = ast.parse(text)
-    taken = {
-        one.name
+    imported = {
+        alias.name
         for node in tree.body
         if isinstance(node, ast.ImportFrom) and node.module == "protocol_kernels"
-        for one in node.names
+        for alias in node.names
     }
-    made = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
     page = (ROOT / "patchfem/ADDING.md").read_text("utf-8")
     table = set(re.findall(r"^\| `(\w+)\(", page, re.M))
-    assert len(table) == 10 and table <= taken | made
-    assert all(hasattr(protocol_kernels, name) for name in taken)
+    assert len(table) == 10 and table <= imported | defined
+    assert all(hasattr(protocol_kernels, name) for name in imported)
     assert all(hasattr(bouc_wen_kernels, name) for name in table)
 
 
@@ -146,16 +148,16 @@ def test_always_notebook_takes_under_five_minutes_to_read(name):
 def test_always_notebook_uses_public_names_and_asserts(name):
     """A notebook imports only `patchfem`, uses its public names and has at least four asserts."""
     tree = ast.parse("\n".join(cell_sources(name, "code")))
-    ours = [
-        one
+    imported = [
+        module
         for node in ast.walk(tree)
         if isinstance(node, (ast.Import, ast.ImportFrom))
-        for one in (
+        for module in (
             [node.module]
             if isinstance(node, ast.ImportFrom)
-            else [each.name for each in node.names]
+            else [alias.name for alias in node.names]
         )
-        if one.startswith("patchfem")
+        if module.startswith("patchfem")
     ]
     used = {
         node.attr
@@ -164,5 +166,5 @@ def test_always_notebook_uses_public_names_and_asserts(name):
         and isinstance(node.value, ast.Name)
         and node.value.id == "pf"
     }
-    assert ours == ["patchfem"] and used and used <= set(pf.__all__)
+    assert imported == ["patchfem"] and used and used <= set(pf.__all__)
     assert sum(isinstance(node, ast.Assert) for node in ast.walk(tree)) >= 4

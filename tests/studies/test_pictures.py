@@ -16,27 +16,27 @@ PICTURES = sorted(
 
 def find_font_sizes(text: str) -> dict:
     """Return {text: smallest font size [pixel]} of a picture drawn WIDTH pixels wide."""
-    wide = float(re.search(r'viewBox="0 0 ([\d.]+)', text)[1])
-    out = {}
-    for style, inside in re.findall(r'<text style="([^"]*)"[^>]*>(.*?)</text>', text, re.S):
-        words = re.sub(r"<[^>]*>|\s+", " ", inside).strip()
-        out[words] = min(
-            float(re.search(r"([\d.]+)px", style)[1]) * WIDTH / wide, out.get(words, WIDTH)
+    width = float(re.search(r'viewBox="0 0 ([\d.]+)', text)[1])
+    sizes = {}
+    for style, content in re.findall(r'<text style="([^"]*)"[^>]*>(.*?)</text>', text, re.S):
+        words = re.sub(r"<[^>]*>|\s+", " ", content).strip()
+        sizes[words] = min(
+            float(re.search(r"([\d.]+)px", style)[1]) * WIDTH / width, sizes.get(words, WIDTH)
         )
-    return out
+    return sizes
 
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_always_picture_is_legible_and_without_code_names(name):
     """The letters of a picture are at least 9 pixels high; no label has an underscore."""
     text = (ROOT / name).read_text("utf-8")
-    found = find_font_sizes(text)
-    assert found and text.count("\n") < 1500 and len(text) < 160e3
-    assert {words: size for words, size in found.items() if size < LEAST} == {}
-    assert [words for words in found if "_" in words] == []
+    sizes = find_font_sizes(text)
+    assert sizes and text.count("\n") < 1500 and len(text) < 160e3
+    assert {words: size for words, size in sizes.items() if size < LEAST} == {}
+    assert [words for words in sizes if "_" in words] == []
 
 
 def test_always_gallery_shows_every_picture_once():
     """README.md shows every picture of the repository once."""
-    shown = re.findall(r"!\[[^\]]+\]\(([^)]+\.svg)\)", (ROOT / "README.md").read_text("utf-8"))
-    assert sorted(set(shown)) == PICTURES and len(shown) == len(set(shown))
+    links = re.findall(r"!\[[^\]]+\]\(([^)]+\.svg)\)", (ROOT / "README.md").read_text("utf-8"))
+    assert sorted(set(links)) == PICTURES and len(links) == len(set(links))

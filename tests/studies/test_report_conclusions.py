@@ -22,11 +22,11 @@ def test_exact_lag_of_the_first_harmonic(ten):
 
     A positive lag means that the block is behind the input.
     """
-    w = ten.block(5.0)[0].window
-    last = w.time >= w.time[-1] - 1 / 143 - 1e-12
-    turn = np.exp(-2j * np.pi * 143 * w.time[last])
-    ratio = np.trapezoid(w.acceleration[last] * turn, w.time[last]) / np.trapezoid(
-        w.base_acceleration[last] * turn, w.time[last]
+    window = ten.block(5.0)[0].window
+    last = window.time >= window.time[-1] - 1 / 143 - 1e-12
+    rotation = np.exp(-2j * np.pi * 143 * window.time[last])
+    ratio = np.trapezoid(window.acceleration[last] * rotation, window.time[last]) / np.trapezoid(
+        window.base_acceleration[last] * rotation, window.time[last]
     )
     assert f"lags by {-np.degrees(np.angle(ratio)):.0f} degrees" in ten.eighth().found
 
@@ -34,27 +34,34 @@ def test_exact_lag_of_the_first_harmonic(ten):
 def test_always_inexpensive_conclusions_have_computed_figures(ten):
     """The inexpensive rows of conclusions.md and figures of the answer have the computed values."""
     text = (ten.FOLDER / "conclusions.md").read_text("utf-8")
-    for one in (ten.first, ten.fourth, ten.sixth, ten.seventh, ten.ninth):
-        found = one()
-        assert f"| {found.number} | {found.claim} | {found.verdict} | {found.found} |" in text
+    for conclusion in (ten.first, ten.fourth, ten.sixth, ten.seventh, ten.ninth):
+        result = conclusion()
+        assert f"| {result.number} | {result.claim} | {result.verdict} | {result.found} |" in text
     assert f"begins {90 - ten.phases(5.0)[0]:.0f} degrees before the input's maximum" in ten.ANSWER
     value = ten.block(8.0)[1]["relative_displacement_amplitude"]
     assert f"to {value / ten.MIL:.0f} mil" in ten.ANSWER
-    own = 2 * np.pi * 143
+    omega = 2 * np.pi * 143
     force = 4 / np.pi * 4.14 * ten.G
     # friction as a square wave
-    assert value == pytest.approx((8 * ten.G - force) / (2 * 0.003 * own**2), rel=1e-3)
+    assert value == pytest.approx((8 * ten.G - force) / (2 * 0.003 * omega**2), rel=1e-3)
 
 
 @pytest.mark.slow
 def test_all_conclusions_have_computed_figures(ten, tmp_path, capsys):
     """The complete study writes conclusions.md again, with six conclusions that hold fully."""
-    found = ten.main(tmp_path / "x.md")
+    results = ten.main(tmp_path / "x.md")
     assert (tmp_path / "x.md").read_text("utf-8") == (ten.FOLDER / "conclusions.md").read_text(
         "utf-8"
     )
-    assert [one.number for one in found] == list(range(1, 11))
-    assert [one.number for one in found if one.verdict == ten.HOLDS] == [1, 3, 5, 7, 8, 10]
+    assert [conclusion.number for conclusion in results] == list(range(1, 11))
+    assert [conclusion.number for conclusion in results if conclusion.verdict == ten.HOLDS] == [
+        1,
+        3,
+        5,
+        7,
+        8,
+        10,
+    ]
     assert ten.ANSWER.startswith(
         "Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2:"
     )
@@ -68,9 +75,9 @@ def test_stiffening_flexures_limit_the_block_at_10_mil(ten):
     text = text.replace('"coulomb"', '"elastic-plastic"\nbond_length = "0.243 um"')
     push = np.sqrt(8**2 - (4 * 4.14 / np.pi) ** 2) * ten.G * 0.8546
     text += f'[structure.stiffening]\ncubic = "{4 / 3 * push / 254e-6**3} N/m^3"\n'
-    found = (
+    amplitude = (
         pf.run(text, **{"drive.acceleration": 8 * ten.G})
         .measures["relative_displacement_amplitude"]
         .value
     )
-    assert found == pytest.approx(254e-6, rel=0.01)
+    assert amplitude == pytest.approx(254e-6, rel=0.01)

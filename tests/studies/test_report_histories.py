@@ -18,14 +18,14 @@ def runs_and_picture(figures, tmp_path_factory):
 
 def check_peaks(figures, name, run):
     """Check that the answer states the peaks of a run beside those of the rig."""
-    read = {
+    measured = {
         "Fig. 28: 135 Hz, 5 g": "8.4 g and 0.44 mil",
         "Fig. 28 (text): 135 Hz, 6 g": "9.5 g and 0.30 mil",
         "Fig. 29: 143 Hz, 5 g": "6.0 g and 0.23 mil",
     }[name]
     assert run.stays
     assert_contains(
-        figures.ANSWER, f"{run.acceleration:.1f} g and {run.displacement:.2f} mil ({read})"
+        figures.ANSWER, f"{run.acceleration:.1f} g and {run.displacement:.2f} mil ({measured})"
     )
 
 
@@ -46,11 +46,15 @@ def test_figure_29_block_is_stable_at_5_g_and_unstable_at_8_g(figures, runs_and_
 
 def test_exact_stable_motion_satisfies_the_equation_of_motion(runs_and_picture):
     """The histories satisfy m a + K x + c v + F = 0, with a absolute and x, v relative to the base."""
-    seen = runs_and_picture[0][0].seen
+    histories = runs_and_picture[0][0].seen
     mass = 1.123
     omega = 2 * np.pi * 143
-    pull = seen.acceleration + omega**2 * seen.output + 0.006 * omega * seen.output_rate
-    np.testing.assert_allclose(mass * pull, -seen.force, atol=1e-9 * np.abs(seen.force).max())
+    acceleration = (
+        histories.acceleration + omega**2 * histories.output + 0.006 * omega * histories.output_rate
+    )
+    np.testing.assert_allclose(
+        mass * acceleration, -histories.force, atol=1e-9 * np.abs(histories.force).max()
+    )
 
 
 @pytest.mark.slow
@@ -71,10 +75,10 @@ def test_figures_28_and_29_all_runs_have_stated_figures(figures, tmp_path, capsy
 @pytest.mark.slow
 def test_figures_28_and_29_level_of_runaway(figures):
     """The block runs away at the stated levels, from rest and released beside its valley."""
-    at = figures.run_block("", 143, 7.9, {})
-    assert at.stays
+    run = figures.run_block("", 143, 7.9, {})
+    assert run.stays
     assert_contains(
-        figures.ANSWER, f"7.9 g the amplitude of the block stays at {at.displacement:.2f} mil;"
+        figures.ANSWER, f"7.9 g the amplitude of the block stays at {run.displacement:.2f} mil;"
     )
     assert [figures.run_block("", 135, level, {}).stays for level in (8.0, 8.1)] == [True, False]
     levels = [round(7 + 0.1 * k, 1) for k in range(14)]
@@ -93,11 +97,11 @@ def test_figures_28_and_29_second_path_limits_the_motion_at_8_g(figures):
         .scene("second path")
         .replace('method = "march"', 'method = "harmonic"')
     )
-    found = pf.run(scene, **{"drive.acceleration": 8 * figures.G})
-    assert found.outcome == "steady"
-    moved = found.measures["relative_displacement_amplitude"].value / figures.MIL
+    result = pf.run(scene, **{"drive.acceleration": 8 * figures.G})
+    assert result.outcome == "steady"
+    amplitude = result.measures["relative_displacement_amplitude"].value / figures.MIL
     assert_contains(
         figures.__doc__,
-        f"steady motion of {moved:.2f} mil at 8 g",
+        f"steady motion of {amplitude:.2f} mil at 8 g",
         f"runs away from {1.2792 * 4.14:.2f} g on",
     )

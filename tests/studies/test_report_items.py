@@ -15,18 +15,20 @@ def test_always_items_page_agrees_with_the_list(items):
 def test_always_items_have_files_verdicts_and_tests(items):
     """Every item has a known verdict and existing files; every item that works has a test."""
     assert len(items.ITEMS) == 79
-    for one in items.ITEMS:
-        verdict, _, lack = one.verdict.partition(": ")
-        assert verdict in items.VERDICTS and bool(lack) == (verdict in ("in part", "missing")), one
-        assert all((ROOT.parent / path).is_file() for path in one[2:5] if path), one
-        assert one.test or verdict in ("missing", "nothing"), one
-        assert one.scene or one.study or verdict == "nothing", one
+    for item in items.ITEMS:
+        verdict, _, missing = item.verdict.partition(": ")
+        assert verdict in items.VERDICTS and bool(missing) == (verdict in ("in part", "missing")), (
+            item
+        )
+        assert all((ROOT.parent / path).is_file() for path in item[2:5] if path), item
+        assert item.test or verdict in ("missing", "nothing"), item
+        assert item.scene or item.study or verdict == "nothing", item
 
 
 def test_always_docstring_states_the_counts_of_items(items):
     """The docstring states how many items work, work in part or are missing."""
     counts = [
-        sum(one.verdict.split(":")[0] == verdict for one in items.ITEMS)
+        sum(item.verdict.split(":")[0] == verdict for item in items.ITEMS)
         for verdict in items.VERDICTS
     ]
     assert counts == [71, 6, 0, 2]

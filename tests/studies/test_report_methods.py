@@ -48,6 +48,7 @@ def test_exact_duhamel_maps_satisfy_the_equation_of_motion(omega, zeta):
     small = 1e-4
 
     def state(time):
+        """Return displacement and velocity at a time within the step."""
         force = start[2] + (start[3] - start[2]) * time / h
         return duhamel_maps(modes, time)[0] @ [*start[:3], force]
 
@@ -72,9 +73,9 @@ def test_order_of_time_integrators_without_friction(solve, steps, order):
     law = (NO_FRICTION, 1.0) if solve is solve_euler else (coulomb(NO_FRICTION),)
     errors = []
     for n in steps:
-        found = solve(MODES, DRIVE, *law, (1.5 * DRIVE.period, n))
-        state = np.concatenate([found.z[-1], found.v[-1]])
-        errors.append(np.abs(state - free_motion(MODES, DRIVE, found.time[-1])).max())
+        motion = solve(MODES, DRIVE, *law, (1.5 * DRIVE.period, n))
+        state = np.concatenate([motion.z[-1], motion.v[-1]])
+        errors.append(np.abs(state - free_motion(MODES, DRIVE, motion.time[-1])).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
     assert errors[0] < {1: 0.1, 2: 1e-3}[order]
 
@@ -83,10 +84,10 @@ def test_exact_free_mass_under_constant_force():
     """A free mass under a constant force has constant acceleration beyond the friction limit."""
     drive = RecordedDrive(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
     start = InitialState(np.zeros(1), np.array([0.1]))
-    found = solve_newmark(FREE, drive, coulomb(1.0), (10.0, 50), start=start)
-    assert found.v[-1, 0] == pytest.approx(0.1 + 2.0 * 10)
-    assert found.z[-1, 0] == pytest.approx(1.0 + 100.0)
-    assert found.accelerations(FREE)[-1] == pytest.approx([2.0])
+    motion = solve_newmark(FREE, drive, coulomb(1.0), (10.0, 50), start=start)
+    assert motion.v[-1, 0] == pytest.approx(0.1 + 2.0 * 10)
+    assert motion.z[-1, 0] == pytest.approx(1.0 + 100.0)
+    assert motion.accelerations(FREE)[-1] == pytest.approx([2.0])
 
 
 def test_exact_mass_sticks_up_to_the_friction_limit():
@@ -94,9 +95,9 @@ def test_exact_mass_sticks_up_to_the_friction_limit():
     modes = replace(FREE, mass=2.0)
     drive = RecordedDrive(np.array([0.0, 1.0]), np.array([0.5, 0.5]), 1.0, False)
     for limit, force, speed in ((3.0, 1.0, 0.0), (0.9, 0.9, 0.05)):
-        found = solve_newmark(modes, drive, coulomb(limit, 1e-3), (1.0, 100), needs_force=True)
-        assert found.force == pytest.approx(force)
-        assert found.v[-1, 0] == pytest.approx(speed, abs=1e-12)
+        motion = solve_newmark(modes, drive, coulomb(limit, 1e-3), (1.0, 100), needs_force=True)
+        assert motion.force == pytest.approx(force)
+        assert motion.v[-1, 0] == pytest.approx(speed, abs=1e-12)
 
 
 @pytest.mark.parametrize("needs_force, release_at", [(False, 3.0), (True, 1.0)])
@@ -106,8 +107,8 @@ def test_exact_stick_speed_delays_the_release(needs_force, release_at):
     With the criterion on the force it slips at the limit of 1 N.
     """
     drive = RecordedDrive(np.array([0.0, 4.0]), np.array([0.0, 4.0]), 4.0, False)
-    found = solve_newmark(FREE, drive, coulomb(1.0, 0.01), (4.0, 400), needs_force=needs_force)
-    assert found.time[np.argmax(found.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
+    motion = solve_newmark(FREE, drive, coulomb(1.0, 0.01), (4.0, 400), needs_force=needs_force)
+    assert motion.time[np.argmax(motion.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
 
 
 @pytest.mark.parametrize("needs_force, order", [(True, 2), (False, 1)])
@@ -119,7 +120,7 @@ def test_order_of_newmark_in_the_first_slip(needs_force, order):
     start = InitialState(np.array([11.5]), np.zeros(1))
     errors = []
     for steps in (200, 400):
-        found = solve_newmark(
+        motion = solve_newmark(
             problems.UNDAMPED_MASS,
             make_release(2 * np.pi),
             coulomb(1.0, 1e-3),
@@ -127,8 +128,8 @@ def test_order_of_newmark_in_the_first_slip(needs_force, order):
             needs_force=needs_force,
             start=start,
         )
-        assert found.force[1] == -1.0
-        errors.append(np.abs(found.z[:, 0] - 1 - 10.5 * np.cos(found.time)).max())
+        assert motion.force[1] == -1.0
+        errors.append(np.abs(motion.z[:, 0] - 1 - 10.5 * np.cos(motion.time)).max())
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
 
 
@@ -163,17 +164,17 @@ def solve_two_masses(law: str, h: float, **how):
 )
 def test_exact_early_motion_of_two_masses_by_duhamel(law, h, how, early, moves, force, at_20):
     """The displacement before slip, and the time and force of the first slip, are the expected ones."""
-    found = solve_two_masses(law, h, **how)
-    x = found.z @ problems.TWO.slide
-    assert np.abs(x[found.time < 8]).max() == pytest.approx(
+    motion = solve_two_masses(law, h, **how)
+    x = motion.z @ problems.TWO.slide
+    assert np.abs(x[motion.time < 8]).max() == pytest.approx(
         early, rel=0.05, abs=0.03 * (early == 0)
     )
     if moves is not None:
         first = int(np.argmax(np.abs(x) > 0.05))
-        assert found.time[first] == pytest.approx(moves, abs=0.06)
-        assert abs(found.force[first]) == pytest.approx(force, abs=0.02)
+        assert motion.time[first] == pytest.approx(moves, abs=0.06)
+        assert abs(motion.force[first]) == pytest.approx(force, abs=0.02)
     if at_20 is not None:
-        assert np.interp(20, found.time, x) == pytest.approx(at_20, rel=6e-3, abs=6e-3)
+        assert np.interp(20, motion.time, x) == pytest.approx(at_20, rel=6e-3, abs=6e-3)
 
 
 def test_exact_convergence_criterion_controls_the_force_error():
@@ -201,14 +202,14 @@ def test_exact_convergence_criterion_controls_the_force_error():
 def test_exact_peak_of_a_block_at_resonance_by_newmark(speed, steps, needs_force, peak, within):
     """The peak of the last cycle at resonance agrees with the expected value."""
     duration = 200 * problems.SDOF_DRIVE.period
-    found = solve_newmark(
+    motion = solve_newmark(
         problems.SDOF,
         problems.SDOF_DRIVE,
         coulomb(problems.SDOF_LIMIT, speed),
         (duration, steps),
         needs_force=needs_force,
     )
-    last = found.z[-10 * steps :] if needs_force else found.z[-steps:]
+    last = motion.z[-10 * steps :] if needs_force else motion.z[-steps:]
     assert np.abs(last).max() == pytest.approx(peak, abs=within)
 
 
@@ -216,17 +217,17 @@ def test_exact_peak_of_a_block_at_resonance_by_newmark(speed, steps, needs_force
 def test_exact_error_of_newmark_in_free_decay(steps, error):
     """The error of Newmark's method against equation 3.11 grows with the number of steps."""
     start = InitialState(np.array([11.5]), np.zeros(1))
-    found = solve_newmark(
+    motion = solve_newmark(
         problems.UNDAMPED_MASS,
         make_release(2 * np.pi),
         coulomb(1.0, 1e-2),
         (100.0, steps),
         start=start,
     )
-    half = np.floor(found.time / np.pi)
+    half = np.floor(motion.time / np.pi)
     # equation 3.11, N0 = 6
-    truth = np.where(half < 6, (10.5 - 2 * half) * np.cos(found.time) + (-1) ** half, -0.5)
-    assert np.abs(found.z[:, 0] - truth).max() == pytest.approx(error, rel=0.02)
+    expected = np.where(half < 6, (10.5 - 2 * half) * np.cos(motion.time) + (-1) ** half, -0.5)
+    assert np.abs(motion.z[:, 0] - expected).max() == pytest.approx(error, rel=0.02)
 
 
 @pytest.mark.parametrize("h, peak, within", [(0.01, 0.1373, 1e-4), (0.2, 0.1895, 6e-4)])
@@ -241,7 +242,7 @@ def test_exact_ringing_of_figure_5_by_euler(h, peak, within):
     segment = DriveSegment(0.0, 0.0, abs(response), omega, np.angle(response))
     drive = PiecewiseDrive((segment,), 2 * np.pi / omega)
     steps = round(drive.period / h)
-    found = solve_euler(
+    motion = solve_euler(
         problems.basis([1.0], [c / 2], [1.0], [1.0]),
         drive,
         0.1,
@@ -250,6 +251,6 @@ def test_exact_ringing_of_figure_5_by_euler(h, peak, within):
         InitialState(np.zeros(1), np.array([-omega])),
     )
     last = slice(-2 * steps, None)
-    assert np.abs(found.z[last, 0] + np.sin(omega * found.time[last])).max() == pytest.approx(
+    assert np.abs(motion.z[last, 0] + np.sin(omega * motion.time[last])).max() == pytest.approx(
         peak, abs=within
     )

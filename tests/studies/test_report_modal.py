@@ -7,8 +7,8 @@ from study_module import assert_contains, load_study
 
 def test_exact_transmissibility_of_a_stuck_block_is_one():
     """Below slip, at 0.8 g rms, the transmissibility H1 is 1 at every frequency."""
-    held = load_study("report/figure_27.py").row("rigid block", 0.8, 4.0)
-    assert np.abs(held.seen.h - 1).max() < 1e-12 and held.slide < 1e-9
+    row = load_study("report/figure_27.py").row("rigid block", 0.8, 4.0)
+    assert np.abs(row.seen.h - 1).max() < 1e-12 and row.slide < 1e-9
 
 
 def test_always_h1_of_a_linear_rig_agrees_with_closed_form():
@@ -19,13 +19,13 @@ def test_always_h1_of_a_linear_rig_agrees_with_closed_form():
     modal = load_study("report/modal_test.py")
     text = (load_study("report/figure_26.py").FOLDER / "block.toml").read_text("utf-8")
     text = text[text.index("[structure]") :].replace("0.003", "0.03").replace("harmonic", "exact")
-    seen = modal.h1(modal.run_random_test(text, 10.0, 0.1), 1.0).between(60, 260)
-    frequency, damping, left = modal.fit_mode(seen)
+    estimate = modal.h1(modal.run_random_test(text, 10.0, 0.1), 1.0).between(60, 260)
+    frequency, damping, residual = modal.fit_mode(estimate)
     assert frequency == pytest.approx(143, rel=2e-3)
     assert damping == pytest.approx(0.03, rel=0.05)
-    assert left < 0.05
-    exact = modal.mode_transmissibility(seen.f, 143, 0.03)
-    assert np.median(np.abs(seen.h / exact - 1)) < 0.01
+    assert residual < 0.05
+    exact = modal.mode_transmissibility(estimate.f, 143, 0.03)
+    assert np.median(np.abs(estimate.h / exact - 1)) < 0.01
 
 
 def test_always_damping_at_high_level_agrees_with_linearisation():
@@ -43,10 +43,10 @@ def test_figure_26_steady_transmissibility_agrees_with_closed_form():
     """The steady transmissibility agrees with the sum over modes, and its peak is stated."""
     figure = load_study("report/figure_26.py")
     free = figure.curve()
-    own = 2 * np.pi * np.array([143.0, 73.0, 129.0])
-    share = np.array([0.99, 0.01, 0.0025])
+    omega = 2 * np.pi * np.array([143.0, 73.0, 129.0])
+    participation = np.array([0.99, 0.01, 0.0025])
     w = 2 * np.pi * free.f[:, None]
-    exact = 1 + np.sum(share * w**2 / (own**2 - w**2 + 0.006j * own * w), axis=1)
+    exact = 1 + np.sum(participation * w**2 / (omega**2 - w**2 + 0.006j * omega * w), axis=1)
     np.testing.assert_allclose(free.h, exact, rtol=1e-12)
     assert_contains(figure.ANSWER, f"at {free.peak[0]:.2f} Hz, with {free.peak[1]:.0f} times")
     assert_contains(
@@ -54,8 +54,8 @@ def test_figure_26_steady_transmissibility_agrees_with_closed_form():
         f"{free.f.size} points",
         f"transmits {np.abs(free.h[free.f < 80]).max():.1f} times",
     )
-    even = np.linspace(60, 210, 121)
-    assert even[np.argmax(np.abs(figure.transmissibility(even)))] == 142.5
+    frequencies = np.linspace(60, 210, 121)
+    assert frequencies[np.argmax(np.abs(figure.transmissibility(frequencies)))] == 142.5
     assert np.abs(figure.transmissibility([142.5]))[0] / free.peak[1] == pytest.approx(
         2 / 3, abs=0.02
     )
@@ -65,13 +65,13 @@ def test_figure_26_steady_transmissibility_agrees_with_closed_form():
 def test_figure_26_random_test_gives_stated_frequency_and_damping(tmp_path, capsys):
     """The random test gives the frequency, the damping ratio and the peak stated in the answer."""
     figure = load_study("report/figure_26.py")
-    free, seen, (frequency, damping, _) = figure.main(tmp_path / "x.svg")
-    low = 1 - np.abs(seen.h).max() / free.peak[1]
+    free, estimate, (frequency, damping, _) = figure.main(tmp_path / "x.svg")
+    deficit = 1 - np.abs(estimate.h).max() / free.peak[1]
     assert_contains(
         figure.ANSWER,
         f"finds this peak at {frequency:.2f} Hz",
         f"ratio of {damping:.5f} (true value 0.003)",
-        f"{100 * low:.1f} % too low",
+        f"{100 * deficit:.1f} % too low",
     )
     assert figure.VERDICT == "yes" and "axial 143 Hz" in (tmp_path / "x.svg").read_text()
 
@@ -81,35 +81,35 @@ def test_figure_27_models_give_stated_frequencies_and_slip(tmp_path, capsys):
     """Frequencies, damping ratios and slip of the three models are those stated in the study."""
     figure = load_study("report/figure_27.py")
     rows = {(r.model, r.level): r for r in figure.main(tmp_path / "x.svg")}
-    more = {
+    records = {
         case: [rows[case], *(figure.row(*case, seed=seed) for seed in (2, 3, 4))]
         for case in (("grooves", 4.5), ("grooves", 5.1))
     }
     rigid = rows["rigid block", 4.2]
     second = rows["second path", 5.1]
     assert np.isnan(rows["rigid block", 1.0].damping)
-    critical = [rigid, second, *more["grooves", 5.1]]
+    critical = [rigid, second, *records["grooves", 5.1]]
     assert all(0.9 < r.damping < 1.1 for r in critical)
     slides = [r.slide for r in critical]
-    several = [
-        f"{min(r.frequency for r in more[case]):.0f} to {max(r.frequency for r in more[case]):.0f} Hz"
-        for case in more
+    ranges = [
+        f"{min(r.frequency for r in records[case]):.0f} to {max(r.frequency for r in records[case]):.0f} Hz"
+        for case in records
     ]
     assert_contains(
         figure.ANSWER,
         f"{min(slides):.1f} to {max(slides):.1f} mil rms",
         f"at {rigid.frequency:.0f} Hz for a rigid",
-        f"{several[1]} for a block that climbs",
+        f"{ranges[1]} for a block that climbs",
         f"{second.frequency:.0f} Hz with",
     )
     assert_contains(
         figure.__doc__,
-        several[0],
+        ranges[0],
         f"{rows['rigid block', 6.0].frequency:.0f} Hz at 6 g rms",
         f"{rows['rigid block', 12.0].frequency:.0f} Hz at 12 g",
         f"slide of {rigid.slide:.1f} mil rms is {rigid.slide / 0.08:.0f} times",
     )
-    assert {f"{r.damping:.1f}" for r in more["grooves", 4.5]} == {"1.3"}
+    assert {f"{r.damping:.1f}" for r in records["grooves", 4.5]} == {"1.3"}
     assert figure.row("second path", 3.0).frequency == pytest.approx(260, rel=0.02)
     spring = (148 / 143) ** 2 - 1
     assert_contains(

@@ -14,36 +14,36 @@ def test_figure_8_peak_spring_force_agrees_with_closed_form():
     """
     figure = load_study("report/figure_8.py")
     for frequency in (5.0, 10.0, 20.0):
-        one = figure.loop(frequency)
-        assert one.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
-        assert np.abs(one.friction).max() == pytest.approx(figure.LIMIT, rel=1e-12)
+        loop = figure.loop(frequency)
+        assert loop.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
+        assert np.abs(loop.friction).max() == pytest.approx(figure.LIMIT, rel=1e-12)
         assert_contains(
             figure.ANSWER,
-            *[f"{one.peak:.2f} times the friction force at 10 Hz"] * (frequency == 10),
+            *[f"{loop.peak:.2f} times the friction force at 10 Hz"] * (frequency == 10),
         )
 
 
 def test_figure_8_loop_area_equals_the_friction_work():
     """The loop area equals the friction work per cycle and agrees with the closed form."""
     figure = load_study("report/figure_8.py")
-    one = figure.loop(10.0)
-    area = abs(np.trapezoid(one.friction, one.slip)) / (4 * figure.LIMIT * figure.STROKE)
-    assert area == pytest.approx(one.work, rel=2e-3)
-    assert one.work == pytest.approx(1 - figure.LIMIT / figure.STIFFNESS / figure.STROKE, rel=5e-3)
+    loop = figure.loop(10.0)
+    area = abs(np.trapezoid(loop.friction, loop.slip)) / (4 * figure.LIMIT * figure.STROKE)
+    assert area == pytest.approx(loop.work, rel=2e-3)
+    assert loop.work == pytest.approx(1 - figure.LIMIT / figure.STIFFNESS / figure.STROKE, rel=5e-3)
 
 
 @pytest.mark.slow
 def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
     """Peaks, static friction coefficient and length from the loops are those stated in the study."""
     figure = load_study("report/figure_8.py")
-    loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
+    loops = {loop.frequency: loop for loop in figure.main(tmp_path / "x.svg")}
     assert_contains(
         figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz"
     )
-    read = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
+    as_rigid = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
     assert all(
         f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06
-        for static, length in read.values()
+        for static, length in as_rigid.values()
     )
     assert figure.LIMIT / figure.STIFFNESS == pytest.approx(3.5e-6, rel=0.01)
     assert_contains(
@@ -53,9 +53,9 @@ def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
         f"{loops[10].swings} swings a stroke at 10 Hz and {loops[20].swings}",
         f"is {loops[10].work:.2f} of that",
     )
-    falls = figure.loop(2.0, 0.33)
-    assert_contains(figure.__doc__, f"the cell shows {falls.peak:.2f}")
-    assert falls.sticks > 50 > 10 > figure.loop(2.0).sticks
+    kinetic = figure.loop(2.0, 0.33)
+    assert_contains(figure.__doc__, f"the cell shows {kinetic.peak:.2f}")
+    assert kinetic.sticks > 50 > 10 > figure.loop(2.0).sticks
     assert figure.ANSWER in capsys.readouterr().out
     assert "load cell" in (tmp_path / "x.svg").read_text()
 
@@ -63,54 +63,63 @@ def test_figure_8_study_gives_its_stated_figures(tmp_path, capsys):
 def test_exact_stuck_block_in_a_sweep_moves_with_the_base():
     """A stuck block in a sweep has the acceleration of the base and no relative displacement."""
     sweeps = load_study("report/sweeps.py")
-    one = sweeps.sweep_level("rigid block", 4.0)
-    assert one.displacement.max() < 1e-9 and one.distortion.max() < 2e-3
-    assert one.acceleration == pytest.approx(4.0, rel=2e-3)
-    assert one.frequency[0] > 130 and one.frequency[-1] < 160 and np.all(np.diff(one.frequency) > 0)
+    sweep = sweeps.sweep_level("rigid block", 4.0)
+    assert sweep.displacement.max() < 1e-9 and sweep.distortion.max() < 2e-3
+    assert sweep.acceleration == pytest.approx(4.0, rel=2e-3)
+    assert (
+        sweep.frequency[0] > 130
+        and sweep.frequency[-1] < 160
+        and np.all(np.diff(sweep.frequency) > 0)
+    )
 
 
 @pytest.mark.slow
 def test_sweeps_give_stated_critical_levels(tmp_path, capsys):
     """The critical levels and accelerations of the three models are those stated in the study."""
     sweeps = load_study("report/sweeps.py")
-    found = sweeps.main(tmp_path / "x.svg")
-    told = {
+    levels = sweeps.main(tmp_path / "x.svg")
+    expected = {
         "rigid block": ("in the model of a rigid block", 0),
         "grooves": ("in the model with grooves", 136),
         "second path": ("in the model with a second load path", 136),
     }
-    for model, (words, least) in told.items():
+    for model, (words, min_frequency) in expected.items():
         words = "{:.2f} to {:.2f} g " + words
-        mine = [one for one in found if one.model == model]
-        level = sweeps.critical(mine)[mine[0].frequency > least]
+        of_model = [sweep for sweep in levels if sweep.model == model]
+        level = sweeps.critical(of_model)[of_model[0].frequency > min_frequency]
         assert_contains(sweeps.ANSWER, words.format(level.min(), level.max()))
-        top = mine[-1].acceleration[mine[-1].frequency > 131] / 4.75
+        transmissibility = of_model[-1].acceleration[of_model[-1].frequency > 131] / 4.75
         if model != "second path":
-            assert_contains(sweeps.__doc__, f"{top.min():.2f} to {top.max():.2f}")
-            assert mine[-1].level == 4.75
-    still = next(one for one in found if one.model == "grooves" and one.level == 3.0)
+            assert_contains(
+                sweeps.__doc__, f"{transmissibility.min():.2f} to {transmissibility.max():.2f}"
+            )
+            assert of_model[-1].level == 4.75
+    stuck = next(sweep for sweep in levels if sweep.model == "grooves" and sweep.level == 3.0)
     assert_contains(
         sweeps.__doc__,
-        f"reads {still.displacement[still.frequency < 135].max():.2f} mil at 3 g where it reads "
-        f"{still.displacement[still.frequency > 140].max():.2f} at most",
+        f"reads {stuck.displacement[stuck.frequency < 135].max():.2f} mil at 3 g where it reads "
+        f"{stuck.displacement[stuck.frequency > 140].max():.2f} at most",
     )
-    assert f"{sweeps.critical([one for one in found if one.model == 'grooves']).min():.1f}" == "4.0"
+    assert (
+        f"{sweeps.critical([sweep for sweep in levels if sweep.model == 'grooves']).min():.1f}"
+        == "4.0"
+    )
     assert sweeps.ANSWER in capsys.readouterr().out
 
 
 def test_always_stepped_levels_reach_the_steady_motion():
     """The time march through increasing levels ends each level in the steady motion of harmonic balance."""
     steps = load_study("report/steps.py")
-    for one in steps.steps(143.0, steps.raise_levels(143.0))[1:]:
-        found = pf.run(
+    for step in steps.steps(143.0, steps.raise_levels(143.0))[1:]:
+        result = pf.run(
             steps.text(),
-            **{"measured.file": str(steps.TABLE), "drive.acceleration": one.level * steps.G},
+            **{"measured.file": str(steps.TABLE), "drive.acceleration": step.level * steps.G},
         )
-        seen = found.measures["relative_displacement_amplitude"].value / steps.MIL
-        felt = found.measures["absolute_acceleration_peak"].value / steps.G
-        assert one.gauge == pytest.approx(seen, abs=5e-3) and one.acceleration == pytest.approx(
-            felt, rel=0.02
-        )
+        amplitude = result.measures["relative_displacement_amplitude"].value / steps.MIL
+        peak = result.measures["absolute_acceleration_peak"].value / steps.G
+        assert step.gauge == pytest.approx(
+            amplitude, abs=5e-3
+        ) and step.acceleration == pytest.approx(peak, rel=0.02)
 
 
 @pytest.mark.slow
@@ -118,8 +127,12 @@ def test_steps_give_stated_gain_and_scores(tmp_path, capsys):
     """The gain, its interval and the scores of the stepped levels are those stated in the study."""
     steps = load_study("report/steps.py")
     found, fits = steps.main(tmp_path / "x.svg")
-    every = [one for row in found.values() for one in row]
-    stable = [np.log(one.read[1] / one.gauge) for one in every if one.read[1] and not one.unstable]
+    all_steps = [step for row in found.values() for step in row]
+    stable = [
+        np.log(step.read[1] / step.gauge)
+        for step in all_steps
+        if step.read[1] and not step.unstable
+    ]
     assert_contains(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
     gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals.ends[3]
     assert_contains(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
@@ -133,16 +146,16 @@ def test_steps_give_stated_gain_and_scores(tmp_path, capsys):
         ]
         assert_contains(steps.ANSWER, words.format(*scores))
     for row in found.values():
-        *first, last = [f"{one.gauge:.3f}" for one in row]
+        *first, last = [f"{step.gauge:.3f}" for step in row]
         assert_contains(steps.__doc__, f"{', '.join(first)} and {last} V")
     assert steps.ANSWER in capsys.readouterr().out
 
 
 def test_always_friction_off_the_axis_causes_runaway_at_135_hz():
     """At 7.25 g grooves alone are stable; with 0.30 radii of gyration of yaw they run away at 135 Hz."""
-    ways = load_study("report/runaways.py")
-    for name, left in (("grooves", [False, False]), ("grooves, yaw 0.30", [True, False])):
-        assert [ways.motion(name, f, 7.25)[0] for f in (135.0, 143.0)] == left
+    study = load_study("report/runaways.py")
+    for name, expected in (("grooves", [False, False]), ("grooves, yaw 0.30", [True, False])):
+        assert [study.motion(name, f, 7.25)[0] for f in (135.0, 143.0)] == expected
 
 
 def test_exact_friction_alone_runs_away_above_den_hartogs_level():
@@ -150,31 +163,33 @@ def test_exact_friction_alone_runs_away_above_den_hartogs_level():
 
     Den Hartog's level of motion without stops is 1.2792 times the limit.
     """
-    ways = load_study("report/runaways.py")
-    limit = 0.4 * 26 * 4.4482216 / 1.123 / ways.G
-    stays, leaves = (ways.motion("friction alone", 143.0, share * limit) for share in (1.2, 1.4))
+    study = load_study("report/runaways.py")
+    limit = 0.4 * 26 * 4.4482216 / 1.123 / study.G
+    stays, leaves = (
+        study.motion("friction alone", 143.0, fraction * limit) for fraction in (1.2, 1.4)
+    )
     assert not stays[0] and leaves[0] and stays[1] < 1
 
 
 @pytest.mark.slow
 def test_runaways_have_stated_levels(tmp_path, capsys):
     """The levels of runaway of all load paths are those stated in the study."""
-    ways = load_study("report/runaways.py")
-    rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
+    study = load_study("report/runaways.py")
+    rows = {row.name: row for row in study.main(tmp_path / "x.svg")}
     near = rows["grooves, yaw 0.25"]
     far = rows["grooves, yaw 0.30"]
     assert_contains(
-        ways.ANSWER,
+        study.ANSWER,
         f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
         f"{far.levels[1]} to {near.levels[1]} g at 143",
         f"moves by {near.before[1]:.1f} to {far.before[1]:.1f} mil",
     )
     assert near.levels[2:] == far.levels[2:] == (8.0, 8.0)
     assert_contains(
-        ways.__doc__,
+        study.__doc__,
         "Grooves leave at " + ", ".join(f"{level}" for level in rows["grooves"].levels),
     )
-    late = {name: one.levels[0] - one.levels[1] for name, one in rows.items()}
+    difference = {name: row.levels[0] - row.levels[1] for name, row in rows.items()}
     quarter = [
         name
         for name in rows
@@ -187,18 +202,21 @@ def test_runaways_have_stated_levels(tmp_path, capsys):
             "grooves, yaw 0.30 at 150 Hz",
         )
     ]
-    assert len(quarter) == 7 and all(late[name] == 0.25 for name in quarter)
-    assert late["grooves worn to 10 um"] == -0.25 and late["interlocking spring"] == 0.5
-    assert late["softening spring"] == 0.25 and late["second interface that slips"] == 0
+    assert len(quarter) == 7 and all(difference[name] == 0.25 for name in quarter)
+    assert difference["grooves worn to 10 um"] == -0.25 and difference["interlocking spring"] == 0.5
+    assert difference["softening spring"] == 0.25 and difference["second interface that slips"] == 0
     alone = rows["friction alone"].levels
     aside = rows["grooves, yaw 0.30 at 150 Hz"].levels
     assert alone == tuple(sorted(alone)) and alone[0] == 5.25 and alone[3] - alone[0] == 0.5
     assert min(aside) == aside[2] == 4.0
-    assert not ways.motion("grooves", 135.0, 8.0)[0]
-    assert not ways.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
-    for level, left in ((5.75, False), (6.25, True)):  # the levels are the same after 400 cycles
-        assert ways.motion("grooves, yaw 0.30", 135.0, level, **{"drive.cycles": 400})[0] == left
-    assert ways.ANSWER in capsys.readouterr().out
+    assert not study.motion("grooves", 135.0, 8.0)[0]
+    assert not study.motion("grooves, yaw 0.09", 135.0, 8.0)[0]
+    # the levels are the same after 400 cycles
+    for level, expected in ((5.75, False), (6.25, True)):
+        assert (
+            study.motion("grooves, yaw 0.30", 135.0, level, **{"drive.cycles": 400})[0] == expected
+        )
+    assert study.ANSWER in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -217,12 +235,12 @@ def test_always_patch_suppresses_rotation_of_a_stuck_block():
 def test_exact_point_on_the_axis_does_not_damp_yaw():
     """With one contact point on the axis, H1 of the yaw mode agrees with the closed form within 1 %."""
     engaged = load_study("report/engaged.py")
-    one = engaged.random_turn("yaw", "one point on the axis", engaged.SLIDING_LEVEL, 16.0)
-    part = (one.f >= 40) & (one.f <= 110)
-    w = 2 * np.pi * one.f[part]
-    own = 2 * np.pi * 129
-    exact = 0.05 / (own**2 - w**2) * engaged.G * 1e6
-    assert np.median(one.moved[part] / exact) == pytest.approx(1, abs=0.01)
+    estimate = engaged.random_turn("yaw", "one point on the axis", engaged.SLIDING_LEVEL, 16.0)
+    part = (estimate.f >= 40) & (estimate.f <= 110)
+    w = 2 * np.pi * estimate.f[part]
+    omega = 2 * np.pi * 129
+    exact = 0.05 / (omega**2 - w**2) * engaged.G * 1e6
+    assert np.median(estimate.moved[part] / exact) == pytest.approx(1, abs=0.01)
 
 
 @pytest.mark.slow

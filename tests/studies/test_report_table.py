@@ -13,26 +13,26 @@ def test_always_table_of_studies_is_up_to_date(page):
     assert (page.FOLDER / "README.md").read_text("utf-8") == page.table(page.studies(), seconds), (
         "run python studies/report/table.py"
     )
-    assert set(seconds) <= {one.path for one in page.studies()}
+    assert set(seconds) <= {study.path for study in page.studies()}
 
 
 def test_always_figure_studies_have_a_verdict(page):
     """The VERDICT of a study of a figure is "yes", or begins with "in part: " or "no: "."""
-    found = {one.path: one for one in page.studies()}
-    assert len(found) == len(page.studies()) > 40 and all(
-        one.question.endswith(("?", ".")) for one in found.values()
+    studies = {study.path: study for study in page.studies()}
+    assert len(studies) == len(page.studies()) > 40 and all(
+        study.question.endswith(("?", ".")) for study in studies.values()
     )
     figures = [path for path in (ROOT / "report").glob("figure*.py")]
     for path in figures:
-        said = found[f"report/{path.name}"].reproduced
-        assert said == "yes" or said.startswith(("in part: ", "no: ")), path.name
+        verdict = studies[f"report/{path.name}"].reproduced
+        assert verdict == "yes" or verdict.startswith(("in part: ", "no: ")), path.name
 
 
 def test_exact_study_texts_are_read_without_import(page):
     """Question, answer and verdict are read from the source and equal those of the imported module."""
     module = load_study("report/figures_28_29.py")
-    one = next(one for one in page.studies() if one.path == "report/figures_28_29.py")
-    assert one[1:] == (
+    study = next(study for study in page.studies() if study.path == "report/figures_28_29.py")
+    assert study[1:] == (
         " ".join(module.__doc__.split("\n\n")[0].split()),
         module.ANSWER,
         module.VERDICT,

@@ -56,17 +56,17 @@ def test_always_page_of_an_effect_shows_its_records(scene_folder):
 
 def test_always_every_effect_has_a_description():
     """The description of every effect is a sentence."""
-    said = [made.about(name) for name in made.SHOWN_EFFECTS]
-    assert all(len(text) > 20 and text.endswith(".") for text in said)
+    descriptions = [made.about(name) for name in made.SHOWN_EFFECTS]
+    assert all(len(text) > 20 and text.endswith(".") for text in descriptions)
 
 
 def test_always_glossary_lists_measures_and_terms_once():
     """The glossary lists every measure and every term once."""
-    heads = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
-    assert len(heads) == len(set(heads)) > 90
+    headings = re.findall(r"^(\S[^\n]*)\n  \S", made.glossary(), re.M)
+    assert len(headings) == len(set(headings)) > 90
     terms = made.glossary_terms()
     assert {row.name.replace("_", " ") for row in (*made.STATIC, *made.MOTION)} | set(terms) == set(
-        heads
+        headings
     )
     assert terms["slide"] != terms["slip"] and "Irreversible part" in terms["slip"]
 
@@ -80,9 +80,11 @@ def test_always_every_package_folder_is_described():
 def find_source_pages() -> list:
     """Return the pages of the repository from which the site is built, without generated pages."""
     conf = (SITE / "conf.py").read_text("utf-8")
-    wanted = ast.literal_eval(re.search(r"include_patterns = (\[.*?\])", conf, re.S)[1])
-    found = {path for pattern in wanted for path in ROOT.glob(pattern.replace("**.md", "**/*.md"))}
-    return sorted(path for path in found if "made" not in path.parts and path != SITE / "README.md")
+    patterns = ast.literal_eval(re.search(r"include_patterns = (\[.*?\])", conf, re.S)[1])
+    paths = {
+        path for pattern in patterns for path in ROOT.glob(pattern.replace("**.md", "**/*.md"))
+    }
+    return sorted(path for path in paths if "made" not in path.parts and path != SITE / "README.md")
 
 
 def read_page_text(page: Path) -> str:
@@ -126,21 +128,21 @@ def test_always_page_links_resolve_and_its_python_parses(page):
         assert target.exists() and (
             target.suffix not in (".md", ".ipynb") or target in find_source_pages()
         ), link
-        heads = (
+        headings = (
             re.findall(r"^#+ (.*)$", target.read_text("utf-8"), re.M)
             if name and target.suffix == ".md"
             else ()
         )
         assert not name or name in {
-            re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads
+            re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings
         }, name
-    for listed in re.findall(r"^```\{toctree\}\n(.*?)^```", text, re.S | re.M):
-        for line in (line for line in listed.splitlines() if line and not line.startswith(":")):
-            place = re.sub(r"^.*<(.*)>$", r"\1", line)
+    for entries in re.findall(r"^```\{toctree\}\n(.*?)^```", text, re.S | re.M):
+        for line in (line for line in entries.splitlines() if line and not line.startswith(":")):
+            entry = re.sub(r"^.*<(.*)>$", r"\1", line)
             assert (
-                f"{place.removeprefix('made/')}.md" in generated_page_names()
-                if place.startswith("made/")
-                else any((page.parent / f"{place}{end}").exists() for end in (".md", ".ipynb"))
+                f"{entry.removeprefix('made/')}.md" in generated_page_names()
+                if entry.startswith("made/")
+                else any((page.parent / f"{entry}{end}").exists() for end in (".md", ".ipynb"))
             ), line
     if page.name == "ADDING.md":
         return  # tests/test_adding.py executes its blocks; some are single lines of a table
@@ -188,10 +190,10 @@ def test_always_site_build_has_no_warnings_or_broken_links(tmp_path, tmp_path_fa
         str(ROOT),
         str(tmp_path),
     ]
-    done = subprocess.run(words, capture_output=True, text=True, env=os.environ)
-    assert done.returncode == 0, done.stderr[-2000:]
-    tried, dead = check.links(tmp_path)
-    assert dead == check.mute(tmp_path) == [] and tried > 1000
+    process = subprocess.run(words, capture_output=True, text=True, env=os.environ)
+    assert process.returncode == 0, process.stderr[-2000:]
+    n_links, broken = check.links(tmp_path)
+    assert broken == check.mute(tmp_path) == [] and n_links > 1000
     assert [text for page in check.PAGES for text in check.faults(page)] == []
     if find_chromium() is not None:
         assert find_browser_errors(tmp_path, tmp_path_factory.mktemp("chromium")) == []
@@ -200,10 +202,10 @@ def test_always_site_build_has_no_warnings_or_broken_links(tmp_path, tmp_path_fa
 def find_browser_errors(site: Path, home: Path) -> list:
     """Return console messages of four pages and words broken at a width of 390 px."""
     browser = Chromium(home)
-    wrong = []
+    errors = []
     for name in ("README", "studies/README", "studies/site/start", "patchfem/scene/MEASURES"):
         page = browser.visit(site / f"{name}.html", 390)
-        wrong += [f"{name}: {fault}" for fault in page.faults]
-        wrong += [f"{name}: the word {word} is broken" for word in page.broken_words()]
+        errors += [f"{name}: {fault}" for fault in page.faults]
+        errors += [f"{name}: the word {word} is broken" for word in page.broken_words()]
     browser.close()
-    return wrong
+    return errors

@@ -10,12 +10,12 @@ def test_always_lanes_are_faster_than_dop853_and_cover_their_errors():
     Few of them lie outside their error estimates.
     """
     rows = load_study("speed/cases_per_second.py").main(128, 1, (100, 400), (1e-6,))
-    rows = {(one["way"], one["knob"]): one for one in rows}
+    rows = {(row["way"], row["knob"]): row for row in rows}
     lanes = rows["lanes, with bars", "1e-3"]
-    whole = rows["DOP853 with events", "1e-06"]
-    assert lanes["outside"] <= 4 and lanes["rms"] < 1e-4 and whole["median"] < 1e-4
+    dop853 = rows["DOP853 with events", "1e-06"]
+    assert lanes["outside"] <= 4 and lanes["rms"] < 1e-4 and dop853["median"] < 1e-4
     # ratio of rates; 2000 with 10 000 cases, where the set-up matters less
-    assert lanes["rate"] > 30 * whole["rate"]
+    assert lanes["rate"] > 30 * dop853["rate"]
     coarse, fine = (rows["loop of thirty lines", steps]["median"] for steps in ("100", "400"))
     assert fine < coarse / 10 < 1e-4
 
@@ -30,6 +30,6 @@ def test_always_lanes_are_faster_than_dop853_and_cover_their_errors():
 )
 def test_always_sweep_families_reach_rate_and_tolerance(name, count, least):
     """A family of sweeps has the expected number of cases, its minimum rate and its tolerance."""
-    (one,) = load_study("speed/cases_per_second.py").families(3, (name,), 1, 0.064)
-    assert one["cases"] == count
-    assert one["rate"] > least and one["best"] == one["rate"] and one["known"] > 0.9
+    (row,) = load_study("speed/cases_per_second.py").families(3, (name,), 1, 0.064)
+    assert row["cases"] == count
+    assert row["rate"] > least and row["best"] == row["rate"] and row["known"] > 0.9

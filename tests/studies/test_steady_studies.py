@@ -19,12 +19,12 @@ march = make_study_fixture("steady/against_march.py")
 )
 def test_exact_time_march_agrees_with_steady_state_solver(march, contact, frequency, near):
     """The time march agrees with the steady-state solver within the stated relative difference."""
-    one = march.row(contact, frequency, 800, 300, 400)
+    row = march.row(contact, frequency, 800, 300, 400)
     for name in march.MEASURES:
-        assert one.miss(name) < near
-        if one.run is not None:
-            assert one.miss(name, "run") < 1e-12
-    assert one.multiplier < 1 and one.regime != "stuck"
+        assert row.miss(name) < near
+        if row.run is not None:
+            assert row.miss(name, "run") < 1e-12
+    assert row.multiplier < 1 and row.regime != "stuck"
 
 
 def test_order_of_the_time_march_with_reversals_inside_steps(march):
@@ -82,11 +82,18 @@ def test_exact_swept_motion_jumps_beyond_the_fold(fold):
 def test_exact_jumps_of_both_sweeps_approach_the_folds(fold, tmp_path):
     """The jumps in both directions lie beyond the folds and approach them with a slower sweep."""
     steady, sweeps = fold.main((0.4, 0.1), path=tmp_path / "x.svg")
-    by = {(s.up, s.rate): s for s in sweeps}
+    by_rate = {(s.up, s.rate): s for s in sweeps}
     assert steady.folds == pytest.approx((147.6777, 146.4509), abs=1e-3)
-    assert steady.folds[0] < by[True, 0.1].jump < by[True, 0.4].jump < steady.folds[0] + 0.36
-    assert steady.folds[1] > by[False, 0.1].jump > by[False, 0.4].jump > steady.folds[1] - 0.43
-    assert by[True, 0.1].miss < 2e-3 and by[False, 0.1].miss < 0.03
+    assert (
+        steady.folds[0] < by_rate[True, 0.1].jump < by_rate[True, 0.4].jump < steady.folds[0] + 0.36
+    )
+    assert (
+        steady.folds[1]
+        > by_rate[False, 0.1].jump
+        > by_rate[False, 0.4].jump
+        > steady.folds[1] - 0.43
+    )
+    assert by_rate[True, 0.1].miss < 2e-3 and by_rate[False, 0.1].miss < 0.03
     for up in (True, False):
         assert fold.at_rest([s for s in sweeps if s.up == up]) == pytest.approx(
             steady.folds[0 if up else 1], abs=0.05
@@ -104,19 +111,21 @@ backbone = make_study_fixture("steady/backbone.py")
 def test_exact_backbone_of_one_harmonic_agrees_with_bench_loop(backbone, tmp_path):
     """The backbone from one harmonic agrees with the bench loop; many harmonics differ at large amplitude."""
     rows = [backbone.case(name, (0.5, 2.0, 20.0), 400) for name in ("elastic-plastic", "bonds")]
-    sharp, soft = rows
+    elastic_plastic, bonds = rows
     # limits of errors at 400 steps per cycle of the bench
-    assert max(sharp.miss("single")) < 3e-4 and max(soft.miss("single")) < 2e-3
+    assert max(elastic_plastic.miss("single")) < 3e-4 and max(bonds.miss("single")) < 2e-3
     # frequency of the stuck contact, sqrt((k + mu N/eps)/m)
-    assert sharp.bench[0][0] == pytest.approx(1007.29, rel=5e-5)
-    held = np.sqrt(143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi) ** 2)
-    assert sharp.single[0][0] == pytest.approx(held, rel=1e-9)
+    assert elastic_plastic.bench[0][0] == pytest.approx(1007.29, rel=5e-5)
+    stuck_frequency = np.sqrt(
+        143.0**2 + 0.3 * 26 * 4.4482216152605 / 1e-6 / 0.884 / (2 * np.pi) ** 2
+    )
+    assert elastic_plastic.single[0][0] == pytest.approx(stuck_frequency, rel=1e-9)
     # damping ratio without slip
-    assert sharp.bench[1][0] == pytest.approx(0.003 * 143 / held, rel=4e-5)
+    assert elastic_plastic.bench[1][0] == pytest.approx(0.003 * 143 / stuck_frequency, rel=4e-5)
     assert (
-        abs(sharp.many[0][1] / sharp.bench[0][1] - 1)
+        abs(elastic_plastic.many[0][1] / elastic_plastic.bench[0][1] - 1)
         < 0.02
-        < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
+        < abs(elastic_plastic.many[0][2] / elastic_plastic.bench[0][2] - 1)
     )
     text = load_study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text

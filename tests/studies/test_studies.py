@@ -18,22 +18,22 @@ def test_exact_tilt_docstring_states_the_patch_measures():
     One cycle of motion suffices, since these results do not depend on the motion.
     """
     module = load_study("rig/tilt.py")
-    said = " ".join(module.__doc__.split())
+    text = " ".join(module.__doc__.split())
     rows = module.main((0.0, 1e-4, 1e-3), 1)
-    (_, some, most), stiff = (
+    (_, small, large), stiffnesses = (
         [row[name][0] for row in rows] for name in ("contact_fraction", "tangential_stiffness")
     )
     assert (
-        f"0.1 mrad leaves {100 * some:.0f} % of the patch in contact and 1 mrad {100 * most:.1f} %"
-        in said
+        f"0.1 mrad leaves {100 * small:.0f} % of the patch in contact and 1 mrad {100 * large:.1f} %"
+        in text
     )
-    flat, tilted, wide = (f"{one:.3e}".replace("e+0", "e") for one in stiff)
-    assert f"shear stiffness falls from {flat} to {tilted} and {wide} N/m" in said
+    flat, tilted, wide = (f"{stiffness:.3e}".replace("e+0", "e") for stiffness in stiffnesses)
+    assert f"shear stiffness falls from {flat} to {tilted} and {wide} N/m" in text
     assert (
         "{:.0f}, {:.0f} and {:.0f} nm of slide".format(
             *(1e9 * row["thresholds"][1] for row in rows)
         )
-        in said
+        in text
     )
 
 
@@ -51,54 +51,54 @@ def test_always_tilt_reduces_stiffness_and_slightly_the_motion():
 
 def test_always_report_law_gives_a_smaller_amplitude(tmp_path):
     """The law as printed in the report gives a smaller amplitude than the law by stretch."""
-    found = load_study("rig/readings.py").main(5, tmp_path / "x.svg")
+    results = load_study("rig/readings.py").main(5, tmp_path / "x.svg")
     for elastic in (False, True):
         (report, a), (stretch, b) = (
-            found[reading, elastic]["relative_displacement_amplitude"]
+            results[reading, elastic]["relative_displacement_amplitude"]
             for reading in ("report", "stretch")
         )
         assert stretch - report > 5 * (a + b)
-    assert all(one["energy_balance"][0] < 1e-9 for one in found.values())
+    assert all(result["energy_balance"][0] < 1e-9 for result in results.values())
 
 
 @pytest.mark.slow
 def test_report_law_gives_stated_amplitudes():
     """The amplitudes of both laws on rigid and elastic pieces, and the energy created, are those stated."""
-    found = load_study("rig/readings.py").main(200, None)
+    results = load_study("rig/readings.py").main(200, None)
     name = "relative_displacement_amplitude"
-    more = "energy_created"
+    created = "energy_created"
     for (reading, elastic), value in (
         (("report", True), 11.949e-6),
         (("stretch", True), 14.803e-6),
         (("report", False), 12.985e-6),
         (("stretch", False), 15.84e-6),
     ):
-        assert found[reading, elastic][name][0] == pytest.approx(
-            value, abs=found[reading, elastic][name][1]
+        assert results[reading, elastic][name][0] == pytest.approx(
+            value, abs=results[reading, elastic][name][1]
         )
-    assert found["report", True][more][0] == pytest.approx(6.04e-6, rel=1e-3)
+    assert results["report", True][created][0] == pytest.approx(6.04e-6, rel=1e-3)
 
 
 def test_always_fixture_stiffness_controls_the_contact_fraction():
     """The softer the fixture, the larger the tilt at which half of the patch is in contact."""
     fixtures = load_study("misalignment/fixtures.py")
-    for spring, half in ((None, 2.95e-5), (1e4, 7.55e-5), (1e3, 4.89e-4)):
-        assert fixtures.tilt_for(0.5, spring, 14) == pytest.approx(half, rel=0.03)
+    for spring, tilt in ((None, 2.95e-5), (1e4, 7.55e-5), (1e3, 4.89e-4)):
+        assert fixtures.tilt_for(0.5, spring, 14) == pytest.approx(tilt, rel=0.03)
     assert fixtures.case(1e-3, 1e2)["contact_fraction"] == 1
     assert fixtures.case(1e-3, None)["contact_fraction"] < 0.03
 
 
 def test_figure_13_curves_have_stated_peaks(tmp_path):
     """The distributions of bond lengths have the peaks and quantiles stated in the answer."""
-    one = load_study("report/figure_13.py")
-    rows = {row["order"]: row for row in one.main(tmp_path / "figure.svg")}
+    figure = load_study("report/figure_13.py")
+    rows = {row["order"]: row for row in figure.main(tmp_path / "figure.svg")}
     assert list(rows) == [-0.5, 0.0, 1.0, 2.0]
     assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
     assert [rows[p]["top_at"] for p in (0.0, 1.0, 2.0)] == [0, 1, 2]
     assert (rows[1]["top"], rows[2]["top"]) == pytest.approx((0.3679, 0.2707), abs=5e-5)
     assert (
         f"at R = p eps: {rows[1]['top']:.4f} for p = 1 and {rows[2]['top']:.4f} for p = 2"
-        in one.ANSWER
+        in figure.ANSWER
     )
     assert [row["nine_tenths"] for row in rows.values()] == pytest.approx(
         [1.35, 2.30, 3.89, 5.32], abs=5e-3
@@ -108,11 +108,11 @@ def test_figure_13_curves_have_stated_peaks(tmp_path):
 
 def test_figure_14_curve_has_stated_values(tmp_path):
     """The normal distribution of Figure 14 has the values stated in the answer."""
-    one = load_study("report/figure_14.py")
-    rows = one.main(tmp_path / "figure.svg")
+    figure = load_study("report/figure_14.py")
+    rows = figure.main(tmp_path / "figure.svg")
     assert [weight for _, weight, _ in rows] == pytest.approx([0.3989, 0.2420, 0.0540, 0], abs=5e-5)
-    assert [share for *_, share in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
-    assert f"{100 * rows[1][2]:.1f} and {100 * rows[2][2]:.1f} % of a bond" in one.ANSWER
+    assert [fraction for *_, fraction in rows] == pytest.approx([0, 0.683, 0.954, 1], abs=6e-4)
+    assert f"{100 * rows[1][2]:.1f} and {100 * rows[2][2]:.1f} % of a bond" in figure.ANSWER
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 
 

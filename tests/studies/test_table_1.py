@@ -7,12 +7,12 @@ PATCH = {"fitted": (0.063, 0.060, 0.062), "held_out": (0.155, 0.280, 0.184)}
 POINT = {"fitted": (0.065, 0.058, 0.063), "held_out": (0.156, 0.284, 0.186)}
 
 
-def check_scores(found, wanted, within=0.0011):
+def check_scores(scores, expected, within=0.0011):
     """Check that the scores of fitted and left-out readings agree with expected ones."""
-    for part, three in wanted.items():
-        one = found[part]
-        assert (one["acceleration"], one["displacement"], one["all"]) == pytest.approx(
-            three, abs=within
+    for part, values in expected.items():
+        score = scores[part]
+        assert (score["acceleration"], score["displacement"], score["all"]) == pytest.approx(
+            values, abs=within
         )
 
 
@@ -40,9 +40,9 @@ def test_table_1_point_contact_scores_like_the_patch():
 )
 def test_table_1_fit_of_the_second_path_at_143_hz(point, wanted, values):
     """From 8 random starts, the fit reaches the optimum of an independent program."""
-    found = load_study("table_1/second_path.py").fit_path(point)
-    check_scores(found.score(found.logs, found.left_out_logs), wanted)
-    assert found.fit.values == pytest.approx(values, rel=2e-3)
+    fit = load_study("table_1/second_path.py").fit_path(point)
+    check_scores(fit.score(fit.logs, fit.left_out_logs), wanted)
+    assert fit.fit.values == pytest.approx(values, rel=2e-3)
 
 
 def test_table_1_scores_of_the_rigid_coulomb_block():
@@ -50,12 +50,12 @@ def test_table_1_scores_of_the_rigid_coulomb_block():
 
     An independent event-driven model with an onset of 4.00 g scores 1.62, 3.68 and 2.26.
     """
-    found = load_study("table_1/unfitted.py").main(400, models=("coulomb",))
-    assert found["coulomb"]["acceleration"] == pytest.approx(1.62, abs=0.01)
-    assert found["coulomb"]["displacement"] == pytest.approx(3.68, abs=0.01)
-    assert found["coulomb"]["all"] == pytest.approx(2.26, abs=0.01)
-    assert found["null"] == pytest.approx(0.116, abs=0.001)
-    assert found["coulomb"]["cells"][0, 6] == pytest.approx(5.42 * 9.80665, abs=0.1)  # 143 Hz, 5 g
+    scores = load_study("table_1/unfitted.py").main(400, models=("coulomb",))
+    assert scores["coulomb"]["acceleration"] == pytest.approx(1.62, abs=0.01)
+    assert scores["coulomb"]["displacement"] == pytest.approx(3.68, abs=0.01)
+    assert scores["coulomb"]["all"] == pytest.approx(2.26, abs=0.01)
+    assert scores["null"] == pytest.approx(0.116, abs=0.001)
+    assert scores["coulomb"]["cells"][0, 6] == pytest.approx(5.42 * 9.80665, abs=0.1)  # 143 Hz, 5 g
 
 
 @pytest.mark.parametrize(
@@ -73,6 +73,6 @@ def test_table_1_patch_moves_at_four_g(frequency, measured):
 @pytest.mark.slow
 def test_table_1_scores_of_the_patch():
     """The patch scores 1.625 for accelerations and 3.37 for displacements."""
-    found = load_study("table_1/unfitted.py").main(800, models=("patch",))
-    assert found["patch"]["acceleration"] == pytest.approx(1.625, abs=0.01)
-    assert found["patch"]["displacement"] == pytest.approx(3.37, abs=0.02)
+    scores = load_study("table_1/unfitted.py").main(800, models=("patch",))
+    assert scores["patch"]["acceleration"] == pytest.approx(1.625, abs=0.01)
+    assert scores["patch"]["displacement"] == pytest.approx(3.37, abs=0.02)

@@ -28,6 +28,7 @@ def integrate_rig(
     h = 2 * np.pi / omega / steps
 
     def rates(y, t):
+        """Return the rates of displacement and velocity of both modes and of the friction force."""
         force = np.clip(y[4], -limit, limit)
         speed = y[1] + arm * y[3]
         pull = (force + stiffness * (y[0] + arm * y[2]) + damping * speed) / MASS
@@ -42,19 +43,23 @@ def integrate_rig(
             ]
         )
 
-    felt = np.zeros((steps, len(omega)))
-    shown = np.zeros((steps, len(omega)))
+    accelerometer = np.zeros((steps, len(omega)))
+    gage = np.zeros((steps, len(omega)))
     for step in range(cycles * steps):
         t = step * h
-        one = rates(y, t)
-        felt[step % steps] = one[1] + level * np.sin(omega * t) + seen * one[3]
-        shown[step % steps] = y[0]
-        two = rates(y + h / 2 * one, t + h / 2)
-        three = rates(y + h / 2 * two, t + h / 2)
-        y = y + h / 6 * (one + 2 * two + 2 * three + rates(y + h * three, t + h))
+        k1 = rates(y, t)
+        accelerometer[step % steps] = k1[1] + level * np.sin(omega * t) + seen * k1[3]
+        gage[step % steps] = y[0]
+        k2 = rates(y + h / 2 * k1, t + h / 2)
+        k3 = rates(y + h / 2 * k2, t + h / 2)
+        y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rates(y + h * k3, t + h))
         y[4] = np.clip(y[4], -limit, limit)
-    turn = np.exp(-2j * np.pi * np.arange(steps) / steps)
-    return np.abs(felt).max(axis=0), np.abs(2 / steps * turn @ felt), np.ptp(shown, axis=0) / 2
+    rotation = np.exp(-2j * np.pi * np.arange(steps) / steps)
+    return (
+        np.abs(accelerometer).max(axis=0),
+        np.abs(2 / steps * rotation @ accelerometer),
+        np.ptp(gage, axis=0) / 2,
+    )
 
 
 def compute_scores(values: dict, gain: float, fundamental: bool) -> dict:
@@ -63,10 +68,10 @@ def compute_scores(values: dict, gain: float, fundamental: bool) -> dict:
         rows = [row for row in list(csv.reader(file))[1:] if row[2] or row[3]]
     conditions = np.array(sorted({(float(row[0]), float(row[1]) * G) for row in rows}))
     peak, first, gage = integrate_rig(conditions, **values)
-    place = {tuple(one): k for k, one in enumerate(conditions)}
-    logs = {here: ([], []) for here in (True, False)}
+    index = {tuple(condition): k for k, condition in enumerate(conditions)}
+    logs = {at_143: ([], []) for at_143 in (True, False)}
     for row in rows:
-        k = place[float(row[0]), float(row[1]) * G]
+        k = index[float(row[0]), float(row[1]) * G]
         if row[2]:
             logs[row[0] == "143"][0].append(
                 np.log(gain * (first if fundamental else peak)[k] / (float(row[2]) * G))
@@ -76,8 +81,11 @@ def compute_scores(values: dict, gain: float, fundamental: bool) -> dict:
                 np.log(max(gage[k], 0.01 * MIL) / (float(row[3]) * MIL))
             )
     return {
-        here: [np.sqrt(np.mean(np.square(part))) for part in (felt + shown, felt, shown)]
-        for here, (felt, shown) in logs.items()
+        at_143: [
+            np.sqrt(np.mean(np.square(part)))
+            for part in (accelerations + displacements, accelerations, displacements)
+        ]
+        for at_143, (accelerations, displacements) in logs.items()
     }
 
 
@@ -92,18 +100,20 @@ def test_table_1_scores_agree_with_independent_integration(rung, reading):
     The path of Figure 27 is a critically damped mode at 148 Hz.
     """
     row = load_study("table_1/fitting.py").read_records()[rung, reading, "143", ""]
-    given = dict(zip((key.rpartition(".")[2] for key in row["keys"]), row["values"]))
-    stiff = {
-        "stiffness": given.get("stiffness", MASS * ((2 * np.pi * 148) ** 2 - AXIAL**2)),
-        "damping": 0.0 if "stiffness" in given else 2 * MASS * (2 * np.pi * 148 - RATIO * AXIAL),
+    parameters = dict(zip((key.rpartition(".")[2] for key in row["keys"]), row["values"]))
+    path = {
+        "stiffness": parameters.get("stiffness", MASS * ((2 * np.pi * 148) ** 2 - AXIAL**2)),
+        "damping": 0.0
+        if "stiffness" in parameters
+        else 2 * MASS * (2 * np.pi * 148 - RATIO * AXIAL),
     }
     friction = {
-        "friction": given["static"],
-        "arm": given["slide"],
-        "seen": given.get("accelerometer", 0.0),
+        "friction": parameters["static"],
+        "arm": parameters["slide"],
+        "seen": parameters.get("accelerometer", 0.0),
     }
-    found = compute_scores(friction | stiff, row["gain"] or np.sqrt(2), "fundamental" in reading)
-    for here, name in ((True, "fitted"), (False, "others")):
-        assert found[here] == pytest.approx(
+    computed = compute_scores(friction | path, row["gain"] or np.sqrt(2), "fundamental" in reading)
+    for at_143, name in ((True, "fitted"), (False, "others")):
+        assert computed[at_143] == pytest.approx(
             [row[name][kind] for kind in ("all", "acceleration", "displacement")], abs=1e-3
         )

@@ -17,15 +17,17 @@ fitting = make_study_fixture("table_1/fitting.py")
 def test_always_every_model_has_conditions_and_ranges(fitting):
     """Every model and kind of reading has 20 conditions and search ranges that are not empty."""
     cells = read_readings(fitting.TABLE)
-    for rung in fitting.RUNGS.values():
-        for reading in rung.readings:
-            asked = rung.question(reading).condition_models(cells.conditions)
-            assert len(asked.rigs) == 20 and asked.read.reading == (
+    for model in fitting.RUNGS.values():
+        for reading in model.readings:
+            question = model.question(reading).condition_models(cells.conditions)
+            assert len(question.rigs) == 20 and question.read.reading == (
                 "fundamental" if "fund" in reading else "peak"
             )
-            assert all(one.low < one.high for one in asked.ranges)
-            ends = {one.key: one.low for one in asked.ranges}
-            assert not any(ends.get(f"structure.bonded.{key}") for key in ("stiffness", "damping"))
+            assert all(key_range.low < key_range.high for key_range in question.ranges)
+            lower_ends = {key_range.key: key_range.low for key_range in question.ranges}
+            assert not any(
+                lower_ends.get(f"structure.bonded.{key}") for key in ("stiffness", "damping")
+            )
 
 
 def test_exact_numbers_of_training_and_left_out_readings(fitting):
@@ -36,8 +38,10 @@ def test_exact_numbers_of_training_and_left_out_readings(fitting):
     cells = read_readings(fitting.TABLE)
     assert int(cells.felt.sum()) == 27 and cells.row.size == 35
     assert int(fitting.training(cells, "143").sum()) == 13 and fitting.training(cells, "all").all()
-    left = [~fitting.training(cells, f"without {one}") for one in (135, 143, 150, 155)]
-    assert [int(one.sum()) for one in left] == [12, 13, 5, 5] and (np.sum(left, axis=0) == 1).all()
+    masks = [~fitting.training(cells, f"without {frequency}") for frequency in (135, 143, 150, 155)]
+    assert [int(frequency.sum()) for frequency in masks] == [12, 13, 5, 5] and (
+        np.sum(masks, axis=0) == 1
+    ).all()
 
 
 def test_always_next_solution_does_not_start_from_harmonic_balance(fitting, monkeypatch):
@@ -47,22 +51,23 @@ def test_always_next_solution_does_not_start_from_harmonic_balance(fitting, monk
     """
     from patchfem.dynamics.events import steady
 
-    asked = fitting.RUNGS["second path"].question("peak").condition_models([(143.0, 49.03)])
+    question = fitting.RUNGS["second path"].question("peak").condition_models([(143.0, 49.03)])
     values = np.array([0.4, 3.5e6, 1400.0, 0.09])
     find_steady = steady.solve_steady
     failures = [NotConverged("lost")]
 
-    def lost(*given):
+    def solve_steady_after_failure(*given):
+        """Raise the stored failures first, then solve."""
         if failures:
             raise failures.pop()
         return find_steady(*given)
 
-    computed = ModelReadings(asked)
-    monkeypatch.setattr(steady, "solve_steady", lost)
+    computed = ModelReadings(question)
+    monkeypatch.setattr(steady, "solve_steady", solve_steady_after_failure)
     by_balance = np.array(computed(values, [0]))
     after = np.array(computed(values * 1.0001, [0]))
-    assert by_balance == pytest.approx(np.array(ModelReadings(asked)(values, [0])), rel=0.02)
-    assert after == pytest.approx(np.array(ModelReadings(asked)(values * 1.0001, [0])), rel=1e-9)
+    assert by_balance == pytest.approx(np.array(ModelReadings(question)(values, [0])), rel=0.02)
+    assert after == pytest.approx(np.array(ModelReadings(question)(values * 1.0001, [0])), rel=1e-9)
 
 
 def test_exact_gain_comes_from_training_readings_only(fitting):
@@ -73,8 +78,8 @@ def test_exact_gain_comes_from_training_readings_only(fitting):
     """
     cells = read_readings(fitting.TABLE)
     gains = {
-        one: fitting.stuck_gain(cells, fitting.training(cells, one))
-        for one in ("143", "all", "without 135", "without 143", "without 150", "without 155")
+        protocol: fitting.stuck_gain(cells, fitting.training(cells, protocol))
+        for protocol in ("143", "all", "without 135", "without 143", "without 150", "without 155")
     }
     assert gains.pop("without 143") == pytest.approx(1.25, rel=1e-12)
     assert list(gains.values()) == pytest.approx([9.9 / 8] * 5, rel=1e-12)
@@ -116,19 +121,19 @@ def test_exact_wear_factor_one_gives_the_unworn_model(fitting):
     """
     cells = read_readings(fitting.TABLE)
     rows = fitting.cells_for("spring and yaw, worn")
-    seen = fitting.training(cells, "143")
+    training = fitting.training(cells, "143")
     values = [0.45, 5e6, 0.09]
-    few = [0, 1]
+    conditions = [0, 1]
     worn = fitting.computed_for("spring and yaw, worn", ROOT2, rows, fitting.training(rows, "143"))
-    plain = fitting.computed_for("spring and yaw", ROOT2, cells, seen)
-    assert np.array(worn([*values, 1.0], few))[:, few] == pytest.approx(
-        np.array(plain(values, few))[:, few], rel=1e-9
+    plain = fitting.computed_for("spring and yaw", ROOT2, cells, training)
+    assert np.array(worn([*values, 1.0], conditions))[:, conditions] == pytest.approx(
+        np.array(plain(values, conditions))[:, conditions], rel=1e-9
     )
-    swing = worn([*values, 2.0], few)[1][0]
-    path = 4 * (swing - 0.243e-6) * 135 * 600
-    depth = 1e-14 * 26 * 4.4482216152605 / 0.0127**2 * path
+    amplitude = worn([*values, 2.0], conditions)[1][0]
+    distance = 4 * (amplitude - 0.243e-6) * 135 * 600
+    depth = 1e-14 * 26 * 4.4482216152605 / 0.0127**2 * distance
     thicker = plain([values[0] * (1 + depth / 1e-6), *values[1:]], [1])
-    assert worn([*values, 2.0], few)[0][1] == pytest.approx(thicker[0][1], rel=1e-9)
+    assert worn([*values, 2.0], conditions)[0][1] == pytest.approx(thicker[0][1], rel=1e-9)
     assert depth > 1e-8
     assert np.array_equal(rows.row, rows.condition) and len(rows.conditions) == 28
 
@@ -139,18 +144,20 @@ def test_always_fit_record_is_complete_with_consistent_scores(fitting):
 
     It starts at one random point and at its optimum with each of two parameters set to zero.
     """
-    found = fitting.fit_rung("second path", "peak", "143", starts=1)
-    assert found["keys"][0] == "friction.static"
-    assert len(found["values"]) == 4
-    assert len(found["cells"][0]) == 20
-    assert found["valleys"]["starts"] == len(found["starts"]) == 3 and found["gain"] is None
-    assert found["valleys"]["best"] == sum(
-        one < 1.001 * min(found["starts"]) for one in found["starts"]
+    record = fitting.fit_rung("second path", "peak", "143", starts=1)
+    assert record["keys"][0] == "friction.static"
+    assert len(record["values"]) == 4
+    assert len(record["cells"][0]) == 20
+    assert record["valleys"]["starts"] == len(record["starts"]) == 3 and record["gain"] is None
+    assert record["valleys"]["best"] == sum(
+        score < 1.001 * min(record["starts"]) for score in record["starts"]
     )
-    logs = np.array(found["logs"])
-    seen = fitting.training(read_readings(fitting.TABLE), "143")
-    assert found["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[seen] ** 2)), rel=1e-3)
-    assert found["others"]["all"] == pytest.approx(np.sqrt(np.mean(logs[~seen] ** 2)), rel=1e-3)
+    logs = np.array(record["logs"])
+    training = fitting.training(read_readings(fitting.TABLE), "143")
+    assert record["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[training] ** 2)), rel=1e-3)
+    assert record["others"]["all"] == pytest.approx(
+        np.sqrt(np.mean(logs[~training] ** 2)), rel=1e-3
+    )
 
 
 @pytest.fixture(scope="module")
