@@ -41,12 +41,12 @@ def read_notebook(name: str):
     return nbformat.v4.new_notebook(cells=[make[k % 2](part) for k, part in enumerate(parts)])
 
 
-BOOKS = {name: read_notebook(name) for name in NAMES}
+NOTEBOOKS = {name: read_notebook(name) for name in NAMES}
 
 
 def cell_sources(name: str, kind: str) -> list:
     """Return the text of all cells of one kind."""
-    return [cell.source for cell in BOOKS[name].cells if cell.cell_type == kind]
+    return [cell.source for cell in NOTEBOOKS[name].cells if cell.cell_type == kind]
 
 
 @pytest.fixture(scope="module")
@@ -70,8 +70,8 @@ def test_always_notebook_runs_without_errors_or_warnings(name, kernel):
     """All cells of a notebook run, with their asserts; it shows its pictures and writes no warning."""
     manager, folder = kernel
     notebook = nbformat.v4.new_notebook(
-        cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, BOOKS[name].cells)],
-        metadata=BOOKS[name].metadata,
+        cells=[nbformat.v4.new_code_cell("%reset -f"), *map(dict.copy, NOTEBOOKS[name].cells)],
+        metadata=NOTEBOOKS[name].metadata,
     )
     notebook = nbformat.from_dict(notebook)
     NotebookClient(
@@ -126,10 +126,10 @@ def test_always_notebook_law_exports_the_protocol_functions():
 @pytest.mark.parametrize("name", NAMES)
 def test_always_notebook_is_valid_and_without_output(name):
     """A notebook has a valid format and no stored output."""
-    nbformat.validate(BOOKS[name])
+    nbformat.validate(NOTEBOOKS[name])
     assert all(
         cell.outputs == [] and cell.execution_count is None
-        for cell in BOOKS[name].cells
+        for cell in NOTEBOOKS[name].cells
         if cell.cell_type == "code"
     )
 

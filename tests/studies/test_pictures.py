@@ -6,7 +6,7 @@ import pytest
 from study_module import ROOT
 
 # Width of a README's column and smallest font size [pixel].
-WIDTH, LEAST = 830, 9.0
+WIDTH, MIN_SIZE = 830, 9.0
 
 # Pictures of the repository; the folder "made" holds output of the site's build.
 PICTURES = sorted(
@@ -32,7 +32,7 @@ def test_always_picture_is_legible_and_without_code_names(name):
     text = (ROOT / name).read_text("utf-8")
     sizes = find_font_sizes(text)
     assert sizes and text.count("\n") < 1500 and len(text) < 160e3
-    assert {words: size for words, size in sizes.items() if size < LEAST} == {}
+    assert {words: size for words, size in sizes.items() if size < MIN_SIZE} == {}
     assert [words for words in sizes if "_" in words] == []
 
 
