@@ -83,7 +83,7 @@ per cent between handbooks; for a sprayed coating they differ by far more. If yo
 constants, measure it on your material.
 
 Case, blanks, hyphens and underscores do not matter in a name, except the case of `TiN`: `ti64`, `Ti6Al4V` and
-`ti-6al-4v` mean `Ti-6Al-4V`. The error for an unknown name proposes the nearest materials.
+`ti-6al-4v` mean `Ti-6Al-4V`. The error for an unknown name lists the materials or proposes near ones.
 """
 
     @classmethod
