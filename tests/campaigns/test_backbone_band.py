@@ -90,7 +90,7 @@ def test_band_contains_curves_of_all_methods(three_curves):
         in backbone.attrs["notes"]
     )
     assert "predicted" not in advice and "Up to 105 um friction dissipates nothing" in advice
-    assert "A contact that sticks reaches its friction limit at 120 um" in advice
+    assert "the sticking contact, friction would reach its limit at 120 um" in advice
     for method in ("balance", "quasi_static", "decay"):
         amplitude = backbone[f"{method}_amplitude"].values
         here = np.isin(backbone.band_amplitude, amplitude)

@@ -53,11 +53,16 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
 
 
 def _describe_slip(joint: Joint, curve) -> list:
-    """Say where the sticking contact reaches its friction limit, and up to where friction dissipates nothing."""
+    """State the amplitude at which friction would reach its limit, and up to which it dissipates nothing.
+
+    The first amplitude follows from the stiffness of the sticking contact.
+    """
     if not joint.friction_limit or joint.is_rigid:
         return []
     edge = format_length(joint.slip_amplitude, 3)
-    sentences = [f"A contact that sticks reaches its friction limit at {edge}."]
+    sentences = [
+        f"At the stiffness of the sticking contact, friction would reach its limit at {edge}."
+    ]
     # Micro-slip has no onset: the smallest slider of a mesh or of a density sets where its loss begins.
     model = joint.model
     has_partial_slip = model.partial_slip or model.rig.friction.has_partial_slip
