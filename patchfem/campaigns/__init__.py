@@ -52,7 +52,7 @@ PUBLIC = {
     ),
     "fits.wear": (
         "FittedCoefficient",
-        "KEY",
+        "COEFFICIENT_KEY",
         "fit_wear",
     ),
     "numerical_settings": (

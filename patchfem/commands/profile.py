@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import tomllib
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -34,9 +35,11 @@ from .shared import (
     text_option,
 )
 
-# tables [contact.profile] and [contact.asperities] of a scene, each up to the next table
+# Tables [contact.profile] and [contact.asperities] of a scene, each up to the next table and the
+# comments above it.
 SPLIT_TABLES = re.compile(
-    r"^[ \t]*\[contact\.(?:profile|asperities)\].*?(?=^[ \t]*\[|\Z)", re.MULTILINE | re.DOTALL
+    r"^[ \t]*\[contact\.(?:profile|asperities)\].*?(?=(?:^[ \t]*(?:#[^\n]*)?\n)*^[ \t]*\[|\Z)",
+    re.MULTILINE | re.DOTALL,
 )
 
 
@@ -126,21 +129,30 @@ def _print_split(
     refuse_existing(out)
     place = Path(os.path.relpath(trace, target.parent)).as_posix()
     text = toml_text.read_text(scene_path)
+    if scene.loads(text, target).contact is None:
+        raise UsageError(
+            f"profile --split: {scene_path} has no [contact], so no patch has this trace"
+        )
     given = require_files(scene.loads(text, target, [f"contact.profile.file={place}"]))
-    built = model.build(given)
-    if built.patch is None:
-        raise UsageError(f"profile --split: {scene_path} has no [contact]")
     with locate_errors(given):
-        divided = trace_split.split_trace(built.patch, cutoff)
+        divided = trace_split.split_trace(model.build(given).patch, cutoff)
     if out is not None:
         kept = SPLIT_TABLES.sub("", text).rstrip()
+        if {"profile", "asperities"} & tomllib.loads(kept)["contact"].keys():
+            raise UsageError(
+                f"profile --split: {scene_path} has profile or asperities inside [contact]; write them as tables "
+                "[contact.profile] and [contact.asperities], or paste the tables that are printed without -o"
+            )
         text = f"{kept}\n\n{divided.tables}"
         scene.loads(text, out)
         write_text(out, text)
     if json_:
         print(json.dumps({"patchfem": __version__, "split": asdict(divided)}, ensure_ascii=False))
         return
-    print(f"{trace}: {divided.describe(cutoff is not None)}")
+    print(
+        f"{trace}: "
+        + divided.describe(is_cutoff_given=cutoff is not None, is_scene_written=out is not None)
+    )
     if out is not None:
         print(f"scene: {out}")
 

@@ -166,7 +166,7 @@ def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") 
     count = int(lost[name].sum())
     case = int(np.argmax(relative_errors))
     others = len(lost) - 1
-    is_known_by_name = (
+    error_text = (
         f"{format_number(100 * relative_errors[case], 2)} % of its value"
         if relative_errors[case] <= ZERO_ERROR_RATIO
         else "larger than the value"
@@ -175,7 +175,7 @@ def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") 
     others_text = f"; {_others_sentence(others)}" if others else ""
     return (
         f"{count} of {number} cases miss{'es' * (count == 1)} {tolerance_text} in {measure_text}; the largest error, at "
-        f"{format_case(case)}, is {is_known_by_name}{others_text}."
+        f"{format_case(case)}, is {error_text}{others_text}."
     )
 
 

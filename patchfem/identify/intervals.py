@@ -262,7 +262,7 @@ def _follow_profile(
         return _IntervalEnd(fit.u[i], True)
 
     def evaluate(step: float, nearby_point) -> tuple:
-        """Return the excess growth at a step of value i, and the point of its minimum."""
+        """Return the root of growth over limit, minus 1, at a step of value i, and the constrained minimum."""
         point = nearby_point.copy()
         point[i] = fit.u[i] + sign * step
         descent = fit.descend(fit.model, point, others)

@@ -43,7 +43,7 @@ def remove_joint(model: Model, patch=None) -> Model:
 
 
 def patch_stiffness(model: Model, patch) -> float:
-    """Return the tangential stiffness [N/m] of a patch that sticks everywhere; 0 if nothing presses it."""
+    """Return the tangential stiffness [N/m] of a patch that sticks everywhere; 0 without contact."""
     f = model.friction
     load = patch.pressure.load
     if not load > 0:

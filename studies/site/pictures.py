@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 import patchfem as pf  # noqa: E402
-from patchfem.export.drawing.film import make_film_settings  # noqa: E402
+from patchfem.export.drawing.film import make_film  # noqa: E402
 from patchfem.export.drawing.panels import outer_edges  # noqa: E402
 from patchfem.export.drawing.paraview import get_stress  # noqa: E402
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE, STYLE  # noqa: E402
@@ -232,7 +232,7 @@ def figures() -> Iterator[tuple[str, Figure]]:
         yield "loop", draw_loop(result)
         result.save(place)
         with Series(Path(place)) as series:
-            film = make_film_settings(series)
+            film = make_film(series)
             yield "pieces", draw_pieces(series, film)
             yield "film", draw_film(series, film)
         os.chdir(place)  # a sweep writes its folder into the current directory

@@ -295,11 +295,16 @@ def test_exact_a_trace_of_two_waves_is_split_between_them(split_scene):
     assert split["pressure"] == pytest.approx(2e3 / 12.7e-3**2)
 
 
-def test_the_split_scene_keeps_the_rest_of_the_text_and_runs(split_scene):
+def test_exact_split_scene_keeps_other_text_and_runs(split_scene):
+    """The new scene has the printed tables, keeps all other lines and comments, and runs."""
+    comment = "# comment above the table of the slide"
+    split_scene.write_text(SPLIT_SCENE.replace("[slide]", f"{comment}\n[slide]"), "utf-8")
     answer = run_cli("profile", "waves.csv", "--split", "scene.toml", "-o", "split.toml")
     assert answer.code == 0 and answer.err == ""
     assert "split the trace: waves longer than " in answer.out
+    assert "-o NEW_SCENE" not in answer.out
     text = Path("split.toml").read_text("utf-8")
+    assert f"{comment}\n[slide]" in text
     for line in SPLIT_SCENE.split("[contact.profile]")[0].splitlines():
         assert line in text
     assert text.index("[slide]") < text.index("[contact.profile]")
@@ -317,27 +322,33 @@ def test_the_split_scene_keeps_the_rest_of_the_text_and_runs(split_scene):
     assert pf.load("other/split.toml").contact.profile.file == "../waves.csv"
 
 
-def test_refuses_a_split_that_cannot_be(split_scene):
+def test_refuses_impossible_split(split_scene):
+    """A scene without patch, with a layer, or with inline tables is refused, as are other options."""
     point = '[normal]\nload = "1 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n'
     slide = SPLIT_SCENE[SPLIT_SCENE.index("[slide]") :]
     Path("point.toml").write_text(point + slide, "utf-8")
     skin = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e13 Pa/m"\n'
     Path("skin.toml").write_text(SPLIT_SCENE + skin, "utf-8")
-    for words, said in (
+    table = SPLIT_SCENE[SPLIT_SCENE.index("[contact.profile]") :].split("\n[")[0]
+    inline = "profile = {file = 'waves.csv', heights = 'surface'}\n"
+    text = SPLIT_SCENE.replace(table, "").replace("[contact]\n", f"[contact]\n{inline}")
+    Path("inline.toml").write_text(text, "utf-8")
+    for words, message in (
         (("scene.toml", "-o", "scene.toml"), "already exists"),
-        (("point.toml",), "contact"),
+        (("point.toml",), "has no [contact], so no patch has this trace"),
+        (("inline.toml", "-o", "new.toml"), "inside [contact]; write them as tables"),
         (("skin.toml",), "without [contact.asperities]"),
         (("scene.toml", "--form", "2"), "--form"),
         (("scene.toml", "--set", "contact.load=1 N"), "--set"),
         (("scene.toml", "--cutoff", "50 mm"), "reduce contact.element_size"),
     ):
         answer = run_cli("profile", "waves.csv", "--split", *words)
-        assert answer.code == 2 and said in answer.err, words
-    assert Path("scene.toml").read_text("utf-8") == SPLIT_SCENE
+        assert answer.code == 2 and message in answer.err, (words, answer.err)
+    assert Path("scene.toml").read_text("utf-8") == SPLIT_SCENE and not Path("new.toml").exists()
 
 
-def test_run_refuses_or_warns_of_such_a_trace_with_both_tables(split_scene):
-    """A refusal of coarse elements and a warning of errors above the tolerance both print them, ready to paste."""
+def test_always_run_prints_tables_of_split_for_unresolved_trace(split_scene):
+    """A refusal of coarse elements and a warning of errors above the tolerance print both tables of a split."""
     static = SPLIT_SCENE[: SPLIT_SCENE.index("[friction]")].replace("[contact.shear]\n", "")
     tables = ["    [contact.profile]", "    [contact.asperities]", '    law = "exponential"']
     for size, code in (("635 um", 2), ("40 um", 3)):

@@ -12,7 +12,7 @@ from command_line import run_cli
 from exported import write_small_series
 from PIL import Image
 
-from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film_settings
+from patchfem.export.drawing.film import DPI, FRAME_SIZE, make_film
 from patchfem.export.drawing.flat import STYLE, Picture
 from patchfem.export.fields.series import MIN_STEP_RATIO, Series, last_consecutive_frames
 
@@ -55,7 +55,7 @@ def frame_pixels(series, settings, number) -> np.ndarray:
 def drawn_frames(small_folder):
     """Return the settings of the small series and the pixels of each of its frames."""
     with Series(small_folder) as series:
-        settings = make_film_settings(series)
+        settings = make_film(series)
         return settings, [frame_pixels(series, settings, number) for number in settings.numbers]
 
 
@@ -74,7 +74,7 @@ def test_exact_last_cycle_excludes_pressed_state():
 def test_exact_frames_share_scale_and_window(small_folder):
     """All frames have one scale, window and magnification, which contain all stresses and positions."""
     with Series(small_folder) as series:
-        settings = make_film_settings(series)
+        settings = make_film(series)
         frames = [series.frame(number) for number in settings.numbers]
     line = frames[0].interface()
     stress = [frame.point_data["normal_stress"][line] for frame in frames]
@@ -98,7 +98,7 @@ def test_exact_frames_share_scale_and_window(small_folder):
 def test_exact_colour_range_is_constant(small_folder):
     """The range of colours is the same in every frame, and the colours show its stresses."""
     with Series(small_folder) as series:
-        settings = make_film_settings(series)
+        settings = make_film(series)
         first_frame = series.frame(settings.numbers[0])
         picture = Picture(first_frame, "", settings.panels(first_frame), FRAME_SIZE, settings.reach)
         assert len(picture.bodies[0].cells) == 2  # triangles and quadrilaterals

@@ -16,7 +16,7 @@ from command_line import run_cli
 from exported import write_small_series
 from paraview_stand_in import SimpleModule, compute_blocks, read_frames
 
-from patchfem.export.drawing.film import make_film_settings
+from patchfem.export.drawing.film import make_film
 from patchfem.export.drawing.panels import upper_piece_slide
 from patchfem.export.fields.blocks import NAMES
 from patchfem.export.fields.series import Series
@@ -62,7 +62,7 @@ def test_exact_paraview_positions_agree_with_figures(bench_folder, script_file, 
     (pieces, _), (interface, _), (clock, _) = simple.shown
     files = read_frames(clock.Input)
     with Series(bench_folder) as series:
-        settings = make_film_settings(series)
+        settings = make_film(series)
         assert [time for time, _ in files] == [series.times[number] for number in settings.numbers]
         for number, (_, file) in list(zip(settings.numbers, files))[::4]:
             frame = series.frame(number)
@@ -108,7 +108,7 @@ def test_exact_script_colours_stress_component(
     assert low == -high and high > 0 and "motion and gap x " in clock.Format
     files = read_frames(clock.Input)
     with Series(bench_folder) as series:
-        frames = [series.frame(number) for number in make_film_settings(series).numbers]
+        frames = [series.frame(number) for number in make_film(series).numbers]
     for (_, _, cells), block in zip(
         compute_blocks(pieces, files[0][1]), (frames[0].blocks["lower"], frames[0].blocks["upper"])
     ):
@@ -134,7 +134,7 @@ def test_exact_script_shows_stick_and_slip(bench_folder, tmp_path, monkeypatch):
     files = read_frames(clock.Input)
     statuses = set()
     with Series(bench_folder) as series:
-        for (_, file), number in zip(files, make_film_settings(series).numbers):
+        for (_, file), number in zip(files, make_film(series).numbers):
             expected = series.frame(number).blocks["interface"].point_data["status"]
             ((_, points, _),) = compute_blocks(line, file)
             assert points["status"].tolist() == expected.tolist()
@@ -209,7 +209,7 @@ def test_always_paraview_draws_every_frame(bench_folder, tmp_path):
         [*screen, "pvpython", "cycle.py", "cycle.png"], cwd=tmp_path, check=True, timeout=300
     )
     with Series(bench_folder) as series:
-        count = len(make_film_settings(series).numbers)
+        count = len(make_film(series).numbers)
         n_frames = len(series)
     pictures = [plt.imread(path)[..., :3] for path in sorted(tmp_path.glob("cycle.*.png"))]
     assert len(pictures) == count and all(picture.shape == (800, 1280, 3) for picture in pictures)

@@ -30,7 +30,7 @@ MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two
 # Size of the largest file that is read [bytes]; a file that compare writes is far smaller.
 MAX_FILE_BYTES = 1 << 20
 DEPTH_TOL = 0.1  # Fraction of the tolerance of the scene to which the depth is met.
-KEY = "wear.coefficient"
+COEFFICIENT_KEY = "wear.coefficient"
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +191,8 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
         )
     if model.wear.start is not None:
         raise PatchfemError(
-            f"fit {KEY}: the fit must start from unworn pieces; leave out wear.start", "wear.start"
+            f"fit {COEFFICIENT_KEY}: the fit must start from unworn pieces; leave out wear.start",
+            "wear.start",
         )
     # The patch of unworn pieces is the same for all coefficients.
     patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
@@ -211,7 +212,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
                 "cycle"
             )
         raise PatchfemError(
-            f"--free {KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
+            f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
             f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {cure}"
         )
     inverse = curve.inverse()
@@ -226,12 +227,12 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
         value *= float(inverse(target.value) / inverse(reached))
     else:
         raise NotConverged(
-            f"fit {KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
+            f"fit {COEFFICIENT_KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
             f"{reached:.6g} in place of {target.value:.6g}"
         )
     if value < bounds.low:
         raise PatchfemError(
-            f"--free {KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
+            f"--free {COEFFICIENT_KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
             f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
         )
     low, high = inverse(np.minimum([target.low, target.high], max_depth)) / inverse(target.value)
@@ -249,9 +250,9 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
 def _read_bounds(free) -> Range:
     """Parse the range of the wear coefficient; PatchfemError for other free keys."""
     ranges = parse_ranges(free)
-    if [bound.key for bound in ranges] != [KEY]:
+    if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
         raise PatchfemError(
-            f"--free: in a scene with [wear] only {KEY} can be fitted, for example {KEY}=1e-16 "
+            f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "
             "m^2/N..1e-12 m^2/N"
         )
     return ranges[0]
@@ -265,7 +266,7 @@ def _compute_curve(model: Model, patch, coefficient: float, name: str, progress)
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     worn = evolve.compute_wear(model, patch, (None, None), progress)
     if worn.stopped:
-        raise PatchfemError(f"fit {KEY}: {worn.stopped}")
+        raise PatchfemError(f"fit {COEFFICIENT_KEY}: {worn.stopped}")
     area = nodal_areas(model.patch, patch.pieces.interface).ravel()
     depths = np.array([moment.depth.ravel() for moment in worn.moments])
     depth = depths.max(axis=1) if name == "worn_depth_max" else depths @ area / area.sum()

@@ -323,7 +323,7 @@ def stress_charts(x, depths, mises, sigma) -> list:
         )
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
-            x_axis, lower_limit, means = reduce_grid(x[i], row, part, GRID)
+            x_lines, depth_lines, means = reduce_grid(x[i], row, part, GRID)
             # four digits suffice, because the values are shown as colours
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
                 means.shape
@@ -332,21 +332,19 @@ def stress_charts(x, depths, mises, sigma) -> list:
                 make_mark(
                     "cells",
                     "",
-                    x=x_axis * size,
-                    y=side * lower_limit * size,
+                    x=x_lines * size,
+                    y=side * depth_lines * size,
                     value=values,
                     top=colour_limit,
                     unit=unit,
                 )
             )
-        across, upper_limit = (
+        x_range, y_range = (
             {"range": [low * size, high * size]} for low, high in ((left, right), (-height, height))
         )
         title = "Von Mises stress" if drawn_charts else "Von Mises stress at the contact"
         drawn_charts.append(
-            make_chart(
-                title, make_axis("x", name) | across, make_axis("y", name) | upper_limit, marks
-            )
+            make_chart(title, make_axis("x", name) | x_range, make_axis("y", name) | y_range, marks)
             | {"frame": _frame_size((right - left) / (2 * height))}
         )
     return drawn_charts[::-1]
@@ -439,7 +437,10 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
     measured : tuple, optional
         Measured slide and force.
     """
-    (x_axis, size), (y_axis, scale) = choose_axis_unit(slide, "m"), choose_axis_unit(force, "N")
+    (slide_unit, size), (force_unit, scale) = (
+        choose_axis_unit(slide, "m"),
+        choose_axis_unit(force, "N"),
+    )
     read = (
         None
         if measured is None
@@ -450,8 +451,8 @@ def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
     return [
         make_chart(
             title,
-            make_axis("slide", x_axis),
-            make_axis("friction force", y_axis),
+            make_axis("slide", slide_unit),
+            make_axis("friction force", force_unit),
             [read, make_line(slide * size, force * scale, "accent", "computed" if read else "")],
         )
     ]
@@ -902,20 +903,20 @@ def levels_chart(rows: list) -> list:
     y = amplitude * scale
     log = needs_log_scale(amplitude)
     is_drawn = y > 0 if log else np.isfinite(y)
-    # Lower end of error bars that would extend below 0.
     marks = []
+    # Lower end of error bars that would extend below 0.
     style = {"floor": 0.1 * float(y[is_drawn].min())} if log else {}
     for k, (a, b) in enumerate(pairwise(drive)):
-        y_axis = b >= a
+        is_raised = b >= a
         if is_drawn[k] and is_drawn[k + 1]:
             marks.append(
                 make_mark(
                     "arrow",
-                    "accent" if y_axis else "warm",
-                    "raised" if y_axis else "lowered",
+                    "accent" if is_raised else "warm",
+                    "raised" if is_raised else "lowered",
                     x=[a, b],
                     y=[y[k], y[k + 1]],
-                    dash="solid" if y_axis else "dashed",
+                    dash="solid" if is_raised else "dashed",
                     **style,
                 )
             )
@@ -961,7 +962,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
     history : dict
         Name -> (j,), with `cycle`; measures are divided by their first value.
     """
-    (x_axis, size), drawn_charts = choose_axis_unit(x, "m"), []
+    (length_unit, size), drawn_charts = choose_axis_unit(x, "m"), []
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = choose_axis_unit(values, unit)
@@ -975,7 +976,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
             for k, colour in zip(pick, ("soft", *COLOURS))
         ]
         drawn_charts.append(
-            make_chart(title, make_axis("x", x_axis), make_axis(title.lower(), name), lines)
+            make_chart(title, make_axis("x", length_unit), make_axis(title.lower(), name), lines)
         )
     drawn_charts[0]["y"]["range"] = [
         0.0,

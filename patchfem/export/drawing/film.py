@@ -88,8 +88,8 @@ class Film:
         )
 
 
-def make_film_settings(series: Series, magnify: float | None = None) -> Film:
-    """Collect what the frames of the last cycle have in common, such as windows and colours.
+def make_film(series: Series, magnify: float | None = None) -> Film:
+    """Return what the frames of an animation have in common, such as windows and colours.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
     Missing
         ffmpeg is not installed or cannot write the file.
     """
-    film = make_film_settings(series, magnify)
+    film = make_film(series, magnify)
     picture = None
     with matplotlib.rc_context(STYLE | {"savefig.bbox": None, "savefig.dpi": "figure"}):
         writer = _movie_writer(out, film.seconds)

@@ -15,7 +15,7 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_text
 from ..fields.series import Frame, Series
 from ..fields.vtu import frames_folder, write_pvd
-from .film import Film, make_film_settings
+from .film import Film, make_film
 from .panels import drawn_displacement, upper_piece_slide, upper_points
 
 MPA = 1e-6
@@ -170,7 +170,7 @@ def write_script(folder: Path, out: Path, component: str = "von_mises") -> str:
     out = Path(out)
     fields = out.with_suffix(".pvd")
     with Series(folder) as series:
-        film = make_film_settings(series)
+        film = make_film(series)
         text = script_text(out, film, component, _colour_range(series, film, component), status)
         write_pvd(fields, series, film.numbers, lambda frame: add_motion(frame, component))
         write_text(out, text)
@@ -231,8 +231,8 @@ def script_text(out: Path, film: Film, component: str, ends: tuple, status: bool
 def add_motion(frame: Frame, component: str = "von_mises") -> Frame:
     """Return a frame with added point arrays for the motion and the slide.
 
-    Their sum is the displacement as drawn. The arrays that the script colours [MPa] are added as
-    well.
+    Their sum is the displacement as drawn. The stress `component`, a name of STRESSES, and the
+    contact pressure are added in MPa as well.
     """
     slide = np.zeros((len(frame.points), 3))
     slide[upper_points(frame), 0] = upper_piece_slide(frame)

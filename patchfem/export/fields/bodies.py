@@ -208,7 +208,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
     x : (k,) array
         Positions along the interface [m].
     side : {"lower", "upper"}
-    piece_fields : _Inside
+    piece_fields : _PieceFields
     u : (1 + f, n, 2) array
         From `_piece_displacements`; its first row is the pressed state.
     """

@@ -228,9 +228,9 @@ def _csv_rows(fit_data: dict) -> list:
         pairs = ((row["acceleration"], G_N), (row["displacement"], MIL))
         measured = [_format_cell(reading["measured"], unit) for reading, unit in pairs]
         computed = [_format_cell(reading["computed"], unit) for reading, unit in pairs]
-        n_held_out = int(any(reading["held"] for reading, _ in pairs))
+        is_held_out = int(any(reading["held"] for reading, _ in pairs))
         drive = [f"{row['frequency']:.9g}", f"{row['input'] / G_N:.9g}"]
-        rows.append([*drive, *measured, row["flag"], *computed, n_held_out])
+        rows.append([*drive, *measured, row["flag"], *computed, is_held_out])
     return rows
 
 
@@ -256,14 +256,14 @@ def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
             group = groups.setdefault((bool(reading["held"]), "U" in row["flag"]), [])
             group.append((reading["measured"] / scale, reading["computed"] / scale))
     marks = []
-    for n_held_out, unstable in sorted(groups):
-        x, y = zip(*groups[n_held_out, unstable])
-        text = "held out" if n_held_out else "fitted"
+    for is_held_out, unstable in sorted(groups):
+        x, y = zip(*groups[is_held_out, unstable])
+        text = "held out" if is_held_out else "fitted"
         if unstable:
             text += ", unstable in the test"
         shape = "triangle" if unstable else "circle"
         marks.append(
-            charts.make_dots(x, y, "warm" if n_held_out else "accent", text, size=4, shape=shape)
+            charts.make_dots(x, y, "warm" if is_held_out else "accent", text, size=4, shape=shape)
         )
     if groups:
         numbers = np.concatenate([np.ravel(points) for points in groups.values()])

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ...campaigns.fits.wear import KEY, FittedCoefficient
+from ...campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
 from ...formatting import format_number
 from ...scene.scene import Scene, loads
 from .files import FITTED_SCENE, FitFiles, describe_measurement
@@ -28,18 +28,18 @@ def describe_wear_fit(fit: FittedCoefficient, scene: Scene) -> FitFiles:
         "runs": fit.runs,
         "model": fit.model,
         "data": {"value": measured.value, "low": measured.low, "high": measured.high},
-        "values": {KEY: value},
+        "values": {COEFFICIENT_KEY: value},
         "warnings": [],
     }
     source = "" if measured.source == "--to" else f" of {Path(measured.source).name}"
     numbers = (fit.value, fit.low, fit.high)
     number, low, high = (format_number(one, 4) for one in numbers)
-    line = f"{KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
+    line = f"{COEFFICIENT_KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
     return FitFiles(
         answer=fit_data,
         lines=[line],
         summary=[line],
         scenes={
-            FITTED_SCENE: f"# {KEY} fitted to {measured.name}{source}\n\n{fitted_scene.resolved()}"
+            FITTED_SCENE: f"# {COEFFICIENT_KEY} fitted to {measured.name}{source}\n\n{fitted_scene.resolved()}"
         },
     )

@@ -311,18 +311,20 @@ def verdict_sentence(summary: dict) -> str:
         ("loop_area", ROUND_OFF_FRACTION * abs(force * motion), "{} per cycle"),
         ("slip_amplitude", 0.0, "by {}"),
     ):
-        slip_sentence = {
+        slipping_measures = {
             name: one
             for name, one in measures.items()
             if re.sub(r"_\d+$", "", name) == kind and one["value"]
         }
         name = max(
-            slip_sentence, key=lambda candidate: slip_sentence[candidate]["value"], default=""
+            slipping_measures,
+            key=lambda candidate: slipping_measures[candidate]["value"],
+            default="",
         )
-        if name and slip_sentence[name]["value"] > max(
-            _error_or_floor(slip_sentence[name]), threshold
+        if name and slipping_measures[name]["value"] > max(
+            _error_or_floor(slipping_measures[name]), threshold
         ):
-            size = form.format(format_with_error(name, slip_sentence[name]))
+            size = form.format(format_with_error(name, slipping_measures[name]))
             return f"The interface as a whole sticks, but {part} ({size}).{rings}"
     return _no_slip_sentence("contact_fraction" in measures, "cycles") + rings
 

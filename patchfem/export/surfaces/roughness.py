@@ -121,17 +121,17 @@ def describe_surface(report: RoughnessReport) -> str:
     )
 
 
-def _areal_filters(cutoff_length: float | None, cutoff: float | None, *, has_holes: bool) -> str:
+def _areal_filters(short_length: float | None, cutoff: float | None, *, has_holes: bool) -> str:
     """Name the filters of a scan and the surface that they leave."""
     parts = [
         f"{name}-filter at {format_length(length)}"
-        for name, length in (("S", cutoff_length), ("L", cutoff))
+        for name, length in (("S", short_length), ("L", cutoff))
         if length
     ]
     if not parts:
         return "; no filter"
     surface = ""
-    if cutoff_length:
+    if short_length:
         surface = " (the S-L surface)" if cutoff else " (the S-F surface)"
     lengths = "each length" if len(parts) > 1 else "this length"
     holes = (

@@ -32,7 +32,7 @@ OPTIONAL_VARIABLES = (
 )
 # Width of the worn part / width of its floor, the deepest fifth, as for measured tracks.
 FLOOR_PARTS = 5
-# Number of points that estimate the noise floor; more points change it by less than the error of
+# Number of points of the floor of the worn part; more points change it by less than the error of
 # the run.
 FLOOR_POINTS = 100
 MIN_WORN_FRACTION = 1e-3  # depth / largest depth below which a node counts as unworn

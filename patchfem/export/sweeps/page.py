@@ -260,9 +260,9 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
     """Return the table for `pages.sweep.page_html` from rows of sweep.csv and from sweep.nc."""
     columns = []
     for key in keys:
-        facts = file[re.sub(r"\W", "_", key)]
+        axis_variable = file[re.sub(r"\W", "_", key)]
         texts = [row[key] for row in rows]
-        axis_values = np.asarray(facts[...])
+        axis_values = np.asarray(axis_variable[...])
         places = {text: place for place, text in enumerate(dict.fromkeys(texts))}
         values = (
             axis_values
@@ -273,7 +273,7 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
         columns.append(
             {
                 "name": key,
-                "unit": str(facts.attrs.get("units", "1")),
+                "unit": str(axis_variable.attrs.get("units", "1")),
                 "texts": texts,
                 "values": values,
                 "log": suits_log_axis(values.tolist()),
@@ -379,13 +379,13 @@ def join_tables(tables: list, names: list) -> dict:
     measures = {}
     shift = np.cumsum([0, *counts])
     for name in dict.fromkeys(name for table in tables for name in table["measures"]):
-        keys_of_tables = [table["measures"].get(name) for table in tables]
-        first = next(one for one in keys_of_tables if one is not None)
+        measures_of_tables = [table["measures"].get(name) for table in tables]
+        first = next(one for one in measures_of_tables if one is not None)
         measures[name] = {"unit": first["unit"], "means": first["means"]} | {
             part: np.concatenate(
                 [
                     np.full(count, np.nan) if one is None else one.get(part, np.zeros(count))
-                    for one, count in zip(keys_of_tables, counts)
+                    for one, count in zip(measures_of_tables, counts)
                 ]
             )
             for part in ("values", "errors", "floors")

@@ -16,8 +16,8 @@ from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_
 from .measures import estimate_measures, max_error_ratio
 from .press import press_patch, solve
 
-# Tolerance [1] at which a patch under prescribed partial slip may take the CPU time of a patch in a rig. A tighter
-# tolerance allows more time, in proportion to (1/tolerance)^0.5: 3.2 times as much for a tenth of it.
+# Tolerance [1] at which a patch under prescribed partial slip may take the CPU time of a patch in a rig. The
+# allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times as much time.
 SLIP_REFERENCE_TOL = 1e-3
 # Largest number of columns of a mesh for which no coarser mesh is made.
 MAX_COLUMNS_WITHOUT_COARSER = 8

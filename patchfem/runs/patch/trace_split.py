@@ -18,7 +18,7 @@ from ...surface.fine import wave_spectrum
 from ...surface.roughness.peaks import PERSSON, trace_moments
 from .skin import combined_modulus
 
-KEY = "contact.profile.file"
+PROFILE_KEY = "contact.profile.file"
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class TraceSplit:
     pressure: float
     tables: str
 
-    def describe(self, is_cutoff_given: bool = False) -> str:
+    def describe(self, *, is_cutoff_given: bool = False, is_scene_written: bool = False) -> str:
         """Describe the split, what it can compute, and its tables in a text of several lines."""
         cutoff = format_length(self.cutoff)
         reason = (
@@ -49,6 +49,7 @@ class TraceSplit:
         )
         if is_cutoff_given:
             reason = f"the elements are {format_length(self.element, 3)} long"
+        command = "`patchfem profile TRACE --split SCENE -o NEW_SCENE` writes the scene. "
         table_lines = self.tables.replace("\n", "\n    ").rstrip()
         return (
             f"split the trace: waves longer than {cutoff} to [contact.profile], shorter ones to [contact.asperities]; "
@@ -56,8 +57,7 @@ class TraceSplit:
             "waves, and its contact_fraction counts where the layer carries, not where peaks touch. The layer is too soft "
             f"where the pressure exceeds {format_quantity(self.closing_pressure, 'Pa', 2)}, which presses these waves flat, "
             "and too stiff where few of them carry. The changes at twice the cutoff and at a hundredth of the decay_length "
-            "show the error. `patchfem profile TRACE --split SCENE -o NEW_SCENE` writes the scene. Tables:\n"
-            f"    {table_lines}"
+            f"show the error. {'' if is_scene_written else command}Tables:\n    {table_lines}"
         )
 
 
@@ -85,7 +85,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
     if gap.profile is None or gap.is_rough or loading.load is None or interface.strips is not None:
         raise PatchfemError(
             "a split needs [contact.profile] and contact.load, without [contact.asperities] and [contact.strips]",
-            KEY,
+            PROFILE_KEY,
         )
     pieces = patch_model.pieces
     element = patch_model.uniform_element_size
@@ -100,7 +100,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
         raise PatchfemError(
             f"{trace.source}: under this load the contact on every wave is shorter than an element of "
             f"{format_length(element, 3)}; reduce contact.element_size",
-            KEY,
+            PROFILE_KEY,
         )
     waves = trace_moments(trace, cutoff).fine
     # Westergaard: a sine of this rms slope closes completely
@@ -109,7 +109,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
         raise PatchfemError(
             f"{trace.source}: the mean pressure presses all waves shorter than {format_length(cutoff)} flat, so that no "
             "layer represents them; reduce contact.element_size",
-            KEY,
+            PROFILE_KEY,
         )
     decay_length = sum(PERSSON) / 2 * waves.height
     tables = [

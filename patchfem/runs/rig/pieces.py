@@ -44,8 +44,8 @@ MOTION_MEASURES = (
 )
 MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a settled motion to the tolerance
 N_CHANGE_WINDOWS = 3  # number of last windows whose extremes show the change of the motion
-# Lower bound [1] of the decay of a free motion in the last windows, for lack of damping.
-MIN_DECAY = 1e-6
+# Relative decay of a free motion over the last windows that is assumed if there is less damping.
+MIN_RELATIVE_DECAY = 1e-6
 
 
 def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -337,7 +337,7 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
     last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
     if len(last) < N_CHANGE_WINDOWS * window:
         return True
-    decayed = max(-np.expm1(-decay * len(last)), MIN_DECAY)
+    decayed = max(-np.expm1(-decay * len(last)), MIN_RELATIVE_DECAY)
     limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
     return np.ptp(last, axis=0).max() > limit
 

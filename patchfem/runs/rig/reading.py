@@ -331,14 +331,14 @@ def sample_friction_works(response) -> dict:
     return {"sampled": sampled, "passed": sum(float(abs(part).sum()) for part in parts)}
 
 
-def compute_work_check(book: dict) -> float:
+def compute_work_check(energies: dict) -> float:
     """Return the relative difference [1] of the friction work from samples and from energies.
 
     Parameters
     ----------
-    book : dict
+    energies : dict
         Energies of a run, with its friction work from samples, from energies and the sum of |work|
         as "sampled", "booked" and "passed" [J].
     """
-    energy = book["power"] + book["peak_stored"]
-    return relative_gap(book["sampled"], book["booked"], book["passed"], energy)
+    scale = energies["power"] + energies["peak_stored"]
+    return relative_gap(energies["sampled"], energies["booked"], energies["passed"], scale)

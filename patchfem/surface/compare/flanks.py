@@ -18,8 +18,9 @@ PARTS = 40  # number of parts of the trace; the ends of a track are known to wit
 FLANK_PARTS = 4  # number of parts in the shortest flank
 PART_SAMPLES = 8  # samples in a part of the second trace; the mean of fewer is too uncertain
 N_DRAWS = 100  # number of random traces into which the track is cut for the intervals
-# Factor for the estimated spectrum; without it only 85 of 100 intervals contain the true value.
-INTERVAL_FACTOR = 1.4
+# Widens the intervals, because the spectrum of the noise is estimated; without this factor only 85 of
+# 100 intervals contain the true value.
+SPECTRUM_ERROR_FACTOR = 1.4
 MIN_CLEARANCE = 1.2  # depth or roughness / the largest one of random traces without a track
 
 
@@ -185,7 +186,9 @@ def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
         errors = np.array(sums) * step - float(shape.sum()) * step
         tail = (1 - LEVEL) / 2
         median = float(np.median(errors))
-        low, high = median + INTERVAL_FACTOR * (np.quantile(errors, (tail, 1 - tail)) - median)
+        low, high = median + SPECTRUM_ERROR_FACTOR * (
+            np.quantile(errors, (tail, 1 - tail)) - median
+        )
         area_interval = Interval(
             area, float(np.clip(area - high, 0.0, area)), float(max(area - low, area))
         )

@@ -29,8 +29,9 @@ N_BINS = 100
 N_RATIOS = 90
 # Smallest fraction of the patch that the traces must show, so that the place of the patch is known.
 MIN_OVERLAP = 0.25
-# Length beyond each end of the patch, as a fraction of it, in which unworn heights show where the wear ends.
-MARGIN = 0.1
+# Measured depths up to this fraction of half the patch length beyond each of its ends take part in the
+# fit, because unworn depths show where the wear ends.
+END_MARGIN_RATIO = 0.1
 # Largest ratio of the fitted coefficient to that of the run; beyond it the computed shape is a guess.
 MAX_RATIO = 2.0
 # Largest ratio that the search tries, to find the coefficient that a refused run should have.
@@ -281,7 +282,7 @@ def fit_computed_wear(comparison: Comparison, history: WearHistory) -> Predicted
     measured = _average_measured_depth(comparison, 2 * history.half / N_BINS)
     _check_length(measured, comparison, history)
     start, others = _search_placements(measured, history)
-    margin = (1 + MARGIN) * history.half
+    margin = (1 + END_MARGIN_RATIO) * history.half
     near = measured.select_range(start.centre - margin, start.centre + margin)
     best = _refine(near, history, start)
     others = [_refine(near, history, other, is_fixed=True) for other in others]

@@ -26,7 +26,7 @@ REGIONS = ("inside", "outside")
 # Smallest ratio of the length of a piece to the cut-off; half a cut-off is trimmed at each end.
 MIN_CUTOFFS = 2.0
 # Ratio of the relative variance of Ra to that of Rq, for Gaussian heights.
-RA_VARIANCE = np.pi - 2
+RA_VARIANCE_RATIO = np.pi - 2
 TEXTS = {
     "Ra": ("m", "mean of the absolute heights of the roughness profile"),
     "Rq": ("m", "root mean square of the heights of the roughness profile"),
@@ -121,7 +121,7 @@ def _measure(pieces: list, cutoff: float, step: float) -> dict:
         freedom = intervals.freedom("power")
         weights.append(roughness.length)
         values.append((mean_absolute(heights), heights.power, rms_slope(heights) ** 2))
-        freedoms.append((freedom / RA_VARIANCE, freedom, intervals.freedom("slope")))
+        freedoms.append((freedom / RA_VARIANCE_RATIO, freedom, intervals.freedom("slope")))
     mean, power, slope = np.average(values, axis=0, weights=weights)
     sizes = {"Ra": mean, "Rq": np.sqrt(power), "slope": np.sqrt(slope)}
     totals = np.sum(freedoms, axis=0)
