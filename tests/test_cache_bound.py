@@ -124,6 +124,9 @@ def test_always_permission_errors_are_ignored(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "rename", raise_permission_error)
     cache_limit.remove_old_folders(current, 0)
+    os.utime(current, (time() - HOUR,) * 2)
+    monkeypatch.setattr(os, "utime", raise_permission_error)
+    cache_limit.mark_used(current)
     cache_limit.mark_used(tmp_path / "nowhere")
     assert old.is_dir()
 

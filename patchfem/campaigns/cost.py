@@ -549,8 +549,9 @@ def cost_sentence(runs: list, tolerance: float) -> str:
 
 def _has_effect(runs: list, tolerance: float) -> bool:
     """Return whether a result of any run differs from that of the best run by more than the tolerance."""
+    names = changed_measures(runs)
     for run in runs:
-        for name in changed_measures(runs):
+        for name in names:
             distance = run.distances.get(name, 0.0)
             if name in run.values and not run._allows(name, distance, tolerance):
                 return True

@@ -45,9 +45,9 @@ AMPLITUDE_TOL = 1e-9
 # largest slide velocity at a reversal times the half period, over the slide, that counts as zero
 REST_TOL = 1e-8
 MAX_SECANT_STEPS = 12  # largest number of secant steps for the damping that balances an amplitude
-# Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times.
+# Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times the
+# elastic force at the reversal, so the interface sticks there.
 MAX_FIRST_RATIO = 2.0
-# the elastic force at the reversal, so the interface sticks there
 # Number of harmonics of the first solution; a second one with twice as many estimates its error.
 N_HARMONICS = 9
 

@@ -101,7 +101,10 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
     if coarser[-1].error * NO_EFFECT_RATIO < present.error:
         return None
     expected = make_setting(2 * present.steps, _expect_errors(measures))
-    other_errors = dict(measures[expected.measure].causes.parts)
+    limiting = measures[expected.measure]
+    other_errors = dict(limiting.causes.parts)
+    # The run states the rest itself, such as the error between samples.
+    other_errors["own"] = limiting.error - sum(other_errors.values())
     other_errors.pop("steps", None)
     cause = max(other_errors, key=other_errors.get, default="")
     finer = expected if expected.error <= NO_EFFECT_RATIO * present.error else None
@@ -112,7 +115,7 @@ def _select_measures(measures: dict, step_runs) -> dict:
     """Return the main measures with an error that all runs have; all such measures without a main one."""
     shared = {}
     for name, measure in measures.items():
-        is_known = measure.value is not None and measure.error is not None
+        is_known = None not in (measure.value, measure.error, measure.causes)
         is_shared = all(name in run.values for run in step_runs)
         if is_known and is_shared and name not in ERROR_MEASURES:
             shared[name] = measure

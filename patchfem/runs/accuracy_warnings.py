@@ -331,7 +331,8 @@ def _find_main_error_kind(finding: Finding, name: str) -> str:
     """Return the kind of discretization (such as the mesh) with the largest error contribution."""
     causes = finding.measures[name].causes
     if causes is not None:
-        return max(causes.parts, key=causes.parts.get, default="own")
+        kind = max(causes.parts, key=causes.parts.get, default="own")
+        return kind if causes.parts.get(kind, 0.0) > 0 else "own"
     # a batch states neither the causes nor the settings of a patch that slips in part
     return "mesh" if finding.patch is not None and not finding.extra else "own"
 
@@ -365,8 +366,8 @@ def _step_remedy(finding: Finding, name: str, excess: dict, steps: int) -> str:
 def _describe_missing_order(name: str, steps: int) -> str:
     """Return the clause that a measure does not converge with the steps."""
     return (
-        f"of the results with {steps // 4}, {steps // 2} and {steps} steps per cycle the last two differ in {name} at "
-        "least as much as the first two"
+        f"the results with {steps // 4}, {steps // 2} and {steps} steps per cycle show no order of convergence of "
+        f"{name}"
     )
 
 

@@ -340,7 +340,7 @@ def test_refuses_impossible_split(split_scene):
         (("skin.toml",), "without [contact.asperities]"),
         (("scene.toml", "--form", "2"), "--form"),
         (("scene.toml", "--set", "contact.load=1 N"), "--set"),
-        (("scene.toml", "--cutoff", "50 mm"), "reduce contact.element_size"),
+        (("scene.toml", "--cutoff", "50 mm"), "not shorter than the trace; give a shorter one"),
     ):
         answer = run_cli("profile", "waves.csv", "--split", *words)
         assert answer.code == 2 and message in answer.err, (words, answer.err)

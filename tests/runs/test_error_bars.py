@@ -106,3 +106,4 @@ def test_exact_cost_limit_of_static_patch_is_larger():
         for tolerance in (None, 1e-2, 1e-6):
             limit = ladder.max_condensing_seconds(patch_model, tolerance)
             assert limit == ladder.MAX_CONDENSING_SECONDS[is_static]
+    assert ladder.MAX_CONDENSING_SECONDS[True] > ladder.MAX_CONDENSING_SECONDS[False]

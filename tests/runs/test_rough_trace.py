@@ -37,17 +37,21 @@ def result(tmp_path_factory):
 
 
 def test_exact_peak_pressure_of_rough_trace_is_that_of_its_pressure_field(result):
-    """The interval of the peak pressure contains the largest pressure of the field on the points."""
+    """The peak pressure is the largest pressure of the points, and its error is smaller than it.
+
+    The largest pressure of the mesh, which smooths the trace, is 141 MPa.
+    """
     peak = result.measures["pressure_peak"]
-    assert abs(result.fields["normal_stress"].max() - peak.value) < peak.error < peak.value
+    assert result.fields["normal_stress"].max() == pytest.approx(peak.value, rel=1e-4)
+    assert 141e6 < peak.value - peak.error / 2 < peak.value
 
 
 def test_exact_loaded_fraction_is_mean_over_peak_pressure(result):
-    """The loaded fraction times the peak pressure is the mean pressure within both errors."""
+    """The loaded fraction times the peak pressure is the mean pressure."""
     peak, fraction = (result.measures[name] for name in ("pressure_peak", "loaded_fraction"))
     mean = 7 / (10e-3 * 1e-3 * LENGTH)
-    relative_error = peak.error / peak.value + fraction.error / fraction.value
-    assert peak.value * fraction.value == pytest.approx(mean, rel=relative_error)
+    assert peak.value * fraction.value == pytest.approx(mean, rel=1e-9)
+    assert fraction.error / fraction.value >= peak.error / peak.value
 
 
 def test_always_moment_of_rough_trace_passes_self_check(result):

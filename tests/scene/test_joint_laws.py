@@ -108,10 +108,10 @@ def test_always_unserved_aim_is_reported(know, want, law, unanswered):
     assert advice in answer.out
 
 
-def test_exact_ageing_scene_gives_force_after_rest(tmp_path, monkeypatch):
+def test_always_ageing_scene_gives_force_after_rest(tmp_path, monkeypatch):
     """The command in the scene of ageing gives the peak force after the rest, which grows with its duration.
 
-    The peak of the first loading is larger and would hide it.
+    The peak of the first loading is larger and would hide it. The forces are recorded values.
     """
     monkeypatch.chdir(tmp_path)
     scene = compose_scene(choose_law("rest", "ageing"))

@@ -43,7 +43,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
         *_describe_slip(joint, curve),
         _describe_width(band, curve),
         *_describe_agreement(band, curves),
-        *_describe_ring_down(joint, band, curves),
+        *_describe_ring_down(joint, band, curves, "decay" in missing),
         *_describe_static_curve(band, curves),
         *_describe_coupling(joint, band, curve),
     ]
@@ -109,14 +109,20 @@ def _describe_agreement(band: Band, curves: dict) -> list:
     beyond = np.flatnonzero(distance > AGREEMENT * np.abs(curve.damping) + curve.damping_error)
     within = f"within {100 * AGREEMENT:g} % of the damping, apart from the numerical error"
     if not beyond.size:
-        return [f"All methods agree {within}, at all amplitudes."]
+        return [
+            f"The computed methods and the predicted ring-down agree {within}, at all amplitudes."
+        ]
     if not beyond[0]:
         return []
-    return [f"Up to {format_length(curve.amplitude[beyond[0] - 1], 3)} all methods agree {within}."]
+    edge = format_length(curve.amplitude[beyond[0] - 1], 3)
+    return [f"Up to {edge} the computed methods and the predicted ring-down agree {within}."]
 
 
-def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
-    """Describe how the damping of a ring-down, computed or predicted, differs from that of the curve, and why."""
+def _describe_ring_down(joint: Joint, band: Band, curves: dict, has_failed: bool) -> list:
+    """Describe how the damping of a ring-down, computed or predicted, differs from that of the curve, and why.
+
+    has_failed: whether method decay was tried and has no curve.
+    """
     curve = curves[band.method]
     if band.ring_down is None:
         return []
@@ -161,8 +167,8 @@ def _describe_ring_down(joint: Joint, band: Band, curves: dict) -> list:
         coupled = ", and neglects the exchange of energy between the modes"
     return [
         f"A ring-down (method decay) is predicted to read {size} damping at {place}, where it differs most{because}. "
-        f"This is an estimate without a run of the decay{coupled}; the band allows for its error. "
-        "For the curve of a ring-down, run --method decay."
+        f"This is an estimate without a run of the decay{coupled}; the band allows for its error."
+        + ("" if has_failed else " For the curve of a ring-down, run --method decay.")
     ]
 
 

@@ -34,6 +34,7 @@ from .measures import (
     Resolution,
     estimate_common_errors,
     extrapolate_measures,
+    include_peak_error,
 )
 from .press import PointSolution, Surface
 from .values import peak_pressures, static_values
@@ -189,14 +190,19 @@ def _combine_series(coarse: list, levels: list) -> dict:
     shared = estimate_common_errors(finest.resolution, finest.values)
     by_points = extrapolate_measures([level.values for level in levels], shared, 0.0)
     by_ends = extrapolate_measures([level.values for level in coarse], {}, 0.0)
-    return {
-        name: Estimate(
-            float(estimate.value + by_ends[name].value - coarse[-1].values[name]),
-            float(estimate.error + by_ends[name].error),
-        )
-        for name, estimate in by_points.items()
-        if name not in PEAK_MEASURES or not finest.has_corner_peak
-    }
+    out = {}
+    for name, estimate in by_points.items():
+        if name not in PEAK_MEASURES or not finest.has_corner_peak:
+            value = estimate.value + by_ends[name].value - coarse[-1].values[name]
+            out[name] = Estimate(float(value), float(estimate.error + by_ends[name].error))
+    peak = out.get("pressure_peak")
+    if peak is not None and peak.value > 0:
+        # The loaded fraction is the mean pressure divided by this peak.
+        mean = finest.values["loaded_fraction"] * finest.values["pressure_peak"]
+        fraction = mean / peak.value
+        error = include_peak_error(fraction, 0.0, peak.error / peak.value)
+        out["loaded_fraction"] = Estimate(float(fraction), float(error))
+    return out
 
 
 def _compute_free_ends(patch_model, level: int) -> FreeEnds:

@@ -372,11 +372,10 @@ def _refine_until_met(
                 ),
                 largest_ratio,
             )
-        is_too_expensive = bodies[
-            0
-        ].x.size > MAX_INTERFACE_NODES or grids.predict_condensing_seconds(
-            bodies
-        ) > ladder.max_condensing_seconds(cases[0], tolerance)
+        n_nodes = bodies[0].x.size
+        seconds = grids.predict_condensing_seconds(bodies)
+        max_seconds = ladder.max_condensing_seconds(cases[0], tolerance)
+        is_too_expensive = n_nodes > MAX_INTERFACE_NODES or seconds > max_seconds
         if largest_ratio <= 1 or is_level_count_fixed or is_too_expensive:
             return pairs, largest_ratio
 

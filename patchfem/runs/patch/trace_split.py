@@ -6,6 +6,7 @@ Westergaard's solution under the mean pressure, is at least one element long. Sh
 layer with the stiffness of Persson's theory. Read `split_trace` first.
 """
 
+import json
 from dataclasses import dataclass
 from math import sqrt
 
@@ -93,9 +94,15 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
     trace = profile.level_profile(gap.profile, ends, element, is_material=False).profile
     pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
     modulus = combined_modulus(patch_model)
-    if cutoff is None:
+    is_given = cutoff is not None
+    if not is_given:
         spectrum = wave_spectrum(trace)
         cutoff = float(f"{spectrum.shortest_resolved_wave(element, pressure / modulus):.3g}")
+    if is_given and not cutoff < trace.length:
+        raise PatchfemError(
+            f"{trace.source}: a cutoff of {format_length(cutoff)} is not shorter than the trace; give a shorter one",
+            PROFILE_KEY,
+        )
     if not cutoff < trace.length:
         raise PatchfemError(
             f"{trace.source}: under this load the contact on every wave is shorter than an element of "
@@ -103,6 +110,11 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
             PROFILE_KEY,
         )
     waves = trace_moments(trace, cutoff).fine
+    if not waves.slope > 0:
+        raise PatchfemError(
+            f"{trace.source}: no waves are shorter than {format_length(cutoff)}, so that there is nothing to split",
+            PROFILE_KEY,
+        )
     # Westergaard: a sine of this rms slope closes completely
     closing_pressure = modulus * waves.slope / sqrt(2)
     if closing_pressure <= pressure:
@@ -114,7 +126,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
     decay_length = sum(PERSSON) / 2 * waves.height
     tables = [
         "[contact.profile]",
-        f'file = "{gap.file}"',
+        f"file = {json.dumps(str(gap.file), ensure_ascii=False)}",
         f'heights = "{"surface" if gap.material else "gap"}"',
         *(['on = "lower"'] if gap.side == "lower" else []),
         "[contact.asperities]",

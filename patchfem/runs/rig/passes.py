@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...core import Outcome
+from ...core import ErrorCauses, Outcome
 from ...effects import law_has_trait
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
@@ -167,7 +167,10 @@ def add_decay(run: CoupledRun) -> CoupledRun:
         measures = dict(run.measures)
         for name, error in zip(("ring_frequency", "ring_damping"), errors[:, 0]):
             measure = measures[name]
-            measures[name] = replace(measure, error=max(measure.error, float(error)))
+            if error > measure.error:
+                measures[name] = replace(
+                    measure, error=float(error), causes=ErrorCauses({"mesh": float(error)})
+                )
         run = replace(run, measures=measures)
     if run.decay is not None:
         errors, causes["the decay curve"] = decays.estimate_stuck_mode_mesh_errors(

@@ -173,8 +173,12 @@ class PieceReader(Reader):
             names = [*MOTION_MEASURES, "slip_start_phase"]
         return IntegratedMeasures(
             {name: known[name] for name in names},
-            loops=(_compute_strips_loop(run, drive),) if self.apart else run.loops,
+            loops=self.loops(run, drive),
         )
+
+    def loops(self, run, drive) -> tuple:
+        """Return the loop of each interface; that of the mean of strips that slide independently."""
+        return (_compute_strips_loop(run, drive),) if self.apart else run.loops
 
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the ledger of rigid elements, which dissipate all work of friction.

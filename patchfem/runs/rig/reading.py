@@ -72,6 +72,10 @@ class Reader:
         """
         return IntegratedMeasures()
 
+    def loops(self, run, drive) -> tuple:
+        """Return the friction loops that the engine itself integrates."""
+        return self.integrated_measures(run, drive).loops
+
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return data that the engine knows more accurately than samples, as fields of `LastCycles`.
 
@@ -127,7 +131,7 @@ class Reader:
         """Return whether all interfaces stick during the last cycles of a run."""
         if not self.has_friction or self.creeps:
             return False
-        if loops := self.integrated_measures(run, self.model.rig.drive.signal).loops:
+        if loops := self.loops(run, self.model.rig.drive.signal):
             limit = max(self.held, slip_round_off(run.window))
             return all(loop.slip_range / 2 <= limit for loop in loops)
         return run_events.is_all_stuck(run.window, self.held)
@@ -173,7 +177,7 @@ class Reader:
         values : dict
             Measures by name.
         """
-        if not self.integrated_measures(run, drive).loops and not hasattr(drive, "band"):
+        if not self.loops(run, drive) and not hasattr(drive, "band"):
             return {}
         ledger = run.response.extra.get("ledger")
         coarse_values = self.values(self.with_half_the_samples(run), drive, ledger)

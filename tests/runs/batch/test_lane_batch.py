@@ -44,7 +44,7 @@ def assert_lanes_agree(law: str, seed: int, count: int, max_cases: int | None = 
     """Assert that 97 % of the measures of random cases in lanes agree with the reference within
     both errors.
 
-    At most `most` of the cases in lanes are compared; None compares all.
+    At most `max_cases` of the cases in lanes are compared; None compares all.
     """
     cases = draw_models(law, seed, count)
     results = batches.solve_models(cases)

@@ -66,6 +66,10 @@ class BalanceReader(Reader):
         values["slip_amplitude"] = float(np.ptp(slips)) / 2
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
+    def loops(self, run, drive) -> tuple:
+        """Return (), because the loop of a balance is evaluated from samples."""
+        return ()
+
     def further_fields(self, run, drive, *, stuck: bool) -> dict:
         """Return the friction loop for the evaluation.
 
