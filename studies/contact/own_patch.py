@@ -3,6 +3,10 @@
 Bilinear elements in plane strain (numpy), a banded Cholesky factorisation (scipy), and the conjugate gradients of
 Polonsky and Keer (Wear 231, 206, 1999) on the condensed compliance. The far faces are bonded to rigid holders that do
 not rotate, the interface has no friction.
+
+rough_split.py compares models that all run on the patch of patchfem; a mistake in the patch would be common to them.
+order_four.py shares no code with the package either, but it needs the edges of the contact as input, and a rough trace
+has many edges that are not known in advance.
 """
 
 from typing import NamedTuple
@@ -12,6 +16,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 GROWTH = 1.12  # ratio of the heights of neighbouring rows of elements
 N_LOADS = 50  # unit loads that are solved at once
+CHANGE_TOL = 1e-10  # forces that change by less than this fraction of the load have converged
 
 
 class OwnContact(NamedTuple):
@@ -91,7 +96,9 @@ def compliance(length: float, height: float, columns: int, young: float, poisson
     return out
 
 
-def press(matrix: np.ndarray, gap: np.ndarray, areas: np.ndarray, load: float) -> OwnContact:
+def press(
+    matrix: np.ndarray, gap: np.ndarray, areas: np.ndarray, load: float, max_iterations: int = 20000
+) -> OwnContact:
     """Press two alike pieces together.
 
     Parameters
@@ -102,17 +109,23 @@ def press(matrix: np.ndarray, gap: np.ndarray, areas: np.ndarray, load: float) -
         Gap [m] and length [m] of each node.
     load : float
         Load [N/m].
+    max_iterations : int
 
     Returns
     -------
     OwnContact
+
+    Raises
+    ------
+    ArithmeticError
+        If the iteration does not converge.
     """
     both = 2 * matrix
     force = load * areas / areas.sum()
     direction = np.zeros(gap.size)
     last = 1.0
     is_reset = True
-    for _ in range(20000):
+    for _ in range(max_iterations):
         opening = gap + both @ force
         touching = force > 0
         opening -= opening[touching].mean()
@@ -131,8 +144,12 @@ def press(matrix: np.ndarray, gap: np.ndarray, areas: np.ndarray, load: float) -
         new *= load / new.sum()
         change = np.abs(new - force).sum() / load
         force = new
-        if change < 1e-10:
+        if change < CHANGE_TOL:
             break
+    else:
+        raise ArithmeticError(
+            f"after {max_iterations} iterations the forces still change by {change:.1e} of the load"
+        )
     touching = force > 0
     stiffness = np.linalg.solve(both[np.ix_(touching, touching)], np.ones(touching.sum())).sum()
     return OwnContact(force / areas, float(areas[touching].sum() / areas.sum()), float(stiffness))
