@@ -8,7 +8,7 @@ noise of 10 nm in each trace. The kinds are:
   2 mm wide and 50 nm deep.
 * wide: a parabola, trapezoid, half wave or wedge of 5.0 mm to 5.9 mm around the middle, 1.5 um deep.
 
-The rules were tuned on seeds below 7000.
+The rules were tuned on seeds below 7000; the tests use the seeds from `HELD_OUT`.
 """
 
 from functools import cache
@@ -20,7 +20,7 @@ from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import compose_verdict
 
-UM, LENGTH = 1e-6, 6000.0
+UM, LENGTH, HELD_OUT = 1e-6, 6000.0, 8200
 KINDS = ("sine", "walk", "standard", "shallow", "vee", "wide")
 SHAPES = {
     "parabola": lambda u: 1 - u**2,
