@@ -59,7 +59,7 @@ PUBLIC = {
         "NUMERICAL_SETTINGS",
         "applicable_settings",
     ),
-    "rows.cells": ("scores",),
+    "rows.cells": ("compute_rms_scores",),
     "rows.condition_models": (
         "FitRequest",
         "GAIN_KEYS",

@@ -10,8 +10,8 @@ from math import pi
 import numpy as np
 
 from patchfem.campaigns import FitRequest
-from patchfem.campaigns.rows.computed import ModelReadings
 from patchfem.campaigns.rows.condition_models import ConditionModels
+from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import frozen_array
 from patchfem.model import build
 
@@ -42,7 +42,7 @@ class Derived(FitRequest):
         super().__init__(scene, wanted, measured)
         self.derive = derive
 
-    def condition_models(self, conditions, *sets: str) -> ConditionModels:
+    def make_condition_models(self, conditions, *sets: str) -> ConditionModels:
         return DerivedAsked(self.scene, conditions, self.ranges, self.measured, self.derive)
 
 
@@ -55,14 +55,14 @@ class DerivedAsked(ConditionModels):
 
     def strings(self, values) -> list:
         """Return the --set strings of values (n,)."""
-        keys = [k for k in self.inner if not isinstance(self.ranges[k], Number)]
-        numbers = [float(values[k]) for k in self.inner if k not in keys]
+        keys = [k for k in self.model_parameters if not isinstance(self.ranges[k], Number)]
+        numbers = [float(values[k]) for k in self.model_parameters if k not in keys]
         return [
             *(self.ranges[k].format_assignment(values[k]) for k in keys),
             *(self.derive(*numbers) if self.derive else ()),
         ]
 
-    def model(self, values):
+    def build_model(self, values):
         return build(self.base.override(self.strings(values)))
 
 
@@ -113,15 +113,15 @@ class Worn(ModelReadings):
     the rows before, four times their amplitude less the stretch of the point, for MINUTES at each.
     """
 
-    def _run(self, values, conditions) -> dict:
+    def _compute_readings(self, values, conditions) -> dict:
         first = float(values[0])
         depth = 0.0
         found = {}
         load = self.models.scene.normal.load
         for row in range(max(conditions) + 1):
             static = first * max(1 + (values[-1] - 1) * depth / DEPTH, 0.05)
-            found |= super()._run([static, *values[1:]], [row])
+            found |= super()._compute_readings([static, *values[1:]], [row])
             swing = found[row][1]
-            cycles = self.models.sine(row).omega / (2 * pi) * 60 * MINUTES
+            cycles = self.models.sine_drive(row).omega / (2 * pi) * 60 * MINUTES
             depth += COEFFICIENT * load / AREA * 4 * max(min(swing, 1e-3) - BOND, 0.0) * cycles
         return found

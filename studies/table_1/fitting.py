@@ -22,9 +22,9 @@ from rungs import (
     TABLE,
 )
 
-from patchfem.campaigns import scores
-from patchfem.campaigns.rows.cells import read_readings
-from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns import compute_rms_scores
+from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
@@ -59,7 +59,7 @@ def training(cells, protocol: str) -> np.ndarray:
     if protocol == "all":
         return np.ones(cells.row.size, bool)
     held = PREDICTED_ROWS if protocol == "143" else f"frequency={protocol.split()[1]} Hz"
-    return ~cells.select(held)
+    return ~cells.select_readings(held)
 
 
 def stuck_gain(cells, seen) -> float:
@@ -67,7 +67,7 @@ def stuck_gain(cells, seen) -> float:
 
     It is the mean at the lowest level of the frequency where it is smallest.
     """
-    here = seen & cells.felt
+    here = seen & cells.is_acceleration
     frequency, level = cells.conditions[cells.condition[here]].T
     ratio = cells.measured[here] / level
     return float(
@@ -80,7 +80,7 @@ def stuck_gain(cells, seen) -> float:
 
 def cells_for(rung: str):
     """Return the readings of Table 1 for a model."""
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     return by_row(cells) if RUNGS[rung].worn else cells
 
 
@@ -102,7 +102,7 @@ def computed_for(rung: str, reading: str, cells, seen, placebo: str = "") -> Mod
         sets.append(placebo)
     one = RUNGS[rung]
     question = one.question(reading, *sets)
-    return (Worn if one.worn else ModelReadings)(question.condition_models(cells.conditions))
+    return (Worn if one.worn else ModelReadings)(question.make_condition_models(cells.conditions))
 
 
 def fit_rung(
@@ -129,9 +129,9 @@ def fit_rung(
     values, ends, valleys = search_starts(
         cells, computed, seen, first, most or starts or one.most, begins
     )
-    computed.forget()
+    computed.reset_motions()
     answer = np.array(computed(values, range(len(cells.conditions))))
-    logs = cells.logs(*answer)
+    logs = cells.compute_log_ratios(*answer)
     return {
         "rung": rung,
         "reading": reading,
@@ -141,8 +141,8 @@ def fit_rung(
         "values": round_digits(values, 6),
         "at_bound": bounds(computed.models.ranges, values),
         "gain": gain(computed, reading, values),
-        "fitted": round_digits(scores(cells, logs, seen)),
-        "others": round_digits(scores(cells, logs, ~seen)),
+        "fitted": round_digits(compute_rms_scores(cells, logs, seen)),
+        "others": round_digits(compute_rms_scores(cells, logs, ~seen)),
         "bootstrap": _bootstrap(cells, logs, seen),
         "logs": round_digits(logs),
         "cells": round_digits(answer / np.array([[G_N], [MIL]])),
@@ -208,13 +208,15 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
     quick = UnitCubeResidual(residual, box, is_quick=True)
     rng = np.random.default_rng(SEED)
     random = 0
-    ends = run_descents(quick, [box.unit(one) for one in begins], before_descent=computed.forget)
+    ends = run_descents(
+        quick, [box.unit(one) for one in begins], before_descent=computed.reset_motions
+    )
     while True:
         points = rng.random((starts - random, SCREEN, len(wanted)))
         ends += run_descents(
             quick,
-            [_screen_points(quick, some, computed.forget) for some in points],
-            before_descent=computed.forget,
+            [_screen_points(quick, some, computed.reset_motions) for some in points],
+            before_descent=computed.reset_motions,
         )
         top = min(ends, key=lambda one: one.cost).u
         zeros = [
@@ -222,11 +224,11 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
             for k, one in enumerate(wanted)
             if one.low == 0 and top[k] > NEAR_BOUND_FRACTION
         ]
-        ends += run_descents(quick, zeros, before_descent=computed.forget)
+        ends += run_descents(quick, zeros, before_descent=computed.reset_motions)
         last = run_descents(
             UnitCubeResidual(residual, box),
             [min(ends, key=lambda one: one.cost).u],
-            before_descent=computed.forget,
+            before_descent=computed.reset_motions,
         )[0]
         best, others = group_valleys(
             cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends]
@@ -266,7 +268,7 @@ def group_valleys(cells, computed, seen, last, ends) -> tuple:
     box = make_space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:
-        computed.forget()
+        computed.reset_motions()
         return residual(values)
 
     least = at(box.values(last.u))
@@ -281,8 +283,10 @@ def group_valleys(cells, computed, seen, last, ends) -> tuple:
         elif rms(here - least) >= VALLEY_DISTANCE and all(
             rms(here - other) >= VALLEY_DISTANCE for other, _ in valleys
         ):
-            logs = cells.logs(*computed(values, range(len(cells.conditions))))
-            valleys.append((here, [score, *(scores(cells, logs, ~seen) or {}).values()]))
+            logs = cells.compute_log_ratios(*computed(values, range(len(cells.conditions))))
+            valleys.append(
+                (here, [score, *(compute_rms_scores(cells, logs, ~seen) or {}).values()])
+            )
     return count, round_digits([row for _, row in valleys])
 
 
@@ -339,7 +343,12 @@ def draw_rows(cells, among) -> np.ndarray:
 
 def _resample_scores(cells, logs, often, kind: str) -> np.ndarray:
     """Return the scores (DRAWS,) of a kind of reading in resampled rows; NaN if none was drawn."""
-    weight = often * {"all": 1, "acceleration": cells.felt, "displacement": ~cells.felt}[kind]
+    weight = (
+        often
+        * {"all": 1, "acceleration": cells.is_acceleration, "displacement": ~cells.is_acceleration}[
+            kind
+        ]
+    )
     square = np.where(weight.sum(axis=0) > 0, np.square(np.asarray(logs, float)), 0.0)
     with np.errstate(invalid="ignore"):
         return np.sqrt(weight @ square / weight.sum(axis=1))

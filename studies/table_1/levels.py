@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from rungs import FOLDER, ROOT2, RUNGS, STUCK_READING
 
-from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import G_N
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -57,10 +57,10 @@ def _compute_measure(scene, frequency: float, level: float, name: str) -> float 
 def runaway(question, values, frequency: float) -> float | None:
     """Return the lowest level [g] of the grid at which a model diverges; None if it stays bounded up to 12 g."""
     computed = ModelReadings(
-        question.condition_models([(frequency, level * G_N) for level in RUNAWAYS])
+        question.make_condition_models([(frequency, level * G_N) for level in RUNAWAYS])
     )
     for k, level in enumerate(RUNAWAYS):
-        computed.forget()
+        computed.reset_motions()
         if computed(values, [k])[1][k] > RUNAWAY_AMPLITUDE:
             return level
     return None
@@ -69,7 +69,7 @@ def runaway(question, values, frequency: float) -> float | None:
 def row(rung: str, reading: str, values, frequency: float) -> dict:
     """Return {"rung", "frequency", "onset" [g], "runaway" [g], "slip_phase" [degrees]} of a model with fitted values."""
     question = RUNGS[rung].question(reading)
-    asked = question.condition_models([(frequency, 5 * G_N)])
+    asked = question.make_condition_models([(frequency, 5 * G_N)])
     scene = asked.base.override(
         [one.format_assignment(value) for one, value in zip(asked.ranges, values)]
     )

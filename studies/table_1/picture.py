@@ -15,7 +15,7 @@ from drawing import drawing
 from fitting import read_records
 from rungs import FOLDER, ROOT2, STUCK_READING, TABLE
 
-from patchfem.campaigns.rows.cells import read_readings
+from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.core import G_N
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
@@ -39,7 +39,7 @@ def main(path: Path = FOLDER / "ladder.svg") -> Path:
     Return the path of the file.
     """
     rows = read_records()
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     with drawing(path, (9.6, 5.4), 2, 4, sharex=True) as (figure, axes):
         for panel, frequency in zip(axes[0], FREQUENCIES):
             _panel(panel, rows, cells, frequency, 0, G_N)
@@ -73,7 +73,7 @@ def _panel(panel, rows: dict, cells, frequency: float, what: int, unit: float) -
         if row is not None:
             values = np.array([np.nan if one is None else one for one in row["cells"][what]])
             panel.plot(level, values[at], line, color=colour, lw=1.6, label=name)
-    here = at[cells.condition] & (cells.felt if what == 0 else ~cells.felt)
+    here = at[cells.condition] & (cells.is_acceleration if what == 0 else ~cells.is_acceleration)
     for flagged, mark, name in (
         (False, "o", "measured"),
         (True, "s", "measured, flagged unstable"),

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.campaigns import FitRequest, RowsOptions, fit_rows, scores
-from patchfem.campaigns.rows.cells import read_readings
-from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns import FitRequest, RowsOptions, compute_rms_scores, fit_rows
+from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.scene import load, loads, read_ranges
 
 FOLDER = Path(__file__).parent
@@ -47,10 +47,10 @@ def question(point: bool = False) -> FitRequest:
 
 def as_it_stands(point: bool = False) -> dict:
     """Return the scores of the scene's own numbers, and the seconds of its 27 readings when they are computed again."""
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     asked = question(point)
-    held = cells.select(PREDICTED_ROWS)
-    computed = ModelReadings(asked.condition_models(cells.conditions))
+    held = cells.select_readings(PREDICTED_ROWS)
+    computed = ModelReadings(asked.make_condition_models(cells.conditions))
     own = asked.scene
     values = [
         own.friction.static,
@@ -59,14 +59,14 @@ def as_it_stands(point: bool = False) -> dict:
         own.structure.mode[1].slide,
     ]
     for _ in range(2):
-        computed.forget()
+        computed.reset_motions()
         begin = time.process_time()
         found = computed(values, range(len(cells.conditions)))
         seconds = time.process_time() - begin
-    logs = cells.logs(*found)
+    logs = cells.compute_log_ratios(*found)
     return {
-        "fitted": scores(cells, logs, ~held),
-        "held_out": scores(cells, logs, held),
+        "fitted": compute_rms_scores(cells, logs, ~held),
+        "held_out": compute_rms_scores(cells, logs, held),
         "seconds": seconds,
     }
 

@@ -16,8 +16,8 @@ from fitting import KIND, better, intervals, read_records, training
 from fitting import NULLS as RIVALS
 from rungs import FOLDER, PROTOCOLS, ROOT2, RUNGS, STUCK_READING, TABLE, variants
 
-from patchfem.campaigns import NULL_MODELS, scores
-from patchfem.campaigns.rows.cells import read_readings
+from patchfem.campaigns import NULL_MODELS, compute_rms_scores
+from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.null_models import fit_null_model
 
 UNITS = {
@@ -131,7 +131,7 @@ def _read_folds(rows: dict, rung: str, reading: str) -> list | None:
 
 def left_logs(folds) -> np.ndarray:
     """Return the logarithms (n,) of every reading by the fit that did not use its frequency."""
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     logs = np.full(cells.row.size, np.nan)
     for fold in folds:
         out = ~training(cells, fold["protocol"])
@@ -145,12 +145,12 @@ def left_out(rows: dict, rung: str, reading: str) -> dict | None:
     if folds is None:
         return None
     logs = left_logs(folds)
-    return scores(read_readings(TABLE), logs, np.ones(logs.size, bool))
+    return compute_rms_scores(read_response_table(TABLE), logs, np.ones(logs.size, bool))
 
 
 def null_left(name: str) -> np.ndarray:
     """Return `left_logs` of a model without mechanics."""
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     out = np.full(cells.row.size, np.nan)
     for protocol in PROTOCOLS[1:]:
         fold = training(cells, protocol)
@@ -192,7 +192,7 @@ def starts_text(row: dict) -> str:
 
 def nulls() -> list:
     """Return rows (name, accelerations fitted, fitted to 143 Hz, held out, left out, all) of scores."""
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     out = []
     seen = training(cells, "143")
     every = np.ones(cells.row.size, bool)
@@ -205,10 +205,10 @@ def nulls() -> list:
             (
                 name,
                 made["acceleration"],
-                scores(cells, logs, seen),
-                scores(cells, logs, ~seen),
-                scores(cells, null_left(name), every),
-                scores(cells, whole, every),
+                compute_rms_scores(cells, logs, seen),
+                compute_rms_scores(cells, logs, ~seen),
+                compute_rms_scores(cells, null_left(name), every),
+                compute_rms_scores(cells, whole, every),
             )
         )
     return out
@@ -282,7 +282,7 @@ def _left_out_lines(rows: dict) -> list:
 
     They have scores with bootstrap intervals, and how often resampled rows prefer the model.
     """
-    cells = read_readings(TABLE)
+    cells = read_response_table(TABLE)
     every = np.ones(cells.row.size, bool)
     out = [
         "| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "
@@ -297,7 +297,7 @@ def _left_out_lines(rows: dict) -> list:
         (f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()
     ] + fully_folded(rows)
     for rung, reading, folds, logs in listed:
-        own = scores(cells, logs, every)
+        own = compute_rms_scores(cells, logs, every)
         drawn = intervals(cells, logs, every)
         cellular = [
             f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})"

@@ -17,8 +17,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from rig_texts import TEXTS
 
-from patchfem.campaigns import scores
-from patchfem.campaigns.rows.cells import read_readings
+from patchfem.campaigns import compute_rms_scores
+from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.core import G_N
 from patchfem.runs import run as runner
 from patchfem.scene import scene
@@ -54,17 +54,22 @@ def main(cycles: float = 800, models=("coulomb", "patch")) -> dict:
     Each model has "cells" (2, c) in m/s^2 and m, "all", "acceleration" and "displacement"; "null" is the score without
     a model.
     """
-    cells = read_readings(RIG / "table1.csv")
+    cells = read_response_table(RIG / "table1.csv")
     every = np.ones(cells.row.size, bool)
     out = {
-        "null": scores(
-            cells, cells.logs(NULL * cells.conditions[:, 1], 0 * cells.conditions[:, 1]), every
+        "null": compute_rms_scores(
+            cells,
+            cells.compute_log_ratios(NULL * cells.conditions[:, 1], 0 * cells.conditions[:, 1]),
+            every,
         )["acceleration"]
     }
     for name in models:
         runs = [answer(name, *condition, cycles, estimate=False) for condition in cells.conditions]
         both = np.array([[run[measure].value for run in runs] for measure in MEASURES])
-        out[name] = {"cells": both, **scores(cells, cells.logs(*both), every)}
+        out[name] = {
+            "cells": both,
+            **compute_rms_scores(cells, cells.compute_log_ratios(*both), every),
+        }
         print(
             f"{name}: all {out[name]['all']:.2f}, accelerations {out[name]['acceleration']:.2f}, displacements "
             f"{out[name]['displacement']:.2f}"

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from study_module import ROOT, load_study, make_study_fixture
 
-from patchfem.campaigns.rows.cells import read_readings
-from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import NotConverged
 
 ROOT2 = "fundamental x sqrt2"
@@ -16,11 +16,11 @@ fitting = make_study_fixture("table_1/fitting.py")
 
 def test_always_every_model_has_conditions_and_ranges(fitting):
     """Every model and kind of reading has 20 conditions and search ranges that are not empty."""
-    cells = read_readings(fitting.TABLE)
+    cells = read_response_table(fitting.TABLE)
     for model in fitting.RUNGS.values():
         for reading in model.readings:
-            question = model.question(reading).condition_models(cells.conditions)
-            assert len(question.rigs) == 20 and question.read.reading == (
+            question = model.question(reading).make_condition_models(cells.conditions)
+            assert len(question.rigs) == 20 and question.instrument.reading == (
                 "fundamental" if "fund" in reading else "peak"
             )
             assert all(key_range.low < key_range.high for key_range in question.ranges)
@@ -35,8 +35,8 @@ def test_exact_numbers_of_training_and_left_out_readings(fitting):
 
     Over the four frequencies every reading is left out once.
     """
-    cells = read_readings(fitting.TABLE)
-    assert int(cells.felt.sum()) == 27 and cells.row.size == 35
+    cells = read_response_table(fitting.TABLE)
+    assert int(cells.is_acceleration.sum()) == 27 and cells.row.size == 35
     assert int(fitting.training(cells, "143").sum()) == 13 and fitting.training(cells, "all").all()
     masks = [~fitting.training(cells, f"without {frequency}") for frequency in (135, 143, 150, 155)]
     assert [int(frequency.sum()) for frequency in masks] == [12, 13, 5, 5] and (
@@ -51,7 +51,7 @@ def test_always_next_solution_does_not_start_from_harmonic_balance(fitting, monk
     """
     from patchfem.dynamics.events import steady
 
-    question = fitting.RUNGS["second path"].question("peak").condition_models([(143.0, 49.03)])
+    question = fitting.RUNGS["second path"].question("peak").make_condition_models([(143.0, 49.03)])
     values = np.array([0.4, 3.5e6, 1400.0, 0.09])
     find_steady = steady.solve_steady
     failures = [NotConverged("lost")]
@@ -76,7 +76,7 @@ def test_exact_gain_comes_from_training_readings_only(fitting):
     At 4 g the accelerometer reads 5.0 and 4.9 g at 143 Hz, 5.0 at 155 Hz, 5.1 at 150 Hz, 5.8 and
     6.0 at 135 Hz.
     """
-    cells = read_readings(fitting.TABLE)
+    cells = read_response_table(fitting.TABLE)
     gains = {
         protocol: fitting.stuck_gain(cells, fitting.training(cells, protocol))
         for protocol in ("143", "all", "without 135", "without 143", "without 150", "without 155")
@@ -119,7 +119,7 @@ def test_exact_wear_factor_one_gives_the_unworn_model(fitting):
 
     A factor of 2 doubles the friction per um of depth.
     """
-    cells = read_readings(fitting.TABLE)
+    cells = read_response_table(fitting.TABLE)
     rows = fitting.cells_for("spring and yaw, worn")
     training = fitting.training(cells, "143")
     values = [0.45, 5e6, 0.09]
@@ -153,7 +153,7 @@ def test_always_fit_record_is_complete_with_consistent_scores(fitting):
         score < 1.001 * min(record["starts"]) for score in record["starts"]
     )
     logs = np.array(record["logs"])
-    training = fitting.training(read_readings(fitting.TABLE), "143")
+    training = fitting.training(read_response_table(fitting.TABLE), "143")
     assert record["fitted"]["all"] == pytest.approx(np.sqrt(np.mean(logs[training] ** 2)), rel=1e-3)
     assert record["others"]["all"] == pytest.approx(
         np.sqrt(np.mean(logs[~training] ** 2)), rel=1e-3
@@ -171,11 +171,11 @@ def test_exact_scores_follow_from_the_stored_cells(fitting, records):
     for (rung, _, protocol, _), row in records.items():
         cells = fitting.cells_for(rung)
         both = np.array([[np.inf if one is None else one for one in part] for part in row["cells"]])
-        logs = cells.logs(*(both * np.array([[fitting.G_N], [fitting.MIL]])))
+        logs = cells.compute_log_ratios(*(both * np.array([[fitting.G_N], [fitting.MIL]])))
         assert logs == pytest.approx(np.array(row["logs"]), abs=2e-3)
         seen = fitting.training(cells, protocol)
         for name, which in (("fitted", seen), ("others", ~seen)):
-            found = fitting.scores(cells, logs, which)
+            found = fitting.compute_rms_scores(cells, logs, which)
             for kind in ("all", "acceleration", "displacement") if found else ():
                 wanted = (row[name] or {}).get(kind)
                 assert (wanted is None and found[kind] is None) or found[kind] == pytest.approx(
@@ -206,7 +206,7 @@ def test_always_records_have_consistent_bounds_gains_and_intervals(fitting, reco
 
     No fit is more than 0.5 % worse in training than a model that it contains.
     """
-    cells = read_readings(fitting.TABLE)
+    cells = read_response_table(fitting.TABLE)
     for (rung, reading, protocol, placebo), row in records.items():
         question = fitting.RUNGS[rung].question(reading, *([placebo] if placebo else []))
         assert row["at_bound"] == fitting.bounds(question.ranges, row["values"])
@@ -266,7 +266,7 @@ def test_table_1_scores_support_the_conclusions(records, fitting):
     assert all(one["path"]["fitted"][kind] > one["spring"]["fitted"][kind] for kind in table.KIND)
     assert abs(one["lift"]["others"]["all"] - spring["all"]) < 0.01
     left = [
-        table.scores(read_readings(fitting.TABLE), logs, np.ones(35, bool))
+        table.compute_rms_scores(read_response_table(fitting.TABLE), logs, np.ones(35, bool))
         for *_, logs in table.fully_folded(records)
     ]
     assert len(left) >= 14

@@ -1,14 +1,14 @@
 """Fit of a rig to a table of measured responses, such as Table 1 of the report.
 
-In: a scene of a rig, rows of frequency, input, acceleration and displacement, ranges of free keys,
-and rows to hold out. Out: values with intervals, and scores of the readings that were fitted, held
-out and left out, for the rig and for models without mechanics.
+In: a scene of a rig, rows of frequency, input, acceleration and displacement, ranges of the free
+parameters, and validation rows. Out: fitted values with confidence intervals, and scores of the
+fitted, the held-out and the left-out readings, for the rig and for power laws without mechanics.
 
 - `cells`: readings of the table
-- `asked`: models of the scene at the measured conditions
-- `computed`: readings that these models give
-- `search`: random starts and descents
-- `null_models`: models without mechanics
+- `condition_models`: models of the rig at the measured conditions
+- `model_readings`: readings that these models predict
+- `search`: descents from random starting points
+- `null_models`: power laws without mechanics
 
 Read `fit` first.
 """

@@ -1,4 +1,4 @@
-"""Readings of a table of measured responses, and the logarithm of computed over measured."""
+"""Measured readings of a response table, and their log ratios to computed readings."""
 
 from dataclasses import dataclass
 from math import log
@@ -10,65 +10,65 @@ from ...core import PatchfemError, frozen_array
 from ...inputs.measured import read_table
 from ...scene.keys.quantities import parse_quantity
 
-# Smallest displacement [m] in a ratio: the last printed digit of the displacements, 0.01 mil.
+# Lower limit of a displacement [m] in a log ratio: the resolution of the printed table, 0.01 mil.
 MIN_DISPLACEMENT = 0.01 * 25.4e-6
-# Largest absolute log ratio; a motion that grows without bound or is zero gets this value.
+# Largest absolute log ratio, which is also assigned to unbounded and to vanishing motions.
 MAX_LOG_RATIO = log(1e3)
-EQUAL_TOL = 1e-9  # Relative difference below which two inputs are the same condition.
+EQUAL_TOL = 1e-9  # Largest relative difference at which two inputs count as equal.
 CONDITION_COLUMNS = {"frequency": "frequency", "input": "acceleration"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Readings:
-    """Measured readings of a table of responses, row by row.
+    """Measured readings of a response table in the order of its rows.
 
-    The acceleration of a row comes before its displacement.
+    The acceleration of a row precedes its displacement.
 
     Attributes
     ----------
     path : Path
     rows : tuple of MeasuredRow
-        All rows, also those without a reading (`inputs.measured`).
+        All rows, including those without a reading (`inputs.measured`).
     row : (n,) array
-        Number of the row of each reading.
-    felt : (n,) array
-        Whether a reading is an acceleration.
+        Index of the table row of each reading.
+    is_acceleration : (n,) array
+        Whether a reading is an acceleration; otherwise it is a displacement.
     measured : (n,) array
         Accelerations [m s-2] and displacements [m].
     unstable : (n,) array
         Whether the row of a reading is flagged U.
     conditions : (c, 2) array
-        Distinct frequencies [Hz] and inputs [m s-2] of rows with a reading, ascending.
+        Distinct pairs of frequency [Hz] and input [m s-2] of the rows with a reading, ascending.
     condition : (n,) array
-        Number of the condition of each reading.
+        Index of the condition of each reading.
     """
 
     path: Path
     rows: tuple
     row: np.ndarray
-    felt: np.ndarray
+    is_acceleration: np.ndarray
     measured: np.ndarray
     unstable: np.ndarray
     conditions: np.ndarray
     condition: np.ndarray
 
     @property
-    def runs(self) -> list:
-        """Names of the rows, made of their frequency and whether they are repeats."""
+    def row_names(self) -> list:
+        """Name of each row: its frequency, followed by "repeat" for a repeated measurement."""
         return [f"{row.frequency:.6g} Hz" + " repeat" * ("R" in row.flag) for row in self.rows]
 
     @property
-    def empty(self) -> list:
-        """Numbers of the rows without any reading."""
+    def empty_rows(self) -> list:
+        """Indices of the rows without any reading."""
         return sorted(set(range(len(self.rows))) - set(self.row.tolist()))
 
-    def column(self, name: str) -> list:
-        """Return the values (n,) of a table column for all readings.
+    def column_values(self, name: str) -> list:
+        """Return the value (n,) of a table column for each reading.
 
-        PatchfemError for a column other than "frequency", "input", "flag" and "run".
+        Raises PatchfemError for a column other than "frequency", "input", "flag" and "run".
         """
         if name == "run":
-            runs = self.runs
+            runs = self.row_names
             return [runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
             raise PatchfemError(
@@ -77,21 +77,21 @@ class Readings:
             )
         return [getattr(self.rows[k], name) for k in self.row]
 
-    def select(self, selector: str) -> np.ndarray:
-        """Return a mask (n,) of the readings that a selector such as "column=value" selects.
+    def select_readings(self, selector: str) -> np.ndarray:
+        """Return a mask (n,) of the readings whose row matches a selector "column=value,value".
 
-        The text is like "frequency=135 Hz,150 Hz" or "run=143 Hz repeat". PatchfemError for a value
-        without its unit, and for a value that no row has.
+        Examples are "frequency=135 Hz,150 Hz" and "run=143 Hz repeat". Raises PatchfemError for a
+        value without a unit, and for a value that no row has.
         """
         name, equals, values = (part.strip() for part in selector.partition("="))
         if not equals or not values:
             raise PatchfemError(
                 f"--hold {selector}: write column=value,value, for example frequency=135 Hz,150 Hz"
             )
-        column = self.column(name)
+        column = self.column_values(name)
         selected = np.zeros(self.row.size, bool)
         for text in map(str.strip, values.split(",")):
-            is_equal = np.array([_equals(name, value, text) for value in column])
+            is_equal = np.array([_cell_matches(name, value, text) for value in column])
             if not is_equal.any():
                 known = ", ".join(dict.fromkeys(_format_cell(name, value) for value in column))
                 raise PatchfemError(
@@ -101,15 +101,13 @@ class Readings:
             selected |= is_equal
         return selected
 
-    def group_readings(self, name: str, selected) -> dict:
-        """Group selected readings by the distinct values of a column.
+    def group_by_column(self, name: str, selected) -> dict:
+        """Group the selected readings by the distinct values of a table column.
 
-        The result maps the value as text to a mask (n,).
-
-        Only the readings in the mask `selected` (n,) count; the values are in the order of the
-        rows.
+        Returns a dict from the formatted value to a mask (n,), in the order of the rows. Readings
+        outside the mask `selected` (n,) belong to no group.
         """
-        column = self.column(name)
+        column = self.column_values(name)
         groups = {}
         for value in dict.fromkeys(column):
             readings = np.array([other == value for other in column]) & selected
@@ -117,10 +115,10 @@ class Readings:
                 groups[_format_cell(name, value)] = readings
         return groups
 
-    def logs(self, acceleration, displacement) -> np.ndarray:
-        """Return the log ratios ln(computed/measured) (n,) of all readings.
+    def compute_log_ratios(self, acceleration, displacement) -> np.ndarray:
+        """Return the log ratio ln(computed/measured) (n,) of each reading.
 
-        It is NaN if nothing was computed, and MAX_LOG_RATIO if a motion is not finite.
+        The ratio is NaN if no motion was computed, and MAX_LOG_RATIO if the motion is not finite.
 
         Parameters
         ----------
@@ -128,16 +126,16 @@ class Readings:
             Accelerations [m s-2] and displacement amplitudes [m] at the conditions.
         """
         at_conditions = np.array([displacement, acceleration], float)
-        computed = at_conditions[self.felt.astype(int), self.condition]
-        minimum = np.where(self.felt, 1e-300, MIN_DISPLACEMENT)
+        computed = at_conditions[self.is_acceleration.astype(int), self.condition]
+        lower_limit = np.where(self.is_acceleration, 1e-300, MIN_DISPLACEMENT)
         with np.errstate(invalid="ignore", divide="ignore"):
-            ratio = np.log(np.maximum(computed, minimum))
-            ratio -= np.log(np.maximum(self.measured, minimum))
+            ratio = np.log(np.maximum(computed, lower_limit))
+            ratio -= np.log(np.maximum(self.measured, lower_limit))
         return np.clip(ratio, -MAX_LOG_RATIO, MAX_LOG_RATIO)
 
 
-def _equals(name: str, value, text: str) -> bool:
-    """Return whether a value of a table column equals that of a selector."""
+def _cell_matches(name: str, value, text: str) -> bool:
+    """Return whether a table cell matches the value of a selector."""
     if name not in CONDITION_COLUMNS:
         return text in value if name == "flag" else text == value
     try:
@@ -148,16 +146,16 @@ def _equals(name: str, value, text: str) -> bool:
 
 
 def _format_cell(name: str, value) -> str:
-    """Format a value of a table column with its unit."""
+    """Format a table cell with its unit."""
     unit = {"frequency": " Hz", "input": " m/s^2"}.get(name)
     return f"{value:.6g}{unit}" if unit else str(value) or "(none)"
 
 
-def read_readings(path: Path) -> Readings:
-    """Read the readings from a CSV file of measured responses (`inputs.measured.read_table`).
+def read_response_table(path: Path) -> Readings:
+    """Read the readings from a CSV table of measured responses (`inputs.measured.read_table`).
 
-    Repeats of a condition remain separate readings. PatchfemError names what is wrong with the
-    file.
+    Repeated measurements of a condition remain separate readings. Raises PatchfemError if the
+    table is invalid.
     """
     rows = tuple(read_table(path))
     row_numbers = []
@@ -181,25 +179,25 @@ def read_readings(path: Path) -> Readings:
             f"{path}: no row has an acceleration or a displacement, so nothing can be fitted"
         )
     inputs = np.array([(rows[k].frequency, rows[k].input) for k in row_numbers])
-    conditions = _distinct_conditions(inputs)
+    conditions = _find_distinct_conditions(inputs)
     condition = [int(np.argmin(np.abs(conditions / pair - 1).max(axis=1))) for pair in inputs]
-    unstable = [("U" in rows[k].flag) for k in row_numbers]
+    is_unstable = [("U" in rows[k].flag) for k in row_numbers]
     return Readings(
         Path(path),
         rows,
         frozen_array(row_numbers, np.int64),
         frozen_array(felt, bool),
         frozen_array(measured),
-        frozen_array(unstable, bool),
+        frozen_array(is_unstable, bool),
         frozen_array(conditions),
         frozen_array(condition, np.int64),
     )
 
 
-def _distinct_conditions(inputs) -> np.ndarray:
-    """Return the distinct pairs (c, 2) of frequency and input, ascending.
+def _find_distinct_conditions(inputs) -> np.ndarray:
+    """Return the distinct pairs (c, 2) of frequency and input in ascending order.
 
-    The same input written in two units differs by round-off, but is one condition.
+    Values that differ only by the round-off of a unit conversion count as equal.
     """
     conditions: list = []
     for pair in sorted(set(map(tuple, inputs.tolist()))):
@@ -208,10 +206,8 @@ def _distinct_conditions(inputs) -> np.ndarray:
     return np.array(conditions)
 
 
-def scores(cells: Readings, log_ratios, selected) -> dict | None:
-    """Return the root mean square of the log ratios of selected readings, by kind.
-
-    It is None if no reading is selected.
+def compute_rms_scores(cells: Readings, log_ratios, selected) -> dict | None:
+    """Return the root mean square log ratio of selected readings by kind of reading.
 
     Parameters
     ----------
@@ -219,22 +215,26 @@ def scores(cells: Readings, log_ratios, selected) -> dict | None:
     log_ratios : (n,) array
         ln(computed/measured).
     selected : (n,) bool
-        Readings that count.
+        Mask of the selected readings.
 
     Returns
     -------
     dict or None
-        By "acceleration", "displacement" and "all"; None if there is no such reading, or if one of
-        them is NaN because it was not predicted.
+        Scores of "acceleration", "displacement" and "all" readings. A score is None if there is no
+        such reading or if one of them was not predicted (NaN). None if no reading is selected.
     """
     if not np.any(selected):
         return None
     log_ratios = np.asarray(log_ratios)
-    every = np.ones(len(log_ratios), bool)
-    kinds = {"acceleration": cells.felt, "displacement": ~cells.felt, "all": every}
+    is_any = np.ones(len(log_ratios), bool)
+    kinds = {
+        "acceleration": cells.is_acceleration,
+        "displacement": ~cells.is_acceleration,
+        "all": is_any,
+    }
     out: dict = {}
-    for name, of_kind in kinds.items():
-        selected_logs = log_ratios[of_kind & selected]
+    for name, is_of_kind in kinds.items():
+        selected_logs = log_ratios[is_of_kind & selected]
         is_known = selected_logs.size and not np.isnan(selected_logs).any()
         out[name] = float(np.sqrt(np.mean(selected_logs**2))) if is_known else None
     return out

@@ -1,4 +1,4 @@
-"""Models of a rig at each measured condition, for given values of the free keys."""
+"""Rig models at the measured conditions, for given values of the free parameters."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, loads
 from ..fits.problem import model_without_joint
 
-# These keys scale the readings; they are not part of the model.
+# Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
 
 
 class FitRequest:
-    """Request for a fit: scene of a rig, ranges of its free keys, and a file of rows."""
+    """Request for a fit of a rig: scene, ranges of its free parameters, and measured data file."""
 
     def __init__(self, scene: Scene, ranges, measured):
         self.scene = scene
         self.ranges = ranges
         self.measured = measured
 
-    def condition_models(self, conditions, *sets: str) -> ConditionModels:
-        """Return the models of the scene at conditions (c, 2), with additional --set strings."""
+    def make_condition_models(self, conditions, *sets: str) -> ConditionModels:
+        """Return the rig models at conditions (c, 2), with additional --set strings."""
         scene = self.scene
         if sets:
             scene = loads(scene.text, scene.path, [*scene.sets, *sets])
@@ -32,10 +32,10 @@ class FitRequest:
 
 
 class ConditionModels:
-    """Models of a rig under sinusoidal base motion at measured conditions.
+    """Rig models under sinusoidal base motion at the measured conditions.
 
-    If the scene names no method, its steady motions are computed, provided that the method
-    'harmonic' accepts it (`notes` says so): a row was read after the rig had settled.
+    The rows were measured in steady state. If the scene does not set a method, the steady-state
+    method 'harmonic' is therefore used where it supports the scene, and `notes` reports this.
 
     Parameters
     ----------
@@ -43,14 +43,14 @@ class ConditionModels:
     conditions : (c, 2) array
         Frequency [Hz] and input [m s-2].
     ranges : list of Range
-        Bounds of the free keys.
+        Bounds of the free parameters.
     measured : Path
-        File of the rows.
+        File of the response table.
 
     Raises
     ------
     SceneError, PatchfemError
-        For a scene or a key that cannot be fitted.
+        If the scene or a parameter cannot be fitted.
     """
 
     def __init__(self, scene: Scene, conditions, ranges, measured):
@@ -58,21 +58,23 @@ class ConditionModels:
         self.ranges = ranges
         self.notes = []
         self.sets = []
-        self._refuse(measured)
+        self._check_scene_and_ranges(measured)
         if scene.measured is None and any(bound.key.startswith("measured.") for bound in ranges):
             self.sets.append(f"measured.file={measured.resolve().as_posix()}")
         if scene.accuracy.method in (None, "auto"):
-            self._choose_steady_method()
+            self._choose_steady_state_method()
         start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
         self.base = BaseScene(start)
-        self.read = start.measured
-        self.inner = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
+        self.instrument = start.measured
+        self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
         self.rigs = []
         for condition in conditions:
-            self.rigs.append(build(self.base.override(condition_sets(*condition))).rig)
+            self.rigs.append(
+                build(self.base.override(format_condition_assignments(*condition))).rig
+            )
 
-    def _refuse(self, measured) -> None:
-        """Raise PatchfemError for a scene or a key that cannot be fitted to measured rows."""
+    def _check_scene_and_ranges(self, measured) -> None:
+        """Raise PatchfemError if the scene or a free parameter cannot be fitted to a response table."""
         scene = self.scene
         drive = scene.drive
         location = f"{scene.path}: fit --to {measured.name}: "
@@ -100,8 +102,8 @@ class ConditionModels:
                     f"--free {bound.key}: the rows of the file give the drive; choose a key of the rig"
                 )
 
-    def _choose_steady_method(self) -> None:
-        """Set the method 'harmonic' if the scene allows it."""
+    def _choose_steady_state_method(self) -> None:
+        """Select the method 'harmonic' if it supports the scene."""
         steady = "accuracy.method=harmonic"
         try:
             loads(self.scene.text, self.scene.path, [*self.scene.sets, *self.sets, steady])
@@ -113,29 +115,29 @@ class ConditionModels:
             "'harmonic'"
         )
 
-    def model(self, values) -> Model:
-        """Return the model for values (n,) of the free keys, with the drive of the scene."""
-        sets = [self.ranges[k].format_assignment(values[k]) for k in self.inner]
+    def build_model(self, values) -> Model:
+        """Build the rig model for values (n,) of the free parameters, with the drive of the scene."""
+        sets = [self.ranges[k].format_assignment(values[k]) for k in self.model_parameters]
         return model_without_joint(self.base, sets)
 
-    def at(self, model: Model, condition: int) -> Model:
+    def with_condition_drive(self, model: Model, condition: int) -> Model:
         """Return the model with the drive of a measured condition."""
         drive = self.rigs[condition].drive
         rig = model.rig.with_signal(drive.signal, frequency=drive.frequency, cycles=drive.cycles)
         return replace(model, rig=rig)
 
-    def sine(self, condition: int) -> SineDrive:
+    def sine_drive(self, condition: int) -> SineDrive:
         """Return the sinusoidal drive of a measured condition."""
         return self.rigs[condition].drive.signal
 
     @property
-    def moves_pieces(self) -> bool:
-        """Whether a free key changes how the pieces are pressed."""
+    def changes_contact(self) -> bool:
+        """Whether a free parameter changes the static contact solution."""
         return any(bound.key.startswith("contact.") for bound in self.ranges)
 
 
-def condition_sets(frequency: float, level: float) -> list:
-    """Return the --set strings of a measured condition.
+def format_condition_assignments(frequency: float, level: float) -> list:
+    """Return the --set strings of a condition with a frequency [Hz] and a base acceleration [m s-2].
 
     frequency [Hz], level: input [m s-2].
     """

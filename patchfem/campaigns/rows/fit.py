@@ -1,10 +1,9 @@
-"""Fit of a rig to rows of measured responses, with scores of the readings.
+"""Fit of a rig to a table of measured responses, with hold-out and cross-validation.
 
-There are scores of the readings that were fitted, held out and left out.
-
-A score is the root mean square of ln(computed/measured). It is given for the rig and for models without
-mechanics that are fitted to the same readings (`nulls`). A search does not see the readings that are
-held out or left out; only the last evaluation predicts them.
+A score is the root mean square of ln(computed/measured). Scores are given for the fitted, the held-out
+and the left-out readings, for the rig and for power laws without mechanics that are fitted to the
+same readings (`nulls`). A search does not use the readings that are held out or left out; they are
+predicted after the fit.
 """
 
 from __future__ import annotations
@@ -18,13 +17,13 @@ import numpy as np
 
 from ...core import PatchfemError
 from ..fits.problem import FittedKeys, FreeKeys
-from .cells import MAX_LOG_RATIO, Readings, read_readings, scores
-from .computed import ModelReadings
+from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
 from .condition_models import ConditionModels, FitRequest
+from .model_readings import ModelReadings
 from .null_models import NULL_MODELS, fit_null_model
 from .search import BestFit, SearchSettings, make_residual, search_random_starts
 
-SAME_SCORE = 1.01  # Ratio of two scores below which two searches found the same fit.
+SAME_SCORE = 1.01  # Largest ratio of scores at which two descents count as the same fit.
 UNSTABLE_MEANINGS = {
     "bound": "count in the fit as lower bounds",
     "out": "are left out of the fit",
@@ -34,9 +33,9 @@ UNSTABLE_MEANINGS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fold:
-    """Cross-validation fit without the readings of a single value of a column.
+    """Cross-validation fold: a fit without the readings that have a given value in a column.
 
-    name: the value; readings: (n,) bool, those left out; search: the fit of all others.
+    name: the value; readings: mask (n,) of the left-out readings; search: fit of all others.
     """
 
     name: str
@@ -46,9 +45,9 @@ class Fold:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Placebo:
-    """Refit with a parameter fixed at a value that differs from the best fit.
+    """Placebo test: a refit with another value of a parameter that is not fitted.
 
-    text: the "key=value" string; search: the fit; logs: (n,) ln(computed/measured).
+    text: "key=value" string of the other value; search: the refit; logs: log ratios (n,).
     """
 
     text: str
@@ -57,10 +56,10 @@ class Placebo:
 
 
 class NullPrediction(NamedTuple):
-    """Prediction of the readings by a model without mechanics.
+    """Predictions of the readings by a power law without mechanics.
 
-    logs: (n,) ln(computed/measured); left_out_logs: (n,) the same by fits that did not see the
-    reading; numbers: fitted values by kind of reading.
+    logs: log ratios ln(computed/measured) (n,); left_out_logs: log ratios (n,) from fits without
+    the reading; numbers: fitted factor and exponents by kind of reading.
     """
 
     logs: np.ndarray
@@ -70,33 +69,33 @@ class NullPrediction(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedRows:
-    """Rig fitted to rows of measured responses.
+    """Fit of a rig to a table of measured responses, with cross-validation and placebo tests.
 
     Attributes
     ----------
     keys : FittedKeys
-        The fit of all readings that are not held out.
+        Fitted parameters from all readings that are not held out.
     models : ConditionModels
-        The models of the scene.
+        Models of the rig at the measured conditions.
     cells : Readings
-        The n measured readings.
+        Measured readings.
     settings : SearchSettings
     held_out : (n,) bool
-        Readings held out.
+        Mask of the readings that were held out.
     search : BestFit
-        The searches of the fit.
+        Search from random starting points.
     computed : (2, c) array
         Acceleration reading [m s-2] and displacement [m] of every condition.
     logs : (n,) array
-        ln(computed/measured).
+        Log ratios ln(computed/measured).
     folds : tuple of Fold
     left_out_logs : (n,) array
-        ln(computed/measured) by the fit that left the reading out; NaN if none did.
+        Log ratios from the fit without the reading; NaN if every fit used it.
     placebos : tuple of Placebo
     nulls : dict of NullPrediction
-        The models without mechanics by name.
+        Predictions of the power laws without mechanics by name.
     n_motions : int
-        Number of motions computed.
+        Number of computed motions.
     """
 
     keys: FittedKeys
@@ -113,38 +112,38 @@ class FittedRows:
     nulls: dict
     n_motions: int
 
-    def score(self, logs, left_out_logs, *, stable: bool = False) -> dict:
-        """Return the scores of the readings that were fitted, held out and left out.
+    def compute_scores(self, logs, left_out_logs, *, only_stable: bool = False) -> dict:
+        """Return the scores of the fitted, the held-out and the left-out readings.
 
         Parameters
         ----------
         logs : (n,) array
-            ln(computed/measured) of any prediction.
+            Log ratios ln(computed/measured) of any prediction.
         left_out_logs : (n,) array
-            ln(computed/measured) of the readings left out, by a fit without them; NaN for others.
-        stable : bool
-            Whether to leave out the readings flagged U.
+            Log ratios of the left-out readings from fits without them; NaN for others.
+        only_stable : bool
+            Whether to exclude the readings flagged U (unstable).
 
         Returns
         -------
         dict
-            `cells.scores` by "fitted", "held_out" and "left_out".
+            Result of `cells.compute_rms_scores` for "fitted", "held_out" and "left_out".
         """
-        among = ~self.cells.unstable if stable else np.ones(self.held_out.size, bool)
+        is_eligible = ~self.cells.unstable if only_stable else np.ones(self.held_out.size, bool)
         is_left_out = ~np.isnan(self.left_out_logs)
         return {
-            "fitted": scores(self.cells, logs, among & ~self.held_out),
-            "held_out": scores(self.cells, logs, among & self.held_out),
-            "left_out": scores(self.cells, left_out_logs, among & is_left_out),
+            "fitted": compute_rms_scores(self.cells, logs, is_eligible & ~self.held_out),
+            "held_out": compute_rms_scores(self.cells, logs, is_eligible & self.held_out),
+            "left_out": compute_rms_scores(self.cells, left_out_logs, is_eligible & is_left_out),
         }
 
 
 @dataclass(frozen=True, slots=True)
 class RowsOptions:
-    """Options of a fit: readings to hold or leave out, placebos, and search settings.
+    """Options of a fit to a response table: validation readings, placebo tests and search settings.
 
-    hold: rows held out, "column=value,value"; leave_out: the column of which each value is left out in
-    turn; placebos: "key=value,value" strings; search: the SearchSettings.
+    hold: selectors "column=value,value" of held-out rows; leave_out: column for cross-validation,
+    whose values are left out one at a time; placebos: "key=value,value" strings; search: settings.
     """
 
     hold: tuple = ()
@@ -154,22 +153,22 @@ class RowsOptions:
 
 
 def fit_rows(
-    question: FitRequest,
+    request: FitRequest,
     options: RowsOptions,
     say: Callable | None = None,
     progress: Callable | None = None,
 ) -> FittedRows:
-    """Fit keys of a rig to rows of measured responses.
+    """Fit free parameters of a rig to a table of measured responses.
 
     Parameters
     ----------
-    question : FitRequest
-        The scene, its free keys and the file of rows.
+    request : FitRequest
+        Scene, free parameters and data file.
     options : RowsOptions
     say : Callable, optional
-        Takes a line of text before code is compiled.
+        Called with a line of text before code is compiled.
     progress : Callable, optional
-        Takes the fraction of starts that are done.
+        Called with the fraction of descents that are finished.
 
     Returns
     -------
@@ -178,22 +177,22 @@ def fit_rows(
     Raises
     ------
     SceneError, PatchfemError
-        For input that cannot be used.
+        If the input is invalid.
     NotConverged
-        If all starts of a search fail.
+        If all descents of a search fail.
     """
     begin = perf_counter()
     settings = options.search
-    n_values = len(question.ranges)
-    cells = read_readings(question.measured)
+    n_values = len(request.ranges)
+    cells = read_response_table(request.measured)
     held_out = np.zeros(cells.row.size, bool)
     for selector in options.hold:
-        held_out |= cells.select(selector)
+        held_out |= cells.select_readings(selector)
     fitted = ~held_out
     _require_enough_readings(cells, fitted, n_values, settings)
-    models = question.condition_models(cells.conditions)
+    models = request.make_condition_models(cells.conditions)
     computed = ModelReadings(models, say)
-    groups = cells.group_readings(options.leave_out, fitted) if options.leave_out else {}
+    groups = cells.group_by_column(options.leave_out, fitted) if options.leave_out else {}
     if len(groups) == 1:
         raise PatchfemError(
             f"--leave-out {options.leave_out}: all rows that are not held out have the same value "
@@ -202,11 +201,11 @@ def fit_rows(
         )
     for group in groups.values():
         _require_enough_readings(cells, fitted & ~group, n_values, settings)
-    # The strings of placebos are checked before the search, which can take hours.
+    # The placebo strings are checked first, because the search can take hours.
     placebo_models = {}
     for placebo in options.placebos:
-        for text in _split_placebo(placebo, question.ranges):
-            placebo_models[text] = question.condition_models(cells.conditions, text)
+        for text in _split_placebo(placebo, request.ranges):
+            placebo_models[text] = request.make_condition_models(cells.conditions, text)
     n_searches = 1 + len(groups) + len(placebo_models)
     report = None if progress is None else _StartCounter(progress, settings.starts * n_searches)
     keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
@@ -215,21 +214,21 @@ def fit_rows(
     fitter = _RowsFitter(cells, keys, settings, report)
     best = fitter.fit(computed, fitted, "all", "rows")
     prediction = _predict_from_rest(computed, best.fit.values, every_condition)
-    logs = cells.logs(*prediction)
+    logs = cells.compute_log_ratios(*prediction)
     left_out_logs = np.full(held_out.size, np.nan)
     folds = []
     for name, group in groups.items():
         fold = fitter.fit(computed, fitted & ~group, f"without {name}")
         conditions = sorted(set(cells.condition[group].tolist()))
         fold_prediction = _predict_from_rest(computed, fold.fit.values, conditions)
-        left_out_logs[group] = cells.logs(*fold_prediction)[group]
+        left_out_logs[group] = cells.compute_log_ratios(*fold_prediction)[group]
         folds.append(Fold(name, group, fold))
     placebos = []
     for text, other_models in placebo_models.items():
         readings = ModelReadings(other_models, say)
         refit = fitter.fit(readings, fitted, text)
         refit_prediction = _predict_from_rest(readings, refit.fit.values, every_condition)
-        placebos.append(Placebo(text, refit, cells.logs(*refit_prediction)))
+        placebos.append(Placebo(text, refit, cells.compute_log_ratios(*refit_prediction)))
     return FittedRows(
         keys=keys.conclude(best.fit, begin, _warn_of_doubtful_fit(cells, best, logs, settings)),
         models=models,
@@ -242,7 +241,7 @@ def fit_rows(
         folds=tuple(folds),
         left_out_logs=left_out_logs,
         placebos=tuple(placebos),
-        nulls={name: _predict_null(cells, name, fitted, groups) for name in NULL_MODELS},
+        nulls={name: _predict_with_null_model(cells, name, fitted, groups) for name in NULL_MODELS},
         n_motions=computed.n_motions,
     )
 
@@ -250,7 +249,7 @@ def fit_rows(
 def _require_enough_readings(
     cells: Readings, training, n_values: int, settings: SearchSettings
 ) -> None:
-    """Raise PatchfemError if a fit has no more readings than free parameters."""
+    """Raise PatchfemError unless there are more fitted readings than free parameters."""
     used = training & ~cells.unstable if settings.unstable == "out" else training
     if used.sum() <= n_values:
         raise PatchfemError(
@@ -260,15 +259,15 @@ def _require_enough_readings(
 
 
 def _predict_from_rest(computed: ModelReadings, values, conditions) -> np.ndarray:
-    """Predict the readings (2, c) of all conditions from motions that begin at rest."""
-    computed.forget()
+    """Predict the readings (2, c) at given conditions with motions that start from rest."""
+    computed.reset_motions()
     return np.array(computed(values, list(conditions)))
 
 
 class _RowsFitter(NamedTuple):
-    """Fitter of the free keys to selected readings of a table.
+    """Fitter of the free parameters to subsets of the readings of a table.
 
-    report: called with 1 after each start, or None.
+    report: callback that is called with 1 after each descent, or None.
     """
 
     cells: Readings
@@ -276,28 +275,30 @@ class _RowsFitter(NamedTuple):
     settings: SearchSettings
     report: Callable | None
 
-    def fit(self, readings: ModelReadings, training, name: str, interval_kind: str = "") -> BestFit:
-        """Fit the free keys to the readings selected by the mask `training` (n,).
+    def fit(
+        self, readings: ModelReadings, training, search_name: str, interval_kind: str = ""
+    ) -> BestFit:
+        """Fit the free parameters to the readings in the mask `training` (n,).
 
         Parameters
         ----------
         readings : ModelReadings
-            Readings of the model.
+            Readings that the model predicts.
         training : (n,) bool
-        name : str
-            Name under which the ends of the starts are stored.
+        search_name : str
+            Name under which the finished descents are stored.
         interval_kind : str
             As in `Problem.solve`.
         """
         residual = make_residual(self.cells, readings, training, self.settings.unstable)
         problem = self.keys.make_problem(residual)
         return search_random_starts(
-            problem, self.settings, readings.forget, interval_kind, name, self.report
+            problem, self.settings, readings.reset_motions, interval_kind, search_name, self.report
         )
 
 
 class _StartCounter:
-    """Counter of finished search starts that reports their fraction of the total."""
+    """Progress callback that counts finished descents and reports their fraction of the total."""
 
     def __init__(self, progress: Callable, total: int):
         self.progress = progress
@@ -305,15 +306,15 @@ class _StartCounter:
         self.finished = 0
 
     def __call__(self, count: int) -> None:
-        """Add finished starts to the count and report the fraction."""
+        """Add to the number of finished descents and report the fraction."""
         self.finished += count
         self.progress(self.finished / self.total)
 
 
 def _split_placebo(text: str, ranges) -> list:
-    """Return the key=value strings of a placebo fit.
+    """Split a placebo option "key=value,value" into a "key=value" string for each value.
 
-    PatchfemError for a key that the fit or the rows would set to another value.
+    Raises PatchfemError for a key that is fitted or that the response table sets.
     """
     key, equals, values = (part.strip() for part in text.partition("="))
     if not equals or not values:
@@ -333,8 +334,8 @@ def _split_placebo(text: str, ranges) -> list:
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
-def _predict_null(cells: Readings, name: str, fitted, groups: dict) -> NullPrediction:
-    """Predict all readings by a null model, including the readings that are left out."""
+def _predict_with_null_model(cells: Readings, name: str, fitted, groups: dict) -> NullPrediction:
+    """Predict all readings by a null model, the left-out ones by fits without them."""
     logs, numbers = fit_null_model(cells, name, fitted)
     left_out_logs = np.full(fitted.size, np.nan)
     for group in groups.values():
@@ -343,12 +344,12 @@ def _predict_null(cells: Readings, name: str, fitted, groups: dict) -> NullPredi
 
 
 def _warn_of_doubtful_fit(cells: Readings, search: BestFit, logs, settings: SearchSettings) -> list:
-    """Return warnings on the measured rows and on the search."""
+    """Return warnings about rows without readings, unstable readings and an unreliable search."""
     warnings = []
-    if cells.empty:
-        numbers = ", ".join(str(k + 1) for k in cells.empty)
+    if cells.empty_rows:
+        numbers = ", ".join(str(k + 1) for k in cells.empty_rows)
         warnings.append(
-            f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: rows "
+            f"{len(cells.empty_rows)} of {len(cells.rows)} rows have no reading and are left out: rows "
             f"{numbers}"
         )
     n_unstable = int(cells.unstable.sum())

@@ -1,8 +1,8 @@
-"""Models without mechanics that a fitted rig has to outperform.
+"""Power laws without mechanics as a baseline for the fitted rig.
 
-They are y = C a^p f^q for each kind of reading; a is the input and f the frequency. The logarithm
-of y is linear in the free values, so each model is an exact linear least-squares solution. Readings
-flagged U count as they are, which can only favour these models.
+The power laws are y = C a^p f^q for each kind of reading, with the input a and the frequency f. The
+logarithm of y is linear in the unknowns, so that linear least squares give the exact solution.
+Readings flagged U are used without correction, which can only favour these models.
 """
 
 import numpy as np
@@ -13,11 +13,11 @@ NULL_MODELS = ("constant", "power_input", "power_input_frequency")
 
 
 def fit_null_model(cells: Readings, name: str, training) -> tuple:
-    """Fit a model without mechanics to selected readings and predict all readings.
+    """Fit a power law without mechanics to selected readings, and predict all readings with it.
 
     The models are y = C a ("constant"), y = C a^p ("power_input") and y = C a^p f^q
-    ("power_input_frequency"). If the training readings do not determine an exponent, such as q at a
-    single frequency, it is that of the smallest change from C a: p = 1 or q = 0.
+    ("power_input_frequency"). An exponent that the training readings do not determine, such as q
+    for a single frequency, keeps its value in the law y = C a: p = 1 or q = 0.
 
     Parameters
     ----------
@@ -25,18 +25,21 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
     name : str
         One of NULL_MODELS.
     training : (n,) bool
-        Readings of the fit.
+        Mask of the fitted readings.
 
     Returns
     -------
     tuple
-        ln(computed/measured) (n,), NaN for a kind without training readings; and by kind the fitted
-        "factor", exponent of "input" and exponent of "frequency".
+        Log ratios ln(computed/measured) (n,), NaN for a kind without training readings; and a dict
+        by kind of the fitted "factor" C and the exponents of "input" and "frequency".
     """
     logs = np.full(cells.row.size, np.nan)
     numbers = {}
     inputs = np.log(cells.conditions[cells.condition])
-    for kind, of_kind in (("acceleration", cells.felt), ("displacement", ~cells.felt)):
+    for kind, of_kind in (
+        ("acceleration", cells.is_acceleration),
+        ("displacement", ~cells.is_acceleration),
+    ):
         fitted = of_kind & training
         if not fitted.any():
             continue

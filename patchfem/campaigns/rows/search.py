@@ -1,6 +1,6 @@
-"""Search for the best-fit parameters of a rig from random starts.
+"""Search for the best-fit parameters of a rig from random starting points.
 
-A search uses nothing but the training readings.
+The search uses the training readings only.
 """
 
 from collections.abc import Callable
@@ -19,26 +19,26 @@ from ...identify.least_squares import (
 )
 from ...identify.space import UnitCubeResidual
 from .cells import Readings
-from .computed import ModelReadings
+from .model_readings import ModelReadings
 
-# How a reading flagged U counts in a fit: as a lower bound, not at all, or as any other.
+# Treatments of a reading flagged U (unstable): as a lower bound, excluded, or as any other.
 UNSTABLE = ("bound", "out", "read")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BestFit:
-    """Best fit of a search from several starts.
+    """Best fit of a search from several starting points.
 
     Attributes
     ----------
     fit : Fit
-        Values with intervals.
+        Fitted parameters with confidence intervals.
     starts : (s, n) array
-        Values at which each start began.
+        Parameters at the starting point of each descent.
     ends : (s, n) array
-        Values at which each start ended; NaN if it failed.
+        Parameters at the end of each descent; NaN if it failed.
     rms : (s,) array
-        Root mean square of the training logarithms at the ends.
+        Root mean square log ratio of the training readings at the end of each descent.
     """
 
     fit: Fit
@@ -49,19 +49,19 @@ class BestFit:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SearchSettings:
-    """Settings of the search for the best-fit parameters.
+    """Settings of a search from random starting points.
 
     Attributes
     ----------
     starts : int
-        Number of random starts.
+        Number of random starting points.
     seed : int
-        Seed of the random starts.
+        Seed of the random numbers.
     unstable : str
-        How readings flagged U count, one of UNSTABLE.
+        Treatment of readings flagged U, one of UNSTABLE.
     access_ends : callable
-        Stores the ends of starts: access_ends(name) returns a stored list or None,
-        access_ends(name, list) stores it.
+        Access to a checkpoint of the finished descents: access_ends(name) returns the stored
+        list of numbers or None, access_ends(name, numbers) stores it.
     """
 
     starts: int = 8
@@ -71,32 +71,35 @@ class SearchSettings:
 
 
 def make_residual(cells: Readings, computed: ModelReadings, training, unstable: str) -> Callable:
-    """Return the function that gives the log ratios of selected readings, by free parameters.
+    """Return the function that computes the log ratios of selected readings from free parameters.
 
     Parameters
     ----------
     cells : Readings
     computed : ModelReadings
     training : (n,) bool
-        Readings of the residual.
+        Mask of the readings in the residual.
     unstable : str
-        How a reading flagged U counts. "bound": it is a lower bound, because the motion still grew,
-        so only a computed value below it counts; "out": not at all; "read": as any other reading.
+        Treatment of readings flagged U. "bound": such a reading is a lower bound, because the
+        motion was still growing, so that only a smaller computed value gives a residual; "out":
+        the reading is excluded; "read": it is treated like any other reading.
     """
-    used = training & ~cells.unstable if unstable == "out" else training
-    conditions = sorted(set(cells.condition[used].tolist()))
-    bound = cells.unstable[used] if unstable == "bound" else np.zeros(int(used.sum()), bool)
+    is_used = training & ~cells.unstable if unstable == "out" else training
+    conditions = sorted(set(cells.condition[is_used].tolist()))
+    is_lower_bound = (
+        cells.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)
+    )
 
     def residual(values):
-        """Return the residual for given free parameters (n,)."""
-        logs = cells.logs(*computed(values, conditions))[used]
-        return np.where(bound, np.minimum(logs, 0.0), logs)
+        """Return the log ratios (r,) of the selected readings for free parameters (n,)."""
+        logs = cells.compute_log_ratios(*computed(values, conditions))[is_used]
+        return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
 
     return residual
 
 
 class _StoredDescents(DescentStorage):
-    """Descents from the starts of a search, which a caller can store as lists.
+    """Storage of the descents of a search as lists of numbers, in a checkpoint of the caller.
 
     Parameters
     ----------
@@ -106,18 +109,18 @@ class _StoredDescents(DescentStorage):
         As in `SearchSettings`.
     """
 
-    def __init__(self, name: str, access_ends: Callable):
-        self.name = name
+    def __init__(self, search_name: str, access_ends: Callable):
+        self.name = search_name
         self.access_ends = access_ends
 
     def save(self, start: int, descent: Descent) -> None:
-        """Store the descent from a start."""
+        """Store the descent from a starting point."""
         stored_cost = descent.cost if np.isfinite(descent.cost) else None
         numbers = [*descent.u.tolist(), stored_cost, descent.rows, bool(descent.is_converged)]
         self.access_ends(f"{self.name}/{start}", numbers)
 
     def load(self, start: int) -> Descent | None:
-        """Return the stored descent from a start, or None."""
+        """Return the stored descent from a starting point, or None."""
         stored = self.access_ends(f"{self.name}/{start}")
         if not stored:
             return None
@@ -130,27 +133,27 @@ def search_random_starts(
     settings: SearchSettings,
     before_descent: Callable,
     interval_kind: str = "rows",
-    name: str = "",
+    search_name: str = "",
     report: Callable | None = None,
 ) -> BestFit:
-    """Solve a least-squares problem with an expensive residual from random starts.
+    """Solve a least-squares problem with an expensive residual from random starting points.
 
-    Each start begins with motions from rest, so that its result depends only on its starting values
-    and on the training readings. The descent with the smallest sum of squares is continued until it
-    converges.
+    The first motions of each descent start from rest, so that its result depends only on its
+    starting point and on the training readings. The descent with the smallest sum of squares is
+    continued until it converges.
 
     Parameters
     ----------
     problem : Problem
     settings : SearchSettings
     before_descent : callable
-        Called before each descent, so that its first motions start from rest.
+        Called before each descent to make its first motions start from rest.
     interval_kind : str
         As in `Problem.solve`.
-    name : str
-        Name under which the ends of the starts are stored.
+    search_name : str
+        Name under which the finished descents are stored.
     report : callable, optional
-        Called with 1 after each start.
+        Called with 1 after each descent.
 
     Returns
     -------
@@ -159,23 +162,23 @@ def search_random_starts(
     Raises
     ------
     NotConverged
-        If all starts fail.
+        If all descents fail.
     """
     space = problem.space
     n = space.low.size
-    quick = UnitCubeResidual(problem.residual, space, is_quick=True)
+    quick_residual = UnitCubeResidual(problem.residual, space, is_quick=True)
     starts = np.random.default_rng(settings.seed).random((settings.starts, n))
     ends = run_descents(
-        quick,
+        quick_residual,
         starts,
-        storage=_StoredDescents(name, settings.access_ends),
+        storage=_StoredDescents(search_name, settings.access_ends),
         before_descent=before_descent,
         report=report,
     )
     rms = np.array([end.rms for end in ends])
     if np.isnan(rms).all():
         raise NotConverged(
-            f"fit: all {settings.starts} searches failed; the first failed for this reason: {quick.reason}"
+            f"fit: all {settings.starts} searches failed; the first failed for this reason: {quick_residual.reason}"
         )
     best = run_descents(
         UnitCubeResidual(problem.residual, space),
@@ -186,7 +189,7 @@ def search_random_starts(
     for end in ends:
         end_values.append(space.values(end.u) if np.isfinite(end.cost) else np.full(n, np.nan))
     return BestFit(
-        fit=assemble_fit(quick, best, interval_kind, ends),
+        fit=assemble_fit(quick_residual, best, interval_kind, ends),
         starts=np.array([space.values(u) for u in starts]),
         ends=np.array(end_values),
         rms=rms,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...campaigns.rows.cells import scores
+from ...campaigns.rows.cells import compute_rms_scores
 from ...campaigns.rows.condition_models import GAIN_KEYS
 from ...campaigns.rows.fit import SAME_SCORE, FittedRows
 from ...campaigns.rows.null_models import NULL_MODELS
@@ -98,12 +98,12 @@ def rows_fit_data(fit: FittedRows) -> dict:
     nulls_stable = {}
     for name in NULL_MODELS:
         null = fit.nulls[name]
-        nulls[name] = fit.score(null.logs, null.left_out_logs) | {"numbers": null.numbers}
-        nulls_stable[name] = fit.score(null.logs, null.left_out_logs, stable=True)
+        nulls[name] = fit.compute_scores(null.logs, null.left_out_logs) | {"numbers": null.numbers}
+        nulls_stable[name] = fit.compute_scores(null.logs, null.left_out_logs, only_stable=True)
     return describe_measurement(keys.scene.title, cells.path.name, "rows", keys.outcome) | {
         "values": describe_values(keys),
-        "scores": fit.score(fit.logs, fit.left_out_logs),
-        "scores_stable": fit.score(fit.logs, fit.left_out_logs, stable=True),
+        "scores": fit.compute_scores(fit.logs, fit.left_out_logs),
+        "scores_stable": fit.compute_scores(fit.logs, fit.left_out_logs, only_stable=True),
         "nulls": nulls,
         "nulls_stable": nulls_stable,
         "unstable": fit.settings.unstable,
@@ -128,7 +128,7 @@ def rows_fit_data(fit: FittedRows) -> dict:
 
 def _instrument_settings(fit: FittedRows) -> dict:
     """Return settings and gains of the instruments of a rig."""
-    read = fit.models.read
+    read = fit.models.instrument
     out = {
         "reading": "peak" if read is None else read.reading,
         "reading_cutoff": None if read is None else read.reading_cutoff,
@@ -167,7 +167,7 @@ def _fold_scores(fit: FittedRows) -> list:
         {
             "left_out": fold.name,
             "training": fold.search.fit.rms,
-            "scores": scores(fit.cells, fit.left_out_logs, fold.readings),
+            "scores": compute_rms_scores(fit.cells, fit.left_out_logs, fold.readings),
             "values": dict(zip(names, fold.search.fit.values.tolist())),
             "starts": [rms if math.isfinite(rms) else None for rms in fold.search.rms.tolist()],
         }
@@ -182,7 +182,7 @@ def _placebo_scores(fit: FittedRows) -> list:
     """
     out = []
     for placebo in fit.placebos:
-        score = fit.score(placebo.logs, np.full(placebo.logs.size, np.nan))
+        score = fit.compute_scores(placebo.logs, np.full(placebo.logs.size, np.nan))
         score.pop("left_out")
         out.append({"set": placebo.text, "scores": score})
     return out
@@ -191,7 +191,7 @@ def _placebo_scores(fit: FittedRows) -> list:
 def _row_entries(fit: FittedRows) -> list:
     """Return measured and computed readings of each condition in SI units."""
     cells = fit.cells
-    keys = zip(cells.row.tolist(), map(bool, cells.felt))
+    keys = zip(cells.row.tolist(), map(bool, cells.is_acceleration))
     number = {key: n for n, key in enumerate(keys)}
     out = []
     for k, row in enumerate(cells.rows):

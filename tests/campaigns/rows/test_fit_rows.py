@@ -10,10 +10,10 @@ from command_line import run_cli
 import patchfem as pf
 from patchfem import SceneError, build, run
 from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
-from patchfem.campaigns.rows.cells import read_readings
-from patchfem.campaigns.rows.computed import ModelReadings
+from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.condition_models import ConditionModels
 from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import SearchCheckpoint, rows_fit_data
@@ -139,7 +139,7 @@ def test_exact_linear_rig_is_recovered_from_closed_form(tmp_path):
         "acceleration_gain": found.keys.fit.values[2],
         "displacement_gain": found.keys.fit.values[3],
     }
-    assert found.score(found.logs, found.left_out_logs)["fitted"]["all"] < 1e-6
+    assert found.compute_scores(found.logs, found.left_out_logs)["fitted"]["all"] < 1e-6
 
 
 def test_always_intervals_cover_parameters_of_linear_rig(tmp_path):
@@ -227,23 +227,23 @@ def test_always_held_out_rows_do_not_affect_fit(tmp_path, friction_rows):
     assert np.array_equal(one.folds[2].search.fit.values, two.folds[2].search.fit.values)
     assert not np.array_equal(one.folds[0].search.fit.values, two.folds[0].search.fit.values)
     assert (
-        one.score(one.logs, one.left_out_logs)["left_out"]["all"]
+        one.compute_scores(one.logs, one.left_out_logs)["left_out"]["all"]
         < 1e-3
-        < two.score(two.logs, two.left_out_logs)["left_out"]["all"]
+        < two.compute_scores(two.logs, two.left_out_logs)["left_out"]["all"]
     )
 
 
 def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
     """The readings computed in a fit agree with marched rows within 1e-6, from cold and from nearby starts."""
     path = write_rows(tmp_path, friction_rows)
-    cells = read_readings(path)
+    cells = read_response_table(path)
     asked = ConditionModels(
         write_and_load(tmp_path, RUBS), cells.conditions, read_free_keys(*RUBS_FREE), path
     )
     computed = ModelReadings(asked)
     cold = np.array(computed([0.45, 2.4e6], range(6)))
     assert (
-        np.abs(cells.logs(*cold)).max() < 1e-6
+        np.abs(cells.compute_log_ratios(*cold)).max() < 1e-6
     )  # The tolerance is the remaining transient of the rows after 400 cycles.
     computed([0.46, 2.5e6], range(6))
     # These motions start from those at nearby values.
@@ -268,14 +268,14 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
     path = write_rows(
         tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in make_linear_rows()]
     )
-    cells = read_readings(path)
+    cells = read_response_table(path)
     scene = write_and_load(tmp_path, LINEAR)
     computed = ModelReadings(
         ConditionModels(scene, cells.conditions, read_free_keys(*LINEAR_FREE), path)
     )
     every = np.ones(cells.row.size, bool)
     for damping, is_above in ((0.01, True), (0.1, False)):
-        logs = cells.logs(*computed([141.0, damping], range(5)))
+        logs = cells.compute_log_ratios(*computed([141.0, damping], range(5)))
         found = {
             what: make_residual(cells, computed, every, what)([141.0, damping])
             for what in ("bound", "out", "read")
@@ -287,7 +287,7 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
         assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
     stable = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
     whole, without = (
-        stable.score(stable.logs, stable.left_out_logs, stable=part)["fitted"]
+        stable.compute_scores(stable.logs, stable.left_out_logs, only_stable=part)["fitted"]
         for part in (False, True)
     )
     assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))

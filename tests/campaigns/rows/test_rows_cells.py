@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from patchfem.campaigns import NULL_MODELS, scores
-from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, MIN_DISPLACEMENT, read_readings
+from patchfem.campaigns import NULL_MODELS, compute_rms_scores
+from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, MIN_DISPLACEMENT, read_response_table
 from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.core import G_N, PatchfemError
 
@@ -24,23 +24,26 @@ def write_table(tmp_path, *rows):
 
 def test_exact_table_1_has_readings_of_report():
     """Table 1 of the report has 27 accelerations and 8 displacements in 20 conditions and 6 runs."""
-    cells = read_readings(TABLE_1)
-    assert (np.count_nonzero(cells.felt), np.count_nonzero(~cells.felt)) == (27, 8)
-    assert len(cells.conditions) == 20 and cells.empty == [
+    cells = read_response_table(TABLE_1)
+    assert (np.count_nonzero(cells.is_acceleration), np.count_nonzero(~cells.is_acceleration)) == (
+        27,
+        8,
+    )
+    assert len(cells.conditions) == 20 and cells.empty_rows == [
         8
     ]  # The condition 143 Hz, 8 g is unstable and has no reading.
     assert np.count_nonzero(cells.unstable) == 4
-    assert len(set(cells.runs)) == 6  # four frequencies, two of which are repeated
+    assert len(set(cells.row_names)) == 6  # four frequencies, two of which are repeated
 
 
 def test_exact_repeated_conditions_are_separate_readings(tmp_path):
     """Repeated rows of a condition are separate readings, with the log ratios of computed to measured values."""
-    cells = read_readings(
+    cells = read_response_table(
         write_table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "150,4,,,U", "143,5,6,,")
     )
     assert cells.condition.tolist() == [0, 0, 0, 1] and cells.row.tolist() == [0, 0, 1, 3]
     assert cells.conditions.tolist() == [[143.0, 4 * G_N], [143.0, 5 * G_N]]
-    logs = cells.logs([4.5 * G_N, np.inf], [0.2 * MIL, 1.0])
+    logs = cells.compute_log_ratios([4.5 * G_N, np.inf], [0.2 * MIL, 1.0])
     assert logs == pytest.approx(
         [np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG_RATIO], rel=1e-14
     )
@@ -48,31 +51,36 @@ def test_exact_repeated_conditions_are_separate_readings(tmp_path):
 
 def test_exact_displacements_are_limited_by_floor(tmp_path):
     """Displacements below the floor count as the floor."""
-    cells = read_readings(write_table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
-    logs = cells.logs([1.0, 1.0], [MIN_DISPLACEMENT / 10, MIN_DISPLACEMENT / 10])
+    cells = read_response_table(write_table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
+    logs = cells.compute_log_ratios([1.0, 1.0], [MIN_DISPLACEMENT / 10, MIN_DISPLACEMENT / 10])
     assert logs == pytest.approx([0.0, np.log(0.5)], abs=1e-14)
 
 
 def test_exact_scores_are_rms_by_kind(tmp_path):
     """Scores are the rms of the log ratios by kind of reading, or None without readings."""
-    cells = read_readings(write_table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
-    found = scores(cells, [0.3, 0.4, -0.5], np.array([True, True, True]))
+    cells = read_response_table(write_table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
+    found = compute_rms_scores(cells, [0.3, 0.4, -0.5], np.array([True, True, True]))
     assert found == pytest.approx(
         {"acceleration": np.sqrt(0.17), "displacement": 0.4, "all": np.sqrt(0.5 / 3)}
     )
-    assert scores(cells, [0.3, 0.4, -0.5], np.array([True, False, False]))["displacement"] is None
-    assert scores(cells, [0.3, 0.4, -0.5], np.zeros(3, bool)) is None
+    assert (
+        compute_rms_scores(cells, [0.3, 0.4, -0.5], np.array([True, False, False]))["displacement"]
+        is None
+    )
+    assert compute_rms_scores(cells, [0.3, 0.4, -0.5], np.zeros(3, bool)) is None
 
 
 def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):
     """Rows are selected by frequency, input, flag or run, and grouped by run."""
-    cells = read_readings(write_table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U"))
-    assert cells.select("frequency=150 Hz").tolist() == [False, False, False, True]
-    assert cells.select("frequency=0.143 kHz,150 Hz").all()
-    assert cells.select("input=4 g").all()
-    assert cells.select("flag=R").tolist() == [False, False, True, False]
-    assert cells.select("run=143 Hz repeat").tolist() == [False, False, True, False]
-    groups = cells.group_readings("run", np.ones(4, bool))
+    cells = read_response_table(
+        write_table(tmp_path, "143,4,5.0,0.1,", "143,4,4.0,,R*", "0150,4,5,,U")
+    )
+    assert cells.select_readings("frequency=150 Hz").tolist() == [False, False, False, True]
+    assert cells.select_readings("frequency=0.143 kHz,150 Hz").all()
+    assert cells.select_readings("input=4 g").all()
+    assert cells.select_readings("flag=R").tolist() == [False, False, True, False]
+    assert cells.select_readings("run=143 Hz repeat").tolist() == [False, False, True, False]
+    groups = cells.group_by_column("run", np.ones(4, bool))
     assert {name: int(group.sum()) for name, group in groups.items()} == {
         "143 Hz": 2,
         "143 Hz repeat": 1,
@@ -93,7 +101,7 @@ def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):
 def test_refuses_selection_without_rows(tmp_path, text, wanted):
     """A selection without rows is refused."""
     with pytest.raises(PatchfemError, match=wanted):
-        read_readings(write_table(tmp_path, "143,4,5.0,0.1,")).select(text)
+        read_response_table(write_table(tmp_path, "143,4,5.0,0.1,")).select_readings(text)
 
 
 @pytest.mark.parametrize(
@@ -107,24 +115,24 @@ def test_refuses_selection_without_rows(tmp_path, text, wanted):
 def test_refuses_rows_without_positive_values(tmp_path, row, wanted):
     """Rows with values that have no logarithm are refused."""
     with pytest.raises(PatchfemError, match=wanted):
-        read_readings(write_table(tmp_path, row))
+        read_response_table(write_table(tmp_path, row))
 
 
 def test_exact_table_1_null_models_agree_with_closed_forms():
     """Null models of table 1 agree with a mean of logarithms within 1e-12 and with normal equations within 1e-8."""
-    cells = read_readings(TABLE_1)
+    cells = read_response_table(TABLE_1)
     f, a = cells.conditions[cells.condition].T
-    train = ~cells.select("frequency=135 Hz,150 Hz,155 Hz")
+    train = ~cells.select_readings("frequency=135 Hz,150 Hz,155 Hz")
     every = np.ones(train.size, bool)
-    for kind in (cells.felt, ~cells.felt):
+    for kind in (cells.is_acceleration, ~cells.is_acceleration):
         ratio = np.log(cells.measured / a)
         logs, _ = fit_null_model(cells, "constant", train)
         assert np.abs(logs - (ratio[kind & train].mean() - ratio))[kind].max() < 1e-12
-    table = np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.felt]
-    y = np.log(cells.measured)[cells.felt]
+    table = np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.is_acceleration]
+    y = np.log(cells.measured)[cells.is_acceleration]
     factor = np.linalg.solve(table.T @ table, table.T @ y)
     logs, numbers = fit_null_model(cells, "power_input_frequency", every)
-    assert np.abs(logs[cells.felt] - (table @ factor - y)).max() < 1e-8
+    assert np.abs(logs[cells.is_acceleration] - (table @ factor - y)).max() < 1e-8
     assert numbers["acceleration"] == pytest.approx(
         {"factor": np.exp(factor[0]), "input": factor[1], "frequency": factor[2]}, rel=1e-6
     )
@@ -135,14 +143,14 @@ def test_exact_table_1_null_scores_with_frequency_left_out():
 
     0.125 and 0.090.
     """
-    cells = read_readings(TABLE_1)
+    cells = read_response_table(TABLE_1)
     every = np.ones(cells.row.size, bool)
     found = {}
     for name in NULL_MODELS:
         left = np.full(cells.row.size, np.nan)
-        for part in cells.group_readings("frequency", every).values():
+        for part in cells.group_by_column("frequency", every).values():
             left[part] = fit_null_model(cells, name, ~part)[0][part]
-        found[name] = scores(cells, left, every)
+        found[name] = compute_rms_scores(cells, left, every)
     assert found["constant"] == pytest.approx(
         {"acceleration": 0.125, "displacement": 0.580, "all": 0.298}, abs=6e-4
     )
@@ -151,7 +159,7 @@ def test_exact_table_1_null_scores_with_frequency_left_out():
 
 def test_exact_null_model_keeps_undetermined_powers(tmp_path):
     """A null model keeps a power of 0 for a single frequency, and of 1 for a single input."""
-    cells = read_readings(write_table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
+    cells = read_response_table(write_table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
     one = fit_null_model(cells, "power_input_frequency", np.array([True, True, False]))[1][
         "acceleration"
     ]

@@ -1,4 +1,4 @@
-"""Computed instrument readings of a rig at measured conditions, by free parameters."""
+"""Instrument readings that a rig model predicts at the measured conditions."""
 
 import numpy as np
 
@@ -10,13 +10,14 @@ from .condition_models import GAIN_KEYS, ConditionModels
 
 
 class ModelReadings:
-    """Function that computes instrument readings of a rig for given free parameters.
+    """Callable that computes the instrument readings of a rig for given free parameters.
 
-    It starts a motion from that of the previous parameters, so that a descent is fast. After
-    `forget` it starts from rest, so that the result does not depend on earlier evaluations.
+    Each motion is continued from the motion for the previous parameters, which makes a descent
+    fast. After `reset_motions` it starts from rest, so that the result does not depend on earlier
+    evaluations.
 
-    A call returns the acceleration reading [m s-2] and the displacement amplitude [m], (c,) each:
-    NaN at conditions that were not requested, and infinite if no bounded motion is found.
+    A call returns the acceleration reading [m s-2] and the displacement amplitude [m], (c,) each.
+    They are NaN at conditions that were not requested, and infinite if no bounded motion exists.
     """
 
     def __init__(self, models: ConditionModels, say=None):
@@ -27,7 +28,7 @@ class ModelReadings:
         self.last_readings = (None, {})
         self.observer = None
         self.n_motions = 0
-        instrument = models.read
+        instrument = models.instrument
         self.reading = ("peak", None)
         self.gains = (1.0, 1.0)
         if instrument is not None:
@@ -36,18 +37,18 @@ class ModelReadings:
         keys = [bound.key for bound in models.ranges]
         self.free_gains = [keys.index(key) if key in keys else None for key in GAIN_KEYS]
 
-    def forget(self) -> None:
-        """Start the next motions from rest."""
+    def reset_motions(self) -> None:
+        """Discard the stored motions, so that the next motions start from rest."""
         self.last_motions = {}
         self.last_readings = (None, {})
 
     def __call__(self, values, conditions) -> tuple:
-        inner = tuple(float(values[k]) for k in self.models.inner)
+        inner = tuple(float(values[k]) for k in self.models.model_parameters)
         last_values, last_readings = self.last_readings
         readings = last_readings if last_values == inner else {}
         missing = [k for k in conditions if k not in readings]
         if missing:
-            readings = readings | self._run(values, missing)
+            readings = readings | self._compute_readings(values, missing)
             self.last_readings = inner, readings
         out = np.full((2, len(self.models.rigs)), np.nan)
         for k in conditions:
@@ -56,21 +57,21 @@ class ModelReadings:
             row *= gain if free is None else values[free]
         return out
 
-    def _run(self, values, conditions) -> dict:
-        """Return acceleration reading without gain and displacement, by condition."""
-        model = self.models.model(values)
+    def _compute_readings(self, values, conditions) -> dict:
+        """Return the acceleration reading without gain and the displacement for each condition."""
+        model = self.models.build_model(values)
         readings = {}
         with locate_errors(model.source):
-            patch = self._get_patch(model)
+            patch = self._get_solved_patch(model)
             needs_cycle = self.reading[0] not in ("peak", "fundamental")
             observer = MotionObserver(model, patch, self.say, needs_cycle, self.observer)
             self.observer = observer
             for k in conditions:
                 self.n_motions += 1
                 if not observer.by:
-                    model_at_k = self.models.at(model, k)
+                    model_at_k = self.models.with_condition_drive(model, k)
                     observer = MotionObserver(model_at_k, patch, self.say, needs_cycle)
-                drive = self.models.sine(k)
+                drive = self.models.sine_drive(k)
                 motion = observer(drive, self.last_motions.get(k))
                 if motion is None:
                     self.last_motions.pop(k, None)
@@ -81,18 +82,18 @@ class ModelReadings:
         return readings
 
     def _read_accelerometer(self, motion, drive) -> float:
-        """Return the accelerometer reading of a motion [m s-2] without its gain."""
+        """Return the accelerometer reading of a motion before its gain is applied [m s-2]."""
         if self.reading[0] == "fundamental" and motion.fundamental is not None:
             return abs(motion.fundamental)
         return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
-    def _get_patch(self, model):
+    def _get_solved_patch(self, model):
         """Return the solved contact patch of a model; None for a [normal] contact.
 
-        It is pressed only once if no free key changes it.
+        The contact is solved again only if a free parameter changes it.
         """
         if model.patch is None:
             return None
-        if self.patch is None or self.models.moves_pieces:
+        if self.patch is None or self.models.changes_contact:
             self.patch = press_patch(model)
         return self.patch
