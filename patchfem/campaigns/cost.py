@@ -25,7 +25,7 @@ from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..runs.patch.ladder import solve_on_split_mesh
-from ..runs.patch.measures import estimate_measures
+from ..runs.patch.measures import estimate_static_measures
 from ..runs.plan import plan
 from ..runs.run import run as run_plan
 from .numerical_settings import (
@@ -434,7 +434,7 @@ def _run_setting(
     try:
         if setting.level:
             fine, *coarser = solve_on_split_mesh(setting.model.patch, setting.level, can_split)
-            return _FinishedRun(estimate_measures(fine, *coarser), (), None)
+            return _FinishedRun(estimate_static_measures(fine, *coarser), (), None)
         result = run_plan(plan(setting.model), fresh=True)
         steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
         return _FinishedRun(result.measures, result.warnings, steps)

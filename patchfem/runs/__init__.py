@@ -60,7 +60,7 @@ PUBLIC = {
         "solve_with_coarser",
         "solve_on_split_mesh",
     ),
-    "patch.measures": ("estimate_measures",),
+    "patch.measures": ("estimate_static_measures",),
     "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
     "patch.result": ("make_bodies",),

@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 from scipy.optimize import brentq
 
-from patchfem.runs import estimate_measures
+from patchfem.runs import estimate_static_measures
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 
@@ -39,7 +39,7 @@ def rolled_pieces(roll: float, count: int, skin: str):
 def case(roll: float, count: int, skin: str = "bare") -> dict:
     """Return {name: Measure} of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
     three = [press_patch(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
-    return estimate_measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
+    return estimate_static_measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
 
 
 def roll_for(centre: float, skin: str, count: int = 16) -> float:

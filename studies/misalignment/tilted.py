@@ -14,7 +14,7 @@ from patchfem.mesh import Layout, TensorGrid, divide_into_columns
 from patchfem.mesh.tensor import graded_depth
 from patchfem.model import build
 from patchfem.model.patch import PatchModel
-from patchfem.runs import estimate_measures
+from patchfem.runs import estimate_static_measures
 from patchfem.runs.patch.condensed import Pair, condense
 from patchfem.runs.patch.press import Patch, press_patch
 from patchfem.scene import scene
@@ -76,7 +76,7 @@ def patches(asked: PatchModel) -> tuple:
 def compute_measures(asked: PatchModel) -> dict:
     """Return {name: Measure} of a model of `case`, with `rubbed`, the portion beyond RUBBED, as a value."""
     three = patches(asked)
-    return estimate_measures(*three) | {"rubbed": rubbed_portion(three[0])}
+    return estimate_static_measures(*three) | {"rubbed": rubbed_portion(three[0])}
 
 
 def rubbed_portion(patch: Patch, share: float = RUBBED_FRACTION) -> float:

@@ -7,10 +7,10 @@ import pytest
 from scene_texts import PIECE
 
 from patchfem import build
-from patchfem.runs import estimate_measures, solve_with_coarser
+from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.limits import extrapolate
+from patchfem.runs.patch.limits import extrapolate_to_zero_cell_length
 from patchfem.runs.patch.press import press_patch
 from patchfem.runs.patch.values import values
 from patchfem.scene import loads
@@ -38,7 +38,7 @@ def compare_with_refined_meshes(scene: str) -> dict:
     sets = [f"contact.{word}" for word in scene.split("; ")]
     model = build(loads(BLOCKS, "a.toml", [*sets, "accuracy.tolerance=1e-2"]))
     series = solve_with_coarser(model.patch, model.accuracy.tolerance)
-    measures = estimate_measures(
+    measures = estimate_static_measures(
         *series, tolerance=model.accuracy.tolerance if model.patch.mesh.is_automatic else None
     )
     grids = [series[0].pair.grid, series[0].pair.upper_grid]
@@ -89,7 +89,7 @@ def test_exact_limit_of_geometric_series(ratio):
     """The extrapolation of 1 + 1/r + 1/r^2 + ... gives r/(r - 1); the error of the finest value is
     1.8 times its distance from this limit."""
     sums = np.cumsum(ratio ** -np.arange(4.0))
-    estimate = extrapolate(sums)
+    estimate = extrapolate_to_zero_cell_length(sums)
     limit = ratio / (ratio - 1)
     assert estimate.extrapolated == pytest.approx(limit, rel=1e-12)
     assert estimate.error == pytest.approx(1.8 * (limit - sums[-1]), rel=1e-12)

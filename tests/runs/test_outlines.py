@@ -17,7 +17,7 @@ from patchfem.elasticity import compute_coating_traction, compute_displacement, 
 from patchfem.mesh import TensorGrid, write_mesh
 from patchfem.mesh.tensor import graded_depth, graded_rows
 from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
-from patchfem.runs import estimate_measures, solve_with_coarser
+from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.result import warn_of_strains
 from patchfem.runs.patch.values import values
@@ -207,7 +207,8 @@ def test_always_errors_of_bounded_measures_cover_finer_mesh(tables):
     smaller tolerance and stay below 5 %."""
     model = build_patch_model(BLOCK + tables)
     coarse, fine = (
-        estimate_measures(*solve_with_coarser(model, tolerance)) for tolerance in (2e-2, 4e-3)
+        estimate_static_measures(*solve_with_coarser(model, tolerance))
+        for tolerance in (2e-2, 4e-3)
     )
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "contact_fraction"):
         assert (
@@ -229,7 +230,7 @@ def test_always_errors_of_unresolved_rounding_cover_fine_mesh(radius, tilt):
         solve_on_columns(model, graded_columns(half, model.pieces.length / 2, edge / 30))
     )
     for cells in (20, 150):
-        measures = estimate_measures(
+        measures = estimate_static_measures(
             *solve_with_coarser(
                 build_patch_model(
                     BLOCK + f'element_size = "{model.pieces.length / cells!r} m"\n' + tables

@@ -17,8 +17,8 @@ from patchfem.formatting import format_length
 from patchfem.mesh import graded_grid, write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.model import make_piece_meshes
-from patchfem.runs import estimate_measures, solve_with_coarser
-from patchfem.runs.patch.measures import plane_state_sentences
+from patchfem.runs import estimate_static_measures, solve_with_coarser
+from patchfem.runs.patch.measures import note_on_plane_state
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.values import values
 from patchfem.runs.run import run
@@ -348,7 +348,7 @@ def test_exact_automatic_mesh_agrees_with_hertz():
     cost does."""
     model = build_patch_model('[contact.crown]\nradius = "0.2 m"\n', 'load = "40 N"')
     series = solve_with_coarser(model, 1e-2)
-    measures = estimate_measures(*series)
+    measures = estimate_static_measures(*series)
     modulus = exact.combined_modulus(210e9, 0.3, 210e9, 0.3)
     half = exact.hertz_half_width(40 / WIDTH, 0.2, modulus)
     peak = exact.hertz_peak(40 / WIDTH, 0.2, modulus)
@@ -365,7 +365,7 @@ def test_exact_plane_state_note_states_difference():
     note."""
     model = build_patch_model(TILT.format(1e-5))
     patch = solve(model, *make_piece_meshes(model))
-    [sentence] = plane_state_sentences(model, patch)
+    [sentence] = note_on_plane_state(model, patch)
     in_stress = replace(model, pieces=replace(model.pieces, plane="stress"))
     stress = values(solve(in_stress, *make_piece_meshes(model)))
     strain = values(patch)
@@ -376,9 +376,7 @@ def test_exact_plane_state_note_states_difference():
     )
     wide_model = build_patch_model()
     wide_model = replace(wide_model, pieces=replace(wide_model.pieces, width=60e-3))
-    assert (
-        plane_state_sentences(wide_model, solve(wide_model, *make_piece_meshes(wide_model))) == []
-    )
+    assert note_on_plane_state(wide_model, solve(wide_model, *make_piece_meshes(wide_model))) == []
 
 
 def test_always_errors_of_uniform_mesh_cover_reference():
@@ -399,7 +397,7 @@ def test_always_errors_of_uniform_mesh_cover_reference():
         "roll_moment": -0.575480,
     }
     for size in (250, 127, 100):
-        measures = estimate_measures(
+        measures = estimate_static_measures(
             *solve_with_coarser(build(loads(text.format(size))).patch, 1e-3)
         )
         for name, value in reference.items():

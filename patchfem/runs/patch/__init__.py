@@ -3,6 +3,6 @@
 In: a `PatchModel`. Out: patches on nested meshes, and static measures with errors. `grids`
 chooses the mesh, for plans and for runs; `condensed` condenses the pieces to their interface;
 `press` computes the pressure; `fine` adds more accurate measures for profiles. `sweep_meshes`
-and `static_batch` solve the patches of a sweep in one batch, and `store` keeps results that several
-runs of one patch share. Read `press` first, then `grids`, `ladder` and `measures`.
+and `static_batch` solve the patches of a sweep in one batch, and `store` caches results that
+several runs of a patch need. Read `press` first, then `grids`, `ladder` and `measures`.
 """

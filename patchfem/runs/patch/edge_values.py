@@ -1,16 +1,16 @@
-"""Record of the length and the stiffness of a contact, for patches with and without strips."""
+"""Record of contact length and contact stiffnesses, for patches with and without strips."""
 
 from typing import NamedTuple
 
 
 class EdgeValues(NamedTuple):
-    """Contact length and contact stiffnesses, which depend on the contact edges.
+    """Contact length and contact stiffnesses, which depend on the positions of the contact edges.
 
-    Each is a number, or (q,) for q patches.
+    Each field is a number, or (q,) for q patches.
 
-    - length: length in contact [m]; the mean of strips.
-    - width: distance between the first and the last end [m].
-    - normal, tangential: stiffness [N/m].
+    - length: length in contact [m]; the mean over the strips.
+    - width: distance between the outermost contact edges [m].
+    - normal, tangential: stiffnesses [N/m].
     - rotational: stiffness [N m/rad].
     """
 

@@ -32,9 +32,9 @@ from .measures import (
     PEAK_MEASURES,
     Estimate,
     Resolution,
-    estimate_common_errors,
-    extrapolate_measures,
-    include_peak_error,
+    estimate_hidden_errors,
+    extrapolate_static_measures,
+    widen_error_by_peak_error,
 )
 from .press import PointSolution, Surface
 from .values import peak_pressures, static_values
@@ -187,9 +187,9 @@ def _combine_series(coarse: list, levels: list) -> dict:
     the finest of these cells. The extrapolation and the error of the first are added to the second.
     """
     finest = levels[-1]
-    shared = estimate_common_errors(finest.resolution, finest.values)
-    by_points = extrapolate_measures([level.values for level in levels], shared, 0.0)
-    by_ends = extrapolate_measures([level.values for level in coarse], {}, 0.0)
+    shared = estimate_hidden_errors(finest.resolution, finest.values)
+    by_points = extrapolate_static_measures([level.values for level in levels], shared, 0.0)
+    by_ends = extrapolate_static_measures([level.values for level in coarse], {}, 0.0)
     out = {}
     for name, estimate in by_points.items():
         if name not in PEAK_MEASURES or not finest.has_corner_peak:
@@ -200,7 +200,7 @@ def _combine_series(coarse: list, levels: list) -> dict:
         # The loaded fraction is the mean pressure divided by this peak.
         mean = finest.values["loaded_fraction"] * finest.values["pressure_peak"]
         fraction = mean / peak.value
-        error = include_peak_error(fraction, 0.0, peak.error / peak.value)
+        error = widen_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
         out["loaded_fraction"] = Estimate(float(fraction), float(error))
     return out
 

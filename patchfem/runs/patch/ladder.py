@@ -13,7 +13,7 @@ from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
 from .condensed import condense, shared_pairs
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import estimate_measures, max_error_ratio
+from .measures import estimate_static_measures, max_mesh_error_ratio
 from .press import press_patch, solve
 
 # Tolerance [1] at which a patch under prescribed partial slip may take the CPU time of a patch in a rig. The
@@ -97,7 +97,9 @@ def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float
     has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
     if not has_trace or patches[1] is None:
         return False
-    return max_error_ratio(estimate_measures(*patches, tolerance=tolerance), tolerance) > 1
+    return (
+        max_mesh_error_ratio(estimate_static_measures(*patches, tolerance=tolerance), tolerance) > 1
+    )
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
@@ -207,7 +209,8 @@ def solve_on_ladder(
         if points is not None:  # The solution on points of the profile is kept for finer meshes.
             patches[0] = _attach_point_solution(patch, points)
         is_within = (
-            max_error_ratio(estimate_measures(*patches, tolerance=tolerance), tolerance) <= 1
+            max_mesh_error_ratio(estimate_static_measures(*patches, tolerance=tolerance), tolerance)
+            <= 1
         )
         shows_slip = _resolves_slip_work(patch_model, patches, tolerance)
         if (
@@ -219,7 +222,10 @@ def solve_on_ladder(
             points = fine.solve_on_points(patch_model, meets_tolerance)
             patches[0] = _attach_point_solution(patch, points)
             is_within = (
-                max_error_ratio(estimate_measures(*patches, tolerance=tolerance), tolerance) <= 1
+                max_mesh_error_ratio(
+                    estimate_static_measures(*patches, tolerance=tolerance), tolerance
+                )
+                <= 1
             )
         is_done = shows_slip and (patches[0].points is not None or is_within)
         if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
@@ -235,10 +241,10 @@ def _attach_point_solution(patch, points):
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
     """Return whether every measure of a solved patch has an estimated error within the tolerance."""
-    patch_measures = estimate_measures(
+    patch_measures = estimate_static_measures(
         _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
     )
-    return max_error_ratio(patch_measures, tolerance) <= 1
+    return max_mesh_error_ratio(patch_measures, tolerance) <= 1
 
 
 def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
@@ -312,12 +318,12 @@ def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | No
         return None
     known = [patch for patch in patches if patch is not None]
     if patches[0].points is not None:
-        found = estimate_measures(*known, tolerance=tolerance)
-        return tolerance / 10 if max_error_ratio(found, tolerance) <= 1 else None
+        found = estimate_static_measures(*known, tolerance=tolerance)
+        return tolerance / 10 if max_mesh_error_ratio(found, tolerance) <= 1 else None
     for decade in range(1, MAX_DECADES + 1):
         tighter = tolerance * 10.0**-decade
-        found = estimate_measures(*known, tolerance=tighter)
-        is_done = max_error_ratio(found, tighter) <= 1 and _resolves_slip_work(
+        found = estimate_static_measures(*known, tolerance=tighter)
+        is_done = max_mesh_error_ratio(found, tighter) <= 1 and _resolves_slip_work(
             patch_model, known, tighter
         )
         if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):

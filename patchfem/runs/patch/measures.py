@@ -1,9 +1,9 @@
-"""Measures of a static patch, with errors from coarser meshes.
+"""Static measures of a patch, with error estimates from coarser meshes.
 
-In: a `Patch` and the same on coarser meshes. Out: measures by name (`estimate_measures`). A value is that of
-the finest mesh, or its limit by extrapolation (`limits`). Its error contains the remaining change
-by refinement and the errors that no change of the mesh shows (`estimate_common_errors`). The module has also
-the model errors due to the plane state and the number of strips.
+In: a `Patch` and the same patch on coarser meshes. Out: measures by name. A value is that of the
+finest mesh, or its limit by extrapolation (`limits`). Its error contains the change that further
+refinement would cause and the errors that refinement does not show (`estimate_hidden_errors`). The
+module also estimates the model errors due to the plane state and to the number of strips.
 """
 
 from dataclasses import replace
@@ -20,39 +20,42 @@ from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
 from ..results.patch_rows import MESH_MEASURES, TABLE
 from .condensed import pair_on_same_meshes
-from .limits import extrapolate
+from .limits import extrapolate_to_zero_cell_length
 from .press import Patch, press_patch
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
-# Ratio of width to height of a piece that is clearly in plane strain; the inverse holds for plane stress.
+# Smallest width/height of a piece for plane strain without doubt; the inverse holds for plane
+# stress.
 MIN_PLANE_STRAIN_RATIO = 8.0
-MIN_RESOLVED_NODES = 12  # Number of contact nodes below which the measures depend on this number.
+# Smallest number of contact nodes at which the measures no longer depend on it.
+MIN_RESOLVED_NODES = 12
 MAX_UNRESOLVED_NODES = 3  # Largest number of nodes of a contact that counts as not resolved.
 ROUND_OFF_FRACTION = 5e-12  # Relative round-off error of the solved contact equations.
-MIN_ERROR = 1e-9  # Smallest relative error that is stated, because no use needs a smaller one.
-MIN_EDGE_OFFSET = 0.012  # Smallest error of the position of an edge between nodes, in cell lengths.
-# Ratio of the further increase of a corner pressure under refinement to its last change.
+MIN_ERROR = 1e-9  # Smallest relative error that is reported; no application needs a smaller one.
+MIN_EDGE_OFFSET = 0.012  # Smallest position error of a contact edge, in cell lengths.
+# Ratio of the remaining increase of a corner pressure to its change by the last refinement.
 CORNER_RISE_FACTOR = 4.0
-# Fraction of the pressure at the corner of a coating that is missed by cells longer than its
-# thickness.
+# Fraction of the corner pressure of a coating that cells longer than the coating thickness miss.
 CORNER_LAYER_FRACTION = 0.15
-# Ratio of the hidden error of an extrapolated value to that of the finest mesh: 4/3 + 1/3, rounded up.
+# Ratio of the hidden error of an extrapolated value to that of the finest mesh: 4/3 + 1/3, rounded
+# up.
 EXTRAPOLATED_ERROR_RATIO = 2.0
-# Factor on the errors of meshes too coarse for a rounding, because none of them shows its effect.
+# Error factor for meshes that do not resolve the rounded ends of a piece.
 UNRESOLVED_ROUNDING_FACTOR = 2.0
 MEASURES_WITH_BAND = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 PEAK_MEASURES = (
     "pressure_peak",
     "loaded_fraction",
-)  # measures without a value if the pressure is unbounded
+)  # Measures without a value where the pressure is unbounded.
 
 
 class Estimate(NamedTuple):
-    """Estimated value and error of a static measure of one patch, or of q patches.
+    """Value and error estimate of a static measure, for one patch or for q patches.
 
     - value: number or (q,).
-    - error: numerical error; None without a coarser mesh.
-    - is_extrapolated: whether the value is the limit of the nested meshes, not that of the finest.
+    - error: error estimate; None without a coarser mesh.
+    - is_extrapolated: whether the value is extrapolated over the nested meshes; otherwise it is
+      that of the finest mesh.
     """
 
     value: float
@@ -60,13 +63,13 @@ class Estimate(NamedTuple):
     is_extrapolated: bool = False
 
     def select(self, case: int) -> "Estimate":
-        """Return the estimate of one of the q patches."""
+        """Return the estimate of a single patch out of q patches."""
         return Estimate(self.value[case], self.error[case], self.is_extrapolated[case])
 
     def to_measure(self, name: str, floor: float | None = None) -> Measure:
         """Convert the estimate of a single patch to a Measure.
 
-        With floor None, the floor of the table applies.
+        If `floor` is None, the floor of the measure table is used.
         """
         row = TABLE[name]
         engine = patch_rows.FINEST_MESH_SOURCE
@@ -81,29 +84,33 @@ class Estimate(NamedTuple):
         )
 
 
-def estimate_measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
-    """Return the static measures of a patch as a dict, each with its estimated error.
+def estimate_static_measures(
+    fine: Patch, *coarse: Patch | None, tolerance: float | None = None
+) -> dict:
+    """Return the static measures of a patch with their error estimates.
 
     Parameters
     ----------
     fine : Patch
     coarse : Patch or None
-        The patch on coarser meshes, fine to coarse; None for a missing one.
+        The patch on coarser meshes, from fine to coarse; None where there is no such mesh.
     tolerance : float or None
-        Tolerance of a patch whose mesh it chose; a value whose error exceeds it is extrapolated.
+        Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
 
     Returns
     -------
     dict
-        Measure by name; the error is None without a coarser mesh, and 0 without a load.
+        Measure by name. The error is None without a coarser mesh, and 0 without a load.
     """
     finest = values(fine)
-    coarse = _select_same_contact_regions(fine, [patch for patch in coarse if patch is not None])
+    coarse = _select_meshes_with_same_contact_intervals(
+        fine, [patch for patch in coarse if patch is not None]
+    )
     if coarse and finest["normal_load"] > 0:
         missed_peak = unresolved_rounding(fine)
-        estimates = extrapolate_measures(
+        estimates = extrapolate_static_measures(
             [*(values(patch) for patch in reversed(coarse)), finest],
-            estimate_common_errors(_resolution_of_patch(fine, missed_peak), finest),
+            estimate_hidden_errors(_compute_patch_resolution(fine, missed_peak), finest),
             tolerance,
             all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
             max(MIN_ERROR, fine.pair.round_off_error),
@@ -114,20 +121,20 @@ def estimate_measures(fine: Patch, *coarse: Patch | None, tolerance: float | Non
         estimates = {name: Estimate(value, error) for name, value in finest.items()}
     out = {name: estimate.to_measure(name) for name, estimate in estimates.items()}
     if coarse and fine.averaging is not None:
-        out |= _include_corner_pressure(out, fine, coarse[0])
+        out |= _widen_errors_by_corner_pressure(out, fine, coarse[0])
     if fine.points is not None:
-        out |= _replace_by_point_measures(out, fine.points.measures)
+        out |= _select_more_accurate_point_measures(out, fine.points.measures)
     reason = _reason_for_unbounded_pressure(fine)
     for name in PEAK_MEASURES if reason else ():
         out[name] = replace(out[name], value=None, error=None, reason=reason)
     return out
 
 
-def _replace_by_point_measures(measures_by_name: dict, estimates: dict) -> dict:
-    """Return the measures that points of a profile give with smaller errors than the mesh.
+def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict) -> dict:
+    """Return the measures that the points of a profile give more accurately than the mesh.
 
-    The relative errors of the peak measures are compared, because a mesh that smooths the profile has
-    a small peak pressure and therefore a small error of it.
+    Peak measures are compared by their relative errors: a mesh that smooths the profile has a low
+    peak pressure, and therefore a small absolute error.
     """
     out = {}
     for name, estimate in estimates.items():
@@ -145,12 +152,12 @@ def _replace_by_point_measures(measures_by_name: dict, estimates: dict) -> dict:
     return out
 
 
-def _select_same_contact_regions(fine: Patch, coarse: list) -> list:
+def _select_meshes_with_same_contact_intervals(fine: Patch, coarse: list) -> list:
     """Select the coarser solutions with as many contact intervals as the finest one.
 
-    A contact region of a few cells next to a step may be missing on a coarse mesh. The change to
-    such a mesh shows this region and no order of convergence, so that neither this mesh nor coarser
-    ones count.
+    A short contact interval beside a step may be missing on a coarse mesh. The change to this mesh
+    then says nothing about the order of convergence, so that this mesh and all coarser ones are
+    left out.
 
     Parameters
     ----------
@@ -161,28 +168,31 @@ def _select_same_contact_regions(fine: Patch, coarse: list) -> list:
     Returns
     -------
     list of Patch
-        At least the first one, whose change then determines the error alone.
+        At least one solution; if it is the only one, its change determines the error.
     """
     if not fine.model.gap.jumps:
         return coarse
-    n_parts = _count_contact_regions(fine.active)
-    n_alike = 0
-    while n_alike < len(coarse) and _count_contact_regions(coarse[n_alike].active) == n_parts:
-        n_alike += 1
-    return coarse[: max(n_alike, 1)]
+    n_intervals = _count_contact_intervals(fine.active)
+    n_selected = 0
+    while (
+        n_selected < len(coarse)
+        and _count_contact_intervals(coarse[n_selected].active) == n_intervals
+    ):
+        n_selected += 1
+    return coarse[: max(n_selected, 1)]
 
 
-def _count_contact_regions(active) -> int:
-    """Count the contact intervals of a contact set (m,)."""
+def _count_contact_intervals(active) -> int:
+    """Return the number of contact intervals in a contact set (m,)."""
     return int(active[0]) + int(np.count_nonzero(active[1:] & ~active[:-1]))
 
 
-def _include_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch) -> dict:
-    """Return the peak measures with errors that include the pressure at a corner.
+def _widen_errors_by_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch) -> dict:
+    """Increase the errors of the peak measures if the pressure at a corner still grows.
 
-    Under a profile, the pressure at a corner may still increase with refinement, although the
-    largest pressure does not change: a corner that the profile just reaches carries ever more on
-    cells half as long. {} if the errors are large enough.
+    At a corner that the profile just reaches, every refinement raises the pressure, although the
+    largest pressure of the patch may not change yet. The result is {} if the errors are large
+    enough already.
     """
     pressure = fine.pressure.sigma_n[[0, -1]].max()
     coarse_pressure = coarse.pressure.sigma_n[[0, -1]].max()
@@ -190,58 +200,58 @@ def _include_corner_pressure(measures_by_name: dict, fine: Patch, coarse: Patch)
     error = pressure + CORNER_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
     if not pressure or error <= peak.error:
         return {}
-    fraction_error = include_peak_error(fraction.value, fraction.error, error / peak.value)
+    fraction_error = widen_error_by_peak_error(fraction.value, fraction.error, error / peak.value)
     return {
         "pressure_peak": replace(peak, error=float(error)),
         "loaded_fraction": replace(fraction, error=float(fraction_error)),
     }
 
 
-def extrapolate_measures(
-    series: list,
-    shared: dict,
+def extrapolate_static_measures(
+    values_by_mesh: list,
+    hidden_errors: dict,
     tolerance: float | None,
     nested: bool = True,
     min_relative_error: float = MIN_ERROR,
-    factor: float = 1.0,
+    error_factor: float = 1.0,
 ) -> dict:
-    """Extrapolate static measures over successively refined meshes, with errors.
+    """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
     Parameters
     ----------
-    series : list of dict
+    values_by_mesh : list of dict
         Values on two meshes or more by name, coarse to fine; numbers or (q,).
-    shared : dict
-        Errors by name that all meshes have in common.
+    hidden_errors : dict
+        Errors by name that no refinement shows (`estimate_hidden_errors`).
     tolerance : float or None
-        A value whose error is within it is not extrapolated; None: no value is.
+        Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.
     nested : bool
         Whether every mesh halves the cells of the previous one.
     min_relative_error : float
-        Smallest relative error that is stated.
-    factor : float
-        Factor of the errors.
+        Lower bound of the relative errors.
+    error_factor : float
+        Factor on all errors.
 
     Returns
     -------
     dict
         Estimate by name.
     """
-    names = list(series[-1])
-    series_values = np.array([[values[name] for name in names] for values in series])
+    names = list(values_by_mesh[-1])
+    series_values = np.array([[values[name] for name in names] for values in values_by_mesh])
     hidden, floors = np.zeros((2, *series_values.shape[1:]))
     for row, name in enumerate(names):
-        hidden[row] = shared.get(name, 0.0)
+        hidden[row] = hidden_errors.get(name, 0.0)
         floors[row] = TABLE[name].floor
     allowed = np.inf
     if tolerance is not None:
         allowed = compute_allowed_error(tolerance, series_values[-1], floors)
-    with np.errstate(invalid="ignore", divide="ignore"):  # patches that were not solved have NaN
-        limit = extrapolate(series_values, nested)
-        error = np.maximum(factor * limit.error, hidden)
+    with np.errstate(invalid="ignore", divide="ignore"):  # Patches that were not solved have NaN.
+        limit = extrapolate_to_zero_cell_length(series_values, nested)
+        error = np.maximum(error_factor * limit.error, hidden)
         extrapolated_error = np.where(
             (limit.extrapolated != limit.value) & (error > allowed),
-            np.maximum(factor * limit.extrapolated_error, EXTRAPOLATED_ERROR_RATIO * hidden),
+            np.maximum(error_factor * limit.extrapolated_error, EXTRAPOLATED_ERROR_RATIO * hidden),
             np.inf,
         )
         best = np.where(extrapolated_error < error, limit.extrapolated, limit.value)
@@ -250,42 +260,44 @@ def extrapolate_measures(
         out = dict(zip(names, map(Estimate, best, error, best != series_values[-1])))
         peak, fraction = (out[name] for name in PEAK_MEASURES)
         relative = np.where(peak.value > 0, peak.error / peak.value, 0.0)
-        fraction_error = include_peak_error(fraction.value, fraction.error, relative)
+        fraction_error = widen_error_by_peak_error(fraction.value, fraction.error, relative)
         out["loaded_fraction"] = fraction._replace(error=fraction_error)
     return out
 
 
-def include_peak_error(fraction, error, relative_peak_error):
-    """Raise the errors of loaded fractions to at least the error that an inaccurate pressure peak causes.
+def widen_error_by_peak_error(fraction, error, relative_peak_error):
+    """Increase the error of loaded fractions to at least that caused by the error of the peak.
 
-    A loaded fraction is the mean pressure divided by the peak, so that it has the relative error of the peak.
+    A loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
+    relative error.
 
     Parameters
     ----------
     fraction, error : float or (q,)
-        Loaded fraction and its own error.
+        Loaded fraction, and its error from the changes between meshes.
     relative_peak_error : float or (q,)
+        Relative error of the peak pressure.
     """
     return np.maximum(
         error, fraction * relative_peak_error / (1 - np.minimum(relative_peak_error, 0.5))
     )
 
 
-def max_error_ratio(measures_by_name: dict, tolerance: float) -> float:
-    """Return the largest ratio of error to allowed error of the measures that choose the mesh.
+def max_mesh_error_ratio(measures_by_name: dict, tolerance: float) -> float:
+    """Return the largest ratio of error to allowed error of the measures that control the mesh.
 
-    Above 1, a measure misses the tolerance. A missing value or error counts as 0.
+    A ratio above 1 means that a measure misses the tolerance. Measures without value or error are
+    ignored.
     """
     return max(measures_by_name[name].error_ratio(tolerance) for name in MESH_MEASURES)
 
 
 def _reason_for_unbounded_pressure(patch: Patch) -> str:
-    """Return the reason why the pressure of a patch diverges under mesh refinement.
+    """Return why the peak pressure of a patch diverges under mesh refinement, or "" if it does not.
 
-    It is "" if the pressure is bounded.
-
-    A contact that ends at the edge of a step has the pressure of a punch with a sharp corner; a
-    contact across a closed step is more singular. A skin makes the pressure bounded.
+    A contact that ends at the edge of a step has the pressure singularity of a flat punch; a
+    contact that extends over a closed step has a stronger one. An asperity layer (skin) bounds the
+    pressure.
     """
     if patch.has_skin:
         return ""
@@ -304,7 +316,7 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
 
 
 def are_cells_halved(fine, coarse) -> bool:
-    """Return whether every cell of the coarser of two Pairs is split in two on the finer one."""
+    """Return whether the finer of two Pairs halves every cell of the coarser one."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
     for fine_body, coarse_body in bodies:
         halved = fine_body.base_grid
@@ -317,22 +329,22 @@ def are_cells_halved(fine, coarse) -> bool:
 
 
 class Resolution(NamedTuple):
-    """Resolution of a contact by its mesh: the cell lengths and pressures that may hide errors.
+    """Resolution of a contact by its mesh, which determines the errors that refinement hides.
 
-    It describes one patch, or q patches.
+    The fields are numbers for one patch, or (q,) for q patches.
 
     - length: length of the interface [m].
     - n_nodes: nodes in contact.
-    - longest_cell, edge_cells: longest cell in which the contact ends, and the sum of all of them
-      [m].
-    - edge_offset: error of the position of an edge, in cells.
+    - longest_cell, edge_cells: longest cell in which the contact ends, and the sum of all such
+      cells [m].
+    - edge_offset: position error of a contact edge, in cells.
     - can_rotate: whether the rotation is free.
-    - closing: range of the gap plus largest elastic closing [m].
-    - corner_pressure: pressure [Pa] that is missed at loaded corners of a coating.
-    - wedge_pressure: pressure [Pa] next to a contact of few nodes.
-    - rounding_pressure: pressure [Pa] of a rounding that is not resolved.
-    - open_ends: length of rounded face in which the contact may end [m].
-    - inner_cells: part of `edge_cells` between two parts of the contact [m].
+    - closing: range of the gap plus the largest elastic displacement [m].
+    - corner_pressure: pressure [Pa] at loaded corners of a coating that the mesh misses.
+    - wedge_pressure: pressure [Pa] beside a contact of few nodes.
+    - rounding_pressure: peak pressure [Pa] of a rounded end that the mesh does not resolve.
+    - open_ends: length of the rounded surface on which a contact edge may lie [m].
+    - inner_cells: part of `edge_cells` between contact intervals [m].
     """
 
     length: float
@@ -349,20 +361,20 @@ class Resolution(NamedTuple):
     inner_cells: float = 0.0
 
 
-def resolution_of_patches(pair, pieces, force, gap_range, can_rotate: bool) -> Resolution:
-    """Return how well the mesh of a Pair resolves the contacts of q patches.
+def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool) -> Resolution:
+    """Return how well a mesh resolves the contacts of q patches.
 
     Parameters
     ----------
     pair : Pair
     pieces : Compliance
-        That of the pair with its skin.
+        Compliance of the pieces with their asperity layer.
     force : (q, m) ndarray
         Nodal forces [N].
     gap_range : float or (q,) ndarray
         Range of the gap [m].
     can_rotate : bool
-        Whether the rotation is free.
+        Whether the upper piece is free to rotate.
 
     Returns
     -------
@@ -373,29 +385,29 @@ def resolution_of_patches(pair, pieces, force, gap_range, can_rotate: bool) -> R
     cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
     longest = cells.max(axis=1)
     corner_pressure = 0.0
-    if pieces is pair.compliance:  # A compliant layer of asperities (skin) bounds the pressure.
+    if pieces is pair.compliance:  # An asperity layer (skin) bounds the pressure.
         ends = (force / interface.weight)[:, [0, -1]]
-        corner_pressure = _missed_corner_pressure(pair, ends, np.diff(interface.x)[[0, -1]])
+        corner_pressure = _unresolved_corner_pressure(pair, ends, np.diff(interface.x)[[0, -1]])
     return Resolution(
         length=interface.length,
         n_nodes=np.maximum(active.sum(axis=1), 1),
         longest_cell=longest,
         edge_cells=cells.sum(axis=1),
-        edge_offset=_edge_offset(pair, longest),
+        edge_offset=_contact_edge_position_error(pair, longest),
         can_rotate=can_rotate,
         closing=gap_range + np.abs(force @ pieces.normal).max(axis=1),
         corner_pressure=corner_pressure,
     )
 
 
-def _resolution_of_patch(patch: Patch, missed_peak: float) -> Resolution:
-    """Return how well the mesh of a solved Patch resolves its contact.
+def _compute_patch_resolution(patch: Patch, missed_peak: float) -> Resolution:
+    """Return how well the mesh of a solved patch resolves its contact.
 
-    missed_peak: pressure [Pa] of `unresolved_rounding`.
+    missed_peak: pressure [Pa] from `unresolved_rounding`.
     """
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     can_rotate = "moment_balance" in patch.pressure.residuals
-    out = resolution_of_patches(
+    out = compute_contact_resolution(
         patch.pair, patch.pieces, force[None], np.ptp(patch.unloaded_gap), can_rotate
     )
     out = Resolution(*(np.ravel(value)[0] for value in out))
@@ -404,53 +416,53 @@ def _resolution_of_patch(patch: Patch, missed_peak: float) -> Resolution:
     is_unresolved = out.n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
     return out._replace(
         edge_offset=out.edge_offset if patch.skin is None else None,
-        wedge_pressure=_wedge_pressure(patch) if is_unresolved else 0.0,
+        wedge_pressure=_wedge_indentation_pressure(patch) if is_unresolved else 0.0,
         rounding_pressure=missed_peak,
         open_ends=float(open_ends(patch)),
         inner_cells=float(cells[int(first) : cells.size - int(last)].sum()),
     )
 
 
-def estimate_common_errors(resolution: Resolution, finest: dict) -> dict:
-    """Estimate the errors that are common to all three meshes of a patch, by measure name.
+def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
+    """Estimate the errors of the static measures that mesh refinement does not show.
 
-    Changes from mesh to mesh do not show these errors. They are due to a contact of few nodes, the
-    layer at a loaded corner of a coating thinner than the cells there, a rounding smaller than the
-    cells, and round-off.
+    They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
+    to a rounded end shorter than the cells, and to round-off.
 
     Parameters
     ----------
     resolution : Resolution
-        That of the finest mesh.
+        Resolution of the finest mesh.
     finest : dict
-        Values by name on the finest mesh.
+        Values on the finest mesh by name.
 
     Returns
     -------
     dict
+        Error by name.
     """
     length = resolution.length
     n_nodes = resolution.n_nodes
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
-    # Half the sum of the edge cells exceeds the longest cell only if the contact has many ends.
+    # Half the sum of the edge cells exceeds the longest one only if the contact has many edges.
     cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
-    arm = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
+    centre_error = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)
     has_few_nodes = (cell > 0) & (n_nodes <= MIN_RESOLVED_NODES)
     peak_error = resolution.corner_pressure + np.where(has_few_nodes, peak / (4 * n_nodes**2), 0.0)
     peak_error = np.maximum(peak_error, resolution.wedge_pressure)
     peak_error = np.maximum(peak_error, resolution.rounding_pressure - peak)
     displacement = (
         ROUND_OFF_FRACTION * (np.abs(finest["approach"]) + resolution.closing)
-        + np.abs(finest["rotation"]) * arm * resolution.can_rotate
+        + np.abs(finest["rotation"]) * centre_error * resolution.can_rotate
     )
     fraction_per_pressure = np.divide(
         finest["loaded_fraction"], peak, out=np.zeros(np.shape(peak)), where=peak != 0
     )
     edge_offset = 0.0
     if resolution.edge_offset is not None:
-        # An edge of a contact of few nodes may lie anywhere in its cell.
+        # In a contact of few nodes, an edge may lie anywhere in its cell.
         min_offset = np.where(is_unresolved, 1.0, 1 / n_nodes**2)
         edge_offset = np.maximum(resolution.edge_offset, min_offset)
     outer_cells = resolution.edge_cells - resolution.inner_cells
@@ -462,18 +474,18 @@ def estimate_common_errors(resolution: Resolution, finest: dict) -> dict:
         "contact_fraction": length_error / length,
         "contact_half_width": width_error / 2,
         "loaded_fraction": peak_error * fraction_per_pressure,
-        "pressure_centre": ROUND_OFF_FRACTION * length + arm,
-        "moment": (ROUND_OFF_FRACTION * length + arm) * load,
+        "pressure_centre": ROUND_OFF_FRACTION * length + centre_error,
+        "moment": (ROUND_OFF_FRACTION * length + centre_error) * load,
         "rotation": displacement / length,
         "approach": ROUND_OFF_FRACTION * resolution.closing,
     }
 
 
-def _edge_offset(pair, cell):
-    """Return the error of the position of a contact edge between two nodes, in cell lengths.
+def _contact_edge_position_error(pair, cell):
+    """Return the position error of a contact edge between two nodes, in cell lengths.
 
-    A soft coating thinner than the cells acts as a bed of springs, whose edge is where the pressure
-    of a node vanishes. cell: longest cell in which the contact ends [m].
+    A soft coating thinner than the cells acts as a Winkler foundation, whose contact ends where the
+    nodal pressure vanishes. cell: longest cell in which the contact ends [m].
     """
     out = MIN_EDGE_OFFSET
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
@@ -485,11 +497,12 @@ def _edge_offset(pair, cell):
     return out
 
 
-def _missed_corner_pressure(pair, sigma, cells):
-    """Return the pressures (...) [Pa] that the mesh misses at loaded corners of a coating.
+def _unresolved_corner_pressure(pair, sigma, cells):
+    """Return the pressures (...) [Pa] at loaded corners of a coating that the mesh misses.
 
-    The free end of a coating adds them. Cells longer than the coating thickness do not resolve
-    them, and they fall with the square of the cell length.
+    The free end of a coating raises the pressure in a layer as long as the coating is thick. Cells
+    longer than this layer do not resolve it; for shorter cells the missed pressure falls with the
+    square of their length.
 
     Parameters
     ----------
@@ -505,10 +518,11 @@ def _missed_corner_pressure(pair, sigma, cells):
     return (CORNER_LAYER_FRACTION * sigma * fraction).max(axis=-1)
 
 
-def _wedge_pressure(patch: Patch) -> float:
-    """Return the largest pressure [Pa] that the gap beside a contact of few nodes permits.
+def _wedge_indentation_pressure(patch: Patch) -> float:
+    """Return the largest pressure [Pa] compatible with the slope of the gap beside the contact.
 
-    It is E* times the slope of the gap there.
+    It is E* times the slope, as for the indentation by a wedge, and is used for contacts of few
+    nodes.
     """
     ends = np.flatnonzero(patch.active[1:] != patch.active[:-1])
     slopes = np.abs(np.diff(patch.unloaded_gap)) / np.diff(patch.x)
@@ -519,11 +533,11 @@ def _wedge_pressure(patch: Patch) -> float:
     return float(slopes[..., ends].max() / flexibility)
 
 
-def plane_state_sentences(patch_model, patch: Patch) -> list:
-    """Return a sentence, as a list, on the model error due to plane stress or plane strain.
+def note_on_plane_state(patch_model, patch: Patch) -> list:
+    """Return a note, as a list, on the model error due to assuming plane strain or plane stress.
 
-    The list is empty for a piece that is far wider than tall in plane strain, or far taller than
-    wide in plane stress. Otherwise no mesh reduces this error.
+    The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
+    stress that is far taller than wide. No mesh refinement reduces this error.
     """
     other_model = with_opposite_plane_state(patch_model)
     if other_model is None:
@@ -531,34 +545,36 @@ def plane_state_sentences(patch_model, patch: Patch) -> list:
     try:
         own_values = values(patch)
         pair = pair_on_same_meshes(other_model, patch.pair)
-        return format_plane_changes(patch_model, own_values, values(press_patch(other_model, pair)))
+        return note_on_plane_state_changes(
+            patch_model, own_values, values(press_patch(other_model, pair))
+        )
     except PatchfemError as error:
         return [
-            f"{_plane_state_clause(patch_model)}; how much the two "
+            f"{_describe_plane_state(patch_model)}; how much the two "
             f"differ is not known, because for plane {other_model.pieces.plane} the contact could not be solved ({error})"
         ]
 
 
 def with_opposite_plane_state(patch_model):
-    """Return the model with plane stress and strain exchanged; None if the state is certain."""
+    """Return the model with the other plane state; None if the assumed state is certain."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     if pieces.plane == "strain":
-        is_right = ratio >= MIN_PLANE_STRAIN_RATIO
+        is_certain = ratio >= MIN_PLANE_STRAIN_RATIO
     else:
-        is_right = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
-    if is_right:
+        is_certain = ratio <= 1 / MIN_PLANE_STRAIN_RATIO
+    if is_certain:
         return None
-    return replace(patch_model, pieces=replace(pieces, plane=_opposite_plane_name(pieces)))
+    return replace(patch_model, pieces=replace(pieces, plane=_opposite_plane_state(pieces)))
 
 
-def _opposite_plane_name(pieces) -> str:
-    """Return "plane stress" for pieces in plane strain, and vice versa."""
+def _opposite_plane_state(pieces) -> str:
+    """Return "stress" for pieces in plane strain, and "strain" for pieces in plane stress."""
     return "stress" if pieces.plane == "strain" else "strain"
 
 
-def _plane_state_clause(patch_model) -> str:
-    """Describe whether plane stress or plane strain is assumed for the pieces."""
+def _describe_plane_state(patch_model) -> str:
+    """Describe the assumed plane state and the width of the pieces."""
     pieces = patch_model.pieces
     ratio = pieces.width / pieces.height
     return (
@@ -567,14 +583,14 @@ def _plane_state_clause(patch_model) -> str:
     )
 
 
-def format_plane_changes(patch_model, own_values: dict, other_values: dict) -> list:
-    """Return a sentence, as a list, on the changes of measures in the opposite plane state.
+def note_on_plane_state_changes(patch_model, own_values: dict, other_values: dict) -> list:
+    """Return a note, as a list, on how the opposite plane state would change the measures.
 
     Parameters
     ----------
     patch_model : PatchModel
     own_values, other_values : dict
-        Values in the plane state of the model and in the other one.
+        Measures in the assumed plane state and in the opposite one.
 
     Returns
     -------
@@ -584,8 +600,10 @@ def format_plane_changes(patch_model, own_values: dict, other_values: dict) -> l
     names = MEASURES_WITH_BAND
     if patch_model.loading.approach is not None:
         names = ("normal_load", *names)
-    elif closing := other_values["approach"] - own_values["approach"]:
-        changes.append(f"approach by {'+' * (closing > 0)}{format_length(closing, 3)}")
+    elif approach_change := other_values["approach"] - own_values["approach"]:
+        changes.append(
+            f"approach by {'+' * (approach_change > 0)}{format_length(approach_change, 3)}"
+        )
     for name in names:
         change = other_values[name] / own_values[name] - 1 if own_values[name] else 0.0
         if abs(change) > 1e-3:
@@ -593,16 +611,16 @@ def format_plane_changes(patch_model, own_values: dict, other_values: dict) -> l
     if not changes:
         return []
     return [
-        f"{_plane_state_clause(patch_model)}; plane {_opposite_plane_name(patch_model.pieces)} would change "
+        f"{_describe_plane_state(patch_model)}; plane {_opposite_plane_state(patch_model.pieces)} would change "
         f"the results by these amounts: {', '.join(changes)}"
     ]
 
 
-def add_strip_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
-    """Add the errors due to the finite number of strips to measures.
+def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
+    """Add the errors due to the finite number of strips to the measures of a patch.
 
-    It is the change to another number of strips on the mesh of `patch`, at second order. Measures
-    without a value are not changed.
+    The error follows from the change with another number of strips on the same mesh, assuming
+    second-order convergence. Measures without a value are left unchanged.
 
     Parameters
     ----------
@@ -632,8 +650,8 @@ def add_strip_errors(patch_model, patch: Patch, measures_by_name: dict) -> dict:
 def with_other_strip_count(patch_model) -> tuple:
     """Return the model with another number of strips, and the ratio of the strip widths.
 
-    It has half as many strips, or twice as many if half as many would not reach to the load line.
-    Without strips to halve it is the model itself.
+    The number of strips is halved, or doubled if half as many strips would not extend to the load
+    line. A model with fewer than two strips is returned unchanged.
     """
     strips = patch_model.interface.strips
     if strips is None or strips.count < 2:

@@ -434,7 +434,7 @@ def solve_contact(
         return press_to_approach_with_rotation(patch_model, pieces, gap, under_load, stiff)
     if patch_model.interface.strips is not None:
         return SolvedContact(
-            pieces, *strip_press.press_strips_of_patch(patch_model, pieces, gap, added, warm_start)
+            pieces, *strip_press.solve_strip_contact(patch_model, pieces, gap, added, warm_start)
         )
     if skin is not None and skin.law != "linear":
         return SolvedContact(*skin_press.press_through_asperities(patch_model, pieces, gap))

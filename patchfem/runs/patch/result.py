@@ -20,7 +20,7 @@ from ..results.patch_rows import TABLE
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .ladder import solve_static_ladder, solve_with_coarser
-from .measures import add_strip_errors, estimate_measures, plane_state_sentences
+from .measures import add_strip_count_errors, estimate_static_measures, note_on_plane_state
 from .values import reaches_steep_end, values
 
 # Poisson's ratio up to which the errors of volumetrically locking elements are reliable.
@@ -95,7 +95,7 @@ def static_measures(model, patch, coarse) -> dict:
         measures_by_name = store.get_or_compute_in_sweep(
             patch_model,
             ("measures", patches, tolerance),
-            lambda: estimate_measures(*patches, tolerance=tolerance),
+            lambda: estimate_static_measures(*patches, tolerance=tolerance),
         )
     values_by_name = {name: measure.value for name, measure in measures_by_name.items()}
     min_floors = measure_floors(patch_model, model.accuracy.tolerance, values_by_name)
@@ -106,7 +106,7 @@ def static_measures(model, patch, coarse) -> dict:
     # For worn strips, `wear.measures` adds the error due to their number.
     if patch.strips is None or coarse[0] is None or model.wear is not None:
         return measures_by_name
-    return add_strip_errors(patch_model, coarse[0], measures_by_name)
+    return add_strip_count_errors(patch_model, coarse[0], measures_by_name)
 
 
 def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
@@ -314,7 +314,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             out += store.get_or_compute_in_sweep(
                 patch_model,
                 ("plane band", other),
-                lambda: plane_state_sentences(patch_model, other),
+                lambda: note_on_plane_state(patch_model, other),
             )
     return out
 

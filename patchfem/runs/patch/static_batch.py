@@ -23,11 +23,11 @@ from .measures import (
     MAX_UNRESOLVED_NODES,
     MIN_ERROR,
     are_cells_halved,
-    estimate_common_errors,
-    extrapolate_measures,
-    format_plane_changes,
-    max_error_ratio,
-    resolution_of_patches,
+    compute_contact_resolution,
+    estimate_hidden_errors,
+    extrapolate_static_measures,
+    max_mesh_error_ratio,
+    note_on_plane_state_changes,
     with_opposite_plane_state,
 )
 from .press import SolvedContact, make_patch, with_linear_skin
@@ -41,7 +41,7 @@ class SolvedPatch(NamedTuple):
     """Solution of a patch that was computed in a batch with others.
 
     - measures: static measures by name.
-    - plane_sentences: sentences on the plane state (`measures.plane_state_sentences`).
+    - plane_sentences: sentences on the plane state (`measures.note_on_plane_state`).
     - patches: the solved Patch on all meshes, fine to coarse.
     """
 
@@ -130,7 +130,7 @@ class BatchSolution(NamedTuple):
             {name: float(column[case]) for name, column in values.items()}
             for values in self.plane_values
         )
-        return format_plane_changes(patch_model, own_values, other_values)
+        return note_on_plane_state_changes(patch_model, own_values, other_values)
 
     def measures(self, case: int, floors: Mapping | None = None) -> dict:
         """Return the measures of one patch of the batch as a dict.
@@ -313,7 +313,7 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
         alike = [patch_models[case] for case in cases]
         solution = solve_batch(collect_loads(alike), tolerance, pairs)
         for row in np.flatnonzero(solution.is_solved).tolist():
-            out[cases[row]] = max_error_ratio(solution.measures(row), tolerance)
+            out[cases[row]] = max_mesh_error_ratio(solution.measures(row), tolerance)
     return out
 
 
@@ -350,16 +350,16 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
         is_solved = is_solved & level.is_solved
     if any(pair.closing.any() for pair in pairs):
         is_solved = np.zeros_like(is_solved)
-    resolution = resolution_of_patches(
+    resolution = compute_contact_resolution(
         pairs[0],
         with_linear_skin(first.interface.skin, pairs[0].compliance),
         fine.contacts.force,
         fine.gap_range,
         first.loading.moment is not None,
     )
-    estimates = extrapolate_measures(
+    estimates = extrapolate_static_measures(
         [level.values for level in reversed(levels)],
-        estimate_common_errors(resolution, fine.values),
+        estimate_hidden_errors(resolution, fine.values),
         (first.mesh.tolerance or tolerance) if first.mesh.is_automatic else None,
         all(are_cells_halved(a, b) for a, b in pairwise(pairs)),
         max(MIN_ERROR, pairs[0].round_off_error),

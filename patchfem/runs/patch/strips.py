@@ -1,7 +1,7 @@
-"""Contact of a patch in strips over its width, pressed by a holder that may roll.
+"""Contact of a patch that is divided into strips over its width, under a holder that may roll.
 
-In: a `PatchModel` with strips and its condensed pieces. Out: the contact of all strips, and its
-extent and stiffness.
+In: a `PatchModel` with strips and its condensed pieces. Out: the contact of all strips, its length
+and its stiffness.
 """
 
 import numpy as np
@@ -23,12 +23,10 @@ from .edge_values import EdgeValues
 from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, make_skin_law
 
 
-def press_strips_of_patch(
-    patch_model, pieces: Compliance, gap, added=None, warm_start=None
-) -> tuple:
-    """Solve the contact of two pieces that are divided in strips over their width.
+def solve_strip_contact(patch_model, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
+    """Solve the contact of two pieces that are divided into strips over their width.
 
-    The stiffnesses are computed from the strips.
+    The strips do not interact: each one has the compliance of its fraction of the width.
 
     Parameters
     ----------
@@ -37,12 +35,12 @@ def press_strips_of_patch(
     gap : (m,) or (s, m)
         Unloaded gap [m].
     added, warm_start
-        Parameters of `StripCompliance`.
+        See `StripCompliance`.
 
     Returns
     -------
     tuple
-        ContactState of the means over the width, smooth skin or None, and StripsState.
+        ContactState averaged over the width, smooth skin or None, and StripsState.
     """
     count, roll, offset = patch_model.interface.strips
     loading = patch_model.loading
@@ -74,10 +72,10 @@ def press_strips_of_patch(
     return mean_state, skin if is_smooth else None, state
 
 
-def rotational_stiffness(state, strip_compliance, x, weight) -> float:
+def strips_rotational_stiffness(state, strip_compliance, x, weight) -> float:
     """Return the rotational stiffness [N m/rad] of strips with a smooth asperity layer.
 
-    The approach is fixed.
+    It holds at fixed approach.
 
     Parameters
     ----------
@@ -87,7 +85,7 @@ def rotational_stiffness(state, strip_compliance, x, weight) -> float:
     x : (m,)
         Positions [m].
     weight : (m,)
-        Areas of one strip [m2].
+        Nodal areas of one strip [m2].
     """
     out = 0.0
     for rate in state.stiffness:
@@ -100,8 +98,8 @@ def rotational_stiffness(state, strip_compliance, x, weight) -> float:
     return out
 
 
-def strip_edge_values(patch) -> EdgeValues:
-    """Return the contact length and the stiffnesses of a solved patch in strips."""
+def compute_strip_edge_values(patch) -> EdgeValues:
+    """Return the contact length and the contact stiffnesses of a patch in strips."""
     weight = patch.pair.compliance.interface.weight / len(patch.strips.offsets)
     if isinstance(patch.skin, SmoothAsperities):
         return _edge_values_with_skin(patch, weight)
@@ -130,12 +128,12 @@ def _edge_values_with_skin(patch, weight) -> EdgeValues:
         width=float(last - first),
         normal=strips_stiffness(normal, weight, state),
         tangential=strips_stiffness(tangential, weight, state, np.inf if ratio is None else ratio),
-        rotational=rotational_stiffness(state, normal, x, weight),
+        rotational=strips_rotational_stiffness(state, normal, x, weight),
     )
 
 
 def _edge_values_between_nodes(patch, weight) -> EdgeValues:
-    """Return contact length and stiffnesses of strips whose contact ends between nodes."""
+    """Return contact length and stiffnesses of strips whose contact edges lie between nodes."""
     state = patch.strips
     x = patch.x
     count = len(state.offsets)

@@ -18,7 +18,7 @@ from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, ladder
 from .condensed import cache_pairs, condense
-from .measures import estimate_measures, max_error_ratio
+from .measures import estimate_static_measures, max_mesh_error_ratio
 from .press import press_patch
 from .static_batch import max_error_ratios, solve_patches_on_pair
 
@@ -383,8 +383,10 @@ def _refine_until_met(
 def _max_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
     """Return the ratio of the largest error of a patch to the tolerance; 0 if it is not solved."""
     try:
-        return max_error_ratio(
-            estimate_measures(*ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance),
+        return max_mesh_error_ratio(
+            estimate_static_measures(
+                *ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance
+            ),
             tolerance,
         )
     except PatchfemError:

@@ -1,8 +1,8 @@
-"""Split of a measured trace between the mesh and a layer of asperities.
+"""Split of a measured trace into waves for the mesh and waves for an asperity layer.
 
 In: a `PatchModel` with a profile that its elements do not resolve. Out: the wavelength that divides
-the trace, and two tables of a scene. A wave is left to the mesh if the contact on it, by
-Westergaard's solution under the mean pressure, is at least one element long. Shorter waves become a
+the trace, and two tables of a scene. The mesh keeps a wave if the contact on it is at least one
+element long (Westergaard's solution under the mean pressure). All shorter waves become an asperity
 layer with the stiffness of Persson's theory. Read `split_trace` first.
 """
 
@@ -24,13 +24,13 @@ PROFILE_KEY = "contact.profile.file"
 
 @dataclass(frozen=True)
 class TraceSplit:
-    """Wavelength that divides a trace, and the layer of its shorter waves.
+    """Cutoff wavelength of a split trace, and the asperity layer of the shorter waves.
 
-    - cutoff: wavelength [m]; longer waves belong to the gap.
-    - decay_length: of the layer [m].
-    - closing_pressure: mean pressure [Pa] that presses the shorter waves flat.
+    - cutoff: cutoff wavelength [m]; longer waves belong to the gap.
+    - decay_length: decay length of the layer [m].
+    - closing_pressure: mean pressure [Pa] that flattens the shorter waves completely.
     - element: length of the elements [m] along the interface.
-    - pressure: mean pressure of the load [Pa].
+    - pressure: mean pressure under the load [Pa].
     - tables: text of the tables [contact.profile] and [contact.asperities].
     """
 
@@ -42,7 +42,7 @@ class TraceSplit:
     tables: str
 
     def describe(self, *, is_cutoff_given: bool = False, is_scene_written: bool = False) -> str:
-        """Describe the split, what it can compute, and its tables in a text of several lines."""
+        """Return a text of several lines on the split, its validity and its scene tables."""
         cutoff = format_length(self.cutoff)
         reason = (
             f"under {format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
@@ -63,13 +63,13 @@ class TraceSplit:
 
 
 def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
-    """Split the trace of a `PatchModel`, by default where its elements cease to resolve the contact.
+    """Split a trace at the shortest wavelength that the elements resolve, or at a given cutoff.
 
     Parameters
     ----------
     patch_model : PatchModel
     cutoff : float, optional
-        Wavelength [m] that divides the trace.
+        Cutoff wavelength [m]; None: chosen from the element length and the mean pressure.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
     Raises
     ------
     PatchfemError
-        If the scene has no such trace, or no wavelength divides it.
+        If the scene has no suitable trace, or if no cutoff divides it.
     """
     loading = patch_model.loading
     gap = patch_model.gap
@@ -115,7 +115,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
             f"{trace.source}: no waves are shorter than {format_length(cutoff)}, so that there is nothing to split",
             PROFILE_KEY,
         )
-    # Westergaard: a sine of this rms slope closes completely
+    # By Westergaard's solution, a sine of this rms slope closes completely at this pressure.
     closing_pressure = modulus * waves.slope / sqrt(2)
     if closing_pressure <= pressure:
         raise PatchfemError(
@@ -135,7 +135,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
         f'cutoff = "{format_length(cutoff)}"',
     ]
     if interface.has_shear:
-        # ridges of like half planes are as stiff along x as across
+        # Ridges on equal half-planes are as stiff along x as across it.
         tables.append("tangential_ratio = 1.0")
     return TraceSplit(
         cutoff, decay_length, closing_pressure, element, pressure, "\n".join(tables) + "\n"
@@ -143,7 +143,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
 
 
 def advise_split(patch_model) -> list[str]:
-    """Return the advice to split the trace of a patch, as a list; [] if it cannot be split."""
+    """Return the advice to split the trace of a patch, as a list; [] if no split is possible."""
     try:
         return [split_trace(patch_model).describe()]
     except PatchfemError:

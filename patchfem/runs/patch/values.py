@@ -162,7 +162,7 @@ def values(patch: Patch) -> dict:
         with one_thread():
             edge_values = _edge_values(patch)
     elif state is not None and state.load > 0:
-        edge_values = strips.strip_edge_values(patch)
+        edge_values = strips.compute_strip_edge_values(patch)
     out = static_values(
         np.ptp(patch.x),
         patch.pieces.interface.weight.sum(),
