@@ -214,7 +214,7 @@ def run_contents(
         for name, values in fields.items():
             if name == "status":
                 flags = {
-                    "long_name": "contact status",
+                    "long_name": "contact status; a node slips if its slip has changed since the previous frame",
                     "flag_meanings": "open stick slip",
                     "flag_values": np.array([0, 1, 2], np.int8),
                 }

@@ -3,7 +3,9 @@ the tolerance."""
 
 import re
 
+import numpy as np
 import pytest
+from scene_texts import DRIVE, MODE
 
 import patchfem as pf
 from patchfem.scene import loads
@@ -92,3 +94,32 @@ def test_exact_stuck_flat_joint_has_no_loop_area():
     assert result.measures["equivalent_stiffness"].value == pytest.approx(
         result.measures["tangential_stiffness"].value, rel=1e-3
     )
+
+
+def test_status_agrees_with_traction_and_slip():
+    """Under Coulomb friction a node slips where its traction is at the limit, up to both ends of the zones of slip,
+    and its slip changes only there, from the first frame on."""
+    scene = SLIDING_BENCH.replace("7.8188e-08", "6e-07").replace("cycles = 2", "cycles = 1")
+    fields = pf.run(loads(scene, "slid.toml")).fields
+    loaded = fields["normal_stress"] > 0
+    at_limit = np.abs(fields["shear_stress"]) > 0.359 * (1 - 1e-9) * fields["normal_stress"]
+    slips = fields["status"] == 2
+    change = np.abs(np.diff(fields["slip"], axis=0, prepend=0.0))
+    assert 0 < slips[1].sum() < slips.max(axis=0).sum() < loaded[0].sum()
+    np.testing.assert_array_equal(slips, at_limit & loaded)
+    np.testing.assert_array_equal(slips, (change > 1e-6 * change.max()) & loaded)
+
+
+def test_status_of_a_rig_agrees_with_slip():
+    """In the last cycle of a rig a node slips where its slip has changed since the previous frame; in the first frame,
+    where its traction is at the limit."""
+    structure = MODE + DRIVE.replace("cycles = 30", "cycles = 3")
+    scene = SLIDING_BENCH[: SLIDING_BENCH.index("[slide]")] + structure
+    fields = pf.run(loads(scene, "rig.toml", ["drive.acceleration=100 g"])).fields
+    loaded = fields["normal_stress"] > 0
+    at_limit = np.abs(fields["shear_stress"]) > 0.359 * (1 - 1e-9) * fields["normal_stress"]
+    slips = fields["status"] == 2
+    change = np.abs(np.diff(fields["slip"], axis=0))
+    assert 0 < slips[1:].sum() < loaded[1:].sum()
+    np.testing.assert_array_equal(slips[1], at_limit[1] & loaded[1])
+    np.testing.assert_array_equal(slips[2:], (change[1:] > 1e-8 * change.max()) & loaded[2:])

@@ -19,7 +19,8 @@ MEANINGS = {
     "sqrt(e/E), where e is the strain energy of the difference between recovered and computed "
     "stress in the cell, and E is the strain energy of both pieces; the squares of all cells "
     "add up to the square of the total error; large values show where the mesh is too coarse; "
-    "the total error is only an estimate, not a bound on the error of the stress"
+    "the total error is only an estimate, not a bound on the error of the stress",
+    "status": "contact status; a node slips if its slip has changed since the previous frame",
 }
 CODES = {
     "part": dict(enumerate(PARTS)),

@@ -25,6 +25,7 @@ from ..results.result import (
     N_FRAMES,
     Result,
     RunInputs,
+    SlipRule,
     has_known_mesh_error,
     make_interface_frames,
     remove_unknown_errors,
@@ -72,7 +73,12 @@ def run_prescribed(inputs: RunInputs) -> Result:
     if patch is not None:
         warnings += _warn_of_overhang(model.patch, patch, fine)
         fields = make_interface_frames(
-            patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames]
+            patch,
+            fine.time[fine.frames],
+            fine.tau,
+            fine.local,
+            fine.slide[fine.frames],
+            SlipRule(shear.element_limit(model, patch), starts_at_rest=True),
         )
     measures = remove_unknown_errors(
         measures, inputs.estimate and has_known_mesh_error(model, patch, inputs.coarse)

@@ -55,6 +55,16 @@ def _slide_elements(task: Slide) -> SlideHistories:
     return followed.histories(patch.pressure.load, tau, local)
 
 
+def element_limit(model, patch):
+    """Return the friction limit (m,) [Pa] of the nodes of parallel elements; None for other benches."""
+    is_element_bench = (
+        model.partial_slip
+        and model.grooves is None
+        and not law_has_trait(model.friction.law, "bonds")
+    )
+    return model.friction.static * patch.pressure.sigma_n if is_element_bench else None
+
+
 def _slide_over_grooves(task: Slide) -> SlideHistories:
     """Compute the histories of deformable pieces over grooves, with shear modes."""
     model = task.model

@@ -16,7 +16,7 @@ from ...friction import record
 from ...model.source import locate_errors
 from ...response import rows
 from ...slip import fields as slip_fields
-from ..results.result import collect_rest_frame, make_interface_frames, patch_surface
+from ..results.result import SlipRule, collect_rest_frame, make_interface_frames, patch_surface
 from . import jenkins_elements, result, store
 from .press import Patch
 from .values import values
@@ -177,6 +177,7 @@ def faces_with_frames(model, snapshots) -> tuple:
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
+                SlipRule(interface.numbers.static * face.patch.pressure.sigma_n),
             )
         out.append(face._replace(fields=fields))
     return tuple(out)

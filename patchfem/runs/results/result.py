@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,10 @@ from ...response import rows
 from . import patch_rows
 
 N_FRAMES = 16  # number of frames of the interface fields in the last cycle
+MIN_SLIP_FRACTION = (
+    1e-2  # change of slip / largest change; above it, a node without friction limit slips
+)
+ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elements
 COUNT_SETTINGS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 _FOLDER_OF_PATH = re.compile(
     r"/[^:]*/(?=[^/:]+: )"
@@ -129,7 +134,23 @@ def patch_surface(patch, fields: dict):
     return patch.surface if "shear_stress" in fields else patch.finest_surface
 
 
-def make_interface_frames(patch, time, tau, local, slide) -> dict:
+class SlipRule(NamedTuple):
+    """Rule by which the nodes of an interface count as slipping in a frame.
+
+    - limit (m,): traction [Pa] at which a node slips, of a law that reaches it exactly; None for
+      other laws, whose slip changes a little at every node.
+    - starts_at_rest: whether the first frame of the motion follows the pressed pieces, without
+      earlier cycles between them.
+    """
+
+    limit: np.ndarray | None = None
+    starts_at_rest: bool = False
+
+
+GRADUAL_SLIP = SlipRule()  # rule of a law without friction limit, after earlier cycles
+
+
+def make_interface_frames(patch, time, tau, local, slide, rule=GRADUAL_SLIP) -> dict:
     """Return the fields of an interface in each frame, from tractions and slips.
 
     Parameters
@@ -141,32 +162,50 @@ def make_interface_frames(patch, time, tau, local, slide) -> dict:
         Traction [Pa] and slip [m] of the nodes.
     slide : (f,)
         Displacement of the upper holder [m].
+    rule : SlipRule
 
     Returns
     -------
     dict
-        Arrays (f + 1, m); status is 0 for open, 1 for stick and 2 for slip.
+        Arrays (f + 1, m); status as in `compute_status`.
     """
     first = _pressed_frame(patch.surface)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
-    slip = np.concatenate([np.zeros((1, tau.shape[1])), local])
-    moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
-    moved[:2] = (
-        0.0  # the first frame of the motion has no predecessor, so that its nodes count as stuck
-    )
-    status = np.where(
-        patch.active, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0
-    ).astype(np.int8)
+    slip = np.concatenate([np.zeros((1, local.shape[1])), local])
     return {
         "time": np.concatenate([[0.0], time]),
         "normal_stress": np.repeat(first["normal_stress"], count, axis=0),
         "gap": np.repeat(first["gap"], count, axis=0),
         "shear_stress": tau,
         "slip": slip,
-        "status": status,
+        "status": compute_status(patch.active, tau, slip, rule),
         "holder_slide": np.concatenate([[0.0], slide]),
     }
+
+
+def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
+    """Return the contact status of the nodes in each frame: 0 for open, 1 for stick, 2 for slip.
+
+    A node slips if its slip has changed since the previous frame. In the first frame of a motion after earlier
+    cycles, it slips if its traction is at the friction limit.
+
+    Parameters
+    ----------
+    active : (m,) or (f, m)
+        Whether a node carries load.
+    tau, slip : (f, m)
+        Traction [Pa] and slip [m]; the first frame is that of the pressed pieces.
+    rule : SlipRule
+    """
+    moved = np.abs(np.diff(slip, axis=0, prepend=slip[:1]))
+    if not rule.starts_at_rest:
+        moved[1] = 0.0
+    min_fraction = MIN_SLIP_FRACTION if rule.limit is None else ROUND_OFF
+    slips = moved > min_fraction * max(moved.max(), 1e-300)
+    if rule.limit is not None and not rule.starts_at_rest:
+        slips[1] = np.abs(tau[1]) >= (1 - ROUND_OFF) * rule.limit
+    return np.where(active, np.where(slips, 2, 1), 0).astype(np.int8)
 
 
 def has_known_mesh_error(model, patch, coarse) -> bool:

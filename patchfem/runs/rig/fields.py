@@ -12,7 +12,13 @@ from ...friction import record
 from ...slip import fields
 from ..bench import averaged
 from ..bench import shear as bench_shear
-from ..results.result import N_FRAMES, collect_rest_frame, make_interface_frames
+from ..results.result import (
+    N_FRAMES,
+    SlipRule,
+    collect_rest_frame,
+    compute_status,
+    make_interface_frames,
+)
 
 
 def collect_frames(model, numerics, patch, raw) -> dict:
@@ -62,6 +68,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
         )
     time = np.array([s["time"] for s in shots])
     shear = bool(model.partial_slip)
+    rule = SlipRule()
     pointed = numerics.per_point and model.grooves is None and not is_bond_list(f)
     if law_has_trait(f.law, "bonds") and (shear or pointed):
         moments = [(s["slide"], s["bonds"]) for s in shots]
@@ -70,16 +77,18 @@ def collect_frames(model, numerics, patch, raw) -> dict:
         length = 0.0 if raw.contact.reduction is None else record.make_law(f).element(1.0).length
         states = [(s["slide"], s["stretch"]) for s in shots]
         tau, local = fields.element_fields(patch, raw.contact.reduction, states, length)
+        rule = SlipRule(f.static * sigma)
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
         local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
-    return make_interface_frames(patch, time, tau, local, np.array([s["slide"] for s in shots]))
+    slide = np.array([s["slide"] for s in shots])
+    return make_interface_frames(patch, time, tau, local, slide, rule)
 
 
 def _collect_varying_load_frames(patch, raw) -> dict:
     """Collect the interface fields of a run with varying normal load in the frames of a cycle.
 
-    The first frame is the pressed state. The status is 0 for open, 1 for stick and 2 for slip.
+    The first frame is the pressed state.
     """
     law = raw.contact.law
     sets = raw.contact.sets
@@ -97,20 +106,13 @@ def _collect_varying_load_frames(patch, raw) -> dict:
     for k, shot in enumerate(shots, 1):
         tau[k], stretch = _compute_nodal_friction(law, shot, nodal[k])
         local[k] = slide[k] - stretch - shot["bend"]
-    moved = np.abs(np.diff(local, axis=0, prepend=local[:1]))
-    moved[:2] = (
-        0.0  # the first frame of the motion has no predecessor, so that its nodes count as stuck
-    )
-    status = np.where(nodal > 0, np.where(moved > 1e-2 * max(moved.max(), 1e-300), 2, 1), 0).astype(
-        np.int8
-    )
     return {
         "time": time,
         "normal_stress": nodal / weight,
         "gap": gap,
         "shear_stress": tau / weight,
         "slip": local,
-        "status": status,
+        "status": compute_status(nodal > 0, tau, local),
         "holder_slide": slide,
     }
 
