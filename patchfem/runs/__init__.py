@@ -41,8 +41,8 @@ PUBLIC = {
         "choose_smooth_bond_summation",
         "steps_per_cycle",
     ),
-    "bench.errors": ("estimate_pass_errors",),
-    "bench.ledger": ("PassOptions",),
+    "bench.errors": ("estimate_bench_errors",),
+    "bench.ledger": ("BenchOptions",),
     "joint": (
         "remove_joint",
         "stuck_patch_stiffness",

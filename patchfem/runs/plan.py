@@ -216,7 +216,7 @@ def _make_plan(model: Model) -> Plan:
     cost = _predict_cost(model)
     on_law += cost.words
     if model.kind == "bench":
-        groups = of_bench.dimensionless_groups(model) | groups
+        groups = of_bench.compute_dimensionless_groups(model) | groups
     if model.friction is not None:
         chain |= _interface_links(model)
         groups |= _law_groups(model)

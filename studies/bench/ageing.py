@@ -69,7 +69,7 @@ def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
         f"accuracy.steps_per_cycle={steps}",
         *more,
     ]
-    found = law_bench.run(build(scene.loads(SCENE, sets=sets)), None, steps)
+    found = law_bench.run_bench(build(scene.loads(SCENE, sets=sets)), None, steps)
     force = found.force / (STATIC * found.load[0])
     rest = np.flatnonzero(np.diff(found.slide) == 0)
     return force[rest[0]], force[rest[-1] + 1], force[rest[-1] + 1 :].max()

@@ -56,7 +56,7 @@ def bench(speed: float, slip: float, reading: str, order: float, lengths: int) -
         f"friction.order={order}",
         "friction.rest_speed=1e-9 m/s",
     ]
-    return law_bench.run(build(scene.loads(SCENE, sets=sets)), None, 10 * lengths).values[
+    return law_bench.run_bench(build(scene.loads(SCENE, sets=sets)), None, 10 * lengths).values[
         "friction_ratio_end"
     ]
 

@@ -202,7 +202,7 @@ def test_exact_parameters_of_bond_growth_are_recovered(tmp_path):
             "friction.slip_growth=1.1e-6 m",
         ],
     )
-    force = bench.run(build(true_scene), None, 4, path=(time, slide, 0, 0.0)).force
+    force = bench.run_bench(build(true_scene), None, 4, path=(time, slide, 0, 0.0)).force
     result = fit_loop(
         scene, write_loop(tmp_path / "loop.csv", time, slide, force), free_ranges(*names)
     )
@@ -499,7 +499,7 @@ def test_exact_fitted_scene_reproduces_fitted_loop(tmp_path, fit_command):
     )
     scene = load(tmp_path / "out/scene.fitted.toml")
     assert scene.friction.static == static["value"] and scene.slide.file == "../loop.csv"
-    run = bench.run(build(scene), None, 400)
+    run = bench.run_bench(build(scene), None, 400)
     written = read_loop(tmp_path / "out/fit.csv")
     at = [np.argmin(np.abs(run.time - t)) for t in written.time]
     fitted = np.array(written.labels["fitted"], float)

@@ -10,11 +10,11 @@ import pytest
 from patchfem import SceneError, build, plan
 from patchfem.core import Missing
 from patchfem.friction import MAX_LIST_SECONDS, steady_loop
-from patchfem.runs import PassOptions, solve_with_coarser
+from patchfem.runs import BenchOptions, solve_with_coarser
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.averaged import limit_tractions
-from patchfem.runs.bench.ledger import N_BLOCK_SAMPLES, Slide
-from patchfem.runs.bench.stepped import slide_step_by_step
+from patchfem.runs.bench.averaged_law import distribute_slip_force
+from patchfem.runs.bench.ledger import N_BLOCK_SAMPLES, SlideTask
+from patchfem.runs.bench.step_by_step import slide_step_by_step
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -63,8 +63,8 @@ def format_sum_law(reading, order, growth):
 def run_both_ways(model, steps, patch=None, frames=0):
     """Return the results of the compiled engine and of the law stepped in NumPy."""
     time, slide = model.slide.samples(steps)[:2]
-    return bench.run(model, patch, steps, frames), slide_step_by_step(
-        Slide(model, patch, time, slide, frames)
+    return bench.run_bench(model, patch, steps, frames), slide_step_by_step(
+        SlideTask(model, patch, time, slide, frames)
     )
 
 
@@ -188,7 +188,7 @@ def test_exact_errors_cover_merging_of_bonds(keys, slide):
     assert result.measures["friction_force_peak"].error >= choice.error * 30
     steps = 4 * model.slide.steps(model.accuracy.tolerance, model.accuracy.steps_per_cycle, 2e-6)
     direct = replace(choice, engine="direct", merge=0.0, tail=0.0, error=0.0)
-    reference = bench.run(model, None, steps, watch=PassOptions(direct))
+    reference = bench.run_bench(model, None, steps, options=BenchOptions(direct))
     for name, measure in result.measures.items():
         if name not in ("work_check", "energy_balance"):
             assert abs(measure.value - reference.values[name]) <= measure.error + measure.floor, (
@@ -246,7 +246,7 @@ def test_exact_work_check_allows_force_jump_at_reversal():
     1e-13."""
     for law in ("coulomb", "coulomb that holds more"):
         assert (
-            bench.run(build_bench(ROUND_OFF_LAWS[law], "sine"), None, 40).values["work_check"]
+            bench.run_bench(build_bench(ROUND_OFF_LAWS[law], "sine"), None, 40).values["work_check"]
             < 1e-13
         )
 
@@ -289,6 +289,6 @@ def test_exact_averaged_tractions_shift_by_bond_length():
     )
     model = SimpleNamespace(friction=SimpleNamespace(bond_length=0.02, order=0))
     force = np.array([3.0, -2.0, 0.0])
-    tractions = limit_tractions(model, patch, force)
+    tractions = distribute_slip_force(model, patch, force)
     assert tractions.sum(axis=1) * 1e-3 == pytest.approx(force, rel=1e-12)
     assert tractions @ x * 1e-3 == pytest.approx([3.0 * 0.02, 2.0 * 0.02, 0.0], rel=1e-3)

@@ -71,7 +71,7 @@ def count_steps(model) -> int:
 def run_bench(text, *sets, steps=None):
     """Return the response of the bench of a scene."""
     model = build(loads(text, sets=sets))
-    return bench.run(model, None, steps or count_steps(model))
+    return bench.run_bench(model, None, steps or count_steps(model))
 
 
 @pytest.fixture

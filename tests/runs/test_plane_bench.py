@@ -66,7 +66,7 @@ def test_exact_friction_on_circular_path_agrees_with_closed_form(
             POINT + LONGER_BONDS,
         )
     )
-    response = law_bench.run(model, None, 4)
+    response = law_bench.run_bench(model, None, 4)
     force = (response.force[-1] + 1j * response.lateral_force[-1]) / (0.3 * response.load[0])
     motion = np.exp(2j * np.pi * revolutions)
     assert abs(force) == pytest.approx(force_ratio, abs=1e-5)
@@ -81,7 +81,7 @@ def test_exact_patch_on_plane_path_agrees_with_pointwise_law(write_path_scene, s
     the pressure of this strip."""
     model = build(write_path_scene(L_SHAPE, SMALL_PATCH + strips + LONGER_BONDS))
     patch = solve_with_coarser(model.patch, 1e-3, False)[0]
-    response = law_bench.run(model, patch, 60, 6)
+    response = law_bench.run_bench(model, patch, 60, 6)
     pressure = patch.strips.pressure if strips else patch.pressure.sigma_n[None]
     offsets = patch.strips.offsets if strips else np.zeros(1)
     count = len(pressure)
@@ -212,4 +212,4 @@ def run_bench(text, *sets):
     """Return the response of a bench of a scene with a triangular slide."""
     model = build(loads(text + TRIANGLE, sets=sets))
     patch = solve_with_coarser(model.patch, 1e-3, False)[0] if model.patch is not None else None
-    return law_bench.run(model, patch, 120, 4)
+    return law_bench.run_bench(model, patch, 120, 4)

@@ -3,8 +3,8 @@
 import pytest
 
 from patchfem import build
-from patchfem.runs.bench.engine import bench_engine
-from patchfem.runs.bench.errors import bond_sum_error
+from patchfem.runs.bench.engine import choose_bench_engine
+from patchfem.runs.bench.errors import find_bond_sum_error
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -45,7 +45,7 @@ def test_exact_bond_sum_error_of_every_engine():
 
     def sum_error(*sets, where=text):
         model = build(loads(where, sets=sets))
-        return bond_sum_error(model, bench_engine(model, model.slide.samples(100)[1]))
+        return find_bond_sum_error(model, choose_bench_engine(model, model.slide.samples(100)[1]))
 
     assert sum_error() == 1e-6 and sum_error("accuracy.tail=0.05") == 0.05
     assert sum_error("accuracy.quadrature=direct") == sum_error("friction.order=1") == 0.0

@@ -44,7 +44,7 @@ def friction_table(law: str) -> str:
 
 def run_bench_along_path(law: str, time, slide, *sets):
     """Return the BenchRun of a law along displacements (k,) [m] at equally spaced times (k,) [s]."""
-    return bench.run(
+    return bench.run_bench(
         build(loads(POINT + friction_table(law) + SINE, sets=sets)),
         None,
         4,

@@ -59,7 +59,7 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
     path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
     contact = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
     steps = steps_per_cycle(contact)
-    return BenchLoop(bench.run(contact, patch, steps), contact, steps)
+    return BenchLoop(bench.run_bench(contact, patch, steps), contact, steps)
 
 
 def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledLoop:

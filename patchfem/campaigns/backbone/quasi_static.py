@@ -6,7 +6,7 @@ from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import quasi_static
 from ...friction.record import steady_loop
 from ...response.errors import add_errors
-from ...runs.bench.errors import estimate_pass_errors
+from ...runs.bench.errors import estimate_bench_errors
 from ...runs.rig import decays
 from .bench_loops import LOOP_MEASURES, settle_loop
 from .joint import Joint
@@ -124,7 +124,7 @@ def _compute_from_bench_loops(joint: Joint, amplitudes) -> Curve:
     moved_areas = []
     for slide in slides:
         settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
-        changes = estimate_pass_errors(settled.model, patches, settled.run, settled.steps)
+        changes = estimate_bench_errors(settled.model, patches, settled.run, settled.steps)
         measures = add_errors(settled.run.values, changes.errors, min_relative_error=MIN_FLOOR)
         stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]

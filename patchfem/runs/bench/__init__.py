@@ -1,9 +1,10 @@
-"""Law bench: friction loop of an interface under a prescribed relative displacement.
+"""Friction response of an interface to a prescribed relative displacement (law bench).
 
-In: a scene with [slide], its solved patch or none, samples of time and slide. Out: `BenchRun`
-with histories of force and energy, frames of the interface, and measures. `engine` chooses how
-a bench is computed and predicts its cost: `closed` (laws without memory), `rigid` (one point,
-by the compiled loops of the rigs), `shear` (elements or bond points of pieces that deform in
-shear), `stepped` (NumPy laws, if the pressure of a point changes during the slide, or for a
-slide in two directions). `errors` runs the coarse passes. Read `bench` first, then `engine`.
+In: a model with [slide] and its Patch with the static contact solution, or None for a single point.
+Out: a `BenchRun` with histories, output frames of the interface and measures.
+
+`engine` chooses the method and predicts its cost. The methods are `closed_form` (laws without
+memory), `rigid` (compiled kernels for a single point), `shear` (pieces that deform in shear) and
+`step_by_step` (NumPy laws for varying pressure or two directions). `errors` estimates the errors
+from coarser runs. Start reading at `bench`, then `engine`.
 """

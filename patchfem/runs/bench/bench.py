@@ -1,7 +1,7 @@
-"""Law bench: prescribe the displacement of an interface and compute the friction loop.
+"""Run of a law bench: friction histories, energies and measures for a prescribed displacement.
 
-In: a model with [slide] and its pressed patch, or none for a single point. Out: a `BenchRun`,
-with or without the shear compliance of the pieces.
+In: a model with [slide] and its Patch with the static contact solution, or None for a single point.
+Out: a `BenchRun`. The pieces may be rigid or deform in shear.
 """
 
 from dataclasses import dataclass
@@ -23,27 +23,26 @@ from ...response.measures import (
     work_difference,
 )
 from . import rigid, shear
-from .closed import slide_in_closed_form
-from .engine import BenchEngine, Method, bench_engine
-from .ledger import DEFAULT_OPTIONS, PassOptions, Slide, SlideHistories
-from .stepped import slide_in_plane, slide_step_by_step
+from .closed_form import slide_in_closed_form
+from .engine import BenchEngine, Method, choose_bench_engine
+from .ledger import DEFAULT_OPTIONS, BenchOptions, SlideHistories, SlideTask
+from .step_by_step import slide_in_plane, slide_step_by_step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BenchRun:
-    """Histories, fields and measures of an interface along a prescribed path of k samples.
+    """Histories, fields and measures of an interface under a prescribed displacement, at k samples.
 
-    - time, slide, rate, force, load, slip (k,): [s], [m], [m/s], [N], [N], [m].
-    - ledger (4, k): work, stored, dissipated and created energy [J]; all but the stored energy are
-      cumulative.
-    - frames (f,): samples at which fields are kept.
-    - tau, local (f, m): traction [Pa] and slip [m] of the nodes in the frames.
+    - time, slide, rate (k,): time [s], relative displacement [m] and velocity [m/s].
+    - ledger (4, k): cumulative work, stored energy, cumulative dissipated and created energy [J].
+    - frames (f,): indices of the samples at which fields are stored.
+    - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
     - values: measures by name.
     - seconds: CPU seconds.
-    - first: sample at which the last cycle starts.
-    - engine: how the slide was computed.
-    - lateral, lateral_force, yaw_moment (k,): of a slide in two directions [m], [N], [N m]; else
-      None.
+    - first: index of the sample at which the last cycle starts.
+    - engine: method that computed the friction force.
+    - lateral, lateral_force, yaw_moment (k,): lateral displacement [m], force [N] and yaw moment [N
+      m] of a motion in two directions; otherwise None.
     """
 
     time: np.ndarray
@@ -65,24 +64,24 @@ class BenchRun:
     yaw_moment: np.ndarray | None = None
 
 
-def run(
-    model, patch, steps: int, frames: int = 0, path=None, watch: PassOptions = DEFAULT_OPTIONS
+def run_bench(
+    model, patch, steps: int, frames: int = 0, path=None, options: BenchOptions = DEFAULT_OPTIONS
 ) -> BenchRun:
-    """Compute the friction histories of a model along its bench path.
+    """Compute the friction response of a model to its prescribed displacement.
 
     Parameters
     ----------
     model : Model
     patch : Patch or None
-        None for [normal].
+        None for a single point ([normal]).
     steps : int
         Steps per cycle.
     frames : int
-        Number of frames of the fields.
+        Number of output frames of the fields.
     path : tuple, optional
-        Path in the form of `SlidePath.samples` that replaces that of the model.
-    watch : PassOptions
-        Options and callbacks of the pass.
+        Displacement path in the form of `SlidePath.samples`; default: the path of the model.
+    options : BenchOptions
+        Options and callbacks.
 
     Returns
     -------
@@ -94,8 +93,10 @@ def run(
         start = time[first]
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
-    engine = bench_engine(model, slide, 1 if patch is None else patch.x.size, watch.choice)
-    histories, lateral = _compute_histories(Slide(model, patch, time, slide, frames, engine, watch))
+    engine = choose_bench_engine(model, slide, 1 if patch is None else patch.x.size, options.choice)
+    histories, lateral = _compute_histories(
+        SlideTask(model, patch, time, slide, frames, engine, options)
+    )
     loops = [(slide, histories.force)]
     if lateral:
         loops.append((lateral["lateral"], lateral["lateral_force"]))
@@ -103,7 +104,7 @@ def run(
     values = _compute_measures(model, time, slide, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
     values["work_check"] = work_difference(histories.ledger[0], loops, jumps)
-    span = time[-1]  # Division by the span avoids overflow for an extremely slow motion.
+    span = time[-1]  # Scaling by the time span avoids overflow for extremely slow motions.
     rate = np.zeros(time.size)
     if time.size > 2:
         rate = np.gradient(slide, time / span) / span
@@ -112,8 +113,8 @@ def run(
     )
 
 
-def _compute_histories(task: Slide) -> tuple[SlideHistories, dict]:
-    """Compute the friction histories along a bench path, and a dict of lateral histories."""
+def _compute_histories(task: SlideTask) -> tuple[SlideHistories, dict]:
+    """Compute the friction histories and a dict of the lateral histories of a bench run."""
     if task.model.slide.across is not None:
         return slide_in_plane(task)
     if task.model.partial_slip:
@@ -126,11 +127,11 @@ def _compute_histories(task: Slide) -> tuple[SlideHistories, dict]:
 
 
 def _compute_measures(model, time, slide, histories: SlideHistories, first: int) -> dict:
-    """Return the measures of a bench run as a dict, except those of its friction loop."""
+    """Compute all measures of a bench run except those of the friction loop."""
     force = histories.force
     load = histories.load
-    # The friction ratio refers to the applied load: friction is lost where the piece slides off the
-    # pressure.
+    # The friction ratio refers to the applied load, because friction vanishes where the upper piece
+    # leaves the pressed area.
     applied = load if model.load_varies else np.full_like(load, load[0])
     is_loaded = applied > 1e-3 * applied.max(initial=0.0)
     ratio = np.divide(force, applied, out=np.zeros_like(force), where=is_loaded)
@@ -154,10 +155,7 @@ def _compute_measures(model, time, slide, histories: SlideHistories, first: int)
 def _compute_loop_measures(
     model, time, slide, histories: SlideHistories, first: int, omega: float
 ) -> dict:
-    """Return the measures of the friction loop of the last cycle as a dict.
-
-    The last cycle starts at sample `first`.
-    """
+    """Compute the measures of the friction loop in the last cycle, which starts at sample `first`."""
     time = time[first:]
     slide = slide[first:]
     force = histories.force[first:]

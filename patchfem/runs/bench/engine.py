@@ -1,8 +1,8 @@
-"""Choice of the method that computes the friction along a bench path, and its cost.
+"""Method and cost of a bench run.
 
-In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `Cost`. Recursion, list of
-bonds and elements are the compiled ones that rigs use. A law without memory needs no loop. If
-the pressure of a point changes during the slide, the law is evaluated sample by sample.
+In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `Cost`. A law without memory has a
+closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs. If
+the pressure at a point changes during the motion, a NumPy law is evaluated sample by sample.
 """
 
 from dataclasses import dataclass, replace
@@ -22,16 +22,16 @@ from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
-BYTES_PER_SAMPLE = 250.0  # Memory of a sample of the histories [bytes].
-# Ratio of the passes through a bond list per step to those in a rig. A prescribed displacement needs no search for the
-# increment of the displacement.
+BYTES_PER_SAMPLE = 250.0  # Memory per sample of the histories [bytes].
+# Ratio of the passes through a bond list per time step to those in a rig. A prescribed displacement
+# needs no iteration for the displacement increment.
 LIST_PASS_RATIO = 1 / 3
 
 
 class Method(Enum):
-    """Method by which the friction force along a bench path is computed.
+    """Method that computes the friction force of a bench run.
 
-    The value is its name in summaries and plans.
+    The value of a member is its name in summaries and plans.
     """
 
     CLOSED = "closed form"
@@ -49,11 +49,11 @@ LIST_METHODS = (Method.LIST, Method.LISTS)
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
-    """Method and settings with which a bench computes the friction along its path.
+    """Method of a bench run, with its settings and its cost.
 
     - method: Method.
-    - seconds: CPU seconds per sample.
-    - choice: engine of the sum over bonds, with its settings; None without a sum.
+    - seconds: predicted CPU time per sample [s].
+    - choice: engine of bond summation with its settings; None for other methods.
     """
 
     method: Method
@@ -69,7 +69,7 @@ class BenchEngine:
 
     @property
     def compiled_code(self):
-        """Compiled code that the method needs."""
+        """Compiled code that the method uses."""
         if self.method in (Method.ELEMENTS, Method.RECURSION):
             return SHORT_CODE
         if self.method in (Method.POINTS, *LIST_METHODS):
@@ -77,17 +77,17 @@ class BenchEngine:
         return NO_CODE
 
 
-def bench_engine(
-    model, slide, points: int = 1, choice: "bond_engines.EngineChoice | None" = None
+def choose_bench_engine(
+    model, slide, n_points: int = 1, choice: "bond_engines.EngineChoice | None" = None
 ) -> BenchEngine:
-    """Choose the method by which the friction force along a bench path is computed.
+    """Choose the method that computes the friction force of a bench run.
 
     Parameters
     ----------
     model : Model
     slide : (k,)
-        Samples of the slide [m].
-    points : int
+        Relative displacement [m].
+    n_points : int
         Nodes of the interface.
     choice : EngineChoice, optional
         Method of the sum over bonds, if it is known.
@@ -104,27 +104,32 @@ def bench_engine(
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or has_changing_pressure(model)
         if model.grooves is None and (
-            is_bond_list(f) or requested_engine(model) not in ("auto", "recursion")
+            is_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
         ):
             choice = choice or choose_bond_summation(model, slide)
-            return _choose_sum_engine(model, slide, points, choice, points)
-        seconds = cost_model.predict_shear_mode_step(points, modes, load_varies=varies)
+            return _make_bond_sum_engine(model, slide, n_points, choice, n_points)
+        seconds = cost_model.predict_shear_mode_step(n_points, modes, load_varies=varies)
         return BenchEngine(Method.POINTS, seconds)
     if model.partial_slip:
         return BenchEngine(
-            Method.ELEMENTS, cost_model.SLIP_NODE_SECONDS * points + cost_model.SAMPLE_SECONDS
+            Method.ELEMENTS, cost_model.SLIP_NODE_SECONDS * n_points + cost_model.SAMPLE_SECONDS
         )
     if has_changing_pressure(model) and model.grooves is None:
-        return _make_stepped_engine(model, slide, points)
+        return _make_stepped_engine(model, slide, n_points)
     if law_has_trait(f.law, "memoryless"):
         return BenchEngine(Method.CLOSED, cost_model.SAMPLE_SECONDS)
     if not law_has_trait(f.law, "bonds"):
         return BenchEngine(Method.ELEMENTS, cost_model.SAMPLE_SECONDS)
-    return _choose_sum_engine(model, slide, points, choice or choose_bond_summation(model, slide))
+    return _make_bond_sum_engine(
+        model, slide, n_points, choice or choose_bond_summation(model, slide)
+    )
 
 
 def steps_per_cycle(model) -> int:
-    """Return the steps per cycle of a bench, from the scene or else from tolerance and grooves."""
+    """Return the number of steps per cycle of a bench run, from the scene or else from the tolerance.
+
+    The path over grooves needs at least N_SAMPLES_PER_RADIAN samples per radian of their phase.
+    """
     slide = model.slide
     accuracy = model.accuracy
     steps = slide.steps(accuracy.tolerance, accuracy.steps_per_cycle, model.friction.bond_length)
@@ -136,19 +141,19 @@ def steps_per_cycle(model) -> int:
 
 
 def has_changing_pressure(model) -> bool:
-    """Return whether the pressure of a point changes during the motion.
+    """Return whether the pressure at a point of the upper piece changes during the motion.
 
-    It changes with the load, or if the point moves over the pressure distribution of the other
-    piece.
+    It changes if the load varies, or if the pressure distribution is fixed to the lower piece.
     """
     return model.load_varies or model.side == "lower"
 
 
 def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
-    """Choose the method that sums the forces of the bonds of a rigidly sliding interface.
+    """Choose the method of bond summation for a rigidly sliding interface.
 
-    It is chosen as in a rig, except that its error is relative to the reached force, which is small
-    if the stroke is short compared with the bond length. slide: samples (k,) [m].
+    The method is chosen as in a rig. Its error refers to the largest force, which is small for
+    strokes that are short compared with the bond length. `slide` (k,) [m] is the relative
+    displacement.
     """
     law = model.bonds
     accuracy = model.accuracy
@@ -156,15 +161,15 @@ def choose_bond_summation(model, slide) -> "bond_engines.EngineChoice":
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    requested = bond_engines.RequestedEngine(requested_engine(model), tail, accuracy.merge)
+    requested = bond_engines.RequestedEngine(find_requested_engine(model), tail, accuracy.merge)
     return bond_engines.choose_engine(law, goal, stroke, steps, requested)
 
 
-def requested_engine(model) -> str:
-    """Return the engine that the scene requests for a sum over bonds, or "auto".
+def find_requested_engine(model) -> str:
+    """Return the engine of bond summation that the scene requests, or "auto".
 
-    "merged" replaces it if every point has its own list and bonds keep the pressure at which they
-    formed while it changes, because each step then leaves a strip.
+    "auto" and "recursion" become "merged" if every point has its own list and the bonds keep the
+    pressure at which they formed. Each step then adds a strip to every list.
     """
     scene_engine = model.accuracy.quadrature
     f = model.friction
@@ -178,11 +183,10 @@ def requested_engine(model) -> str:
 
 
 def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | None":
-    """Choose a bond summation without merging, whose force varies smoothly with parameters.
+    """Choose a bond summation without merging, so that the force is smooth in the parameters.
 
-    It is None for laws without bonds, or if the scene prescribes the engine or the merging. With
-    merging, the force would jump by the error of the sum when a value of the scene changes, which
-    disturbs a fit.
+    With merging, the summation error jumps when a parameter changes, which disturbs a fit. The
+    result is None for laws without bonds, and if the scene fixes the engine or the merging.
     """
     if (
         not law_has_trait(model.friction.law, "bonds")
@@ -197,29 +201,29 @@ def choose_smooth_bond_summation(model, slide) -> "bond_engines.EngineChoice | N
 
 
 def mean_stroke(slide) -> tuple:
-    """Return the mean path [m] and the mean number of moving steps between two reversals."""
+    """Return the mean path [m] and the mean number of moving steps between reversals."""
     moves = np.diff(slide)
     directions = np.sign(moves[moves != 0])
     count = 1 + np.count_nonzero(directions[1:] != directions[:-1])
     return float(np.abs(moves).sum()) / count, max(directions.size / count, 1.0)
 
 
-def _choose_sum_engine(
-    model, slide, points: int, choice: "bond_engines.EngineChoice", lists: int = 1
+def _make_bond_sum_engine(
+    model, slide, n_points: int, choice: "bond_engines.EngineChoice", n_lists: int = 1
 ) -> BenchEngine:
-    """Return the bench engine for a law that sums over bonds, and its predicted CPU time [s].
+    """Return the bench engine of a nonlocal law with its predicted CPU time.
 
-    lists: number of lists, one per point with shear modes, else 1.
+    `n_lists` is the number of bond n_lists: one per point with shear modes, otherwise 1.
     """
     law = model.bonds
     if choice.engine == "recursion":
         return BenchEngine(Method.RECURSION, cost_model.RECURSION_STEP_SECONDS, choice)
-    if law.breakaway and lists == 1:  # A bond list cannot represent an elastic range.
-        return _make_stepped_engine(model, slide, points)
+    if law.breakaway and n_lists == 1:  # A bond list cannot represent an elastic range.
+        return _make_stepped_engine(model, slide, n_points)
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
     strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
-    seconds = (LIST_PASS_RATIO if lists == 1 else lists) * choice.seconds
+    seconds = (LIST_PASS_RATIO if n_lists == 1 else n_lists) * choice.seconds
     if choice.strips:
         seconds *= strips / choice.strips
     if size * seconds > parameters.MAX_LIST_SECONDS:
@@ -229,18 +233,19 @@ def _choose_sum_engine(
             "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
             "",
         )
-    return BenchEngine(Method.LIST if lists == 1 else Method.LISTS, seconds, choice)
+    return BenchEngine(Method.LIST if n_lists == 1 else Method.LISTS, seconds, choice)
 
 
-def _make_stepped_engine(model, slide, points: int) -> BenchEngine:
-    """Return the bench engine that evaluates a friction law sample by sample."""
-    return BenchEngine(Method.STEPPED, _predict_step_seconds(model, slide, points))
+def _make_stepped_engine(model, slide, n_points: int) -> BenchEngine:
+    """Return the bench engine that evaluates a NumPy law sample by sample."""
+    return BenchEngine(Method.STEPPED, _predict_step_seconds(model, slide, n_points))
 
 
-def _predict_step_seconds(model, slide, points: int) -> float:
+def _predict_step_seconds(model, slide, n_points: int) -> float:
     """Predict the CPU time [s] of one step of a NumPy law.
 
-    The law depends on the last increment, or is a sum over the strips of the path.
+    A law without bond list takes a constant time. The sum over bonds takes a time proportional to
+    the number of strips.
     """
     f = model.friction
     if not is_bond_list(f):
@@ -250,37 +255,39 @@ def _predict_step_seconds(model, slide, points: int) -> float:
     return (3 if model.load_varies else 1) * (
         cost_model.PATH_STEP_SECONDS
         + cost_model.PATH_STRIP_SECONDS * strips
-        + cost_model.PATH_POINT_SECONDS * strips * points
+        + cost_model.PATH_POINT_SECONDS * strips * n_points
     )
 
 
 def uses_parallel_elements(model) -> bool:
-    """Return whether parallel elements represent the partial slip of a bench."""
+    """Return whether the partial slip of a bench run is computed by parallel elements."""
     simple = model.grooves is None and model.slide.across is None
     return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
 
 
-def predict_cost(model, points: int) -> Cost:
+def predict_cost(model, n_points: int) -> Cost:
     """Predict the CPU time and the memory of a bench run.
 
     Parameters
     ----------
     model : Model
-    points : int
-        Nodes of the interface; 1 without a patch.
+    n_points : int
+        Number of interface nodes; 1 without a patch.
     """
     per_cycle = steps_per_cycle(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
-    engine = bench_engine(model, slide, points)
-    # The run and its passes with half and a quarter of the steps take about as long as two runs; a
-    # sum over bonds or cells needs a further pass.
+    engine = choose_bench_engine(model, slide, n_points)
+    # The runs with half and with a quarter of the steps take about as long as the run itself. A
+    # nonlocal law or a cell density needs another run.
     has_cells = law_has_trait(model.friction.law, "cells") and engine.method is Method.ELEMENTS
     passes = 3 if has_cells else 2
     steps = passes * time.size
     samples = MemoryPart(
-        BYTES_PER_SAMPLE * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model)
+        BYTES_PER_SAMPLE * steps / 2,
+        f"{steps // 2} samples of the slide",
+        _find_sample_count_key(model),
     )
     sizes = {}
     lists = ()
@@ -294,17 +301,14 @@ def predict_cost(model, points: int) -> Cost:
     return motion + engine.compiled_code.cost()
 
 
-def _samples_key(model) -> str:
-    """Return the scene key that sets the number of samples along the bench path."""
+def _find_sample_count_key(model) -> str:
+    """Return the scene key that sets the number of samples of a bench run."""
     if model.slide.kind == "file":
         return "slide.file"
     return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
 
 
-def dimensionless_groups(model) -> dict:
-    """Return the dimensionless ratio of displacement amplitude to bond length as a dict.
-
-    The dict is empty without a bond length.
-    """
+def compute_dimensionless_groups(model) -> dict:
+    """Return the ratio of the displacement amplitude to the bond length as a dict, if both exist."""
     length = model.friction.bond_length
     return {"amplitude_over_bond_length": model.slide.amplitude / length} if length else {}

@@ -1,6 +1,7 @@
-"""Errors of a bench due to its steps, its mesh and its sum over bonds, from coarse passes.
+"""Errors of a bench run due to time steps, mesh and bond summation, from coarser runs.
 
-In: the fine pass and patches on nested meshes. Out: errors by measure name for each kind.
+In: a BenchRun and patches on nested meshes. Out: error estimates by measure for each
+discretization.
 """
 
 from collections.abc import Callable
@@ -29,22 +30,22 @@ from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import LIST_METHODS, Method, uses_parallel_elements
 from .law import estimate_tail_loss
-from .ledger import PassOptions
+from .ledger import BenchOptions
 
-# Tolerance that sets the steps of passes on coarser meshes. Parallel elements follow any path
-# exactly, so that it is not the tolerance of the run.
+# Tolerance that sets the steps of runs on coarser meshes. It differs from that of the run, because
+# parallel elements follow any path exactly.
 MESH_TOL = 1e-2
-# Ratio of the merge width of the pass that shows the merging error to that of the fine pass.
+# Ratio of the merge width in the comparison run to that of the finest run.
 FINER_MERGE_FACTOR = 0.5
 
 
-class CoarsePass(NamedTuple):
-    """Settings of a coarser computation along a bench path, which serves an error estimate.
+class CoarserRun(NamedTuple):
+    """Settings of a coarser bench run for an error estimate.
 
     - steps: steps per cycle.
-    - level: index of the coarser mesh; 0 is that of the run.
-    - choice: engine of the sum over bonds, with its settings.
-    - springs, modes: see `PassOptions`.
+    - level: index of the mesh; 0 is the finest one.
+    - choice: engine of bond summation with its settings.
+    - springs, modes: see `BenchOptions`.
     """
 
     steps: int
@@ -54,12 +55,13 @@ class CoarsePass(NamedTuple):
     modes: int | None = None
 
 
-class PassErrors(NamedTuple):
-    """Errors of the measures of a bench, estimated from coarser computations.
+class BenchErrors(NamedTuple):
+    """Error estimates of the measures of a bench run.
 
-    - errors: what is coarser, and errors by measure name (`coarser.estimate_errors`).
-    - seconds: CPU seconds.
-    - step_runs: StepRuns of the bench and of its coarser computations in time, fine to coarse.
+    - errors: pairs of the coarsened discretization and the errors by measure, see
+      `coarser.estimate_errors`.
+    - seconds: CPU time of the coarser runs [s].
+    - step_runs: StepRun of the run and of each run with fewer steps, from fine to coarse.
     """
 
     errors: list
@@ -67,50 +69,50 @@ class PassErrors(NamedTuple):
     step_runs: list
 
 
-def estimate_pass_errors(model, patches: list, fine_run, steps: int, say=None) -> PassErrors:
-    """Estimate the errors of a bench run from coarser computations along its path.
+def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) -> BenchErrors:
+    """Estimate the errors of a bench run from coarser runs.
 
     Parameters
     ----------
     model : Model
     patches : list of Patch
-        The patch on nested meshes, fine to coarse; [None] without a patch.
+        Patches on nested meshes, from fine to coarse; [None] without a patch.
     fine_run : BenchRun
-        The computation whose errors are estimated.
+        Run whose errors are estimated.
     steps : int
-        Its number of steps per cycle.
+        Number of steps per cycle of this run.
     say : callable, optional
         Callback for a line of text.
     """
 
-    def solve(variant: CoarsePass):
-        """Run the bench with the settings of a coarse pass and return its BenchRun."""
-        watch = PassOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
+    def solve(variant: CoarserRun):
+        """Compute a bench run with coarser settings."""
+        options = BenchOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         begin = process_time()
-        coarse_run = bench.run(model, patches[variant.level], variant.steps, watch=watch)
+        coarse_run = bench.run_bench(model, patches[variant.level], variant.steps, options=options)
         cpu_seconds[variant] = process_time() - begin
         return coarse_run
 
     cpu_seconds = {}
-    ladder = list_coarse_passes(model, patches, fine_run, steps)
-    coarse_passes = {}
-    errors, seconds = estimate_errors(solve, fine_run.values, ladder, coarse_passes)
-    if bond_sum_error(model, fine_run.engine):
+    coarser_runs = list_coarser_runs(model, patches, fine_run, steps)
+    bench_runs = {}
+    errors, seconds = estimate_errors(solve, fine_run.values, coarser_runs, bench_runs)
+    if find_bond_sum_error(model, fine_run.engine):
         errors.append(("bonds", _estimate_bond_sum_errors(model, fine_run)))
     step_runs = [StepRun(steps, fine_run.seconds, fine_run.values)]
-    for coarse_pass in ladder[0].runs:
-        values = coarse_passes[coarse_pass].values
-        step_runs.append(StepRun(coarse_pass.steps, cpu_seconds[coarse_pass], values))
-    return PassErrors(errors, seconds, step_runs)
+    for run in coarser_runs[0].runs:
+        values = bench_runs[run].values
+        step_runs.append(StepRun(run.steps, cpu_seconds[run], values))
+    return BenchErrors(errors, seconds, step_runs)
 
 
-def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
-    """List the coarser computations from which the errors of a bench run are estimated.
+def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
+    """List the coarser runs from which the errors of a bench run are estimated.
 
-    They have half and a quarter of the steps. At a quarter of the steps they also have the coarser
-    mesh, another number of shear modes, merged cells of a slider density, or narrower strips of a
-    merged bond list. Parallel elements are run on all coarser meshes, with steps that do not depend
-    on the tolerance.
+    Two runs have half and a quarter of the steps. Further runs with a quarter of the steps have,
+    where it applies, a coarser mesh, another number of shear modes, merged slider cells, or
+    narrower strips of a merged bond list. Parallel elements are computed on all coarser meshes with
+    a number of steps that does not depend on the tolerance.
 
     Parameters
     ----------
@@ -118,24 +120,28 @@ def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
     patches : list of Patch
     fine_run : BenchRun
     steps : int
-        Steps per cycle of the fine pass.
+        Number of steps per cycle of `fine_run`.
     """
     choice = fine_run.engine.choice
-    halved = CoarsePass(max(4, steps // 8 * 4), 0, choice)
-    quarter = CoarsePass(max(4, steps // 16 * 4), 0, choice)
-    # Parallel elements follow any path exactly, so that the sampling affects the harmonics only.
+    halved = CoarserRun(max(4, steps // 8 * 4), 0, choice)
+    quarter = CoarserRun(max(4, steps // 16 * 4), 0, choice)
+    # Parallel elements follow any path exactly, so that the steps affect only the harmonics.
     rule = (
         convergence_errors if uses_parallel_elements(model) else partial(step_errors, steps=steps)
     )
     out = [CoarserRuns((halved, quarter), rule, of="steps")]
-    meshed = len(patches) > 1
+    has_coarser_mesh = len(patches) > 1
     patch = patches[0]
-    if meshed and uses_parallel_elements(model):
+    if has_coarser_mesh and uses_parallel_elements(model):
         length = model.friction.bond_length
-        same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
-        out.append(shear.list_coarser_element_runs(len(patches) - 1, quarter._replace(steps=same)))
-    elif meshed:
-        # The number of modes is fixed, so that only the mesh changes.
+        steps_on_coarse_mesh = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
+        out.append(
+            shear.list_coarser_element_runs(
+                len(patches) - 1, quarter._replace(steps=steps_on_coarse_mesh)
+            )
+        )
+    elif has_coarser_mesh:
+        # Both runs have the same number of modes, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
         out.append(make_spatial_coarsening(quarter._replace(level=1, modes=count), quarter))
         if count:
@@ -154,11 +160,8 @@ def list_coarse_passes(model, patches: list, fine_run, steps: int) -> list:
     return out
 
 
-def bond_sum_error(model, engine) -> float:
-    """Return the error bound of the bond summation relative to the friction limit [1].
-
-    It is 0 for a law without such a sum.
-    """
+def find_bond_sum_error(model, engine) -> float:
+    """Return the error bound of the bond summation relative to the friction limit, or 0 without one."""
     if engine.method in LIST_METHODS:
         return engine.choice.error
     if engine.method in (Method.STEPPED, Method.PLANE) and is_bond_list(model.friction):
@@ -167,7 +170,7 @@ def bond_sum_error(model, engine) -> float:
 
 
 def _estimate_bond_sum_errors(model, fine_run) -> dict:
-    """Return the errors of the bench measures due to the bond summation, as a dict."""
+    """Estimate the errors of the measures due to bond summation."""
     work = np.abs(np.diff(fine_run.ledger[0]))
     friction = model.friction
     scale = FrictionScale(
@@ -177,4 +180,4 @@ def _estimate_bond_sum_errors(model, fine_run) -> dict:
         float(work.sum()),
         float(work[fine_run.first :].sum()),
     )
-    return friction_errors(fine_run.values, bond_sum_error(model, fine_run.engine), scale)
+    return friction_errors(fine_run.values, find_bond_sum_error(model, fine_run.engine), scale)

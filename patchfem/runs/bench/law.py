@@ -1,7 +1,7 @@
-"""Friction law that a bench evaluates, and the pressure under which its interface slides.
+"""Friction law of a bench run as a NumPy object, and the pressure at the interface nodes.
 
-In: a model with friction and its patch. Out: a NumPy law object for any value of friction.law,
-nodal pressures and areas.
+In: a model with friction and its Patch. Out: a law object for any value of friction.law, nodal
+pressures and areas.
 """
 
 import numpy as np
@@ -9,17 +9,14 @@ import numpy as np
 from ...effects import law_has_trait
 from ...friction.bonds import quadrature, recursion
 from ...friction.record import make_law
-from . import averaged
+from . import averaged_law
 
 
 def make_numpy_law(model, patch=None):
-    """Return the NumPy object of the friction law of a model.
-
-    Only an averaged law depends on the patch.
-    """
+    """Return the friction law of a model as a NumPy object; only an averaged law uses the patch."""
     f = model.friction
     if law_has_trait(f.law, "averaged"):
-        return averaged.make_averaged_law(model, patch)
+        return averaged_law.make_averaged_law(model, patch)
     if not law_has_trait(f.law, "bonds"):
         return make_law(f, patch.pressure.load if patch is not None else model.point.load)
 
@@ -32,7 +29,7 @@ def make_numpy_law(model, patch=None):
 
 
 def estimate_tail_loss(model) -> float:
-    """Return the cut-off error of the NumPy sum over bonds relative to the friction limit [1]."""
+    """Return the truncation error of the sum over bonds, relative to the friction limit."""
     accuracy = model.accuracy
     if accuracy.quadrature == "direct":
         return 0.0
@@ -40,9 +37,9 @@ def estimate_tail_loss(model) -> float:
 
 
 def nodal_pressure(model, patch) -> tuple:
-    """Return pressure (m,) [Pa] and area (m,) [m2] of the interface nodes.
+    """Return the pressures (m,) [Pa] and the areas (m,) [m2] of the interface nodes.
 
-    Without a patch there is a single point that carries the load.
+    Without a patch, a single point carries the load.
     """
     if patch is None:
         return np.array([model.point.load]), np.ones(1)
@@ -50,11 +47,10 @@ def nodal_pressure(model, patch) -> tuple:
 
 
 def find_rest_ends(model, slide) -> dict:
-    """Return the samples where motion starts from rest with static above kinetic friction.
+    """Return the samples at which sliding starts from rest, with the sign of the motion.
 
-    They are the first sample of the path and the last one of every rest; the values are the signs
-    of the motion that starts there. The dict is empty unless static exceeds kinetic Coulomb
-    friction.
+    These are the first sample of the path and the last sample of each rest. The dict is empty
+    unless the static Coulomb coefficient exceeds the kinetic one.
     """
     f = model.friction
     if not law_has_trait(f.law, "set-valued") or f.kinetic is None or not f.kinetic < f.static:

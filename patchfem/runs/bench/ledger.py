@@ -1,6 +1,6 @@
-"""Task of a bench engine, the histories that it returns, and their energy balance.
+"""Input of a bench engine, its result, and energies and slip along the path.
 
-In: forces, losses and samples of a pass. Out: `SlideHistories`, the ledger (4, k), and slip of the
+In: forces, losses and samples of a run. Out: `SlideHistories`, energies (4, k), and slip of the
 interface and of its points.
 """
 
@@ -11,21 +11,21 @@ import numpy as np
 
 from ...effects import law_has_trait
 
-# Number of samples between two progress reports. With so many, the cost of calling compiled code is
-# negligible.
+# Number of samples per block, after which the progress is reported. With this size the cost of
+# calling compiled code is negligible.
 N_BLOCK_SAMPLES = 4096
-# Ratio of created to dissipated energy below which the created energy is round-off.
+# Largest ratio of created to dissipated energy at which the created energy counts as round-off.
 ROUND_OFF_FRACTION = 1e-13
 
 
 class SlideHistories(NamedTuple):
-    """Histories of force, slip and energies along the bench path, at k samples.
+    """Histories of force, slip and energies of a bench run, at k samples.
 
-    - force, load (k,): [N].
-    - slip (k,): [m].
-    - ledger (4, k): energies of `make_ledger` [J].
-    - frames (f,): samples of the frames.
-    - tau, local (f, m): traction [Pa] and slip [m] of the nodes in the frames.
+    - force, load (k,): friction force and normal load [N].
+    - slip (k,): irreversible part of the displacement [m].
+    - ledger (4, k): energies [J], see `stack_energies`.
+    - frames (f,): indices of the samples with stored fields.
+    - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
     """
 
     force: np.ndarray
@@ -37,33 +37,33 @@ class SlideHistories(NamedTuple):
     local: np.ndarray
 
 
-def make_ledger(work, stored, losses) -> np.ndarray:
-    """Return work, stored, dissipated and created energy (4, k) [J] of k samples.
+def stack_energies(work, stored, losses) -> np.ndarray:
+    """Return work, stored, dissipated and created energy (4, k) [J] at k samples.
 
     Parameters
     ----------
     work, stored : (k,)
         Cumulative work and stored energy [J].
     losses : (k, 2)
-        Created and dissipated energy of every step [J], summed over the points.
+        Created and dissipated energy of each step [J], summed over the points.
     """
     created, dissipated = np.cumsum(losses, axis=0).T
     created = created if created[-1] > ROUND_OFF_FRACTION * dissipated[-1] else 0 * created
     return np.stack([work, stored, dissipated, created])
 
 
-def split_losses(losses) -> tuple:
-    """Sum the created and the dissipated energy over m points.
+def sum_losses_by_sign(losses) -> tuple:
+    """Return the created and the dissipated energy, each summed over m points.
 
-    losses (..., m): dissipated energy of each point; a negative one is created energy.
+    `losses` (..., m) is the dissipated energy of each point; a negative value is created energy.
     """
     return -np.minimum(losses, 0.0).sum(axis=-1), np.maximum(losses, 0.0).sum(axis=-1)
 
 
-def elastic_slip(model, slide, force, load) -> np.ndarray:
-    """Return the slip (k,) [m] of a rigid interface: displacement minus elastic bond stretch.
+def compute_interface_slip(model, slide, force, load) -> np.ndarray:
+    """Return the slip (k,) [m] of a rigid interface, i.e. displacement minus elastic bond stretch.
 
-    The stretch is at most one bond length.
+    The stretch is limited to one bond length.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ def elastic_slip(model, slide, force, load) -> np.ndarray:
     return slide - np.clip(stretch, -length, length)
 
 
-def local_slip(model, slide, tau, sigma) -> np.ndarray:
-    """Return the slip (f, m) [m] of points under a common relative displacement.
+def compute_local_slip(model, slide, tau, sigma) -> np.ndarray:
+    """Return the slip (f, m) [m] of the points of a rigidly moving interface.
 
     Parameters
     ----------
@@ -99,22 +99,22 @@ def local_slip(model, slide, tau, sigma) -> np.ndarray:
 
 
 def _bond_length(model) -> float:
-    """Return the bond length [m]; 0 for a law without elastic stretch."""
+    """Return the bond length [m], or 0 for a law without elastic stretch."""
     if law_has_trait(model.friction.law, "averaged"):
         return 0.0
     return model.friction.bond_length or 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class PassOptions:
-    """Options and callbacks of one computation along a bench path.
+class BenchOptions:
+    """Options and callbacks of a bench run.
 
-    - choice: method of the sum over bonds; None: chosen by the pass.
-    - say: callback for a line of text when something compiles.
+    - choice: method of bond summation; None: chosen automatically.
+    - say: callback for messages about compilation.
     - progress: callback for the completed fraction.
-    - springs: function that maps (stiffness, yield slide) of the elements of partial slip to those
-      that are used; None: all of them.
-    - modes: number of shear modes of the pieces; None: by the scene.
+    - springs: function that replaces the stiffnesses and yield displacements of the parallel
+      elements; None: they are used unchanged.
+    - modes: number of shear modes of the pieces; None: set by the scene or the tolerance.
     """
 
     choice: object = None
@@ -129,17 +129,17 @@ class PassOptions:
             self.progress(fraction)
 
 
-DEFAULT_OPTIONS = PassOptions()
+DEFAULT_OPTIONS = BenchOptions()
 
 
-class Slide(NamedTuple):
-    """Relative displacement of an interface, sampled along a prescribed path for an engine.
+class SlideTask(NamedTuple):
+    """Input of a bench engine: model, patch, displacement path and options.
 
-    - model, patch: Model and its pressed Patch; None under [normal].
-    - time, slide (k,): samples [s], [m].
-    - frames: number of frames of the fields.
+    - model, patch: Model, and its Patch or None for a single point.
+    - time, slide (k,): samples of time [s] and relative displacement [m].
+    - frames: number of output frames of the fields.
     - engine: BenchEngine.
-    - options: PassOptions.
+    - options: BenchOptions.
     """
 
     model: object
@@ -148,10 +148,10 @@ class Slide(NamedTuple):
     slide: np.ndarray
     frames: int = 0
     engine: object = None
-    options: PassOptions = DEFAULT_OPTIONS
+    options: BenchOptions = DEFAULT_OPTIONS
 
     @property
-    def frame_numbers(self) -> np.ndarray:
+    def frame_indices(self) -> np.ndarray:
         """Indices of the samples with stored fields, without the first sample (the pressed state)."""
         if not self.frames:
             return np.zeros(0, int)

@@ -1,6 +1,6 @@
-"""Bench from its plan to its Result, with errors and with warnings on law and overhang.
+"""Result of a bench run with error estimates, warnings and notes.
 
-In: a plan of kind bench and its pressed patch. Out: a Result.
+In: a plan of kind bench and its Patch. Out: a Result.
 """
 
 from dataclasses import replace
@@ -38,29 +38,31 @@ from ..results.travel import (
 )
 from . import bench, shear
 from .engine import steps_per_cycle
-from .errors import PassErrors, estimate_pass_errors
-from .ledger import PassOptions
+from .errors import BenchErrors, estimate_bench_errors
+from .ledger import BenchOptions
 
-MAX_EXTRA_CYCLES = 4  # Largest number of further cycles in which a steady loop is searched for.
-MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points times samples) of this search.
+MAX_EXTRA_CYCLES = 4  # Largest number of added cycles in the search for a steady loop.
+MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points x samples) in this search.
 
 
 def run_prescribed(inputs: RunInputs) -> Result:
-    """Run a plan with prescribed displacement and return its Result."""
+    """Compute a plan with prescribed displacement and return its Result."""
     model = inputs.plan.model
     patch = inputs.patch
     steps = steps_per_cycle(model)
     frames = N_FRAMES if patch is not None else 0
-    options = PassOptions(None, inputs.say, inputs.progress)
-    fine = bench.run(model, patch, steps, frames, watch=options)
+    options = BenchOptions(None, inputs.say, inputs.progress)
+    fine = bench.run_bench(model, patch, steps, frames, options=options)
     inputs.seconds["bench"] = fine.seconds
-    coarse_passes = PassErrors([], 0.0, [])
+    error_estimates = BenchErrors([], 0.0, [])
     if inputs.estimate:
         patches = [patch, *(mesh for mesh in inputs.coarse if mesh is not None)]
-        coarse_passes = estimate_pass_errors(model, patches, fine, steps, inputs.say)
-        inputs.seconds["error"] = coarse_passes.seconds
-    step_values = [run.values for run in coarse_passes.step_runs]
-    measures = add_errors(fine.values, coarse_passes.errors, step_values, min_relative_error=1e-10)
+        error_estimates = estimate_bench_errors(model, patches, fine, steps, inputs.say)
+        inputs.seconds["error"] = error_estimates.seconds
+    step_values = [run.values for run in error_estimates.step_runs]
+    measures = add_errors(
+        fine.values, error_estimates.errors, step_values, min_relative_error=1e-10
+    )
     warnings = [
         *inputs.warnings,
         *_warn_of_bond_law(model),
@@ -87,7 +89,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         "engine": fine.engine.name,
         "steps": steps,
         "notes": [*_note_on_growth(model, fine), *note_on_groove_slope(model, patch)],
-        "step_runs": coarse_passes.step_runs,
+        "step_runs": error_estimates.step_runs,
     }
     if model.partial_slip and (count := shear.count_shear_modes(model, patch)):
         extra["shear_modes"] = count
@@ -106,7 +108,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
 
 
 def _warn_of_bond_law(model) -> list:
-    """Return the warnings on a bond law that do not depend on the displacement path."""
+    """Return warnings on a bond law that do not depend on the displacement path."""
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     warnings = [
@@ -123,7 +125,7 @@ def _warn_of_bond_law(model) -> list:
 
 
 def _warn_of_created_energy(model, fine) -> list:
-    """Return a warning, as a list, on energy that the law as printed in the 1985 report creates."""
+    """Return a list with a warning if the law of the 1985 report has created energy."""
     created = fine.values["energy_created"]
     exchanged = np.abs(np.diff(fine.ledger[0])).sum()
     if model.friction.reading != "report" or created <= 1e-6 * exchanged:
@@ -136,7 +138,7 @@ def _warn_of_created_energy(model, fine) -> list:
 
 
 def _note_on_growth(model, fine) -> list:
-    """Return the notes on the growth of bonds with contact time."""
+    """Return notes on the growth of bonds with contact time."""
     friction = model.friction
     if not law_has_trait(friction.law, "bonds"):
         return []
@@ -146,11 +148,11 @@ def _note_on_growth(model, fine) -> list:
     return note_on_growth(model.bonds, peak)
 
 
-def _loop_closing_error(fine) -> float:
-    """Return the relative mismatch of start and end of the last cycle [1].
+def _compute_loop_closing_error(fine) -> float:
+    """Return the relative difference between start and end of the last cycle.
 
-    It is the larger of two changes over the cycle: that of the force over its peak, and that of the
-    stored energy over the work.
+    It is the larger of the change of the force over its peak and the change of the stored energy
+    over the work.
     """
     force = fine.force[fine.first :]
     work, stored, *_ = fine.ledger[:, fine.first :]
@@ -165,17 +167,17 @@ def _loop_closing_error(fine) -> float:
 
 
 def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
-    """Return a warning, as a list, if the last friction loop is neither closed nor steady.
+    """Return a list with a warning if the last friction loop is neither closed nor steady.
 
-    It names the number of cycles after which the loop is steady, if MAX_EXTRA_CYCLES cycles with at most
-    MAX_EVALUATIONS evaluations show it.
+    The warning names the number of cycles after which the loop is steady, if at most
+    MAX_EXTRA_CYCLES more cycles and MAX_EVALUATIONS evaluations are sufficient to find it.
     """
     period = model.slide.period
     tolerance = model.accuracy.tolerance
     cycles = model.slide.cycles
     if period is None or cycles < 1 or not fine.values.get("loop_area"):
         return []
-    if (gap := _loop_closing_error(fine)) <= tolerance:
+    if (gap := _compute_loop_closing_error(fine)) <= tolerance:
         return []
     text = (
         f"{OPEN_LOOP}: it misses by {100 * gap:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction "
@@ -185,7 +187,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
     evaluations = fine.time.size * points * (cycles + MAX_EXTRA_CYCLES) / cycles
     if evaluations > MAX_EVALUATIONS:
         return [f"{text}; raise slide.cycles"]
-    longer = bench.run(
+    longer = bench.run_bench(
         replace(model, slide=replace(model.slide, cycles=cycles + MAX_EXTRA_CYCLES)), patch, steps
     )
     ends = longer.time[-1] - period * np.arange(MAX_EXTRA_CYCLES + 1, -1, -1)
@@ -202,7 +204,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
 
 
 def _warn_of_overhang(patch_model, patch, fine) -> list:
-    """Return warnings of a bench whose upper piece slides off the patch."""
+    """Return warnings if the upper piece slides off the pressed area or off the lower piece."""
     warnings = []
     lateral = 0.0
     if fine.lateral is not None:

@@ -1,8 +1,8 @@
 """Rigid sliding under a pressure that moves with the upper piece, by compiled engines.
 
-In: a `Slide`. Out: `SlideHistories`. Every point has the same slide, and the laws are
-linear in the pressure, so that the traction of a point is that of a single point with the whole
-load, times the fraction of the load at the point.
+In: a `SlideTask`. Out: `SlideHistories`. All points have the same displacement and the laws are linear
+in the pressure. Therefore a single point under the whole load is computed, and its force is
+distributed over the points in proportion to their pressure.
 """
 
 from dataclasses import replace
@@ -20,43 +20,43 @@ from ...friction.record import make_law
 from ...response.coarser import CoarserRuns
 from ...response.errors import merged_cell_errors
 from .engine import Method
-from .follow import follow_path
 from .law import nodal_pressure
-from .ledger import Slide, SlideHistories, elastic_slip, local_slip
+from .ledger import SlideHistories, SlideTask, compute_interface_slip, compute_local_slip
+from .path_response import follow_path
 
 
-def slide_rigidly(task: Slide) -> SlideHistories:
-    """Compute the histories of rigid sliding along a bench path by a compiled kernel."""
+def slide_rigidly(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of rigid sliding with a compiled kernel."""
     model = task.model
     law = model.friction.law
     sigma, weight = nodal_pressure(model, task.patch)
     load = float(weight @ sigma)
-    is_paced = (
+    depends_on_speed = (
         model.friction.rest_growth is not None
         or model.load_varies
         or not (law_has_trait(law, "bonds") or law_has_trait(law, "timeless"))
     )
-    followed = follow_path(_make_point_model(task, load), task, is_paced)
-    frames = followed.frames
+    response = follow_path(_make_point_model(task, load), task, depends_on_speed)
+    frames = response.frames
     slide = task.slide
-    ratio = followed.force[frames] / load if load > 0 else np.zeros(frames.size)
+    ratio = response.force[frames] / load if load > 0 else np.zeros(frames.size)
     tau = np.outer(ratio, sigma)
     loads = np.full(slide.size, load)
     if model.load_varies:
         loads = model.point.evaluate(task.time)
     if task.engine.method is Method.ELEMENTS or model.grooves is not None:
-        slip = followed.slip
+        slip = response.slip
         local = np.where(sigma > 0, slip[frames, None], slide[frames, None])
     else:
-        slip = elastic_slip(model, slide, followed.force, loads)
-        local = local_slip(model, slide[frames], tau, sigma)
-    return SlideHistories(followed.force, loads, slip, followed.ledger, frames, tau, local)
+        slip = compute_interface_slip(model, slide, response.force, loads)
+        local = compute_local_slip(model, slide[frames], tau, sigma)
+    return SlideHistories(response.force, loads, slip, response.ledger, frames, tau, local)
 
 
 def make_climbing_model(model, load: float, patch=None, count: int | None = None):
-    """Return the contact model of a law with memory along the flanks of grooves.
+    """Return the contact model of a law with memory on the flanks of grooves.
 
-    In a bench no mass is lifted.
+    A bench run has no lifted mass.
 
     Parameters
     ----------
@@ -64,9 +64,9 @@ def make_climbing_model(model, load: float, patch=None, count: int | None = None
     load : float
         Normal load [N].
     patch : Patch, optional
-        Pressed patch whose pieces deform in shear.
+        Patch whose pieces deform in shear.
     count : int, optional
-        Number of shear modes of the pieces; None: by the tolerance.
+        Number of shear modes of the pieces; default: by the tolerance.
     """
     f = model.friction
     if law_has_trait(f.law, "bonds"):
@@ -85,8 +85,8 @@ def make_climbing_model(model, load: float, patch=None, count: int | None = None
     return flank_climbing.with_shear_modes(contact, patch, count, model.accuracy.tolerance)
 
 
-def _make_point_model(task: Slide, load: float) -> ContactModel:
-    """Return the contact model of a single point that carries the full load [N]."""
+def _make_point_model(task: SlideTask, load: float) -> ContactModel:
+    """Return the contact model of a single point under the whole load [N]."""
     model = task.model
     friction = model.friction
     engine = task.engine
@@ -104,12 +104,12 @@ def _make_point_model(task: Slide, load: float) -> ContactModel:
     return bond_list_model(law, friction.static * load, choice.reach(law.order), choice.merge)
 
 
-def list_merged_cell_runs(reference_pass) -> CoarserRuns:
-    """List coarser runs in which every four cells of a slider density are merged to one.
+def list_merged_cell_runs(reference_run) -> CoarserRuns:
+    """List coarser runs in which groups of four slider cells are merged into one.
 
-    reference_pass: the CoarsePass with which they are compared.
+    `reference_run` is the run with which they are compared.
     """
     runs = tuple(
-        reference_pass._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES
+        reference_run._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES
     )
-    return CoarserRuns(runs, merged_cell_errors, reference_pass, "cells")
+    return CoarserRuns(runs, merged_cell_errors, reference_run, "cells")

@@ -1,7 +1,7 @@
-"""Sliding of pieces that deform in shear: parallel elements or shear modes.
+"""Sliding of pieces that deform in shear, by parallel elements or shear modes.
 
-In: a `Slide` of a model with [contact.shear]. Out: `SlideHistories`, and the coarse passes that
-show the error of the mesh of elements.
+In: a `SlideTask` of a model with [contact.shear]. Out: `SlideHistories`, and coarser runs that show the
+mesh error of parallel elements.
 """
 
 import numpy as np
@@ -18,21 +18,22 @@ from ...response.coarser import CoarserRuns
 from ...response.errors import ERROR_MEASURES, absolute_change, convergence_errors
 from ...slip.fields import bond_shear_modes, element_fields, point_fields
 from ..patch.jenkins_elements import elements
-from .follow import follow_path
-from .ledger import Slide, SlideHistories
+from .ledger import SlideHistories, SlideTask
+from .path_response import follow_path
 from .rigid import make_climbing_model
 
-# Fraction of the mean pressure assumed at nodes without initial pressure of the lower piece.
+# Ratio of the assumed pressure of an initially unloaded node of the lower piece to the mean
+# pressure.
 OPEN_PRESSURE_FRACTION = 1e-3
 
 
-def slide_in_shear(task: Slide) -> SlideHistories:
-    """Compute the bench histories of pieces that deform in shear.
+def slide_in_shear(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of pieces that deform in shear.
 
     Raises
     ------
     NotConverged
-        If the residual of a step is too large.
+        If a time step has too large a residual.
     """
     if task.model.grooves is not None:
         return _slide_over_grooves(task)
@@ -41,8 +42,8 @@ def slide_in_shear(task: Slide) -> SlideHistories:
     return _slide_elements(task)
 
 
-def _slide_elements(task: Slide) -> SlideHistories:
-    """Compute the histories of elastic pieces whose friction is a set of parallel elements."""
+def _slide_elements(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of elastic pieces that are replaced by parallel elements."""
     patch = task.patch
     friction = task.model.friction
     length = make_law(friction).element(1.0).length
@@ -50,13 +51,13 @@ def _slide_elements(task: Slide) -> SlideHistories:
     springs = reduction.stiffness, reduction.yield_displacement
     if task.options.springs:
         springs = task.options.springs(*springs)
-    followed = follow_path(jenkins_model(*springs), task)
-    tau, local = element_fields(patch, reduction, followed.states, length)
-    return followed.histories(patch.pressure.load, tau, local)
+    response = follow_path(jenkins_model(*springs), task)
+    tau, local = element_fields(patch, reduction, response.states, length)
+    return response.to_slide_histories(patch.pressure.load, tau, local)
 
 
 def element_limit(model, patch):
-    """Return the friction limit (m,) [Pa] of the nodes of parallel elements; None for other benches."""
+    """Return the friction limit (m,) [Pa] at the nodes of parallel elements, otherwise None."""
     is_element_bench = (
         model.partial_slip
         and model.grooves is None
@@ -65,23 +66,21 @@ def element_limit(model, patch):
     return model.friction.static * patch.pressure.sigma_n if is_element_bench else None
 
 
-def _slide_over_grooves(task: Slide) -> SlideHistories:
-    """Compute the histories of deformable pieces over grooves, with shear modes."""
+def _slide_over_grooves(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of elastic pieces over grooves by shear modes."""
     model = task.model
     patch = task.patch
     load = patch.pressure.load
     contact = make_climbing_model(model, load, patch, model.accuracy.shear_modes)
-    is_paced = not law_has_trait(model.friction.law, "timeless")
-    followed = follow_path(contact, task, is_paced)
-    followed.require_convergence()
-    tau, local = groove_fields(patch, contact, followed.states)
-    return followed.histories(load, tau, local)
+    depends_on_speed = not law_has_trait(model.friction.law, "timeless")
+    response = follow_path(contact, task, depends_on_speed)
+    response.require_convergence()
+    tau, local = compute_groove_fields(patch, contact, response.states)
+    return response.to_slide_histories(load, tau, local)
 
 
-def groove_fields(patch, contact, states) -> tuple:
-    """Return the traction (f, m) [Pa] and the slip (f, m) [m] of points that climb grooves.
-
-    The points have shear modes.
+def compute_groove_fields(patch, contact, states) -> tuple:
+    """Return traction (f, m) [Pa] and slip (f, m) [m] at the nodes of a patch over grooves.
 
     Parameters
     ----------
@@ -89,7 +88,7 @@ def groove_fields(patch, contact, states) -> tuple:
     contact
         Contact model of the grooves.
     states : sequence
-        f states (slide [m], `ClimbingModel.shown`).
+        f states as pairs (relative displacement [m], `ClimbingModel.shown`).
     """
     index = contact.shear.points
     m = patch.x.size
@@ -105,38 +104,38 @@ def groove_fields(patch, contact, states) -> tuple:
     return tau, local
 
 
-def _slide_bond_points(task: Slide) -> SlideHistories:
-    """Compute the bench histories of bonds at the points of elastic pieces, by shear modes."""
+def _slide_bond_points(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of bonds at the points of elastic pieces by shear modes."""
     model = task.model
     patch = task.patch
     law = model.bonds
     choice = task.engine.choice
-    shear = shear_modes_of_points(model, patch, task.options.modes)
+    shear = compute_point_shear_modes(model, patch, task.options.modes)
     if model.side == "lower":
-        contact = make_lists_on_lower_piece(model, patch, choice, shear)
+        contact = make_bond_lists_on_lower_piece(model, patch, choice, shear)
     elif choice is not None:
-        contact = make_sheared_lists(patch, law, shear, choice)
+        contact = make_bond_lists_with_shear(patch, law, shear, choice)
     else:
         weight = patch.pieces.interface.weight
         contact = points_model(law, weight, patch.pressure.sigma_n, shear)
-    followed = follow_path(contact, task, law.has_growth)
-    followed.require_convergence()
-    tau, local = point_fields(patch, law, contact.reduction, followed.states)
-    return followed.histories(patch.pressure.load, tau, local)
+    response = follow_path(contact, task, law.has_growth)
+    response.require_convergence()
+    tau, local = point_fields(patch, law, contact.reduction, response.states)
+    return response.to_slide_histories(patch.pressure.load, tau, local)
 
 
-def shear_modes_of_points(model, patch, count: int | None = None):
-    """Return the shear modes of the contact points at which a bench sums over bonds.
+def compute_point_shear_modes(model, patch, count: int | None = None):
+    """Return the shear modes of the contact points of a nonlocal law.
 
-    If the pressure belongs to the lower piece, the points are all nodes; a node without pressure at
-    first counts as if under OPEN_PRESSURE_FRACTION times the mean pressure of the others.
+    If the pressure is fixed to the lower piece, all nodes are contact points. An initially unloaded
+    node then has OPEN_PRESSURE_FRACTION times the mean pressure of the loaded nodes.
 
     Parameters
     ----------
     model : Model
     patch : Patch
     count : int, optional
-        Number of modes; None: by scene and tolerance.
+        Number of modes; default: by the scene, otherwise by the tolerance.
     """
     law = model.bonds
     sigma = patch.pressure.sigma_n
@@ -144,48 +143,49 @@ def shear_modes_of_points(model, patch, count: int | None = None):
     count = count or model.accuracy.shear_modes
     if model.side != "lower":
         return bond_shear_modes(patch, law, count, tolerance)
-    # Computing a single mode first refuses a patch that could jump without a change of displacement.
+    # A single mode is computed first, because this rejects a patch that could jump at constant
+    # displacement.
     bond_shear_modes(patch, law, 1, 1.0)
     return bond_shear_modes(
         patch,
         law,
         count,
         tolerance,
-        sigma=np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_pressure(patch)),
+        sigma=np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch)),
     )
 
 
-def mean_pressure(patch) -> float:
-    """Return the mean pressure [Pa] over the nodes that carry load."""
+def mean_loaded_pressure(patch) -> float:
+    """Return the mean pressure [Pa] over the loaded nodes."""
     return patch.pressure.load / float(patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0))
 
 
 def count_shear_modes(model, patch) -> int | None:
-    """Return the number of shear modes of a bench with bonds, or None without shear modes."""
+    """Return the number of shear modes of a bench run with bonds, or None without shear modes."""
     if (
         not model.partial_slip
         or not law_has_trait(model.friction.law, "bonds")
         or model.grooves is not None
     ):
         return None
-    return shear_modes_of_points(model, patch).stiffness.size
+    return compute_point_shear_modes(model, patch).stiffness.size
 
 
-def make_lists_on_lower_piece(model, patch, choice, shear):
-    """Return the model with a bond list per node, under the pressure of the lower piece.
+def make_bond_lists_on_lower_piece(model, patch, choice, shear):
+    """Return the contact model with a bond list at each node, for pressure fixed to the lower piece.
 
     Parameters
     ----------
     model : Model
     patch : Patch
     choice : Choice
-        Method of the sum over bonds.
+        Method of bond summation.
     shear : ShearModes or None
-        Modes on every node; None for pieces that are rigid in shear.
+        Shear modes at the nodes; None for pieces that are rigid in shear.
     """
     law = model.bonds
     sigma = patch.pressure.sigma_n
-    mean = mean_pressure(patch)
+    mean = mean_loaded_pressure(patch)
     return point_lists_model(
         law,
         law.static * mean * patch.pieces.interface.weight,
@@ -197,8 +197,8 @@ def make_lists_on_lower_piece(model, patch, choice, shear):
     )
 
 
-def make_sheared_lists(patch, law, shear, choice, force=None):
-    """Return the model with bond lists at the points of the shear modes of a pressed patch.
+def make_bond_lists_with_shear(patch, law, shear, choice, force=None):
+    """Return the contact model with a bond list at each point of the shear modes.
 
     Parameters
     ----------
@@ -207,9 +207,9 @@ def make_sheared_lists(patch, law, shear, choice, force=None):
         Bond parameters.
     shear : ShearModes
     choice : Choice
-        Method of the sum over bonds.
+        Method of bond summation.
     force : (k,), optional
-        Normal forces [N] of the points, if few points represent all.
+        Normal forces [N] of the points, if a few points represent all nodes.
     """
     sigma = patch.pressure.sigma_n[shear.points] if force is None else np.ones_like(force)
     force = patch.pieces.interface.weight[shear.points] * sigma if force is None else force
@@ -218,24 +218,24 @@ def make_sheared_lists(patch, law, shear, choice, force=None):
     )
 
 
-def list_coarser_element_runs(count: int, reference_pass) -> CoarserRuns:
-    """List runs of a bench with parallel elements on coarser meshes.
+def list_coarser_element_runs(count: int, reference_run) -> CoarserRuns:
+    """List bench runs with parallel elements on coarser meshes.
 
     Parameters
     ----------
     count : int
         Number of coarser meshes.
-    reference_pass : CoarsePass
-        CoarsePass with which they are compared.
+    reference_run : CoarserRun
+        Run with which they are compared.
     """
-    runs = tuple(reference_pass._replace(level=level) for level in range(1, count + 1))
-    return CoarserRuns(runs, mesh_errors, reference_pass, "mesh")
+    runs = tuple(reference_run._replace(level=level) for level in range(1, count + 1))
+    return CoarserRuns(runs, estimate_mesh_errors, reference_run, "mesh")
 
 
-def mesh_errors(*values: dict) -> dict:
-    """Estimate the mesh error of each measure from its values on nested meshes.
+def estimate_mesh_errors(*values: dict) -> dict:
+    """Estimate the mesh errors of the measures from their values on nested meshes.
 
-    The residual of a balance is an error itself, so that its change is used.
+    Measures that are themselves errors, such as the energy balance, have their change as error.
     """
     changes = absolute_change(values[0], values[1])
     errors = convergence_errors(*values)

@@ -10,7 +10,7 @@ from ...dynamics.march import varying_load
 from ...effects import is_bond_list, law_has_trait
 from ...friction import record
 from ...slip import fields
-from ..bench import averaged
+from ..bench import averaged_law
 from ..bench import shear as bench_shear
 from ..results.result import (
     N_FRAMES,
@@ -50,13 +50,13 @@ def collect_frames(model, numerics, patch, raw) -> dict:
         )
         tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
-            tau = averaged.limit_tractions(model, patch, raw.window.force[at])
+            tau = averaged_law.distribute_slip_force(model, patch, raw.window.force[at])
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return make_interface_frames(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
 
     shots = raw.snapshots
     if model.partial_slip and model.grooves is not None:
-        tau, local = bench_shear.groove_fields(
+        tau, local = bench_shear.compute_groove_fields(
             patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
         )
         return make_interface_frames(

@@ -19,7 +19,7 @@ from ...model.law import InterfaceLaw, make_bond_parameters
 from ...model.model import Model
 from ...slip import fields, shear_modes
 from ...structure.drive_sizes import find_drive_omega
-from ..bench import averaged, rigid, shear
+from ..bench import averaged_law, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
 from .lists import choose_bond_summation
@@ -161,7 +161,7 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
         return _make_bond_contact(model, numerics, patch, load)
     if law_has_trait(f.law, "averaged"):
         return models.coulomb_model(
-            *(f.static * load * averaged.rigid_limit_ratio(model, patch),) * 2
+            *(f.static * load * averaged_law.slip_force_ratio(model, patch),) * 2
         )
     element = make_law(f, load).element(load)
     if not soft:
@@ -186,14 +186,14 @@ def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
     if model.side == "lower" and (model.partial_slip or is_list):
         modes = None
         if model.partial_slip:
-            modes = shear.shear_modes_of_points(model, patch, numerics.shear_modes)
-        return shear.make_lists_on_lower_piece(model, patch, choice, modes)
+            modes = shear.compute_point_shear_modes(model, patch, numerics.shear_modes)
+        return shear.make_bond_lists_on_lower_piece(model, patch, choice, modes)
     if is_list and not model.partial_slip:
         return models.bond_list_model(law, limit, choice.reach(law.order), choice.merge)
     if model.partial_slip:
         reduced, force = _compute_shear_modes(patch, law, numerics.shear_modes, model)
         if is_list:
-            return shear.make_sheared_lists(patch, law, reduced, choice, force)
+            return shear.make_bond_lists_with_shear(patch, law, reduced, choice, force)
         if force is not None:
             return models.points_model(law, force, np.ones_like(force), reduced)
         weight = patch.pieces.interface.weight

@@ -63,7 +63,7 @@ def choose_bond_summation(model: Model, numerics: Numerics):
     from sliding is STICKING_STROKE_RATIO times that of the drive.
     """
     return numerics.choice or _choose_for_engine(
-        model, numerics, _relative_stretch(model), bench_engine.requested_engine(model)
+        model, numerics, _relative_stretch(model), bench_engine.find_requested_engine(model)
     )
 
 

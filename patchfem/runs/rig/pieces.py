@@ -29,7 +29,7 @@ from ...structure.drive_sizes import (
     is_periodic,
     is_sinusoidal,
 )
-from ..bench import averaged
+from ..bench import averaged_law
 from . import interface, strips
 from .levels import remove_incomplete_cycle, run_levels
 from .reading import Reader
@@ -466,7 +466,7 @@ def coulomb_limits(model, patch) -> list:
         return [tuple(map(float, law.friction_limits(law.load))) for law in laws]
     static, kinetic = model.friction_limits(normal_load(model, patch))
     if law_has_trait(friction.law, "averaged"):
-        static = static * averaged.rigid_limit_ratio(model, patch)
+        static = static * averaged_law.slip_force_ratio(model, patch)
     if friction.kinetic is None:
         kinetic = static
     return [(float(static), float(kinetic))]

@@ -11,7 +11,7 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import judge_outcome
 from ..bench import bench
-from ..bench.closed import integrate_steps
+from ..bench.closed_form import integrate_steps
 from ..bench.engine import steps_per_cycle
 from ..patch.press import nodal_areas
 from ..results.travel import judge_outcome_on_piece
@@ -112,7 +112,9 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
     """Return the slip path of the nodes in the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
-    run = bench.run(model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles)
+    run = bench.run_bench(
+        model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles
+    )
     outcome = judge_outcome_on_piece(None, model.patch, patch, run.slide)
     if is_uniform:
         cycle = _last_bench_cycle(run)

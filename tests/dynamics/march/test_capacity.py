@@ -89,9 +89,9 @@ def test_exact_enlarged_list_of_bench_equals_large_list(monkeypatch):
         '[normal]\nload = "100 N"\n[friction]\nlaw = "nonlocal"\nstatic = 0.3\nbond_length = "2 um"\norder = 2\n'
         '[slide]\nkind = "sine"\namplitude = "40 um"\nfrequency = "10 Hz"\n[accuracy]\nquadrature = "direct"\n'
     )
-    large = bench.run(build(text), None, 400)
+    large = bench.run_bench(build(text), None, 400)
     monkeypatch.setattr(list_numbers, "list_capacity", lambda *_: 50)
-    growing = bench.run(build(text), None, 400)
+    growing = bench.run_bench(build(text), None, 400)
     assert np.array_equal(large.force, growing.force) and np.array_equal(
         large.ledger, growing.ledger
     )

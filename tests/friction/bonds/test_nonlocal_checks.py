@@ -168,7 +168,7 @@ bond_length = "2 um"
 [slide]
 {motion}
 """
-    return law_bench.run(build(scene.loads(text, "bench.toml")), None, steps).values
+    return law_bench.run_bench(build(scene.loads(text, "bench.toml")), None, steps).values
 
 
 @pytest.mark.parametrize(

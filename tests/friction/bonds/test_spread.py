@@ -40,7 +40,7 @@ def test_exact_bench_forces_scale_with_spread_factor(law):
     point = POINT.replace("[normal]\n", '[normal]\nwidth = "12.7 mm"\n')
     for text in (point, SMALL_PATCH):
         full, reduced = (
-            bench.run(
+            bench.run_bench(
                 build(loads(text + NONLOCAL_2UM + law + TRIANGLE, sets=sets)),
                 solve_bench_patch(text),
                 80,

@@ -128,7 +128,7 @@ def test_exact_surface_at_reference_temperature_has_no_effect():
     without_table = loads(text + TRIANGLE)
     with_table = loads(text + WARM + TRIANGLE, sets=sets)
     run_without, run_with = (
-        bench.run(build(scene), None, 200) for scene in (without_table, with_table)
+        bench.run_bench(build(scene), None, 200) for scene in (without_table, with_table)
     )
     assert (run_without.force == run_with.force).all() and run_without.values == run_with.values
     assert plan(without_table).groups == plan(with_table).groups
@@ -139,7 +139,7 @@ def test_exact_steady_friction_on_warm_bench():
     rest = 10 * np.exp(2500 * (1 / 293.15 - 1 / 393.15))
     slip = 2e-7 * np.exp(1500 * (1 / 393.15 - 1 / 293.15))
     scene = loads(POINT + GROWING + WARM + CONSTANT_SPEED)
-    ratio = bench.run(build(scene), None, 2000).values["friction_ratio_end"]
+    ratio = bench.run_bench(build(scene), None, 2000).values["friction_ratio_end"]
     expected = 0.6 * friction_forms.steady_bond_length(5e-3, 2e-6, 0.7, rest, slip) / 2e-6
     assert ratio == pytest.approx(expected, rel=1e-6)
     cold_ratio = 0.6 * friction_forms.steady_bond_length(5e-3, 2e-6, 0.7, 10.0, 2e-7) / 2e-6
@@ -289,7 +289,7 @@ def test_exact_unused_effects_are_not_imported(tmp_path):
         "friction.bonds.plane_quadrature",
         "runs.bench.two_directions",
         "runs.results.heat",
-        "runs.bench.averaged",
+        "runs.bench.averaged_law",
     }
     assert not {f"patchfem.{name}" for name in unused_modules} & modules_after(
         FROM_PYTHON, tmp_path / "scene.toml"

@@ -150,11 +150,11 @@ def test_order_coulomb_work_under_varying_load(amplitude):
     load = lambda t: max(100 + load_amplitude * np.cos(2 * np.pi * 300 * t + 0.5), 0.0)  # noqa: E731
     expected = 0.3e-3 * quad(load, 0, 0.02, limit=500, epsabs=1e-12)[0]
     errors = [
-        abs(law_bench.run(model, None, steps).values["friction_work"] / expected - 1)
+        abs(law_bench.run_bench(model, None, steps).values["friction_work"] / expected - 1)
         for steps in (40, 80)
     ]
     assert errors[1] <= 3e-4 and errors[1] < errors[0] / 3
-    result = law_bench.run(model, None, 40)
+    result = law_bench.run_bench(model, None, 40)
     assert result.force == pytest.approx(0.3 * result.load * (result.slide > 0), abs=1e-12)
     if load_amplitude > 100:
         assert (result.load == 0).any() and result.values["friction_ratio_peak"] == pytest.approx(
@@ -187,7 +187,7 @@ def test_refuses_load_frequency_beyond_resolution():
         ["normal.amplitude=1 N", "normal.frequency=1000000 kHz", "slide.cycles=1000"],
     )
     with pytest.raises(Missing, match=r"lower normal\.frequency"):
-        law_bench.run(build(scene), None, 400)
+        law_bench.run_bench(build(scene), None, 400)
 
 
 @pytest.mark.parametrize(

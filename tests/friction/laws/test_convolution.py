@@ -192,7 +192,7 @@ def run_bench(text, *sets, steps=64):
     """Return the solved patch, if there is one, and the bench run of a scene."""
     model = build(loads(text, sets=sets))
     patch = solve_with_coarser(model.patch, 1e-3, False)[0] if model.patch is not None else None
-    return patch, bench.run(model, patch, steps, 4)
+    return patch, bench.run_bench(model, patch, steps, 4)
 
 
 def test_exact_point_under_varying_load_equals_coulomb():

@@ -1,6 +1,6 @@
 """Response of a compiled contact model to a prescribed displacement, in blocks of samples.
 
-In: a ContactModel and a `Slide`. Out: `PathResponse`.
+In: a ContactModel and a `SlideTask`. Out: a `PathResponse`.
 """
 
 from itertools import pairwise
@@ -12,17 +12,17 @@ from ...core import NotConverged
 from ...dynamics.march.capacity import copy_state, enlarge_list, is_full
 from ...dynamics.march.faces import STEP_TOL
 from ...dynamics.march.models import load_instances
-from .ledger import N_BLOCK_SAMPLES, Slide, SlideHistories, make_ledger
+from .ledger import N_BLOCK_SAMPLES, SlideHistories, SlideTask, stack_energies
 
 
 class PathResponse(NamedTuple):
-    """Histories of a contact model under a prescribed displacement, at k samples.
+    """Response of a contact model to a prescribed displacement, at k samples.
 
-    - force, slip (k,): [N], [m].
-    - ledger (4, k): energies of `make_ledger` [J].
-    - frames (f,): samples of the frames.
-    - states: contact state in each frame.
-    - n_failed: number of steps with too large a residual.
+    - force, slip (k,): friction force [N] and slip [m].
+    - ledger (4, k): energies [J], see `stack_energies`.
+    - frames (f,): indices of the samples with stored fields.
+    - states: displacement and state of the contact in each frame.
+    - n_failed: number of steps whose residual exceeds the tolerance.
     """
 
     force: np.ndarray
@@ -33,7 +33,7 @@ class PathResponse(NamedTuple):
     n_failed: int
 
     def require_convergence(self) -> None:
-        """Raise NotConverged if the residual of any step was too large."""
+        """Raise NotConverged if any step has too large a residual."""
         if self.n_failed:
             raise NotConverged(
                 f"in {self.n_failed} time steps of the prescribed slide the friction force has an error "
@@ -41,56 +41,56 @@ class PathResponse(NamedTuple):
                 "",
             )
 
-    def histories(self, load: float, tau, local) -> SlideHistories:
-        """Return the histories in the form of a bench run under constant load [N].
+    def to_slide_histories(self, load: float, tau, local) -> SlideHistories:
+        """Return the histories of a bench run under constant load.
 
         Parameters
         ----------
         load : float
         tau, local : (f, m)
-            Traction [Pa] and slip [m] of the nodes in the frames.
+            Traction [Pa] and slip [m] at the nodes in each frame.
         """
         loads = np.full(self.force.size, load)
         return SlideHistories(self.force, loads, self.slip, self.ledger, self.frames, tau, local)
 
 
-def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathResponse:
-    """Compute the response of a ContactModel to the displacement path of a bench.
+def follow_path(model, task: SlideTask, depends_on_speed: bool = False) -> PathResponse:
+    """Compute the response of a ContactModel to the prescribed displacement of a bench run.
 
     Parameters
     ----------
     model : ContactModel
-    task : Slide
+    task : SlideTask
     depends_on_speed : bool
-        Whether the law depends on the speed.
+        Whether the friction law depends on the sliding speed.
 
     Raises
     ------
     Missing
-        If a list of bonds exceeds its memory.
+        If a bond list exceeds the available memory.
     """
     loops = load_instances(task.options.say)
     time = task.time
     slide = task.slide
     contact = model.build()
-    frames = task.frame_numbers
-    pace_changes = _find_step_changes(time) if depends_on_speed else np.zeros(0, int)
+    frames = task.frame_indices
+    step_changes = _find_step_changes(time) if depends_on_speed else np.zeros(0, int)
     last = slide.size - 1
     ends = np.unique(
-        np.concatenate([np.arange(0, last, N_BLOCK_SAMPLES), frames, pace_changes, [last]])
+        np.concatenate([np.arange(0, last, N_BLOCK_SAMPLES), frames, step_changes, [last]])
     )
     forces = np.zeros((slide.size, 3))
     energies = np.zeros((slide.size, 2))
 
     def follow_block(contact, begin: int, end: int) -> int:
-        """Compute the samples of a block and return the number of steps that did not converge.
+        """Compute the response in a block of samples and return the number of failed steps.
 
         Parameters
         ----------
         contact
-            Contact at the start of the block, which the computation changes.
+            State of the contact at the start of the block; updated in place.
         begin, end : int
-            First and last sample.
+            Indices of the first and the last sample.
         """
         block = slice(begin, end + 1)
         return loops.follow_path(
@@ -122,11 +122,11 @@ def follow_path(model, task: Slide, depends_on_speed: bool = False) -> PathRespo
     losses = np.zeros((slide.size, 2))
     losses[1:, 0] = -np.minimum(energies[:-1, 0], 0.0)
     losses[1:, 1] = np.maximum(energies[:-1, 0], 0.0)
-    ledger = make_ledger(work, energies[:, 1], losses)
+    ledger = stack_energies(work, energies[:, 1], losses)
     return PathResponse(forces[:, 0], forces[:, 2], ledger, frames, states, n_failed)
 
 
 def _find_step_changes(time) -> np.ndarray:
-    """Return the indices of the samples at which the time step changes its length."""
+    """Return the indices of the samples at which the time step changes."""
     step = np.diff(time)
     return 1 + np.flatnonzero(np.abs(np.diff(step)) > 1e-6 * np.minimum(step[1:], step[:-1]))

@@ -1,7 +1,7 @@
-"""Friction law averaged over a patch, for a prescribed displacement or a sliding block.
+"""Friction law with a spatially averaged pressure, for a bench run or a rigidly sliding block.
 
-In: a model with law 'convolution' and its pressed patch. Out: the law object, the limit force
-over mu_s N, and tractions.
+In: a model with law 'convolution' and its Patch with the static contact solution. Out: the law
+object, the ratio of its slip force to mu_s N, and nodal tractions.
 """
 
 import numpy as np
@@ -9,43 +9,40 @@ import numpy as np
 from ...core import PatchfemError
 from ...effects import describe_unsupported, import_effect, law_has_trait
 
-# Largest relative difference of the limit forces in both directions that counts as zero.
+# Largest relative difference between the slip forces forward and backward that counts as zero.
 EQUAL_LIMITS_TOL = 1e-9
 
 
-def _averaged_law_module():
-    """Return the module of the averaged friction law, imported on first use."""
+def _import_averaged_law():
+    """Import the module of the averaged friction law, which is loaded only if a scene needs it."""
     return import_effect("friction.law=convolution")
 
 
 def make_averaged_law(model, patch):
-    """Return the averaged friction law of a model on its patch.
-
-    patch: None under [normal].
-    """
-    f = model.friction
-    law = _averaged_law_module()
+    """Return the averaged friction law of a model on its patch (None for a single point)."""
+    friction = model.friction
+    law = _import_averaged_law()
     if patch is None:
-        return law.Convolution(f.static, f.bond_length, f.order)
+        return law.Convolution(friction.static, friction.bond_length, friction.order)
 
     pattern = patch.pressure.sigma_n if model.side == "lower" else None
-    return law.Convolution(f.static, f.bond_length, f.order, patch.x, pattern)
+    return law.Convolution(friction.static, friction.bond_length, friction.order, patch.x, pattern)
 
 
-def rigid_limit_ratio(model, patch) -> float:
-    """Return the ratio of the friction limit of a rigid block to static coefficient x load [1].
+def slip_force_ratio(model, patch) -> float:
+    """Return the ratio of the slip force of a rigid block to the static coefficient times the load.
 
     Raises
     ------
     PatchfemError
-        If the limit differs between the two directions of sliding.
+        If the slip force differs between the two directions of sliding.
     """
     f = model.friction
     if patch is None or not law_has_trait(f.law, "averaged"):
         return 1.0
     weight = patch.pieces.interface.weight
     sigma = patch.pressure.sigma_n
-    forward, back = _averaged_law_module().sliding_limits(
+    forward, back = _import_averaged_law().sliding_limits(
         patch.x, sigma, weight, f.bond_length, f.order
     )
     if abs(forward - back) > EQUAL_LIMITS_TOL * max(forward, back):
@@ -60,10 +57,10 @@ def rigid_limit_ratio(model, patch) -> float:
     return (forward + back) / 2 / patch.pressure.load
 
 
-def limit_tractions(model, patch, force) -> np.ndarray:
-    """Distribute the friction force of a fully slipping rigid block over its nodes as tractions.
+def distribute_slip_force(model, patch, force) -> np.ndarray:
+    """Distribute the friction force of a slipping rigid block over its nodes.
 
-    The tractions are proportional to the averaged pressure in the direction of the force.
+    The tractions are proportional to the pressure averaged in the direction of the force.
 
     Parameters
     ----------
@@ -83,7 +80,7 @@ def limit_tractions(model, patch, force) -> np.ndarray:
     weight = patch.pieces.interface.weight
     unit_tractions = []
     for direction in (1.0, -1.0):
-        average = _averaged_law_module().average_pressure(
+        average = _import_averaged_law().average_pressure(
             x, x, sigma, direction, friction.bond_length, friction.order
         )
         traction = np.where(sigma > 0, average, 0.0)

@@ -1,20 +1,25 @@
-"""Rigid sliding of a friction law without memory in closed form, under a constant load.
+"""Rigid sliding of a friction law without memory under constant load, in closed form.
 
-In: a model whose pressure moves with the upper piece, and a path. Out: `SlideHistories`. In every step,
-the force of such a law is a fraction of its limit, and the limit depends only on the direction
-of the slide.
+In: a `SlideTask` whose pressure moves with the upper piece. Out: `SlideHistories`. In every step, the
+friction force is a fraction of its limit, and the limit depends only on the direction of sliding.
 """
 
 import numpy as np
 
 from .law import find_rest_ends, make_numpy_law, nodal_pressure
-from .ledger import Slide, SlideHistories, elastic_slip, local_slip, make_ledger
+from .ledger import (
+    SlideHistories,
+    SlideTask,
+    compute_interface_slip,
+    compute_local_slip,
+    stack_energies,
+)
 
-N_GAUSS_POINTS = 8  # Number of Gauss points per step along the flank of a groove.
+N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a groove.
 
 
-def slide_in_closed_form(task: Slide) -> SlideHistories:
-    """Compute the histories of rigid sliding with a law without memory, in closed form."""
+def slide_in_closed_form(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of rigid sliding with a law without memory."""
     if task.model.grooves is not None:
         return _slide_over_grooves_in_closed_form(task)
     slide = task.slide
@@ -23,15 +28,15 @@ def slide_in_closed_form(task: Slide) -> SlideHistories:
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     increments = np.diff(slide)
     fraction = law.limit_fraction(increments, np.diff(task.time))
-    if law.has_force_at_rest:  # At rest, the traction of the last motion persists.
-        last = _last_moving_steps(increments)
+    if law.has_force_at_rest:  # The traction of the last motion persists at rest.
+        last = _find_last_moving_steps(increments)
         fraction = np.where(last < 0, 0.0, fraction[last])
     fraction = np.concatenate([[0.0], fraction])
     direction = (fraction > 0).astype(int)
     force = fraction * (limits @ weight)[direction]
     work = np.append(0.0, force[1:] * increments)
     losses = np.stack([np.zeros(fraction.size), work], axis=1)
-    frames = task.frame_numbers
+    frames = task.frame_indices
     tau = fraction[frames, None] * limits[direction[frames]]
     for sample, sign in find_rest_ends(task.model, slide).items():
         breakaway = law.breakaway_traction(sigma, sign)
@@ -42,20 +47,20 @@ def slide_in_closed_form(task: Slide) -> SlideHistories:
     return SlideHistories(
         force,
         load,
-        elastic_slip(task.model, slide, force, load),
-        make_ledger(np.cumsum(work), np.zeros(fraction.size), losses),
+        compute_interface_slip(task.model, slide, force, load),
+        stack_energies(np.cumsum(work), np.zeros(fraction.size), losses),
         frames,
         tau,
-        local_slip(task.model, slide[frames], tau, sigma),
+        compute_local_slip(task.model, slide[frames], tau, sigma),
     )
 
 
-def _slide_over_grooves_in_closed_form(task: Slide) -> SlideHistories:
-    """Compute the histories of slow rigid sliding over grooves, in closed form.
+def _slide_over_grooves_in_closed_form(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of quasi-static rigid sliding over grooves.
 
-    The force is N (t + phi)/(1 - phi t), with the slope t and phi = f/R along the flank. The lift
-    of the load is stored energy, the friction work along the flank is dissipated; no mass is
-    lifted.
+    The force is N (t + phi)/(1 - phi t), with the slope t and the friction ratio phi = f/R along
+    the flank. The work of lifting the load is stored energy; the friction work along the flank is
+    dissipated. Inertia is neglected.
     """
     model = task.model
     slide = task.slide
@@ -65,31 +70,32 @@ def _slide_over_grooves_in_closed_form(task: Slide) -> SlideHistories:
     load = float(weight @ sigma)
     increments = np.diff(slide)
     if law.has_force_at_rest:
-        last = _last_moving_steps(increments)
+        last = _find_last_moving_steps(increments)
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(increments)[last]))
         ratio = grooves.force_ratio(slide, direction, law.kinetic)
         lowest, highest = (
             grooves.force_ratio(slide[0], sign, model.friction.static) for sign in (-1.0, 1.0)
         )
-        # At rest before the motion, friction on the flank takes the value that balances the load.
+        # Before the motion starts, the friction on the flank balances the load as far as its limit
+        # allows.
         ratio[direction == 0] = np.clip(0.0, lowest, highest)
         loss = load * grooves.friction_loss(slide[:-1], slide[1:], law.kinetic)
     else:
         duration = np.diff(task.time)
         speed = np.divide(increments, duration, out=np.zeros_like(increments), where=duration > 0)
-        slope, phi = _along_flank(grooves, law, slide, np.append(0.0, speed))
+        slope, phi = _evaluate_flank_friction(grooves, law, slide, np.append(0.0, speed))
         ratio = (slope + phi) / (1 - phi * slope)
 
-        def dissipated_force(places):
-            """Return the dissipated work per displacement [N] at displacements (k - 1,) [m]."""
-            slope, phi = _along_flank(grooves, law, places, speed)
+        def dissipated_force(displacement):
+            """Return the dissipated energy per displacement [N] at displacements (k - 1,) [m]."""
+            slope, phi = _evaluate_flank_friction(grooves, law, displacement, speed)
             return load * phi * (1 + slope**2) / (1 - phi * slope)
 
         loss = integrate_steps(slide, dissipated_force)
     rise = load * grooves.height_difference(slide[:-1], slide[1:])
     for sample, sign in find_rest_ends(model, slide).items():
         ratio[sample] = grooves.force_ratio(slide[sample], sign, model.friction.static)
-    frames = task.frame_numbers
+    frames = task.frame_indices
     task.options.report(1.0)
     losses = np.stack([np.zeros(slide.size), np.append(0.0, loss)], axis=1)
     work = np.append(0.0, np.cumsum(rise + loss))
@@ -97,15 +103,15 @@ def _slide_over_grooves_in_closed_form(task: Slide) -> SlideHistories:
         load * ratio,
         np.full(slide.size, load),
         slide.copy(),
-        make_ledger(work, load * grooves.height(slide), losses),
+        stack_energies(work, load * grooves.height(slide), losses),
         frames,
         ratio[frames, None] * sigma,
         np.repeat(slide[frames, None], sigma.size, axis=1),
     )
 
 
-def _last_moving_steps(increments) -> np.ndarray:
-    """Return for each step the index of the last moving step so far (k - 1,); -1 without one."""
+def _find_last_moving_steps(increments) -> np.ndarray:
+    """Return, for each step, the index of the last moving step up to it; -1 if there is none."""
     steps = np.where(increments != 0, np.arange(increments.size), -1)
     return np.maximum.accumulate(steps)
 
@@ -118,7 +124,7 @@ def integrate_steps(slide, integrand) -> np.ndarray:
     slide : (k,)
         [m].
     integrand : callable
-        Function of slides (k - 1,) [m].
+        Function of the displacements (k - 1,) [m].
     """
     move = np.diff(slide)
     out = np.zeros_like(move)
@@ -127,10 +133,10 @@ def integrate_steps(slide, integrand) -> np.ndarray:
     return out
 
 
-def _along_flank(grooves, law, slide, speed) -> tuple:
-    """Return the slope t of a groove flank and the friction ratio f/R [1] along it.
+def _evaluate_flank_friction(grooves, law, slide, speed) -> tuple:
+    """Return the slope t of a groove flank and the friction ratio f/R along it.
 
-    They are given at displacements [m] with speeds [m/s].
+    The arguments are displacements [m] and speeds [m/s].
     """
     t = grooves.slope(slide)
     return t, law.static * law.limit_fraction(np.sqrt(1 + t**2) * speed, 1.0)

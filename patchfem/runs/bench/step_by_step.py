@@ -1,7 +1,7 @@
 """Rigid sliding with NumPy laws, sample by sample, for varying pressure or two directions.
 
-In: a `Slide`. Out: `SlideHistories`. This reference implementation of the compiled
-engines takes every law and every bench with a rigid slide.
+In: a `SlideTask`. Out: `SlideHistories`. This implementation accepts every law and every bench run with
+rigid sliding; it is the reference for the compiled engines.
 """
 
 from collections.abc import Callable
@@ -14,23 +14,22 @@ from ...friction.protocol import Step
 from .law import find_rest_ends, make_numpy_law, nodal_pressure
 from .ledger import (
     N_BLOCK_SAMPLES,
-    Slide,
     SlideHistories,
-    elastic_slip,
-    local_slip,
-    make_ledger,
-    split_losses,
+    SlideTask,
+    compute_interface_slip,
+    compute_local_slip,
+    stack_energies,
+    sum_losses_by_sign,
 )
 
-# Largest number of strip-point products of a direct quadrature; a larger bench is refused.
+# Largest number of operations (strips x samples x points) of a direct sum over bonds.
 MAX_STRIP_POINT_PRODUCTS = 2e11
 
 
-def slide_step_by_step(task: Slide) -> SlideHistories:
-    """Compute the histories of rigid sliding sample by sample with a NumPy law.
+def slide_step_by_step(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of rigid sliding with a NumPy law, sample by sample.
 
-    The pressure moves with the upper piece, belongs to the lower piece, or changes with the load
-    over time.
+    The pressure moves with the upper piece, is fixed to the lower piece, or varies with the load.
 
     Raises
     ------
@@ -39,35 +38,35 @@ def slide_step_by_step(task: Slide) -> SlideHistories:
     """
     model = task.model
     law = make_numpy_law(model, task.patch)
-    points = _pressed_points(task)
+    points = _make_pressed_points(task)
     refuse_expensive_sum(model, law, task.slide.size, points.weight.size, task.slide)
     take_step = _step_under_changing_load if model.load_varies else _step_law
     histories = _evaluate_law(
         task, law, take_step, task.slide[:, None], points, find_rest_ends(model, task.slide)
     )
-    frames = task.frame_numbers
+    frames = task.frame_indices
     force = histories.force[:, 0]
     tau = histories.tau[:, 0]
     sigma = np.array([points.pressure(sample) for sample in frames]).reshape(tau.shape)
     return SlideHistories(
         force,
         histories.load,
-        elastic_slip(model, task.slide, force, histories.load),
+        compute_interface_slip(model, task.slide, force, histories.load),
         histories.ledger,
         frames,
         tau,
-        local_slip(model, task.slide[frames], tau, sigma),
+        compute_local_slip(model, task.slide[frames], tau, sigma),
     )
 
 
-def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
-    """Compute the histories of rigid sliding in two directions, from a displacement file.
+def slide_in_plane(task: SlideTask) -> tuple[SlideHistories, dict]:
+    """Compute the friction histories of rigid sliding in two directions.
 
-    The directions are those of the displacement and of `lateral` in slide.file. The pressure of a
-    rigid upper piece is constant at every point, and the law is linear in it, so that the traction
-    of every point is that of a point under unit pressure times its pressure. yaw_moment [N m] is
-    the sum of y f_x - x f_y, the moment about +z of the friction on the upper piece, with f
-    positive against its slip; strips have their positions y over the width.
+    The file of `slide.file` gives the displacements along x and in the lateral direction. The law
+    is linear in the pressure, which is constant at every point of the upper piece. Therefore, the
+    law is evaluated once at unit pressure, and the traction of each point is the result times its
+    pressure. The yaw moment [N m] is the sum of y f_x - x f_y over the points, where f is the
+    resistance to slip of the upper piece. Strips have lateral positions y.
 
     Returns
     -------
@@ -82,11 +81,11 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
     lateral = np.interp(task.time, model.slide.corners[0], model.slide.across)
     unit_point = _PressedPoints(np.ones(1), lambda sample: np.ones(1))
     unit = _evaluate_law(task, law, _step_law, np.stack([slide, lateral], axis=1), unit_point, {})
-    sums = _pressure_sums(model, patch)
+    sums = _sum_pressure(model, patch)
     sigma = np.array([sums.load]) if patch is None else patch.pressure.sigma_n
     compliance = law.law.length / law.law.static if law.law.static > 0 else 0.0
     slip = slide - compliance * unit.force[:, 0]
-    frames = task.frame_numbers
+    frames = task.frame_indices
     histories = SlideHistories(
         sums.load * unit.force[:, 0],
         np.full(slide.size, sums.load),
@@ -105,10 +104,10 @@ def slide_in_plane(task: Slide) -> tuple[SlideHistories, dict]:
 
 
 class _PressedPoints(NamedTuple):
-    """Areas of the interface points and their pressure along the bench path.
+    """Areas of the interface points, and their pressure at each sample.
 
     - weight (m,): areas [m2].
-    - pressure: function from the index of a sample to the pressure (m,) [Pa].
+    - pressure: function of the sample index that returns the pressures (m,) [Pa].
     """
 
     weight: np.ndarray
@@ -116,11 +115,11 @@ class _PressedPoints(NamedTuple):
 
 
 class _LawHistories(NamedTuple):
-    """Force, load, energy and traction histories of a friction law in d directions of slip.
+    """Histories of a friction law for slip in d directions, at k samples.
 
-    - force (k, d), load (k,): [N].
-    - ledger (4, k): energies of `make_ledger` [J].
-    - tau (f, d, m): tractions in the frames [Pa].
+    - force (k, d), load (k,): friction force and normal load [N].
+    - ledger (4, k): energies [J], see `stack_energies`.
+    - tau (f, d, m): tractions in each frame [Pa].
     """
 
     force: np.ndarray
@@ -130,25 +129,25 @@ class _LawHistories(NamedTuple):
 
 
 def _evaluate_law(
-    task: Slide, law, take_step: Callable, path, points: _PressedPoints, breakaways: dict
+    task: SlideTask, law, take_step: Callable, path, points: _PressedPoints, breakaways: dict
 ) -> _LawHistories:
     """Evaluate a friction law along a displacement path, sample by sample.
 
     Parameters
     ----------
-    task : Slide
+    task : SlideTask
     law
     take_step : callable
-        Function that takes one step of the law.
+        Function that computes one step of the law.
     path : (k, d)
-        Slide in d directions [m].
-    points : _Points
+        Relative displacement in d directions [m].
+    points : _PressedPoints
     breakaways : dict
-        Sign of the motion that starts, by the sample at the end of a rest.
+        Sign of the velocity after each rest, by the sample at which the rest ends.
     """
     weight = points.weight
     size, n_directions = path.shape
-    frames = set(task.frame_numbers.tolist())
+    frames = set(task.frame_indices.tolist())
     sigma = points.pressure(0)
     state = law.start(sigma) if n_directions == 1 else law.start(sigma, n_directions)
     force = np.zeros((size, n_directions))
@@ -170,7 +169,7 @@ def _evaluate_law(
                 sigma,
                 task.time[sample] - task.time[sample - 1],
             )
-            losses[sample] = split_losses(weight * dissipated)
+            losses[sample] = sum_losses_by_sign(weight * dissipated)
             work[sample] = work[sample - 1] + increment @ np.atleast_2d(mean) @ weight
         if sample in breakaways:
             traction = law.breakaway_traction(sigma, breakaways[sample])
@@ -187,22 +186,22 @@ def _evaluate_law(
     return _LawHistories(
         force,
         load,
-        make_ledger(work, stored, losses),
+        stack_energies(work, stored, losses),
         np.array(tau).reshape(len(tau), n_directions, weight.size),
     )
 
 
 def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
-    """Raise Missing if a direct sum over bonds exceeds the limit of operations.
+    """Raise Missing if a direct sum over bonds needs too many operations.
 
-    Bonds older than 25 bond lengths count as cut off.
+    Bonds are assumed to be neglected after a path of 25 bond lengths.
 
     Parameters
     ----------
     model : Model
     law
     samples, points : int
-        Numbers of samples and points.
+        Number of samples and of points.
     slide : (k,)
         [m].
     """
@@ -219,8 +218,8 @@ def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
         )
 
 
-def _pressed_points(task: Slide) -> _PressedPoints:
-    """Return the interface points with their pressure along the bench path."""
+def _make_pressed_points(task: SlideTask) -> _PressedPoints:
+    """Return the interface points with their pressure at each sample."""
     model = task.model
     if model.load_varies:
         loads = model.point.evaluate(task.time)
@@ -238,15 +237,16 @@ def _pressed_points(task: Slide) -> _PressedPoints:
 
 
 def _step_law(law, state, increment: float, before, after, duration: float) -> Step:
-    """Compute one step of a friction law at constant or given pressure."""
+    """Compute one step of a friction law under the pressure at its end."""
     return law.step(state, increment, before, after, duration)
 
 
 def _step_under_changing_load(law, state, increment: float, before, after, duration: float) -> Step:
-    """Compute one step of a friction law while the load changes from `before` to `after`.
+    """Compute one step of a friction law while the pressure changes from `before` to `after`.
 
-    Half of the change is applied before the motion and half after it, which is of order 1 if bonds
-    are released, else of order 2. A law without stretch takes the change during the motion.
+    Half of the change is applied before the motion and half after it (Strang splitting). The method
+    is of second order, and of first order if bonds are released. A law that can change its load
+    during the motion takes the whole change itself.
     """
     if increment != 0 and getattr(law, "can_change_load", False):
         return law.step(state, increment, before, after, duration)
@@ -258,15 +258,18 @@ def _step_under_changing_load(law, state, increment: float, before, after, durat
 
 
 class _PressureSums(NamedTuple):
-    """Load [N] of the pressure, and its first moments in x (moment) and y (roll) [N m]."""
+    """Resultant of the pressure [N] and its first moments in x (moment) and y (roll) [N m]."""
 
     load: float
     moment: float = 0.0
     roll: float = 0.0
 
 
-def _pressure_sums(model, patch) -> _PressureSums:
-    """Return the load [N] and the first moments [N m] of a pressure; 0 about x without strips."""
+def _sum_pressure(model, patch) -> _PressureSums:
+    """Return the resultant [N] and the first moments [N m] of the pressure.
+
+    The moment in y is 0 without strips.
+    """
     if patch is None:
         return _PressureSums(model.point.load)
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
