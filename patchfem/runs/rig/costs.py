@@ -342,7 +342,7 @@ def _interpreted_seconds(model: Model) -> float:
 
 def _is_event_loop_cached(model: Model) -> bool:
     """Return whether the compiled event loop for the number of modes of a rig is cached."""
-    from ...dynamics.events.to_slide_histories import (
+    from ...dynamics.events.histories import (
         is_loop_cached,  # imported here because a plan does not need the engine otherwise
     )
 
