@@ -30,7 +30,7 @@ PUBLIC = {
         "DEFAULT_STARTS",
         "FittedCurve",
         "fit_curve",
-        "is_curve",
+        "is_damping_curve_file",
     ),
     "fits.loop": (
         "FittedLoop",
@@ -40,7 +40,7 @@ PUBLIC = {
     "fits.patch": (
         "FittedPatch",
         "fit_patch",
-        "read_slides",
+        "check_amplitudes",
     ),
     "fits.patch_laws": (
         "FITTED_LAWS",

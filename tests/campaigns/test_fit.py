@@ -173,7 +173,7 @@ def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
     )
     result = fit_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
     assert result.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
-    assert result.rms < 1e-7 * LOAD and result.held_rms is None and result.step_error == 0
+    assert result.rms < 1e-7 * LOAD and result.held_out_rms is None and result.step_error == 0
     assert (
         result.keys.fit.intervals.ends[:, 0] <= result.keys.fit.values
     ).all() and result.keys.warnings == []
@@ -209,7 +209,7 @@ def test_exact_parameters_of_bond_growth_are_recovered(tmp_path):
     assert result.keys.fit.values == pytest.approx(
         [TRUTH["growth"][name] for name in names], rel=1e-6
     )
-    assert result.pieces == 1 and result.rms < 1e-6
+    assert result.steps_per_row == 1 and result.rms < 1e-6
 
 
 def test_order_of_bond_growth_fit_is_two(tmp_path):
@@ -236,8 +236,8 @@ def test_order_of_bond_growth_fit_is_two(tmp_path):
         result = fit_loop(scene, loop, free_ranges("friction.static"))
         assert result.step_error <= 0.1 * tolerance * 31
         assert result.rms < 1.4 * result.step_error
-        assert pieces is None or result.pieces == pieces
-        results.append((result.pieces, result.rms))
+        assert pieces is None or result.steps_per_row == pieces
+        results.append((result.steps_per_row, result.rms))
     (few_pieces, coarse_rms), (many_pieces, fine_rms) = results
     assert (
         np.log(coarse_rms / fine_rms) / np.log(many_pieces / few_pieces)
@@ -393,7 +393,7 @@ def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
         scene, wrong, free_ranges("friction.static", "friction.bond_length"), ["cycle=2.0"]
     )
     assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and result.rms < 1e-6
-    assert result.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
+    assert result.held_out_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
     assert result.held_out.sum() == 40
     first = fit_loop(
         scene,

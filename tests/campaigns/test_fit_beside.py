@@ -19,7 +19,7 @@ from test_fit import (
 )
 
 from patchfem.campaigns import LoopOptions, fit_loop
-from patchfem.campaigns.fits.loop_path import count_whole_cycles, prepend_warm_up
+from patchfem.campaigns.fits.loop_path import count_warm_up_rows, prepend_warm_up
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_loop
 
@@ -67,7 +67,7 @@ def test_exact_warm_up_path_ends_at_first_row(tmp_path):
     time, slide = sine_path(50, 2)
     position = slide[3:] - slide[3]
     loop = read_loop(write_loop(tmp_path / "loop.csv", time[3:], position, np.ones(position.size)))
-    warm_up_rows = count_whole_cycles(loop)
+    warm_up_rows = count_warm_up_rows(loop)
     assert warm_up_rows == 50 or warm_up_rows == 51
     times, path, before = prepend_warm_up(loop.time, loop.displacement, warm_up_rows, 2e-6)
     assert before == warm_up_rows + 1 and path[0] == 0 and np.diff(times).min() > 0

@@ -9,7 +9,7 @@ from scene_texts import DRIVE, KILOGRAM, POINT, make_friction_table, make_shaken
 
 import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
-from patchfem.campaigns.fits.curve import read_curve
+from patchfem.campaigns.fits.curve import read_damping_curve
 from patchfem.core import PatchfemError
 from patchfem.scene import loads
 
@@ -120,15 +120,15 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
         "method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n"
     )
     with pytest.raises(PatchfemError, match="several methods"):
-        read_curve(table)
+        read_damping_curve(table)
     table.write_text("amplitude [m],frequency [Hz],damping\n-1e-6,100,0.1\n2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="above 0"):
-        read_curve(table)
+        read_damping_curve(table)
     table.write_text(
         "amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n"
     )
     with pytest.raises(PatchfemError, match="errors must be 0 or more"):
-        read_curve(table)
+        read_damping_curve(table)
 
 
 def test_refuses_fewer_values_than_parameters(tmp_path):
@@ -156,11 +156,11 @@ def test_exact_progress_counts_computed_curves(monkeypatch):
     """The progress of a fit counts computed curves, without repeated ones."""
     messages = []
     monkeypatch.setattr(curves, "PROGRESS_SECONDS", 0.0)
-    monkeypatch.setattr(curves.CurveModel, "model", lambda self, values: None)
+    monkeypatch.setattr(curves.CurveModel, "build_model", lambda self, values: None)
     monkeypatch.setattr(
         curves.CurveModel, "compute_model_curve", lambda self, model, method: np.zeros((2, 3))
     )
     curve_model = curves.CurveModel(loads(IWAN), [], AMPLITUDES, messages.append)
     for value in (1.0, 2.0, 2.0, 3.0):
-        curve_model.compute("balance", [value])
+        curve_model.compute_curve("balance", [value])
     assert [message.split(" ")[0] for message in messages] == ["0", "1", "2"]

@@ -9,7 +9,7 @@ from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, make_friction_table
 
 import patchfem as pf
 from patchfem.campaigns import fit_patch
-from patchfem.campaigns.fits.patch_laws import Curves, LawProblem
+from patchfem.campaigns.fits.patch_laws import LawProblem, LoopCurves
 from patchfem.formatting import format_number, format_quantity
 from patchfem.friction import steady_loop
 from patchfem.scene import Friction
@@ -52,7 +52,7 @@ def test_exact_parameters_of_each_law_are_recovered_from_its_loops(law, keys):
     """The parameters of a law are recovered from its own steady loops within 1e-6."""
     true_law = Friction.model_construct(law=law, static=0.3, **keys)
     amplitudes = np.geomspace(2e-7, 6e-5, 20)
-    target = Curves(*steady_loop(true_law, 100.0, amplitudes))
+    target = LoopCurves(*steady_loop(true_law, 100.0, amplitudes))
     result = LawProblem(law, 0.3, 100.0, amplitudes, target, 5e6).solve()
     assert result.values == pytest.approx(keys, rel=1e-6)
     assert np.abs(result.deviations).max() < 1e-6

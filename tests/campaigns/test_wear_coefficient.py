@@ -8,7 +8,7 @@ from scene_texts import COATED, COULOMB, POINT
 
 import patchfem as pf
 from patchfem import load
-from patchfem.campaigns.fits.wear import read_depth
+from patchfem.campaigns.fits.wear import read_measured_depth
 from patchfem.core import PatchfemError
 
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
@@ -90,4 +90,4 @@ def test_refuses_unsuitable_depths_and_parameters(scene, tmp_path):
     scene.write_text(POINT + COULOMB + SINE + WEAR)
     assert "use [contact]" in fit_error("--to", "worn_depth_max=1 um", *FREE)
     with pytest.raises(PatchfemError, match="above zero"):
-        read_depth("worn_depth_max=0 um")
+        read_measured_depth("worn_depth_max=0 um")

@@ -24,7 +24,7 @@ from campaigns import Row
 
 import patchfem as pf
 from patchfem.campaigns import compute_backbone, fit_curve
-from patchfem.campaigns.fits.curve import read_curve
+from patchfem.campaigns.fits.curve import read_damping_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
 from patchfem.identify import UnitCubeResidual
@@ -158,7 +158,7 @@ def chi_square(fit) -> float:
 
 def minimize_from_truth(case: DecayCase, path: Path, keys: list) -> float:
     """Return chi square after a descent from the true values, with all curves by harmonic balance."""
-    amplitude, measured, error = read_curve(path)
+    amplitude, measured, error = read_damping_curve(path)
     base = BaseScene(pf.load(case.scene))
 
     def residual(values) -> np.ndarray:

@@ -1,9 +1,9 @@
-"""Fits of a scene: values of its keys that explain a measurement.
+"""Fits of scene parameters to measurements.
 
-In: a scene, ranges of its free keys, and a measurement: a friction loop (`loop`), a curve of frequency
-and damping against amplitude (`curve`), a worn depth (`wear`), or the loops of the scene's own patch
-(`patch`). Rows of responses have a folder of their own, `campaigns.rows`. Out: values with 95 %
-intervals and warnings (`problem.FittedKeys`), and what was measured and computed. A fit to a loop, a
-curve or rows minimises the sum of squares of a `problem.Problem`, by `identify.least_squares`.
+In: a scene, ranges of its free parameters, and a measurement: a friction loop (`loop`), frequency and
+damping as functions of amplitude (`curve`) or a worn depth (`wear`). `patch` fits friction laws to the
+computed loops of a patch instead, and `campaigns.rows` fits a rig to a table of responses. Out: fitted
+values with 95 % confidence intervals and warnings (`problem.FittedKeys`), and the measured and computed
+data. Fits to a loop, a curve or a table minimise a sum of squares by `identify.least_squares`.
 Read `problem` first, then `loop`.
 """

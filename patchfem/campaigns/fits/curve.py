@@ -1,10 +1,10 @@
-"""Fit of a rig to measured frequency and damping against amplitude.
+"""Fit of a rig to measured frequency and damping as functions of amplitude.
 
-The curve of the model is that of a periodic motion at the measured amplitudes, by harmonic balance.
-The search uses the curve of one static force, which takes a hundredth of the time, corrected so
-that it has the value and the slopes of the balance (`identify.two_models`). If this does not
-converge, the search uses the balance itself; if one of the two methods has no result, it uses the
-other.
+The reference curve of the model comes from periodic motions at the measured amplitudes, by harmonic
+balance. The search uses a quasi-static curve instead, which is a hundred times faster and is
+corrected to have the value and the derivatives of the reference (`identify.two_models`). If this
+search does not converge, the reference is used directly. If one of the two methods has no result,
+the other is used.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +28,13 @@ from ...response.errors import error_of_change
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
-from .problem import FittedKeys, FreeKeys, format_assignments, model_without_joint, parse_ranges
+from .problem import (
+    FittedKeys,
+    FreeKeys,
+    build_model_without_joint,
+    format_assignments,
+    parse_ranges,
+)
 
 UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
@@ -36,25 +42,25 @@ UNITS = {
     "damping": {"": 1.0, "1": 1.0},
 }
 HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
-# Relative error that is assumed for a frequency if its row states none.
+# Relative error of a frequency whose row gives no error.
 DEFAULT_FREQUENCY_ERROR = 1e-3
-# Relative error that is assumed for a damping ratio if its row states none.
+# Relative error of a damping ratio whose row gives no error.
 DEFAULT_DAMPING_ERROR = 5e-2
-# Smallest relative standard deviation of a value, because an error of 0 has no weight.
+# Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
-METHODS = ("balance", "quasi-static")  # The first method is the reference, the last one is fast.
-DEFAULT_STARTS = 6  # Number of starts of a search by the fast method.
-# Largest number of values tried besides those of the scene until both methods have a curve.
+METHODS = ("balance", "quasi-static")  # Reference method and fast method.
+DEFAULT_STARTS = 6  # Number of starting points of a search by the fast method.
+# Largest number of trial parameters, besides those of the scene, to find usable methods.
 MAX_TRIALS = 8
-PROGRESS_SECONDS = 10.0  # Time between two lines of progress [s].
-MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
-# Number of cached curves, because a step of the search needs the last ones again.
+PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
+MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a message lists.
+# Number of cached curves; each step of the search evaluates some of the last ones again.
 N_CACHED_CURVES = 8
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 
 class MeasuredCurve(NamedTuple):
-    """Measured frequency and damping ratio of a mode against amplitude.
+    """Measured frequency and damping ratio of a mode as functions of amplitude.
 
     Attributes
     ----------
@@ -63,21 +69,21 @@ class MeasuredCurve(NamedTuple):
     value : (2, k) array
         Frequency [Hz] and damping ratio.
     error : (2, k) array
-        Their standard deviations.
+        Standard deviations of `value`.
     """
 
     amplitude: np.ndarray
     value: np.ndarray
     error: np.ndarray
 
-    def residual(self, curve) -> np.ndarray:
-        """Return the residual (2k,) of a computed curve (2, k) over the standard deviations."""
+    def normalized_residual(self, curve) -> np.ndarray:
+        """Return the residual (2k,) of a computed curve (2, k), divided by the standard deviations."""
         return ((curve - self.value) / self.error).ravel()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedCurve:
-    """Fit of a rig to a measured curve of frequency and damping.
+    """Fit of a rig to measured frequency and damping as functions of amplitude.
 
     Attributes
     ----------
@@ -86,11 +92,11 @@ class FittedCurve:
         File of the measured curve.
     measured : MeasuredCurve
     model : (2, k) array
-        Fitted frequency [Hz] and damping ratio.
+        Computed frequency [Hz] and damping ratio.
     method : {"balance", "quasi-static"}
-        How the curve of the model was computed.
+        Reference method of the computed curve.
     notes : tuple of str
-        Sentences about what is compared, and about the error of the modes that a reduced structure lacks.
+        Notes about the compared quantities and about neglected modes of a reduced structure.
     """
 
     keys: FittedKeys
@@ -101,8 +107,8 @@ class FittedCurve:
     notes: tuple = ()
 
 
-def is_curve(path) -> bool:
-    """Return whether the header of a file is that of a table of damping against amplitude."""
+def is_damping_curve_file(path) -> bool:
+    """Return whether a file is a CSV table of damping against amplitude, judged by its header."""
     path = Path(path)
     if path.suffix.lower() != ".csv" or not path.is_file():
         return False
@@ -110,12 +116,12 @@ def is_curve(path) -> bool:
     return "amplitude" in head and "damping" in head
 
 
-def read_curve(path) -> MeasuredCurve:
-    """Read a measured curve that `import --decay` or `backbone` wrote.
+def read_damping_curve(path) -> MeasuredCurve:
+    """Read a measured curve from a table that `import --decay` or `backbone` wrote.
 
-    Raises PatchfemError that names all mistakes.
+    Raises PatchfemError with all validation errors.
     """
-    table = _read_table(path)
+    table = _read_curve_columns(path)
     if len(set(table.labels.get("method", ("",)))) > 1:
         raise PatchfemError(
             f"{path}: the file contains the curves of several methods; keep the rows of one method "
@@ -138,13 +144,13 @@ def read_curve(path) -> MeasuredCurve:
     if not (amplitude > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(amplitude, kind="stable")
-    # An error is half the width of a 95 % interval: two standard deviations.
+    # An error is half the width of a 95 % interval, which is two standard deviations.
     deviation = np.maximum(error / 2, MIN_SPREAD * np.abs(value))
     return MeasuredCurve(amplitude[order], value[:, order], deviation[:, order])
 
 
-def _read_table(path):
-    """Read the columns of a curve file, with or without the prefix "decay_"."""
+def _read_curve_columns(path):
+    """Read the columns of a curve table, whose names may have the prefix "decay_"."""
     units = {}
     for prefix in ("decay_", ""):
         for name, unit in UNITS.items():
@@ -155,19 +161,19 @@ def _read_table(path):
 
 
 class CurveModel:
-    """Frequency [Hz] and damping (2, k) of a rig at measured amplitudes, by free parameters.
+    """Computed frequency [Hz] and damping ratio (2, k) of a rig at the measured amplitudes.
 
-    Methods raise PatchfemError for values without a curve.
+    The methods take the free parameters, and raise PatchfemError if no curve exists for them.
 
     Parameters
     ----------
     scene : Scene
     ranges : list of Range
-        Bounds of the free keys.
+        Bounds of the free parameters.
     amplitude : (k,) array
         Measured amplitudes [m].
     say : callable, optional
-        Takes a line of progress.
+        Called with a line of text that reports the progress.
     """
 
     def __init__(self, scene: Scene, ranges: list, amplitude: np.ndarray, say=None):
@@ -180,99 +186,105 @@ class CurveModel:
         self.last_progress = self.begin
         self.n_computed = 0
         self.methods = list(METHODS)
-        self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute)
+        self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute_uncached)
 
-    def compute(self, method: str, values) -> np.ndarray:
-        """Compute the curve by a method; NaN at amplitudes at which the mode does not oscillate."""
+    def compute_curve(self, method: str, values) -> np.ndarray:
+        """Compute the curve (2, k) by a method; NaN at amplitudes where the mode does not oscillate."""
         return self._cached_curve(tuple(map(float, values)), method)
 
-    def model(self, values):
-        """Build the rig for given free parameters, with the modes that it has without the joint."""
-        return model_without_joint(self.base, format_assignments(self.ranges, values))
+    def build_model(self, values):
+        """Build the rig model for given free parameters, with the modes without the joint."""
+        return build_model_without_joint(self.base, format_assignments(self.ranges, values))
 
     def compute_model_curve(self, model, method: str) -> np.ndarray:
-        """Compute frequency and damping of any model at the measured amplitudes."""
-        return _compute_curve(model, self.distinct, method)[:, self.rows]
+        """Compute frequency and damping ratio of any model at the measured amplitudes."""
+        return _compute_backbone_curve(model, self.distinct, method)[:, self.rows]
 
-    def _compute(self, values: tuple, method: str) -> np.ndarray:
-        """Compute the curve for values of the free keys, and report the progress."""
+    def _compute_uncached(self, values: tuple, method: str) -> np.ndarray:
+        """Compute the curve for given free parameters, and report the progress."""
         if self.say and perf_counter() - self.last_progress >= PROGRESS_SECONDS:
             self.last_progress = perf_counter()
             elapsed = self.last_progress - self.begin
             self.say(f"{self.n_computed} curves of the model computed in {elapsed:.0f} s")
         self.n_computed += 1
-        return self.compute_model_curve(self.model(values), method)
+        return self.compute_model_curve(self.build_model(values), method)
 
     def choose_methods(self, trials: list) -> None:
-        """Select the METHODS that have a curve for the first trial values at which most have one."""
+        """Select the methods that can compute a curve, from trial values of the parameters.
+
+        The selection is that of the first trial for which the largest number of METHODS succeeds.
+        """
         reasons: list = []
-        best: list = []
+        best_methods: list = []
         for values in trials:
-            possible = []
+            successful_methods = []
             for method in METHODS:
                 try:
-                    self.compute(method, values)
-                    possible.append(method)
+                    self.compute_curve(method, values)
+                    successful_methods.append(method)
                 except PatchfemError as reason:
                     reasons.append(f"{method}: {reason}")
-            best = max(best, possible, key=len)
-            if len(best) == len(METHODS):
+            best_methods = max(best_methods, successful_methods, key=len)
+            if len(best_methods) == len(METHODS):
                 break
-        if not best:
+        if not best_methods:
             raise PatchfemError(
                 "no curve of frequency and damping could be computed within the ranges of --free; "
                 f"{'; '.join(reasons[: len(METHODS)])}; leave out the rows with the largest "
                 "damping, or change the ranges of --free"
             )
-        self.methods = best
+        self.methods = best_methods
 
-    def reference(self, values) -> np.ndarray:
+    def compute_reference(self, values) -> np.ndarray:
         """Compute the curve by the reference method; NaN where the mode does not oscillate."""
-        return self.compute(self.methods[0], values)
+        return self.compute_curve(self.methods[0], values)
 
-    def quick(self, values) -> np.ndarray:
-        """Compute the curve by the fast method; PatchfemError if the mode does not oscillate."""
-        curve = self.compute(self.methods[-1], values)
+    def compute_quick(self, values) -> np.ndarray:
+        """Compute the curve by the fast method.
+
+        Raises PatchfemError if the mode does not oscillate at one of the amplitudes.
+        """
+        curve = self.compute_curve(self.methods[-1], values)
         missing = self.amplitude[np.isnan(curve[0])]
         if missing.size:
             raise PatchfemError(
                 "the mode of the model does not oscillate at the amplitudes "
-                f"{_list_amplitudes(missing)}; leave out these rows, or narrow the ranges of --free"
+                f"{_format_amplitudes(missing)}; leave out these rows, or narrow the ranges of --free"
             )
         return curve
 
-    def complete_reference(self, values) -> np.ndarray:
-        """Compute the curve by the reference method, with gaps filled by the fast method.
+    def compute_filled_reference(self, values) -> np.ndarray:
+        """Compute the curve by the reference method, and fill its gaps by the fast method.
 
-        In rows in which only the reference method has no value, the value of the fast method is
-        multiplied by the ratio of both methods in the row that is nearest in amplitude.
+        In a gap, the value of the fast method is multiplied by the ratio of both methods at the
+        nearest amplitude at which the reference method has a value.
         """
-        curve = self.reference(values)
-        quick = self.compute(self.methods[-1], values)
+        curve = self.compute_reference(values)
+        quick = self.compute_curve(self.methods[-1], values)
         known = np.flatnonzero(~np.isnan(curve[0]))
-        nearest = known[_nearest_rows(self.amplitude[known], self.amplitude)]
+        nearest = known[_find_nearest_amplitudes(self.amplitude[known], self.amplitude)]
         return np.where(np.isnan(curve), quick * (curve / quick)[:, nearest], curve)
 
 
 def fit_curve(
     scene: Scene, to: Path, free: Sequence, say=None, starts: int = DEFAULT_STARTS
 ) -> FittedCurve:
-    """Fit parameters of a rig to measured frequency and damping against amplitude.
+    """Fit free parameters of a rig to measured frequency and damping as functions of amplitude.
 
-    Each row is weighted by its error. Values at which the mode does not oscillate are failed
-    evaluations. For a reduced structure the intervals contain the error of the missing modes.
+    Each row is weighted by its error. Parameters for which the mode does not oscillate count as a
+    failed evaluation. For a reduced structure the intervals include the error of neglected modes.
 
     Parameters
     ----------
     scene : Scene
     to : Path
-        File of the curve, as `read_curve` takes it.
+        File of the measured curve, in the format of `read_damping_curve`.
     free : sequence of str
-        Free keys with their ranges, "table.key=low..high".
+        Free parameters with their ranges, "table.key=low..high".
     say : Callable, optional
-        Takes a line of progress.
+        Called with a line of text that reports the progress.
     starts : int
-        Starts of the search by the fast method.
+        Number of starting points of the search by the fast method.
 
     Returns
     -------
@@ -281,52 +293,59 @@ def fit_curve(
     Raises
     ------
     SceneError, PatchfemError
-        For input that cannot be used.
+        If the input is invalid.
     NotConverged
         If no search converges.
     """
     begin = perf_counter()
     ranges = parse_ranges(free)
-    measured = read_curve(to)
-    count = measured.amplitude.size
-    if 2 * count <= len(ranges):
+    measured = read_damping_curve(to)
+    n_amplitudes = measured.amplitude.size
+    if 2 * n_amplitudes <= len(ranges):
         raise PatchfemError(
-            f"{to}: {count} amplitudes are too few to determine {len(ranges)} values; at least "
+            f"{to}: {n_amplitudes} amplitudes are too few to determine {len(ranges)} values; at least "
             f"{len(ranges) // 2 + 1} are needed"
         )
     curves = CurveModel(scene, ranges, measured.amplitude, say)
     keys = FreeKeys(scene, ranges)
-    problem = keys.make_problem(lambda values: measured.residual(curves.quick(values)))
+    problem = keys.make_problem(
+        lambda values: measured.normalized_residual(curves.compute_quick(values))
+    )
     space = problem.space
     other_trials = map(space.values, make_space_filling_points(MAX_TRIALS, len(ranges)))
     curves.choose_methods([problem.start, *other_trials])
     if say:
-        say(f"{count} amplitudes computed by {' and '.join(curves.methods)}")
-    model = curves.quick
+        say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
+    model = curves.compute_quick
     if len(curves.methods) > 1:
-        models = TwoModels(curves.quick, curves.complete_reference, measured.residual, space)
+        models = TwoModels(
+            curves.compute_quick,
+            curves.compute_filled_reference,
+            measured.normalized_residual,
+            space,
+        )
         model, start = _search_two_models(models, problem.start, starts, measured.amplitude)
-        model = model or curves.complete_reference
+        model = model or curves.compute_filled_reference
         problem = replace(problem, start=start)
         starts = 1
-    problem = replace(problem, residual=lambda values: measured.residual(model(values)))
+    problem = replace(problem, residual=lambda values: measured.normalized_residual(model(values)))
     fit = problem.solve(starts, "series")
-    widened = _include_missing_modes(keys.ranges, problem, fit, curves, measured, model)
-    missing = measured.amplitude[np.isnan(curves.reference(fit.values)[0])]
+    widened = _widen_by_missing_modes(keys.ranges, problem, fit, curves, measured, model)
+    missing = measured.amplitude[np.isnan(curves.compute_reference(fit.values)[0])]
     if missing.size:
-        keys = replace(keys, notes=[_describe_substitutes(missing)])
+        keys = replace(keys, notes=[_warn_of_substituted_values(missing)])
     return FittedCurve(
-        keys=keys.conclude(widened.fit, begin),
+        keys=keys.make_fitted_keys(widened.fit, begin),
         path=Path(to),
         measured=measured,
         model=model(fit.values),
         method=curves.methods[0],
-        notes=_compare_methods(to, curves.methods[0], measured) + widened.notes,
+        notes=_note_different_methods(to, curves.methods[0], measured) + widened.notes,
     )
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
-    """Fit the surrogate model; return it, or None, and its best-fit parameters."""
+    """Search with the corrected fast model; return this model, or None, and the best-fit parameters."""
     try:
         return models.search(start, starts)
     except NotConverged:
@@ -334,45 +353,45 @@ def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tupl
     except PatchfemError as reason:
         raise PatchfemError(
             "with the fitted values harmonic balance finds no oscillation at the amplitudes "
-            f"{_list_amplitudes(amplitude)}: {reason}; leave out the rows with the largest "
+            f"{_format_amplitudes(amplitude)}: {reason}; leave out the rows with the largest "
             "damping, or narrow the ranges of --free"
         ) from None
 
 
-def _describe_substitutes(amplitudes) -> str:
-    """Return the warning on amplitudes (k,) [m] at which harmonic balance has no result."""
+def _warn_of_substituted_values(amplitudes) -> str:
+    """Return the warning about amplitudes (k,) [m] at which harmonic balance has no result."""
     return (
-        f"harmonic balance found no oscillation at the amplitudes {_list_amplitudes(amplitudes)}; there, "
+        f"harmonic balance found no oscillation at the amplitudes {_format_amplitudes(amplitudes)}; there, "
         "the values of the static curve are used, multiplied by the ratio of the two methods at "
         "the nearest amplitude at which both have a value"
     )
 
 
-def _compare_methods(path, method: str, measured: MeasuredCurve) -> tuple:
-    """Return a note if the measured curve and that of the model are of different kinds."""
-    label = (*_read_table(path).labels.get("method", ()), "decay")[0]
-    if label == method:
+def _note_different_methods(path, method: str, measured: MeasuredCurve) -> tuple:
+    """Return a note if the measured and the computed curve come from different methods."""
+    measured_method = (*_read_curve_columns(path).labels.get("method", ()), "decay")[0]
+    if measured_method == method:
         return ()
     k = int(np.argmax(measured.value[1]))
-    lost = -np.expm1(-2 * np.pi * measured.value[1, k])
+    amplitude_loss = -np.expm1(-2 * np.pi * measured.value[1, k])
     amplitude = format_length(measured.amplitude[k], 3)
     return (
         f"the measured curve is compared with the curve by {method} at the same amplitudes, not "
         "with a computed decay; a decay gives mean values over a cycle, so the two differ most "
         f"where the damping is largest: at {amplitude} one cycle reduces the amplitude by "
-        f"{100 * lost:.2g} %. The intervals do not contain this difference; `patchfem backbone "
+        f"{100 * amplitude_loss:.2g} %. The intervals do not contain this difference; `patchfem backbone "
         "scene.fitted.toml` computes both curves",
     )
 
 
 class WidenedFit(NamedTuple):
-    """Fit with intervals that include the error of missing modes, and notes on it."""
+    """Fit with intervals that include the error due to neglected modes, and notes about it."""
 
     fit: Fit
     notes: tuple
 
 
-def _include_missing_modes(
+def _widen_by_missing_modes(
     ranges: list,
     problem: Problem,
     fit: Fit,
@@ -380,74 +399,76 @@ def _include_missing_modes(
     measured: MeasuredCurve,
     model: Callable,
 ) -> WidenedFit:
-    """Widen the intervals of a fit by the effect of modes that a reduced structure lacks.
+    """Widen the intervals of a fit by the effect of modes that a reduced structure neglects.
 
     Parameters
     ----------
     ranges : list of Range
-        The free keys.
+        Ranges of the free parameters.
     problem : Problem
     fit : Fit
-        Its solution.
+        Solution of the problem.
     curves : CurveModel
     measured : MeasuredCurve
     model : callable
-        Curve (2, k) that the problem compares with the measured one, as a function of the values.
+        Function from the free parameters to the fitted curve (2, k).
     """
     method = curves.methods[0]
-    rig = curves.model(fit.values)
-    if rig.rig.structure.richer_rig is None:
+    rig_model = curves.build_model(fit.values)
+    if rig_model.rig.structure.richer_rig is None:
         return WidenedFit(fit, ())
     try:
-        richer = curves.compute_model_curve(replace(rig, rig=rig.rig.structure.richer_rig), method)
+        richer_curve = curves.compute_model_curve(
+            replace(rig_model, rig=rig_model.rig.structure.richer_rig), method
+        )
     except PatchfemError as reason:
         return WidenedFit(fit, (f"{NO_MODE_ERROR}: {reason}",))
-    reference = curves.reference(fit.values)
-    change = np.nan_to_num(richer - reference)
+    reference = curves.compute_reference(fit.values)
+    change = np.nan_to_num(richer_curve - reference)
     error = error_of_change(change, ratio=0.5, order=2.0)
     shifted = replace(
         problem,
-        residual=lambda values: measured.residual(model(values) + error),
+        residual=lambda values: measured.normalized_residual(model(values) + error),
         start=fit.values,
     )
-    moved = np.abs(shifted.solve(1, "").values - fit.values)
+    parameter_shifts = np.abs(shifted.solve(1, "").values - fit.values)
     space = problem.space
-    ends = fit.intervals.ends + moved[:, None] * [-1, 1]
+    ends = fit.intervals.ends + parameter_shifts[:, None] * [-1, 1]
     ends = frozen_array(np.clip(ends, space.low[:, None], space.high[:, None]))
-    fractions = map(_format_fraction, moved, fit.values)
-    moves = [f"{bound.key} by {fraction}" for bound, fraction in zip(ranges, fractions)]
+    fractions = map(_format_relative_shift, parameter_shifts, fit.values)
+    shift_texts = [f"{bound.key} by {fraction}" for bound, fraction in zip(ranges, fractions)]
     frequency, damping = 100 * np.nanmax(np.abs(change / reference), axis=1)
     note = (
         "the intervals contain the error of the modes left out of the structure; a computation "
         f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up "
-        f"to {damping:.2g} %, and moves {', '.join(moves)}"
+        f"to {damping:.2g} %, and moves {', '.join(shift_texts)}"
     )
     intervals = replace(fit.intervals, ends=ends)
     return WidenedFit(replace(fit, intervals=intervals), (note,))
 
 
-def _format_fraction(change: float, value: float) -> str:
-    """Format a change as a percentage of a value, or as a number if the value is 0."""
-    return f"{100 * change / abs(value):.2g} %" if value else f"{change:.2g}"
+def _format_relative_shift(shift: float, value: float) -> str:
+    """Format a shift as a percentage of a value, or as a number if the value is 0."""
+    return f"{100 * shift / abs(value):.2g} %" if value else f"{shift:.2g}"
 
 
-def _nearest_rows(amplitudes, others) -> np.ndarray:
-    """Return the indices (m,) of the amplitudes (k,) that are nearest in ratio to others (m,)."""
-    return np.abs(np.log(np.asarray(others)[:, None] / amplitudes)).argmin(axis=1)
+def _find_nearest_amplitudes(amplitudes, targets) -> np.ndarray:
+    """Return the indices (m,) of the amplitudes (k,) with the closest ratios to targets (m,)."""
+    return np.abs(np.log(np.asarray(targets)[:, None] / amplitudes)).argmin(axis=1)
 
 
-def _list_amplitudes(amplitudes) -> str:
-    """Return the first amplitudes as text, with their units."""
+def _format_amplitudes(amplitudes) -> str:
+    """Format the first amplitudes as a list with units."""
     listed = ", ".join(
         format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED_AMPLITUDES]
     )
     return listed + (", ..." if len(amplitudes) > MAX_LISTED_AMPLITUDES else "")
 
 
-def _compute_curve(model, amplitudes, method: str) -> np.ndarray:
+def _compute_backbone_curve(model, amplitudes, method: str) -> np.ndarray:
     """Compute frequency [Hz] and damping ratio (2, k) at increasing amplitudes (k,) [m].
 
-    They are NaN if the mode does not oscillate; PatchfemError if it oscillates at no amplitude.
+    Both are NaN where the mode does not oscillate. Raises PatchfemError if it never oscillates.
     """
     with locate_errors(model.source):
         backbone = compute_backbone(model, "", amplitudes, (method,), errors=False)
@@ -455,5 +476,8 @@ def _compute_curve(model, amplitudes, method: str) -> np.ndarray:
         raise PatchfemError(backbone.missing[method])
     curve = backbone.curves[method]
     values = np.full((2, amplitudes.size), np.nan)
-    values[:, _nearest_rows(amplitudes, curve.amplitude)] = curve.frequency, curve.damping
+    values[:, _find_nearest_amplitudes(amplitudes, curve.amplitude)] = (
+        curve.frequency,
+        curve.damping,
+    )
     return values

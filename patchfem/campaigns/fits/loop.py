@@ -1,8 +1,8 @@
-"""Fit of a scene with a prescribed displacement to a measured friction loop.
+"""Fit of a bench scene with a prescribed displacement to a measured friction loop.
 
-The model starts without stress in the first row of the record and follows the measured displacement,
-which is linear between two rows. Where the force depends on the time steps, they are halved until they
-no longer change the fit.
+The model is free of stress in the first row of the record and follows the measured displacement,
+which is interpolated linearly between rows. If the force depends on the time steps, they are halved
+until the fit converges.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,17 +20,17 @@ from ...inputs.loops import Loop, read_loop
 from ...scene.keys.quantities import UNIT_FACTORS
 from ...scene.scene import Scene, SceneError
 from .loop_model import BenchModel
-from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
+from .loop_path import DEFAULT_OPTIONS, LoopOptions, make_offsets
 from .problem import FittedKeys, FreeKeys, parse_ranges
 
-# Number of time steps between two rows above which the steps are not halved any more.
-MAX_PIECES = 64
-# Change of the force over the tolerance below which it has no effect on a fit.
+# Number of time steps between two rows from which the steps are no longer halved.
+MAX_STEPS_PER_ROW = 64
+# Largest change of the force, over the tolerance, that is negligible in a fit.
 STEP_FRACTION = 0.1
-MIN_INDEPENDENT = 0.6  # Fraction of independent rows below which a warning states the correlation.
-# Residual over peak force below which rounding, not correlation, dominates the residual.
+MIN_INDEPENDENT = 0.6  # Smallest fraction of independent rows without a warning about correlation.
+# Residual over peak force up to which round-off dominates the residual.
 MIN_RMS = 1e-6
-# Force in the first row over the peak above which the record cannot begin at rest.
+# Largest force in the first row, over the peak force, of a record that begins at rest.
 MAX_FIRST_FORCE = 0.2
 LOAD_UNITS = {
     "time": UNIT_FACTORS["time"],
@@ -47,18 +47,18 @@ class FittedLoop:
     Attributes
     ----------
     keys : FittedKeys
-        Its values are those of the free keys, then those of `offsets`.
+        Fitted values of the free parameters, followed by those of `offsets`.
     loop : Loop
-        The measured loop.
+        Measured loop.
     offsets : list of Offset
     held_out : (k,) bool
-        Rows that were only predicted.
+        Mask of the rows that were predicted but not fitted.
     model : (k,) array
-        Fitted force or friction ratio at the rows of `loop`.
+        Computed force or friction ratio at the rows of `loop`.
     step_error : float
-        Largest change of the model when its time steps are halved.
-    pieces : int
-        Time steps between two rows.
+        Largest change of `model` when the time steps are halved.
+    steps_per_row : int
+        Number of time steps between two rows.
     """
 
     keys: FittedKeys
@@ -67,22 +67,22 @@ class FittedLoop:
     held_out: np.ndarray
     model: np.ndarray
     step_error: float
-    pieces: int
+    steps_per_row: int
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residual in the fitted rows, in the unit of the reading."""
-        return self._rms(~self.held_out)
+        """Root mean square residual of the fitted rows, in the unit of the reading."""
+        return self._residual_rms(~self.held_out)
 
     @property
-    def held_rms(self) -> float | None:
-        """Root mean square of the residual in the rows held out; None if there are none."""
-        return self._rms(self.held_out) if self.held_out.any() else None
+    def held_out_rms(self) -> float | None:
+        """Root mean square residual of the held-out rows; None if there are none."""
+        return self._residual_rms(self.held_out) if self.held_out.any() else None
 
-    def _rms(self, rows) -> float:
-        """Return the root mean square of the residual in some rows."""
+    def _residual_rms(self, mask) -> float:
+        """Return the root mean square residual of the rows in a mask (k,)."""
         residual = self.model - self.loop.reading
-        return float(np.sqrt(np.mean(residual[rows] ** 2)))
+        return float(np.sqrt(np.mean(residual[mask] ** 2)))
 
 
 def fit_loop(
@@ -93,21 +93,21 @@ def fit_loop(
     say: Callable | None = None,
     options: LoopOptions = DEFAULT_OPTIONS,
 ) -> FittedLoop:
-    """Fit keys of a scene with a prescribed displacement to the friction loop in a file.
+    """Fit free parameters of a bench scene to the measured friction loop in a file.
 
     Parameters
     ----------
     scene : Scene
     to : Path
-        File of the loop.
+        File of the measured loop.
     free : sequence of str
-        Free keys with their ranges, "table.key=low..high".
+        Free parameters with their ranges, "table.key=low..high".
     hold : sequence of str
-        Rows that are predicted without being fitted, "column=value,value".
+        Selectors "column=value,value" of rows that are predicted but not fitted.
     say : Callable, optional
-        Takes a line of progress.
+        Called with a line of text that reports the progress.
     options : LoopOptions
-        Offsets that are fitted as well, and whether the record is driven once beforehand.
+        Fitted offsets and warm-up cycles.
 
     Returns
     -------
@@ -116,9 +116,9 @@ def fit_loop(
     Raises
     ------
     SceneError, PatchfemError
-        For input that cannot be used.
+        If the input is invalid.
     NotConverged
-        If the model fails at all starting points.
+        If the model cannot be evaluated at any starting point.
     """
     begin = perf_counter()
     if scene.kind != "bench":
@@ -133,7 +133,7 @@ def fit_loop(
     held_out = np.zeros(loop.reading.size, bool)
     for selector in hold:
         held_out |= loop.select_rows(selector)
-    offsets = read_offsets(options.offsets, loop)
+    offsets = make_offsets(options.offsets, loop)
     n_values = len(ranges) + len(offsets)
     n_used = np.count_nonzero(~held_out)
     if n_used <= n_values:
@@ -141,15 +141,15 @@ def fit_loop(
             f"{to}: only {n_used} rows are used for the fit (rows that are held out do not count), "
             f"too few to determine {n_values} values and their intervals"
         )
-    bench = BenchModel(scene, loop, ranges, offsets, warm=options.warm, say=say)
+    bench = BenchModel(scene, loop, ranges, offsets, warm_up=options.warm, say=say)
     scale = float(np.abs(loop.reading[~held_out]).max())
 
     def residual(values) -> np.ndarray:
-        """Return the residual over the largest force (r,) in the fitted rows."""
+        """Return the residual (r,) of the fitted rows, divided by the largest measured force."""
         return (bench(values) - loop.reading)[~held_out] / scale
 
     offset_ranges = [offset.range for offset in offsets]
-    keys = FreeKeys(scene, ranges, offset_ranges, bench.sets, bench.notes)
+    keys = FreeKeys(scene, ranges, offset_ranges, bench.assignments, bench.notes)
     try:
         refined = _solve_with_refined_steps(keys.make_problem(residual), bench, say)
     except NotConverged as error:
@@ -158,13 +158,13 @@ def fit_loop(
         raise
     model = bench(refined.fit.values)
     fitted = FittedLoop(
-        keys=keys.conclude(refined.fit, begin),
+        keys=keys.make_fitted_keys(refined.fit, begin),
         loop=loop,
         offsets=offsets,
         held_out=held_out,
         model=model,
         step_error=refined.step_error,
-        pieces=bench.pieces,
+        steps_per_row=bench.steps_per_row,
     )
     has_lead_in = bool(offsets) or options.warm
     doubts = _warn_of_doubtful_fit(fitted, scene, has_lead_in=has_lead_in)
@@ -173,68 +173,72 @@ def fit_loop(
 
 
 class RefinedFit(NamedTuple):
-    """Fit with the largest change of its model when the time steps are halved."""
+    """Fit, and the largest change of the computed force when the time steps are halved."""
 
     fit: Fit
     step_error: float
 
 
-def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> RefinedFit:
-    """Fit with time steps that are halved until the change of the force is negligible."""
-    if bench.exact:
+def _solve_with_refined_steps(problem: Problem, bench_model: BenchModel, say) -> RefinedFit:
+    """Solve the fit, halving the time steps until their effect on the force is negligible."""
+    if bench_model.is_exact:
         return RefinedFit(problem.solve(interval_kind="series"), 0.0)
     fit = problem.solve(interval_kind="")
     agreed = fit.agreed
     while True:
-        coarse = bench(fit.values)
-        bench.pieces *= 2
-        fine = bench(fit.values)
+        coarse = bench_model(fit.values)
+        bench_model.steps_per_row *= 2
+        fine = bench_model(fit.values)
         change = float(np.abs(fine - coarse).max())
         peak = float(np.abs(fine).max())
-        tolerance = STEP_FRACTION * bench.scene.accuracy.tolerance * peak
+        tolerance = STEP_FRACTION * bench_model.scene.accuracy.tolerance * peak
         problem = replace(problem, start=fit.values)
-        if bench.pinned or change <= tolerance or bench.pieces >= MAX_PIECES:
-            bench.pieces //= 2
-            last = _add_counts(problem.solve(1, "series"), fit)
+        if (
+            bench_model.has_fixed_steps
+            or change <= tolerance
+            or bench_model.steps_per_row >= MAX_STEPS_PER_ROW
+        ):
+            bench_model.steps_per_row //= 2
+            last = _add_search_counts(problem.solve(1, "series"), fit)
             return RefinedFit(replace(last, agreed=agreed), change)
         if say:
-            say(f"{bench.pieces} time steps between neighbouring rows of the record")
-        fit = _add_counts(problem.solve(1, ""), fit)
+            say(f"{bench_model.steps_per_row} time steps between neighbouring rows of the record")
+        fit = _add_search_counts(problem.solve(1, ""), fit)
 
 
-def _add_counts(fit: Fit, before: Fit) -> Fit:
-    """Add the numbers of evaluations and failures of an earlier fit to a fit."""
+def _add_search_counts(fit: Fit, previous: Fit) -> Fit:
+    """Add the numbers of evaluations and failures of a previous fit to those of a fit."""
     counts = SearchCounts(
-        fit.counts.evaluations + before.counts.evaluations,
-        fit.counts.failures + before.counts.failures,
-        before.counts.reason or fit.counts.reason,
+        fit.counts.evaluations + previous.counts.evaluations,
+        fit.counts.failures + previous.counts.failures,
+        previous.counts.reason or fit.counts.reason,
     )
     return replace(fit, counts=counts)
 
 
 def _warn_of_doubtful_fit(fitted: FittedLoop, scene: Scene, *, has_lead_in: bool) -> list:
-    """Return warnings if the rows differ from the model by more than independent noise.
+    """Return warnings about correlated residuals, the initial state and the time steps.
 
-    `has_lead_in`: the model does not start without stress in the first row.
+    `has_lead_in`: whether the model may carry stress in the first row.
     """
     loop = fitted.loop
     peak = float(np.abs(loop.reading).max())
     n_used = np.count_nonzero(~fitted.held_out)
-    rows = fitted.keys.fit.intervals.rows
+    n_independent = fitted.keys.fit.intervals.rows
     warnings = []
-    if fitted.rms > MIN_RMS * peak and rows < MIN_INDEPENDENT * n_used:
+    if fitted.rms > MIN_RMS * peak and n_independent < MIN_INDEPENDENT * n_used:
         warnings.append(
             "the deviations of neighbouring rows are correlated, so the intervals are computed as "
-            f"if the {n_used} rows were {max(rows, 1):.3g} independent rows; a part of the deviation "
+            f"if the {n_used} rows were {max(n_independent, 1):.3g} independent rows; a part of the deviation "
             "is systematic"
         )
-    first = abs(loop.reading[0])
+    first_force = abs(loop.reading[0])
     starts_at_rest = (
         fitted.held_out[0] or has_lead_in or law_has_trait(scene.friction.law, "memoryless")
     )
-    if first > MAX_FIRST_FORCE * peak and not starts_at_rest:
+    if first_force > MAX_FIRST_FORCE * peak and not starts_at_rest:
         warnings.append(
-            f"the force in the first row is {first / peak:.0%} of the largest force, but the model "
+            f"the force in the first row is {first_force / peak:.0%} of the largest force, but the model "
             "starts without force: use --warm-up, hold out the first cycle, or give a record that "
             "begins at rest"
         )

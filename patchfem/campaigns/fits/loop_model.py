@@ -1,4 +1,4 @@
-"""Friction force along a measured displacement, as a function of free keys of the scene."""
+"""Friction force along a measured displacement as a function of free parameters."""
 
 from itertools import product
 
@@ -16,69 +16,71 @@ from ...runs.bench.engine import choose_smooth_bond_summation
 from ...runs.bench.ledger import BenchOptions
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError
-from .loop_path import count_whole_cycles, prepend_warm_up
-from .problem import format_assignments, press_patch
+from .loop_path import count_warm_up_rows, prepend_warm_up
+from .problem import format_assignments, solve_contact
 
-# Largest number of free [contact] keys whose bounds and middles choose the shared meshes: 3**3
-# models.
+# Largest number of free [contact] parameters whose bounds and middles determine the shared meshes;
+# they require 3**3 models.
 MAX_MESH_KEYS = 3
-REST_SPEED_FRACTION = 1e-3  # Speed over the largest measured speed below which bonds are at rest.
-AMPLITUDE_TOL = 0.02  # Relative difference of two amplitudes above which a note names them.
+REST_SPEED_FRACTION = 1e-3  # Rest speed of growing bonds over the largest measured speed.
+AMPLITUDE_TOL = 0.02  # Largest relative difference of two amplitudes that is not reported.
 
 
 class BenchModel:
-    """Model force or friction ratio (k,) at the rows of a measured loop, by free parameters.
+    """Callable that computes the force or friction ratio (k,) at the rows of a measured loop.
 
     Parameters
     ----------
     scene : Scene
-        With its [slide].
+        Scene with a table [slide].
     loop : Loop
-        The measured loop.
+        Measured loop.
     ranges : list of Range
-        Bounds of the free keys.
+        Bounds of the free parameters.
     offsets : sequence of Offset
-        Their values follow those of the keys.
+        Offsets, whose values follow those of the free parameters.
     warm : bool
-        Whether the complete cycles of the record are driven once beforehand.
+        Whether the complete cycles of the record are repeated before it as a warm-up.
     say : Callable, optional
-        Takes a line of progress.
+        Called with a line of text that reports the progress.
     """
 
     def __init__(
-        self, scene: Scene, loop: Loop, ranges: list, offsets=(), *, warm: bool = False, say=None
+        self, scene: Scene, loop: Loop, ranges: list, offsets=(), *, warm_up: bool = False, say=None
     ):
         self.scene = scene
         self.loop = loop
         self.ranges = ranges
         self.say = say
-        self.base = BaseScene(scene)  # The text is parsed once, not at every evaluation.
+        self.base = BaseScene(scene)  # The scene text is parsed only once.
         self.offsets = [offset.name for offset in offsets]
-        self.warm = count_whole_cycles(loop) if warm else 0
+        self.n_warm_up_rows = count_warm_up_rows(loop) if warm_up else 0
         self.notes: list = []
-        self.time = self._row_times()
+        self.time = self._find_row_times()
         self._note_amplitude()
-        law = scene.friction
-        self.sets = self._rest_speed_sets()
-        rigid = law_has_trait(law.law, "set-valued") and not law_has_trait(law.law, "averaged")
-        self.force_jumps = law_has_trait(law.law, "creeps") or rigid
-        self.exact = self._is_exact()
+        friction = scene.friction
+        self.assignments = self._rest_speed_assignments()
+        rigid = law_has_trait(friction.law, "set-valued") and not law_has_trait(
+            friction.law, "averaged"
+        )
+        self.is_force_discontinuous = law_has_trait(friction.law, "creeps") or rigid
+        self.is_exact = self._force_is_step_independent()
         steps = scene.accuracy.steps_per_cycle
-        self.pinned = steps is not None
-        self.pieces = 1
-        if self.pinned and not self.exact:
-            self.pieces = max(1, -(-steps // (loop.reading.size - 1)))
+        self.has_fixed_steps = steps is not None
+        self.steps_per_row = 1
+        if self.has_fixed_steps and not self.is_exact:
+            self.steps_per_row = max(1, -(-steps // (loop.reading.size - 1)))
         self.first_error = None
         self.n_computed = 0
         self.patch = None
-        self.moves_contact = any(bound.key.startswith("contact.") for bound in ranges)
-        # The meshes are shared by all values, and chosen when a patch is first pressed.
+        self.changes_contact = any(bound.key.startswith("contact.") for bound in ranges)
+        # The common meshes of all values are chosen when a contact is first solved.
         self.meshes = None
 
-    def _rest_speed_sets(self) -> list:
-        """Return the assignment of a rest speed for growing bonds from the measured motion.
+    def _rest_speed_assignments(self) -> list:
+        """Return the assignment of a rest speed from the measured speed, for bonds that grow at rest.
 
-        It is [] if the scene sets the rest speed, or if the bonds do not grow.
+        The list is empty if the scene sets the rest speed or if the bonds do not grow.
         """
         law = self.scene.friction
         grows = law_has_trait(law.law, "bonds") and law.rest_growth is not None
@@ -89,8 +91,8 @@ class BenchModel:
         speed = REST_SPEED_FRACTION * float(speeds.max())
         return [f"friction.rest_speed={speed!r} m/s"]
 
-    def _is_exact(self) -> bool:
-        """Return whether the force at the rows is independent of the time steps."""
+    def _force_is_step_independent(self) -> bool:
+        """Return whether the computed force at the rows does not depend on the time steps."""
         law = self.scene.friction
         contact = self.scene.contact
         bonds = law_has_trait(law.law, "bonds")
@@ -102,30 +104,33 @@ class BenchModel:
         return not (bonds and contact.compliance_key) and find_shape_side(contact) != "lower"
 
     def __call__(self, values) -> np.ndarray:
-        """Compute the reading (k,) at the rows; PatchfemError for values that make no scene."""
-        count = len(self.ranges)
-        offsets = dict(zip(self.offsets, values[count:]))
-        model = self._model(self.build_scene(values[:count]))
+        """Compute the reading (k,) at the rows for free parameters and offsets (n,).
+
+        Raises PatchfemError if the scene is invalid for these values.
+        """
+        n_keys = len(self.ranges)
+        offsets = dict(zip(self.offsets, values[n_keys:]))
+        model = self._build_model(self.build_scene(values[:n_keys]))
         self.n_computed += 1
         with locate_errors(model.source):
-            reading = self._reading(model, offsets.get("displacement", 0.0))
+            reading = self._compute_reading(model, offsets.get("displacement", 0.0))
         return reading + offsets.get("force", 0.0)
 
-    def _model(self, scene: Scene) -> Model:
-        """Build the model of a scene, and store the first error."""
+    def _build_model(self, scene: Scene) -> Model:
+        """Build the model of a scene, and store the first error that occurs."""
         try:
             with locate_errors(scene):
                 return build(scene)
         except PatchfemError as error:
-            # Building reads files of the scene, and its errors do not depend on the free keys.
+            # The files of the scene are read here; their errors do not depend on the free parameters.
             self.first_error = self.first_error or error
             raise
 
-    def _reading(self, model: Model, offset: float) -> np.ndarray:
-        """Compute force or friction ratio (k,) of a model for a displacement with an offset [m]."""
-        patch = self._patch(model)
-        path = prepend_warm_up(self.time, self.loop.displacement, self.warm, offset)
-        corner = np.arange(path.time.size) * self.pieces
+    def _compute_reading(self, model: Model, offset: float) -> np.ndarray:
+        """Compute the force or friction ratio (k,) for the displacement with an offset [m]."""
+        patch = self._get_solved_patch(model)
+        path = prepend_warm_up(self.time, self.loop.displacement, self.n_warm_up_rows, offset)
+        corner = np.arange(path.time.size) * self.steps_per_row
         number = np.arange(corner[-1] + 1)
         time = np.interp(number, corner, path.time)
         displacement = np.interp(number, corner, path.displacement)
@@ -136,60 +141,63 @@ class BenchModel:
                 "the normal load is 0 or less; give a load that presses the pieces together", ""
             )
         reading = run.force[corner]
-        if self.force_jumps:
-            # The force jumps at a row between two straight segments; the reading is the mean of
-            # both sides.
+        if self.is_force_discontinuous:
+            # The force is discontinuous at a row between two straight segments, where the reading
+            # is the mean of the values before and after.
             after = run.force[np.minimum(corner + 1, number[-1])]
             reading = np.where(corner == 0, after, (reading + after) / 2)
         reading = reading[path.n_before :]
         return reading / run.load[0] if self.loop.quantity == "friction_ratio" else reading
 
     def build_scene(self, values) -> Scene:
-        """Return the scene with given values of its free keys."""
+        """Return the scene with given values of the free parameters."""
         try:
-            return self.base.override([*self.sets, *format_assignments(self.ranges, values)])
+            return self.base.override([*self.assignments, *format_assignments(self.ranges, values)])
         except SceneError as error:
             self.first_error = self.first_error or error
             raise PatchfemError(error.mistakes[0]) from None
 
-    def _patch(self, model: Model):
-        """Return the pressed patch of a model; None for a [normal] contact."""
+    def _get_solved_patch(self, model: Model):
+        """Return the solved contact patch of a model; None for a [normal] contact."""
         if model.patch is None:
             return None
-        if self.moves_contact:
-            self.patch = press_patch(self._shared_meshes().with_shared_meshes(model))
+        if self.changes_contact:
+            self.patch = solve_contact(self._get_shared_meshes().with_shared_meshes(model))
         elif self.patch is None:
-            self.patch = press_patch(model)
+            self.patch = solve_contact(model)
         return self.patch
 
-    def _shared_meshes(self):
-        """Return meshes shared by the bounds and the middle of each range of a [contact] key."""
+    def _get_shared_meshes(self):
+        """Return the meshes that all values of the free parameters have in common.
+
+        They are chosen on the first call, for the bounds and the middle of each [contact] range.
+        """
         if self.meshes is not None:
             return self.meshes
-        middle = [(bound.low + bound.high) / 2 for bound in self.ranges]
+        range_middles = [(bound.low + bound.high) / 2 for bound in self.ranges]
         keys = [bound.key for bound in self.ranges]
         contact_keys = [k for k, key in enumerate(keys) if key.startswith("contact.")]
         contact_keys = contact_keys[:MAX_MESH_KEYS]
-        levels = [(self.ranges[k].low, middle[k], self.ranges[k].high) for k in contact_keys]
+        levels = [(self.ranges[k].low, range_middles[k], self.ranges[k].high) for k in contact_keys]
         models = []
         first_error = self.first_error
         for values in product(*levels):
-            point = list(middle)
+            parameters = list(range_middles)
             for k, value in zip(contact_keys, values):
-                point[k] = value
+                parameters[k] = value
             try:
-                models.append(build(self.build_scene(point)))
+                models.append(build(self.build_scene(parameters)))
             except PatchfemError:
-                continue  # The search meets the same error and counts it as a failed evaluation.
+                continue  # The search counts the same error as a failed evaluation.
         self.first_error = first_error
         self.meshes = meshes.SharedMeshes(models, False)
         return self.meshes
 
-    def _row_times(self) -> np.ndarray:
-        """Return the times of the measured rows [s].
+    def _find_row_times(self) -> np.ndarray:
+        """Return the time of each measured row [s].
 
-        They are measured, or computed from the speed of the motion, or equally spaced if time has
-        no effect.
+        The times are measured, or computed from the speed of the slide. They are equally spaced if
+        the force does not depend on time.
         """
         loop = self.loop
         scene = self.scene
@@ -219,7 +227,7 @@ class BenchModel:
         )
 
     def _note_amplitude(self) -> None:
-        """Add a note if the amplitude of the scene differs from that of the record."""
+        """Add a note if the slide amplitude of the scene differs from the measured amplitude."""
         slide = self.scene.slide
         amplitude = float(np.ptp(self.loop.displacement)) / 2
         if slide.kind not in ("sine", "triangle"):

@@ -1,4 +1,4 @@
-"""Displacement path that drives the model of a loop fit: a lead-in and the record."""
+"""Displacement path imposed on the model in a loop fit: optional lead-in, then the record."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,20 +11,20 @@ from ...inputs.loops import Loop
 from ...scene.ranges import Range
 
 OFFSETS = ("force", "displacement")
-POSITION_TOL = 1e-6  # Fraction of the range of the record below which two positions are equal.
+POSITION_TOL = 1e-6  # Largest difference of equal positions over the displacement range.
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Offset:
-    """Constant that is fitted in addition to the keys of the scene.
+    """Constant offset that is fitted in addition to the scene parameters.
 
     Attributes
     ----------
     name : {"force", "displacement"}
-        A force [N] or friction ratio [1] that the record adds to the reading, or the displacement
-        [m] of the first row from the position without stress.
+        "force": constant error of the measured force [N] or friction ratio [1]; "displacement":
+        distance [m] of the first row from the stress-free position.
     range : Range
-        Its bounds: the size of the record to either side.
+        Bounds of the offset, which are minus and plus the size of the record.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Offset:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LoopOptions:
-    """Names of fitted OFFSETS, and whether the record is driven once beforehand."""
+    """Options of a loop fit: names of the fitted offsets, and whether to add warm-up cycles."""
 
     offsets: tuple = ()
     warm: bool = False
@@ -42,8 +42,8 @@ class LoopOptions:
 DEFAULT_OPTIONS = LoopOptions()
 
 
-def read_offsets(names: Sequence, loop: Loop) -> list:
-    """Return the offsets of a fit by name; PatchfemError for a name not in OFFSETS."""
+def make_offsets(names: Sequence, loop: Loop) -> list:
+    """Return the offsets of a fit by name, with bounds from the record."""
     requested = []
     for text in names:
         requested += [name.strip() for name in text.split(",")]
@@ -62,16 +62,16 @@ def read_offsets(names: Sequence, loop: Loop) -> list:
     return offsets
 
 
-def count_whole_cycles(loop: Loop) -> int:
-    """Count the rows of the complete cycles at the start of a recorded loop.
+def count_warm_up_rows(loop: Loop) -> int:
+    """Return the number of leading rows of a measured loop that form complete cycles.
 
-    These rows end where the record last passes its first displacement in the first direction. The
-    first row counts. PatchfemError for a record that does not return there.
+    The rows end at the last passage of the first displacement in the initial direction. Raises
+    PatchfemError if the record does not contain a complete cycle.
     """
     displacement = loop.displacement
     direction = np.sign(displacement[np.flatnonzero(displacement)[0]])
-    behind = displacement * direction < -POSITION_TOL * np.ptp(displacement)
-    returns = np.flatnonzero(behind[:-1] & ~behind[1:])
+    is_behind = displacement * direction < -POSITION_TOL * np.ptp(displacement)
+    returns = np.flatnonzero(is_behind[:-1] & ~is_behind[1:])
     if not returns.size:
         raise PatchfemError(
             f"{loop.path}: --warm-up needs a record of at least one whole cycle, in which the "
@@ -81,10 +81,10 @@ def count_whole_cycles(loop: Loop) -> int:
     return int(returns[-1]) + 1
 
 
-class DrivenPath(NamedTuple):
-    """Displacement path that drives the model of a loop fit.
+class ImposedPath(NamedTuple):
+    """Displacement path that is imposed on the model in a loop fit.
 
-    time: (n,) [s]; displacement: (n,) [m]; n_before: number of points before the record.
+    time: (n,) [s]; displacement: (n,) [m]; n_before: number of lead-in points before the record.
     """
 
     time: np.ndarray
@@ -92,21 +92,21 @@ class DrivenPath(NamedTuple):
     n_before: int
 
 
-def prepend_warm_up(time, recorded, n_warm_up_rows: int, offset: float) -> DrivenPath:
-    """Return a path that begins at displacement 0 and continues as recorded.
+def prepend_warm_up(time, recorded, n_warm_up_rows: int, offset: float) -> ImposedPath:
+    """Return the imposed path: from displacement 0, through optional warm-up cycles, to the record.
 
     Parameters
     ----------
     time, recorded : (r,) array
         Times [s] and displacements [m] of the record; the first displacement is 0.
     n_warm_up_rows : int
-        Number of leading rows that form complete cycles and are driven once before the record; 0 for none.
+        Number of leading rows that form complete cycles and are repeated before the record; 0 for none.
     offset : float
-        Displacement of the first row [m]; it is reached at the mean speed of the record.
+        Displacement of the first row [m], which is approached at the mean speed of the record.
 
     Returns
     -------
-    DrivenPath
+    ImposedPath
     """
     speed = np.abs(np.diff(recorded)).sum() / (time[-1] - time[0])
     displacement = recorded + offset
@@ -115,15 +115,15 @@ def prepend_warm_up(time, recorded, n_warm_up_rows: int, offset: float) -> Drive
     if offset:
         lead_in.append(0.0)
         lead_in_times.append(-abs(offset) / speed)
-    start = 0.0
+    record_start = 0.0
     if n_warm_up_rows:
-        # The last of these rows comes before the first displacement is reached again; the record
-        # gives the time from there to the first displacement.
+        # The displacement returns to its first value between the last of these rows and the next
+        # one; the time of the return is interpolated.
         before, after = recorded[n_warm_up_rows - 1 : n_warm_up_rows + 1]
         step = time[n_warm_up_rows] - time[n_warm_up_rows - 1]
         return_time = time[n_warm_up_rows - 1] + step * (0.0 - before) / (after - before)
         lead_in = [*lead_in, *displacement[:n_warm_up_rows]]
         lead_in_times = [*lead_in_times, *(time[:n_warm_up_rows] - time[0])]
-        start = return_time - time[0]
-    times = np.concatenate([lead_in_times, time - time[0] + start])
-    return DrivenPath(times - times[0], np.concatenate([lead_in, displacement]), len(lead_in))
+        record_start = return_time - time[0]
+    times = np.concatenate([lead_in_times, time - time[0] + record_start])
+    return ImposedPath(times - times[0], np.concatenate([lead_in, displacement]), len(lead_in))

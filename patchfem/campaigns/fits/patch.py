@@ -1,9 +1,8 @@
-"""Friction laws of a single point, fitted to the friction loops of a patch.
+"""Single-point friction laws fitted to the friction loops of a contact patch.
 
-Points under a constant load that stick or slip are elastic-plastic elements in parallel
-(`slip.shear_modes`): their curve of first loading is exact, and Masing's rule gives the loops.
-`patch_laws` fits each law to them, over amplitudes of the slide that are evenly spaced in their
-logarithm.
+A patch under a constant load, whose points stick or slip, is equivalent to elastic-plastic elements in
+parallel (`slip.shear_modes`). Their initial loading curve is exact, and Masing's rule gives the loops.
+`patch_laws` fits each law to these loops at logarithmically spaced displacement amplitudes.
 """
 
 from dataclasses import dataclass
@@ -21,24 +20,26 @@ from ...model.source import locate_errors
 from ...runs.joint import stuck_patch_stiffness
 from ...runs.patch import jenkins_elements, ladder
 from ...scene.scene import Scene
-from .patch_laws import FITTED_LAWS, MIN_LOSS, Curves, LawProblem
+from .patch_laws import FITTED_LAWS, MIN_LOSS, LawProblem, LoopCurves
 
-# Number of amplitudes per decade; this density resolves every regime of a law.
+# Number of amplitudes per decade, which resolves every regime of a law.
 AMPLITUDES_PER_DECADE = 8
-MIN_AMPLITUDES = 12  # Smallest number of amplitudes, also of a short range.
-MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude over slip force/stiffness; below it nothing slips.
-MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude over the amplitude at which every element slips.
-MAX_FIRST_FACTOR = 0.2  # Largest start of an amplitude range over slip force/stiffness.
-# Inverse of the fraction of slipping elements below which the mesh dominates the loss.
+MIN_AMPLITUDES = 12  # Smallest number of amplitudes of any range.
+MIN_AMPLITUDE_FACTOR = (
+    1e-2  # Smallest amplitude over slip force/stiffness; smaller ones cause no slip.
+)
+MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude over the yield displacement of the last element.
+MAX_FIRST_FACTOR = 0.2  # Upper limit of the first amplitude over slip force/stiffness.
+# Inverse of the smallest fraction of slipping elements at which the mesh resolves the loss.
 N_RESOLVED_ELEMENTS = 16
-# Root-mean-square change of the loss by a coarser mesh above which the mesh is refined.
+# Largest root mean square difference of the loss between two meshes without refinement.
 MAX_LOSS_CHANGE = 0.1
-REFINE_FACTOR = 10.0  # Tolerance of the mesh over the tolerance of its refinement.
-MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, because that takes too long.
+REFINE_FACTOR = 10.0  # Ratio of the mesh tolerances before and after a refinement.
+MIN_TOLERANCE = 9e-5  # Smallest tolerance of a mesh that is refined; finer meshes take too long.
 
 
 class Elements(NamedTuple):
-    """Elastic-plastic elements: stiffness (t,) [N/m] and yield displacement (t,) [m]."""
+    """Elastic-plastic elements in parallel: stiffness (t,) [N/m] and yield displacement (t,) [m]."""
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray
@@ -53,9 +54,9 @@ class Elements(NamedTuple):
         """Stiffness while no element slips [N/m]."""
         return float(self.stiffness.sum())
 
-    def compute_curves(self, slides) -> Curves:
-        """Compute force and loss of the elements at displacement amplitudes (k,) [m]."""
-        return Curves(*masing_loop(self.stiffness, self.yield_displacement, slides))
+    def compute_curves(self, amplitudes) -> LoopCurves:
+        """Compute peak force and energy loss per cycle at displacement amplitudes (k,) [m]."""
+        return LoopCurves(*masing_loop(self.stiffness, self.yield_displacement, amplitudes))
 
 
 class PatchLoops(NamedTuple):
@@ -66,32 +67,31 @@ class PatchLoops(NamedTuple):
     load, slip_force : float
         Normal load and largest friction force [N].
     stiffness : float
-        Stiffness while nothing slips [N/m], extrapolated over the meshes if the pieces alone are
-        elastic.
+        Stiffness without slip [N/m], extrapolated over the meshes if only the pieces are elastic.
     stiffness_error : float or None
-        Its error [N/m]; None if it is not known.
-    slides : (k,) array
+        Error of the stiffness [N/m]; None if it is unknown.
+    amplitudes : (k,) array
         Displacement amplitudes [m].
-    curves : Curves
+    curves : LoopCurves
     mesh_change : (2, k) array or None
-        Relative change of the curves by a coarser mesh; None if there is none.
+        Relative difference of the curves to those of a coarser mesh; None if there is none.
     nodes : int
-        Number of nodes of the interface.
+        Number of interface nodes.
     """
 
     load: float
     slip_force: float
     stiffness: float
     stiffness_error: float | None
-    slides: np.ndarray
-    curves: Curves
+    amplitudes: np.ndarray
+    curves: LoopCurves
     mesh_change: np.ndarray | None
     nodes: int
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedPatch:
-    """Fitted point laws, by name, that can replace the patch of a scene.
+    """Fitted single-point friction laws, by name, that can replace the patch of a scene.
 
     best: the law with the smallest sum of squares.
     """
@@ -104,13 +104,13 @@ class FittedPatch:
     seconds: float
 
 
-def fit_patch(scene: Scene, slides=None) -> FittedPatch:
-    """Fit point friction laws (FITTED_LAWS) to the friction loops of a patch.
+def fit_patch(scene: Scene, amplitudes=None) -> FittedPatch:
+    """Fit single-point friction laws (FITTED_LAWS) to the friction loops of a patch.
 
     Parameters
     ----------
     scene : Scene
-    slides : (k,) array, optional
+    amplitudes : (k,) array, optional
         Increasing displacement amplitudes [m]; by default from the onset of slip to twice the
         amplitude at which the complete patch slips.
 
@@ -121,14 +121,13 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
     Raises
     ------
     PatchfemError
-        If the patch cannot be described by elastic-plastic elements; the message says what to
-        change.
+        If elastic-plastic elements cannot represent the patch.
     """
     begin = perf_counter()
     model = build(scene)
     with locate_errors(scene):
         _check_model(model)
-        meshed = _solve_with_refined_mesh(model, slides)
+        meshed = _solve_with_refined_mesh(model, amplitudes)
         stuck = stuck_patch_stiffness(model, meshed.patch, meshed.coarser_patches or (None,))
     elements = meshed.elements
     loops = PatchLoops(
@@ -136,7 +135,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
         slip_force=elements.slip_force,
         stiffness=stuck.value if stuck else elements.total_stiffness,
         stiffness_error=stuck.error if stuck else None,
-        slides=meshed.slides,
+        amplitudes=meshed.amplitudes,
         curves=meshed.curves,
         mesh_change=meshed.mesh_change,
         nodes=meshed.patch.x.size,
@@ -147,105 +146,108 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
         problem = LawProblem(
             law,
             **friction,
-            slides=loops.slides,
+            amplitudes=loops.amplitudes,
             target=loops.curves,
             stiffness=elements.total_stiffness,
         )
         laws[law] = problem.solve()
     best = min(laws, key=lambda law: laws[law].fit.rms)
-    warnings = _warn_of_mesh(model, meshed)
+    warnings = _warn_of_coarse_mesh(model, meshed)
     return FittedPatch(scene, loops, laws, best, warnings, perf_counter() - begin)
 
 
-class _LoopsByMesh(NamedTuple):
-    """Friction loops of a patch on a mesh, and their change by a coarser mesh.
+class _LoopsOnMesh(NamedTuple):
+    """Friction loops of a patch on a given mesh, and their difference to a coarser mesh.
 
     Attributes
     ----------
     patch : Patch
     coarser_patches : tuple
-        Patches on coarser meshes, or None.
+        Patches on coarser meshes; None for a mesh that was not solved.
     elements : Elements
-    slides : (k,) array
+    amplitudes : (k,) array
         Displacement amplitudes [m].
-    curves : Curves
+    curves : LoopCurves
     mesh_change : (2, k) array or None
-        Relative change of the curves by a coarser mesh; None if there is none.
+        Relative difference of the curves to those of a coarser mesh; None if there is none.
     """
 
     patch: object
     coarser_patches: tuple
     elements: Elements
-    slides: np.ndarray
-    curves: Curves
+    amplitudes: np.ndarray
+    curves: LoopCurves
     mesh_change: np.ndarray | None
 
     @property
     def loss_change(self) -> float:
-        """Root-mean-square change of the loss by a coarser mesh; 0 without such a mesh."""
+        """Root mean square relative difference of the loss to a coarser mesh; 0 if there is none."""
         return (
             0.0 if self.mesh_change is None else float(np.sqrt(np.mean(self.mesh_change[1] ** 2)))
         )
 
 
-def _solve_with_refined_mesh(model: Model, slides) -> _LoopsByMesh:
-    """Solve the patch on finer meshes until a coarser mesh hardly changes the loss."""
+def _solve_with_refined_mesh(model: Model, requested_amplitudes) -> _LoopsOnMesh:
+    """Solve the contact on a sequence of refined meshes until the energy loss converges."""
     tolerance = model.accuracy.tolerance
     while True:
         patch, *coarser = ladder.solve_with_coarser(model.patch, tolerance)
         if not patch.pressure.load > 0:
             raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
-        elements = _patch_elements(model, patch)
-        amplitudes = _default_slides(elements) if slides is None else np.asarray(slides, float)
+        elements = _make_elements(model, patch)
+        if requested_amplitudes is None:
+            amplitudes = _default_amplitudes(elements)
+        else:
+            amplitudes = np.asarray(requested_amplitudes, float)
         curves = elements.compute_curves(amplitudes)
         coarse = next((other for other in coarser if other is not None), None)
         change = None
         if coarse is not None:
-            coarse_curves = _patch_elements(model, coarse).compute_curves(amplitudes)
+            coarse_curves = _make_elements(model, coarse).compute_curves(amplitudes)
             change = coarse_curves.relative_deviations(curves, amplitudes)
-        meshed = _LoopsByMesh(patch, tuple(coarser), elements, amplitudes, curves, change)
+        meshed = _LoopsOnMesh(patch, tuple(coarser), elements, amplitudes, curves, change)
         can_refine = model.patch.mesh.is_automatic and tolerance >= MIN_TOLERANCE
         if meshed.loss_change <= MAX_LOSS_CHANGE or not can_refine:
             return meshed
         tolerance /= REFINE_FACTOR
 
 
-def _default_slides(elements: Elements) -> np.ndarray:
+def _default_amplitudes(elements: Elements) -> np.ndarray:
     """Return amplitudes (k,) [m] from the onset of slip to slip of the complete patch."""
     stuck_limit = elements.slip_force / elements.total_stiffness
-    high = MAX_AMPLITUDE_FACTOR * float(elements.yield_displacement.max())
-    trials = np.geomspace(MIN_AMPLITUDE_FACTOR * stuck_limit, high, 1024)
+    max_amplitude = MAX_AMPLITUDE_FACTOR * float(elements.yield_displacement.max())
+    trials = np.geomspace(MIN_AMPLITUDE_FACTOR * stuck_limit, max_amplitude, 1024)
     curves = elements.compute_curves(trials)
     slip_onset = trials[np.argmax(curves.loss > MIN_LOSS * 4 * trials * curves.force)]
     yields = np.sort(elements.yield_displacement)
     resolved = yields[yields.size // N_RESOLVED_ELEMENTS]
-    low = max(slip_onset, min(resolved, MAX_FIRST_FACTOR * stuck_limit))
-    count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
-    return np.geomspace(low, high, max(MIN_AMPLITUDES, count))
+    min_amplitude = max(slip_onset, min(resolved, MAX_FIRST_FACTOR * stuck_limit))
+    count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(max_amplitude / min_amplitude)))
+    return np.geomspace(min_amplitude, max_amplitude, max(MIN_AMPLITUDES, count))
 
 
-def _warn_of_mesh(model: Model, meshed: _LoopsByMesh) -> tuple:
-    """Return a warning if a coarser mesh changes the loss of a patch too much."""
+def _warn_of_coarse_mesh(model: Model, meshed: _LoopsOnMesh) -> tuple:
+    """Return a warning if the mesh is too coarse for an accurate energy loss."""
     if meshed.loss_change <= MAX_LOSS_CHANGE:
         return ()
     if model.patch.mesh.is_automatic:
-        cure = "begin with larger amplitudes, at which more elements of the patch slip"
+        advice = "begin with larger amplitudes, at which more elements of the patch slip"
     elif model.patch.mesh.file is None:
-        cure = (
+        advice = (
             "leave contact.element_size out: the mesh is then refined until the energy loss is "
             "accurate enough"
         )
     else:
-        cure = "refine the mesh in the file"
+        advice = "refine the mesh in the file"
     return (
         f"with this mesh ({meshed.patch.x.size} interface nodes) the energy loss has an error of "
         f"{100 * meshed.loss_change:.2g} % (rms); this error also makes `chi` of law 'iwan' uncertain, and "
-        f"`chi` sets the exponent of micro-slip; {cure}",
+        f"`chi` sets the exponent of micro-slip; {advice}",
     )
 
 
-def _patch_elements(model: Model, patch) -> Elements:
-    """Return the elastic-plastic elements of a pressed patch."""
+def _make_elements(model: Model, patch) -> Elements:
+    """Return the elastic-plastic elements that represent a solved patch."""
     friction = model.friction
     load = patch.pressure.load
     element = make_law(friction, load).element(load)
@@ -259,7 +261,7 @@ def _patch_elements(model: Model, patch) -> Elements:
 
 
 def _check_model(model: Model) -> None:
-    """Raise PatchfemError if a patch cannot be described by elastic-plastic elements."""
+    """Raise PatchfemError if elastic-plastic elements cannot represent the patch of a model."""
     friction = model.friction
     rig = model.rig
     if model.patch is None or friction is None:
@@ -299,10 +301,10 @@ def _check_model(model: Model) -> None:
         )
 
 
-def read_slides(lengths) -> np.ndarray | None:
-    """Check requested amplitudes (k,) [m]; PatchfemError if there are fewer than three.
+def check_amplitudes(lengths) -> np.ndarray | None:
+    """Return displacement amplitudes as an array (k,) [m]; None if none are given.
 
-    It returns None if no amplitudes are given.
+    Raises PatchfemError if there are fewer than three amplitudes.
     """
     if lengths is None:
         return None

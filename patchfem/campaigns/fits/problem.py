@@ -1,7 +1,7 @@
-"""Least-squares problem over free keys of a scene, and the record of the fitted keys.
+"""Least-squares problem for free parameters of a scene, and the record of the fitted values.
 
-A fit to a loop, a curve or rows makes an `identify.least_squares.Problem` of its free keys, solves it,
-and concludes with the fitted keys and all warnings.
+A fit to a loop, a curve or a response table makes a `Problem` of its free parameters, solves it, and
+returns `FittedKeys` with all warnings.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -21,24 +21,25 @@ from ...scene.overrides import BaseScene
 from ...scene.ranges import Range, read_ranges
 from ...scene.scene import Scene, SceneError, loads
 
-# Ratio high/low of a range above which its middle is the geometric mean, as in `identify.space`.
-LOG_RATIO = 10.0
+# Largest ratio high/low of a range whose middle is the arithmetic mean; the middle of a wider range
+# is the geometric mean, as in `identify.space`.
+MAX_LINEAR_RATIO = 10.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedKeys:
-    """Fitted values of the free keys of a scene, with intervals and warnings.
+    """Fitted values of the free parameters of a scene, with confidence intervals and warnings.
 
     Attributes
     ----------
     scene : Scene
         The scene before the fit.
     ranges : list of Range
-        Bounds of the free keys.
+        Bounds of the free parameters.
     fit : Fit
-        Values and intervals, in the order of `ranges`, then of values that are no keys.
+        Values and intervals in the order of `ranges`, followed by fitted offsets.
     sets : list of str
-        The ``table.key=value`` strings that make the scene the fitted one.
+        The ``table.key=value`` strings of the fitted scene.
     warnings : list of str
     seconds : float
         Elapsed time of the fit.
@@ -63,20 +64,20 @@ class FittedKeys:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FreeKeys:
-    """Free keys of a scene as the unknowns of a least-squares problem.
+    """Free parameters of a scene as the unknowns of a least-squares problem.
 
     Attributes
     ----------
     scene : Scene
-        The scene whose keys are free.
+        Scene with the initial values.
     ranges : list of Range
-        Bounds of the free keys.
+        Bounds of the free parameters.
     offsets : sequence of Range
-        Bounds of values that are fitted as well and are no keys of the scene; they follow the keys.
+        Bounds of additional unknowns that are not scene keys.
     sets : sequence of str
-        The ``table.key=value`` strings that the scene takes for all values.
+        The ``table.key=value`` strings that are set for all values of the parameters.
     notes : sequence of str
-        Sentences about what the model assumes, which become warnings.
+        Assumptions of the model, which are added to the warnings.
     """
 
     scene: Scene
@@ -87,47 +88,49 @@ class FreeKeys:
 
     @property
     def bounds(self) -> list:
-        """Ranges of all unknowns, keys first."""
+        """Ranges of all unknowns; those of the scene keys come first."""
         return [*self.ranges, *self.offsets]
 
     def make_problem(self, residual: Callable) -> Problem:
         """Return the least-squares problem for a residual function of the unknowns.
 
-        It starts from the values of the scene, else from the middle of each range.
+        The starting point has the values of the scene, or the middle of a range if there is none.
         """
         return Problem(
             residual,
             low=[bound.low for bound in self.bounds],
             high=[bound.high for bound in self.bounds],
-            start=[_initial_value(self.scene, bound) for bound in self.bounds],
+            start=[_find_initial_value(self.scene, bound) for bound in self.bounds],
         )
 
-    def conclude(self, fit: Fit, begin: float, doubts: Sequence = ()) -> FittedKeys:
-        """Return the fitted keys with intervals and all warnings.
+    def make_fitted_keys(
+        self, fit: Fit, start_time: float, extra_warnings: Sequence = ()
+    ) -> FittedKeys:
+        """Return the fitted values with their confidence intervals and all warnings.
 
         Parameters
         ----------
         fit : Fit
-        begin : float
-            Time of `perf_counter` at which the fit began [s].
-        doubts : sequence of str
-            Warnings that only this kind of fit gives.
+        start_time : float
+            Value of `perf_counter` at the start of the fit [s].
+        extra_warnings : sequence of str
+            Additional warnings of this kind of fit.
         """
         undetermined = describe_fit(fit, [bound.key for bound in self.bounds])
-        warnings = [*self.scene.remarks, *self.notes, *undetermined, *doubts]
+        warnings = [*self.scene.remarks, *self.notes, *undetermined, *extra_warnings]
         sets = [*self.sets, *format_assignments(self.ranges, fit.values)]
-        return FittedKeys(self.scene, self.ranges, fit, sets, warnings, perf_counter() - begin)
+        return FittedKeys(self.scene, self.ranges, fit, sets, warnings, perf_counter() - start_time)
 
 
 def format_assignments(ranges: Iterable, values: Iterable) -> list:
-    """Return the ``table.key=value`` strings that set free keys to values (n,)."""
+    """Return the ``table.key=value`` strings that set free parameters to values (n,)."""
     return [bound.format_assignment(value) for bound, value in zip(ranges, values)]
 
 
 def parse_ranges(texts: Iterable) -> list:
-    """Parse the ranges of free keys from "table.key=low..high" strings.
+    """Parse the ranges of free parameters from "table.key=low..high" strings.
 
-    Raises SceneError with all mistakes.
+    Raises SceneError with all validation errors.
     """
     ranges, mistakes = read_ranges(texts)
     if mistakes:
@@ -135,20 +138,20 @@ def parse_ranges(texts: Iterable) -> list:
     return ranges
 
 
-def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
-    """Build a rig model whose modes are those without the joint.
+def build_model_without_joint(base: BaseScene, sets: Iterable) -> Model:
+    """Build a rig model with the modes of the structure without the joint.
 
     Parameters
     ----------
     base : BaseScene
-        The scene whose keys are changed.
+        Scene before the changes.
     sets : iterable of str
-        ``table.key=value`` strings.
+        ``table.key=value`` strings of the changes.
 
     Raises
     ------
     PatchfemError
-        For values that make no scene, so that a search counts them as a failed evaluation.
+        If the changed scene is invalid; a search counts this as a failed evaluation.
     """
     try:
         return joint.remove_joint(build(base.override(sets)))
@@ -156,34 +159,37 @@ def model_without_joint(base: BaseScene, sets: Iterable) -> Model:
         raise PatchfemError(error.mistakes[0]) from None
 
 
-def press_patch(model: Model):
-    """Solve the contact of a model without error estimates; PatchfemError without contact."""
+def solve_contact(model: Model):
+    """Solve the static contact problem of a model without error estimates.
+
+    Raises PatchfemError if the surfaces do not touch.
+    """
     patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     if patch.pressure.outcome is Outcome.NO_CONTACT:
         raise PatchfemError(patch.pressure.outcome.sentence, "")
     return patch
 
 
-def _initial_value(scene: Scene, bound: Range) -> float:
-    """Return the value of a key in a scene, limited to its range.
+def _find_initial_value(scene: Scene, bound: Range) -> float:
+    """Return the starting value of a free parameter: its value in the scene, clipped to its range.
 
-    If the scene does not set it, it is the middle of the range.
+    It is the middle of the range if the scene does not set the parameter.
     """
     value = scene
     for part in split_key(bound.key):
-        value = _find_item(value, part) if isinstance(value, tuple) else getattr(value, part, None)
+        value = _find_table(value, part) if isinstance(value, tuple) else getattr(value, part, None)
     if not isinstance(value, float):
         value = (bound.low + bound.high) / 2
-        if bound.low > 0 and bound.high > LOG_RATIO * bound.low:
+        if bound.low > 0 and bound.high > MAX_LINEAR_RATIO * bound.low:
             value = np.sqrt(bound.low * bound.high)
     return float(np.clip(value, bound.low, bound.high))
 
 
-def _find_item(items: tuple, word: str):
-    """Return the table of an array by its name or its number from 0; None if not found."""
-    named = [item for item in items if getattr(item, "name", None) == word]
+def _find_table(tables: tuple, name_or_index: str):
+    """Return the table of an array of tables by its name or its index; None if there is none."""
+    named = [item for item in tables if getattr(item, "name", None) == name_or_index]
     if named:
         return named[0]
-    if word.isdecimal() and int(word) < len(items):
-        return items[int(word)]
+    if name_or_index.isdecimal() and int(name_or_index) < len(tables):
+        return tables[int(name_or_index)]
     return None

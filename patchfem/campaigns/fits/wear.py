@@ -1,8 +1,8 @@
 """Fit of the wear coefficient to a measured worn depth, with its interval.
 
 The worn depth depends only on the product of coefficient and cycles, so one run with the largest
-coefficient gives the depth for all smaller ones. A run with the coefficient that is read from this
-curve checks and corrects it.
+coefficient gives the depth for all smaller ones. The coefficient is interpolated from this curve, and
+then checked and corrected by further runs.
 """
 
 import json
@@ -24,12 +24,12 @@ from ...scene.keys.quantities import parse_quantity
 from ...scene.ranges import Range
 from .problem import parse_ranges
 
-# Names of the worn depths as in compare.json; the more accurate one comes first.
+# Names of the worn depths in compare.json, the more accurate one first.
 QUANTITIES = ("worn_depth_mean", "worn_depth_max")
-MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three of them.
-# Size of the largest file that is read [bytes]; a file that compare writes is far smaller.
+MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
+# Largest size of a file that is read [bytes]; files of `compare` are far smaller.
 MAX_FILE_BYTES = 1 << 20
-DEPTH_TOL = 0.1  # Fraction of the tolerance of the scene to which the depth is met.
+DEPTH_TOL = 0.1  # Largest relative error of the computed depth over the tolerance of the scene.
 COEFFICIENT_KEY = "wear.coefficient"
 
 
@@ -57,7 +57,7 @@ class FittedCoefficient:
         Coefficient and its interval [m2/N].
     measured : MeasuredDepth
     model : float
-        The measured quantity that the scene gives with this coefficient [m].
+        Worn depth that is computed with the fitted coefficient [m].
     bounds : Range
         Bounds of the search.
     runs : int
@@ -74,48 +74,48 @@ class FittedCoefficient:
 
 
 class WearCurve(NamedTuple):
-    """Worn depth (j,) [m] over the completed fraction of the cycles (j,)."""
+    """Worn depth (j,) [m] as a function of the completed fraction of the cycles (j,)."""
 
     fraction: np.ndarray
     depth: np.ndarray
 
-    def inverse(self) -> Callable:
-        """Return a function that gives the fraction of the cycles at a worn depth."""
-        grows = np.concatenate([[True], np.diff(self.depth) > 0])
-        depth = self.depth[grows]
-        fraction = self.fraction[grows]
+    def make_inverse(self) -> Callable:
+        """Return a function that interpolates the fraction of the cycles at a given worn depth."""
+        is_growing = np.concatenate([[True], np.diff(self.depth) > 0])
+        depth = self.depth[is_growing]
+        fraction = self.fraction[is_growing]
         if depth.size > 2:
             return PchipInterpolator(depth, fraction, extrapolate=False)
         return lambda value: np.interp(value, depth, fraction)
 
 
-def read_depth(text: str) -> MeasuredDepth:
-    """Read a measured depth from a string or from a JSON file that compare writes.
+def read_measured_depth(text: str) -> MeasuredDepth:
+    """Read a measured depth from a string, or from a JSON file written by `compare`.
 
-    The text is "worn_depth_max=2.5 um..3.5 um", or a single value. PatchfemError and Missing name what
-    is wrong.
+    A string has the form "worn_depth_max=2.5 um..3.5 um", or contains a single value. Raises
+    PatchfemError for an invalid depth and Missing for a missing file.
     """
     name, equals, value = (part.strip() for part in text.partition("="))
     if not equals:
-        return _read_file(Path(text))
+        return _read_depth_file(Path(text))
     if name not in QUANTITIES:
         raise PatchfemError(
             f"--to {text}: {name} is not a possible quantity; use one of {', '.join(QUANTITIES)}, "
             'such as "worn_depth_max=2.5 um..3.5 um", or the JSON file that compare writes'
         )
     try:
-        ends = [parse_quantity(part.strip(), "length") for part in value.split("..")]
+        bounds = [parse_quantity(part.strip(), "length") for part in value.split("..")]
     except ValueError as error:
         raise PatchfemError(f"--to {name}: {error}") from None
-    if len(ends) > 2 or not 0 < ends[0] <= ends[-1]:
+    if len(bounds) > 2 or not 0 < bounds[0] <= bounds[-1]:
         raise PatchfemError(
             f"--to {text}: give one value above zero, or a range low..high above zero"
         )
-    return MeasuredDepth(name, (ends[0] + ends[-1]) / 2, ends[0], ends[-1], "--to")
+    return MeasuredDepth(name, (bounds[0] + bounds[-1]) / 2, bounds[0], bounds[-1], "--to")
 
 
-def _read_file(path: Path) -> MeasuredDepth:
-    """Read a measured depth from a JSON file that compare writes."""
+def _read_depth_file(path: Path) -> MeasuredDepth:
+    """Read a measured depth from a JSON file written by `compare`."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise PatchfemError(
@@ -135,7 +135,7 @@ def _read_file(path: Path) -> MeasuredDepth:
     measures = content.get("measures", content) if isinstance(content, dict) else {}
     for name in QUANTITIES:
         measure = measures.get(name) if isinstance(measures, dict) else None
-        numbers = _measure_interval(measure)
+        numbers = _read_interval(measure)
         if numbers is not None and numbers[0] > 0:
             value, low, high = numbers
             return MeasuredDepth(name, value, max(low, 0.0), high, str(path))
@@ -145,10 +145,10 @@ def _read_file(path: Path) -> MeasuredDepth:
     )
 
 
-def _measure_interval(measure) -> list | None:
-    """Return value, low and high of a measure in a compare file.
+def _read_interval(measure) -> list | None:
+    """Return value, low and high of a measure in a file written by `compare`.
 
-    It is None if one of them is not a number.
+    Returns None if one of them is not a finite number.
     """
     if not isinstance(measure, dict):
         return None
@@ -159,18 +159,18 @@ def _measure_interval(measure) -> list | None:
 
 
 def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
-    """Find the wear coefficient for which the computed depth equals a measured one.
+    """Fit the wear coefficient so that the computed worn depth equals the measured one.
 
     Parameters
     ----------
     model : Model
-        With [wear].
+        Model with wear.
     to : str
-        The measured depth, as `read_depth` takes it.
+        Measured depth, in the format of `read_measured_depth`.
     free : sequence of str
-        ("wear.coefficient=low..high",)
+        Range of the coefficient, ("wear.coefficient=low..high",).
     progress : Callable, optional
-        Takes the completed fraction of a run.
+        Called with the completed fraction of a run.
 
     Returns
     -------
@@ -179,12 +179,12 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
     Raises
     ------
     SceneError, PatchfemError
-        For input that cannot be used, or if no coefficient within the range gives the depth.
+        If the input is invalid, or if no coefficient within the range gives the depth.
     NotConverged
         If the runs do not converge to a coefficient.
     """
-    bounds = _read_bounds(free)
-    target = read_depth(to)
+    bounds = _parse_coefficient_range(free)
+    target = read_measured_depth(to)
     if model.patch is None:
         raise PatchfemError(
             f"--to {target.name}: a [normal] contact has no worn depth; use [contact]", "normal"
@@ -194,41 +194,44 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
             f"fit {COEFFICIENT_KEY}: the fit must start from unworn pieces; leave out wear.start",
             "wear.start",
         )
-    # The patch of unworn pieces is the same for all coefficients.
+    # The contact of the unworn pieces does not depend on the coefficient.
     patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
 
     def compute(coefficient: float) -> WearCurve:
-        """Compute the depth over the cycles for a wear coefficient [m2/N]."""
-        return _compute_curve(model, patch, coefficient, target.name, progress)
+        """Compute the worn depth over the cycles for a wear coefficient [m2/N]."""
+        return _compute_wear_curve(model, patch, coefficient, target.name, progress)
 
     curve = compute(bounds.high)
     max_depth = float(curve.depth[-1])
     if not max_depth >= target.value:
         is_worn_through = curve.fraction[-1] < 1
-        cure = "raise the high bound"
+        advice = "raise the high bound"
         if is_worn_through:
-            cure = (
+            advice = (
                 "with this bound as the coefficient the coating is worn through before the last "
                 "cycle"
             )
         raise PatchfemError(
             f"--free {COEFFICIENT_KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
-            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {cure}"
+            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {advice}"
         )
-    inverse = curve.inverse()
+    inverse = curve.make_inverse()
     value = float(bounds.high * inverse(target.value))
-    runs = 1
-    reached = math.nan
-    while runs < MAX_RUNS:
-        runs += 1
-        reached = float(compute(value).depth[-1])
-        if abs(reached - target.value) <= DEPTH_TOL * model.accuracy.tolerance * target.value:
+    n_runs = 1
+    computed_depth = math.nan
+    while n_runs < MAX_RUNS:
+        n_runs += 1
+        computed_depth = float(compute(value).depth[-1])
+        if (
+            abs(computed_depth - target.value)
+            <= DEPTH_TOL * model.accuracy.tolerance * target.value
+        ):
             break
-        value *= float(inverse(target.value) / inverse(reached))
+        value *= float(inverse(target.value) / inverse(computed_depth))
     else:
         raise NotConverged(
             f"fit {COEFFICIENT_KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
-            f"{reached:.6g} in place of {target.value:.6g}"
+            f"{computed_depth:.6g} in place of {target.value:.6g}"
         )
     if value < bounds.low:
         raise PatchfemError(
@@ -241,14 +244,14 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
         low=float(value * low),
         high=float(value * high),
         measured=target,
-        model=reached,
+        model=computed_depth,
         bounds=bounds,
-        runs=runs,
+        runs=n_runs,
     )
 
 
-def _read_bounds(free) -> Range:
-    """Parse the range of the wear coefficient; PatchfemError for other free keys."""
+def _parse_coefficient_range(free) -> Range:
+    """Parse the range of the wear coefficient; raise PatchfemError for other parameters."""
     ranges = parse_ranges(free)
     if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
         raise PatchfemError(
@@ -258,10 +261,10 @@ def _read_bounds(free) -> Range:
     return ranges[0]
 
 
-def _compute_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
+def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
     """Compute the worn depth over the cycles for a wear coefficient [m2/N].
 
-    patch: solved contact of the unworn pieces.
+    `patch` is the solved contact of the unworn pieces, and `name` one of QUANTITIES.
     """
     model = replace(model, wear=replace(model.wear, coefficient=coefficient))
     worn = evolve.compute_wear(model, patch, (None, None), progress)

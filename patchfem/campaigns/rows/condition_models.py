@@ -9,7 +9,7 @@ from ...effects import find_waveform
 from ...model.model import Model, build
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, loads
-from ..fits.problem import model_without_joint
+from ..fits.problem import build_model_without_joint
 
 # Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
@@ -118,7 +118,7 @@ class ConditionModels:
     def build_model(self, values) -> Model:
         """Build the rig model for values (n,) of the free parameters, with the drive of the scene."""
         sets = [self.ranges[k].format_assignment(values[k]) for k in self.model_parameters]
-        return model_without_joint(self.base, sets)
+        return build_model_without_joint(self.base, sets)
 
     def with_condition_drive(self, model: Model, condition: int) -> Model:
         """Return the model with the drive of a measured condition."""

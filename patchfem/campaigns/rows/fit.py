@@ -230,7 +230,9 @@ def fit_rows(
         refit_prediction = _predict_from_rest(readings, refit.fit.values, every_condition)
         placebos.append(Placebo(text, refit, cells.compute_log_ratios(*refit_prediction)))
     return FittedRows(
-        keys=keys.conclude(best.fit, begin, _warn_of_doubtful_fit(cells, best, logs, settings)),
+        keys=keys.make_fitted_keys(
+            best.fit, begin, _warn_of_doubtful_fit(cells, best, logs, settings)
+        ),
         models=models,
         cells=cells,
         settings=settings,

@@ -5,7 +5,7 @@ import numpy as np
 from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.watched import MotionObserver
-from ..fits.problem import press_patch
+from ..fits.problem import solve_contact
 from .condition_models import GAIN_KEYS, ConditionModels
 
 
@@ -95,5 +95,5 @@ class ModelReadings:
         if model.patch is None:
             return None
         if self.patch is None or self.models.changes_contact:
-            self.patch = press_patch(model)
+            self.patch = solve_contact(model)
         return self.patch

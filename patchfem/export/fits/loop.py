@@ -68,8 +68,8 @@ def _collect_fit_data(loop_fit: FittedLoop) -> dict:
     }
     bounds = [*keys.ranges, *(offset.range for offset in loop_fit.offsets)]
     held_out_score = None
-    if loop_fit.held_rms is not None:
-        held_out_score = {"rows": int(loop_fit.held_out.sum()), "rms": loop_fit.held_rms}
+    if loop_fit.held_out_rms is not None:
+        held_out_score = {"rows": int(loop_fit.held_out.sum()), "rms": loop_fit.held_out_rms}
     measured = loop.path.name
     return describe_measurement(keys.scene.title, measured, loop.quantity, keys.outcome) | {
         "values": describe_values(keys),
@@ -83,7 +83,7 @@ def _collect_fit_data(loop_fit: FittedLoop) -> dict:
         "held": held_out_score,
         "peak": float(np.abs(loop.reading).max()),
         "step_error": loop_fit.step_error,
-        "steps_between_rows": loop_fit.pieces,
+        "steps_between_rows": loop_fit.steps_per_row,
         "evaluations": fit.counts.evaluations,
         "failures": fit.counts.failures,
         "descents_agreed": fit.agreed,

@@ -54,7 +54,7 @@ def _collect_fit_data(fit: FittedPatch) -> dict:
     best = laws[fit.best]
     mesh = None
     if patch.mesh_change is not None:
-        mesh = _difference_sizes(patch.mesh_change, patch.slides) | {"nodes": patch.nodes}
+        mesh = _difference_sizes(patch.mesh_change, patch.amplitudes) | {"nodes": patch.nodes}
     scene = fit.scene
     return describe_measurement(scene.title, scene.path.name, "patch", best["outcome"]) | {
         "law": fit.best,
@@ -64,8 +64,8 @@ def _collect_fit_data(fit: FittedPatch) -> dict:
         "slip_force": patch.slip_force,
         "stiffness": patch.stiffness,
         "stiffness_error": patch.stiffness_error,
-        "rows": int(patch.slides.size),
-        "amplitudes": [float(patch.slides[0]), float(patch.slides[-1])],
+        "rows": int(patch.amplitudes.size),
+        "amplitudes": [float(patch.amplitudes[0]), float(patch.amplitudes[-1])],
         "mesh": mesh,
         "warnings": [*scene.remarks, *fit.warnings],
         "seconds": round(fit.seconds, 6),
@@ -75,7 +75,7 @@ def _collect_fit_data(fit: FittedPatch) -> dict:
 def _describe_law(law: str, fitted_law: FittedLaw, fit: FittedPatch) -> dict:
     """Return the values and errors of a fitted law, as written in fit.json."""
     units = FITTED_LAWS[law].units
-    sizes = _difference_sizes(fitted_law.deviations, fit.patch.slides)
+    sizes = _difference_sizes(fitted_law.deviations, fit.patch.amplitudes)
     return {
         "values": {
             f"friction.{key}": {"value": value, "unit": units.get(key, "1")}
@@ -117,7 +117,10 @@ def _relative_loss(fitted_law: FittedLaw, fit: FittedPatch) -> dict:
         fitted_law.deviations[1],
     )
     k = np.abs(relative_difference).argmax()
-    return {"relative": float(relative_difference[k]), "relative_at": float(fit.patch.slides[k])}
+    return {
+        "relative": float(relative_difference[k]),
+        "relative_at": float(fit.patch.amplitudes[k]),
+    }
 
 
 def _scene_text(fit: FittedPatch, law: str, fit_data: dict, path: Path) -> str:
@@ -143,7 +146,7 @@ def _csv_rows(fit: FittedPatch) -> list:
     curves = {"patch": fit.patch.curves} | {law: one.curves for law, one in fit.laws.items()}
     parts = ("force [N]", "loss [J]")
     head = ["slide [m]", *(f"{name} {part}" for name in curves for part in parts)]
-    columns = [fit.patch.slides]
+    columns = [fit.patch.amplitudes]
     for curve in curves.values():
         columns += [curve.force, curve.loss]
     return [head, *([*map(repr, row)] for row in np.column_stack(columns).tolist())]
@@ -151,7 +154,7 @@ def _csv_rows(fit: FittedPatch) -> list:
 
 def _draw_charts(fit: FittedPatch) -> list:
     """Chart the stiffness and the loss per cycle against the slide amplitude."""
-    slides = fit.patch.slides
+    slides = fit.patch.amplitudes
     unit, scale = choose_axis_unit(slides, "m")
     along = charts.make_axis("amplitude of the slide", unit, True)
     x = slides * scale

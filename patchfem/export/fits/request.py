@@ -4,10 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...campaigns.fits.curve import DEFAULT_STARTS, fit_curve, is_curve
+from ...campaigns.fits.curve import DEFAULT_STARTS, fit_curve, is_damping_curve_file
 from ...campaigns.fits.loop import fit_loop
 from ...campaigns.fits.loop_path import LoopOptions
-from ...campaigns.fits.patch import fit_patch, read_slides
+from ...campaigns.fits.patch import check_amplitudes, fit_patch
 from ...campaigns.fits.problem import parse_ranges
 from ...campaigns.fits.wear import fit_wear
 from ...campaigns.rows.condition_models import FitRequest
@@ -111,7 +111,7 @@ def fit_into(
     lengths = None
     if options.amplitudes:
         lengths = axes.read_lengths(options.amplitudes, format_option("amplitudes"))
-    slides = read_slides(lengths)
+    slides = check_amplitudes(lengths)
     with Folder(target, options.resume) as folder:
         if folder.dropped and listener.say is not None:
             listener.say(folder.dropped)
@@ -140,7 +140,7 @@ def choose_kind(scene: Scene, to: str) -> str:
         return "wear"
     if scene.kind not in ("rig", "linear"):
         return "loop"
-    return "curve" if is_curve(to) else "rows"
+    return "curve" if is_damping_curve_file(to) else "rows"
 
 
 def _check_options(kind: str, options: FitOptions, format_option: Callable) -> None:
