@@ -3,7 +3,7 @@
 Plans state them, and runs that would take too long are refused.
 
 All constants were measured on one machine with plain scenes and compiled code; `measure_machine_time_ratio` compares another
-machine with it. The modules that count the work define its units: `runs.rig.costs`, `runs.rig.lists`,
+machine with it. The modules that count the work define its units: `runs.rig.costs`, `runs.rig.bond_lists`,
 `runs.bench.engine`, `friction.bonds.engines`, `runs.patch.plan` and `elasticity.grid_fronts`.
 """
 

@@ -109,7 +109,7 @@ PUBLIC = {
         "find_motion_properties",
     ),
     "rig.numerics": ("choose_numerics",),
-    "rig.pieces": ("YieldingElements",),
+    "rig.event_driven": ("YieldingElements",),
     "rig.plan": (
         "drive_and_knee",
         "stuck_stiffnesses",

@@ -17,7 +17,7 @@ from ..model.model import Model
 from ..structure import drive_sizes
 from .bench import engine as bench_engine
 from .patch import grids as patch_grids
-from .rig import costs, engines, lists, numerics
+from .rig import bond_lists, costs, engines, numerics
 
 # Ratio of present to required steps per cycle of a rig, below which runs missed the tolerance: of 60 random
 # rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it below
@@ -226,7 +226,7 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
         or engines.choose_engine(model).name != engines.MARCH.name
     ):
         return None
-    if lists.choose_bond_summation(model, numerics.choose_numerics(model)).error <= tolerance:
+    if bond_lists.choose_bond_summation(model, numerics.choose_numerics(model)).error <= tolerance:
         return None
     return Cause(f"with {' and '.join(pinned)} as given", dict.fromkeys(pinned))
 

@@ -6,7 +6,7 @@ import pytest
 
 from patchfem import load, plan
 from patchfem.runs import choose_numerics
-from patchfem.runs.rig.lists import estimate_list_cost
+from patchfem.runs.rig.bond_lists import estimate_list_cost
 from patchfem.runs.run import run
 
 APPROACH_WITH_MOMENT = """[contact]

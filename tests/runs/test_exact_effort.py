@@ -7,7 +7,7 @@ from event_run import collect_rows
 import patchfem as pf
 from patchfem.core import Missing
 from patchfem.runs.rig import costs
-from patchfem.runs.rig.pieces import coulomb_limits
+from patchfem.runs.rig.event_driven import coulomb_limits
 
 CHAIN = """[structure]
 masses = ["1 kg", "2 kg"]

@@ -8,7 +8,7 @@ import pytest
 
 from patchfem import load, plan
 from patchfem.core import Missing
-from patchfem.runs.rig import lists
+from patchfem.runs.rig import bond_lists
 from patchfem.runs.run import run
 
 GROWTH_SENTENCE = "each reversal makes the list of bonds longer"
@@ -179,7 +179,7 @@ def test_refuses_stuck_block_with_too_long_bond_list(monkeypatch):
     scene = load(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
     start = process_time()
     assert GROWTH_SENTENCE in str(plan(scene))
-    monkeypatch.setattr(lists, "MAX_LIST_SECONDS", 3.0)
+    monkeypatch.setattr(bond_lists, "MAX_LIST_SECONDS", 3.0)
     with pytest.raises(
         Missing,
         match=r"the list of bonds would need a computing time of about \d+ s, more than the "

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.testing import assert_array_equal
 
 from patchfem.core import Response
-from patchfem.runs.rig.reading import thin_samples
+from patchfem.runs.rig.evaluation import thin_samples
 
 HISTORIES = [name for name in Response.__dataclass_fields__ if name != "extra"]
 

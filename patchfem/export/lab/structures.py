@@ -23,7 +23,7 @@ from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
 from ...runs.patch import result as patch_result
-from ...runs.rig import costs, engines, numerics, pieces
+from ...runs.rig import costs, engines, event_driven, numerics
 from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
@@ -222,7 +222,7 @@ def friction_elements(model: Model) -> Elements:
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
     chosen = replace(numerics.choose_numerics(model), pairs=costs.count_merges(model))
-    groups = pieces.YieldingElements(model, chosen, patch).groups
+    groups = event_driven.YieldingElements(model, chosen, patch).groups
     stiffness = np.concatenate([group.stiffness for group in groups])
     limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])
     direction = np.repeat(rows, [group.stiffness.size for group in groups], axis=0)

@@ -34,10 +34,10 @@ from ...response.errors import (
 from ...response.measures import energy_balance
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
+from ..rig.bond_lists import choose_bond_summation
 from ..rig.costs import MAX_MARCH_STEPS
 from ..rig.engines import MARCH, choose_engine
 from ..rig.interface import reduce_to_few_points
-from ..rig.lists import choose_bond_summation
 from . import pressed
 from .case_results import CaseResults, has_unreadable_table
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results

@@ -19,7 +19,7 @@ from ...dynamics.harmonic import balance as point_balance
 from ...dynamics.harmonic import harmonic, point
 from ...response import measures
 from ...response.measures import measure_half_range
-from ..rig import march, pieces, solve
+from ..rig import event_driven, march, solve
 from ..rig.engines import ENGINES, MARCH, choose_steady_method
 from ..rig.numerics import choose_numerics
 from ..rig.steady import balance as rig_balance
@@ -173,7 +173,7 @@ class MotionObserver:
     def _orbits(self):
         """Return the search for periodic motions of elastic-plastic elements, made on first use."""
         modes = self.model.rig.modes
-        groups = pieces.YieldingElements(self.model, self.numerics, self.patch).groups
+        groups = event_driven.YieldingElements(self.model, self.numerics, self.patch).groups
         finder = self.before.pop("yields", None)
         if finder is not None and finder.replace_system(modes, groups):
             return finder

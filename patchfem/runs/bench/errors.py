@@ -39,7 +39,7 @@ MESH_TOL = 1e-2
 FINER_MERGE_FACTOR = 0.5
 
 
-class CoarserRun(NamedTuple):
+class CoarseRun(NamedTuple):
     """Settings of a coarser bench run for an error estimate.
 
     - steps: steps per cycle.
@@ -85,7 +85,7 @@ def estimate_bench_errors(model, patches: list, fine_run, steps: int, say=None) 
         Callback for a line of text.
     """
 
-    def solve(variant: CoarserRun):
+    def solve(variant: CoarseRun):
         """Compute a bench run with coarser settings."""
         options = BenchOptions(variant.choice, say, springs=variant.springs, modes=variant.modes)
         begin = process_time()
@@ -123,8 +123,8 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
         Number of steps per cycle of `fine_run`.
     """
     choice = fine_run.engine.choice
-    halved = CoarserRun(max(4, steps // 8 * 4), 0, choice)
-    quarter = CoarserRun(max(4, steps // 16 * 4), 0, choice)
+    halved = CoarseRun(max(4, steps // 8 * 4), 0, choice)
+    quarter = CoarseRun(max(4, steps // 16 * 4), 0, choice)
     # Parallel elements follow any path exactly, so that the steps affect only the harmonics.
     rule = (
         convergence_errors if uses_parallel_elements(model) else partial(step_errors, steps=steps)

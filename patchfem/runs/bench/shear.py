@@ -225,7 +225,7 @@ def list_coarser_element_runs(count: int, reference_run) -> CoarserRuns:
     ----------
     count : int
         Number of coarser meshes.
-    reference_run : CoarserRun
+    reference_run : CoarseRun
         Run with which they are compared.
     """
     runs = tuple(reference_run._replace(level=level) for level in range(1, count + 1))

@@ -1,6 +1,6 @@
 """Amplitude above which friction does not limit a mode that gains energy.
 
-In: a `passes.CoupledRun` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
+In: a `postprocessing.CoupledRun` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
 the largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 

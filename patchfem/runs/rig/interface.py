@@ -22,7 +22,7 @@ from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, rigid, shear
 from ..patch import faces, jenkins_elements
 from . import strips, varying_load
-from .lists import choose_bond_summation
+from .bond_lists import choose_bond_summation
 from .numerics import Numerics
 
 # largest ratio of the backbone error to the tolerance, for the reduction to few modes and for that to

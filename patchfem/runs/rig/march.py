@@ -26,9 +26,9 @@ from ...structure.drive_sizes import (
 )
 from . import levels as rig_levels
 from . import strips
+from .bond_lists import ListGuard, choose_bond_summation, has_list
+from .evaluation import Reader, compute_work_check
 from .interface import make_contact
-from .lists import ListGuard, choose_bond_summation, has_list
-from .reading import Reader, compute_work_check
 from .solution import CycleLoop, Solution, compute_sampled_loop, normal_load
 
 # Safety factor on the first-order error of a run that ends beside its requested end.

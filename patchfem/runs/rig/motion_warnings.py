@@ -1,6 +1,6 @@
 """Warnings of a coupled run on its law, load and engine, and notes on their meaning.
 
-In: a `passes.CoupledRun`. Out: lists of sentences.
+In: a `postprocessing.CoupledRun`. Out: lists of sentences.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ from ..results.notes import (
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
-from . import pieces, strips
+from . import event_driven, strips
 from .costs import reason_to_march_elements
 from .engines import ENGINES, PIECES
 from .solution import normal_load
@@ -105,7 +105,7 @@ def warn_of_peak_at_sweep_end(run, modes) -> list:
 
     Parameters
     ----------
-    run : passes.CoupledRun
+    run : postprocessing.CoupledRun
     modes : callable
         Returns the modes, as `plan.mode_frequencies` does.
     """
@@ -307,7 +307,7 @@ def _note_unmoved_elements(run) -> list:
         return []
     window = run.solution.window
     slides = window.extra.get("slides", window.slide[:, None])
-    elements = pieces.YieldingElements(run.model, run.numerics, run.patch)
+    elements = event_driven.YieldingElements(run.model, run.numerics, run.patch)
     for group, slide in zip(elements.groups, slides.T):
         most = float(group.yield_displacement.max(initial=0.0))
         half = float(np.ptp(slide)) / 2

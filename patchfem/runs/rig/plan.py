@@ -27,7 +27,7 @@ from ..cost import (
     EngineCode,
     MemoryPart,
 )
-from . import lists
+from . import bond_lists
 from .costs import (
     MARCH_HISTORY,
     count_intervals_by_cause,
@@ -200,8 +200,8 @@ def predict_march_cost(model: Model, numerics, points: int) -> Cost:
     sizes = {}
     parts = []
     modes = 0
-    if is_bonds and lists.has_list(model, numerics):
-        entries, seconds = lists.estimate_list_cost(model, numerics)
+    if is_bonds and bond_lists.has_list(model, numerics):
+        entries, seconds = bond_lists.estimate_list_cost(model, numerics)
         each = seconds / steps
         sizes["bond_list_about"] = int(entries)
         parts.append(
@@ -221,7 +221,7 @@ def predict_march_cost(model: Model, numerics, points: int) -> Cost:
     else:
         each = _step_seconds_without_modes(model, numerics, points, is_bonds=is_bonds)
     # the cost includes runs with a half and a quarter of the steps, and each halving of the step
-    passes = 0.75 + 2 ** (lists.count_step_halvings(model) + 1) - 1
+    passes = 0.75 + 2 ** (bond_lists.count_step_halvings(model) + 1) - 1
     times = {
         "motion": steps * passes * each,
         "histories": cost_model.KEPT_SAMPLE_SECONDS * count_kept_samples(numerics),
@@ -397,19 +397,21 @@ def bond_sum_sentences(model: Model, numerics) -> list:
     """Return the sentences of a plan on the bond summation or the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else describe_element_engine(model, numerics.engine)
-    choice = lists.choose_bond_summation(model, numerics)
+    choice = bond_lists.choose_bond_summation(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
         return sentences
-    if lists.is_list_growing(model):
+    if bond_lists.is_list_growing(model):
         remedy = 'set friction.reading = "stretch" to give the block a finite stiffness'
-        if lists.is_stuck_without_stiffness(model):
+        if bond_lists.is_stuck_without_stiffness(model):
             remedy = "set friction.order above 0 to give the block a stiffness"
         sentences.append(
             f"{_describe_stuck_block(model)}, so that the computing time is known within a factor of about 12 only; "
             f"{remedy}"
         )
-    elif (seconds := lists.estimate_list_cost(model, numerics)[1]) > parameters.MAX_LIST_SECONDS:
+    elif (
+        seconds := bond_lists.estimate_list_cost(model, numerics)[1]
+    ) > parameters.MAX_LIST_SECONDS:
         sentences.append(
             "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
             f"{seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s"
@@ -419,9 +421,9 @@ def bond_sum_sentences(model: Model, numerics) -> list:
 
 def _describe_stuck_block(model: Model) -> str:
     """Describe how bonds stop a block while its bond list grows."""
-    if lists.is_stuck_without_stiffness(model):
+    if bond_lists.is_stuck_without_stiffness(model):
         held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
-    elif lists.is_stuck_after_release(model):
+    elif bond_lists.is_stuck_after_release(model):
         held = "with the law as printed in the report the block does not slide after its release"
     else:
         held = (

@@ -2,7 +2,7 @@
 
 In: the inputs of a run, i.e. its plan and its pressed patch. Out: a Result. `run_refined` makes the
 run at the first numerical settings whose displacement is known to the tolerance; `run_coupled`
-applies the functions of `passes` to it.
+applies the functions of `postprocessing` to it.
 """
 
 from dataclasses import replace
@@ -18,13 +18,13 @@ from ...response.rows import set_final_floors
 from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
-from . import levels, lists, passes
+from . import bond_lists, levels, postprocessing
 from .costs import MAX_MARCH_STEPS
 from .engines import ENGINES
 from .fields import collect_frames
 from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
-from .passes import CoupledRun
+from .postprocessing import CoupledRun
 from .runner import Runner
 from .solution import Solution, compute_curve_measures
 from .solve import refuse_long_run
@@ -72,14 +72,14 @@ def run_coupled(inputs: RunInputs) -> Result:
     refuse_long_run(model, numerics)
     run = CoupledRun(inputs, *run_refined(inputs, numerics))
     if run.solution.levels:
-        run = passes.add_level_measures(run)
-    run = passes.add_outcome(run)
-    run = passes.add_reasons(run)
+        run = postprocessing.add_level_measures(run)
+    run = postprocessing.add_outcome(run)
+    run = postprocessing.add_reasons(run)
     if rig.drive.kind == "free" and run.has_errors:
-        run = passes.add_decay(run)
+        run = postprocessing.add_decay(run)
     if run.has_friction and find_decay_rate(rig.modes) < 0:
-        run = passes.add_limit_cycles(run)
-    warnings = passes.collect_warnings(run)
+        run = postprocessing.add_limit_cycles(run)
+    warnings = postprocessing.collect_warnings(run)
     notes = [*collect_notes(run), *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].finds_periodic_motion and run.outcome is Outcome.GROWS:
@@ -90,7 +90,7 @@ def run_coupled(inputs: RunInputs) -> Result:
         fields = collect_frames(model, run.numerics, inputs.patch, solution)
     return Result(
         plan=inputs.plan,
-        outcome=passes.judge_outcome_on_pieces(run),
+        outcome=postprocessing.judge_outcome_on_pieces(run),
         measures=measures,
         response=solution.response,
         window=solution.window,
@@ -98,7 +98,7 @@ def run_coupled(inputs: RunInputs) -> Result:
         fields=fields,
         seconds=inputs.seconds,
         warnings=[*inputs.warnings, *warnings],
-        extra=passes.collect_extra(run, measures, notes),
+        extra=postprocessing.collect_extra(run, measures, notes),
     )
 
 
@@ -207,8 +207,8 @@ def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -
         "steps_per_cycle" in numerics.pinned
         or steps > MAX_MARCH_STEPS
         or steps * numerics.cycles > MAX_RUN_STEPS
-        or lists.is_list_too_long(model, numerics, book)
-        or lists.has_doubling_failed(book, displacement_errors)
+        or bond_lists.is_list_too_long(model, numerics, book)
+        or bond_lists.has_doubling_failed(book, displacement_errors)
         or run.solution.outcome in EARLY_OUTCOMES
     )
 

@@ -12,8 +12,8 @@ from ...dynamics.cycles import SAMPLES_PER_CYCLE
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import ROWS_NEEDING_RUN, find_definition
+from .evaluation import Reader, compute_work_check, thin_samples
 from .interface import make_contact
-from .reading import Reader, compute_work_check, thin_samples
 from .solution import Solution
 
 # Smallest ratio of the slip to its round-off, with which the onset of slip is located within a step.

@@ -4,7 +4,7 @@ In: a Model, its Numerics and its pressed patch. Out: a Solution. `engines` says
 can compute; the module of an engine is loaded when it solves.
 """
 
-from . import costs, lists, march, pieces, smooth
+from . import bond_lists, costs, event_driven, march, smooth
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
 
@@ -28,7 +28,7 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     Solution
     """
     if numerics.engine in ("exact", "piecewise"):
-        run = pieces.run_pieces
+        run = event_driven.run_pieces
     elif numerics.engine == "smooth":
         run = smooth.run_smooth
     elif numerics.engine == "march":
@@ -46,4 +46,4 @@ def refuse_long_run(model, numerics) -> None:
     if numerics.engine in ("exact", "piecewise"):
         costs.refuse_long_exact_run(model)
     elif numerics.engine == "march":
-        lists.refuse_long_list(model, numerics)
+        bond_lists.refuse_long_list(model, numerics)

@@ -7,7 +7,7 @@ In: a Model, its Numerics and its pressed patch. Out: a VaryingLoadModel of
 from ...dynamics.march import varying_load as march
 from ...effects import is_bond_list
 from ...model.model import Model
-from .lists import choose_bond_summation
+from .bond_lists import choose_bond_summation
 from .numerics import Numerics
 
 

@@ -16,8 +16,8 @@ from patchfem.friction import Bonds, Quadrature, RequestedEngine, choose_engine,
 from patchfem.friction.bonds.engines import ENGINES
 from patchfem.response import energy_balance
 from patchfem.runs import choose_numerics as settings_of
+from patchfem.runs.rig.bond_lists import choose_bond_summation
 from patchfem.runs.rig.interface import make_single_contact
-from patchfem.runs.rig.lists import choose_bond_summation
 from patchfem.runs.rig.motion_warnings import warn_of_created_energy
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy

@@ -22,7 +22,7 @@ from ....response.ringing import make_ringing_measures
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import count_merges
 from ...rig.engines import EXACT, PIECES, choose_engine
-from ...rig.pieces import (
+from ...rig.event_driven import (
     RigidElements,
     evaluate_reading,
     find_steady_motion,

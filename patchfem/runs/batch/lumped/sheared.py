@@ -13,7 +13,7 @@ import numpy as np
 from ....model.model import Model
 from ....response.errors import coarser_errors
 from ...rig.engines import PIECES, choose_engine
-from ...rig.pieces import YieldingElements
+from ...rig.event_driven import YieldingElements
 from .. import pressed
 from ..case_results import CaseResults, has_unreadable_table
 from . import pieces

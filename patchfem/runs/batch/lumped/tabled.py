@@ -14,7 +14,7 @@ from ....compiled import load
 from ....dynamics.lanes import run as march
 from ....model.model import Model
 from ...rig.engines import PIECES
-from ...rig.pieces import YieldingElements
+from ...rig.event_driven import YieldingElements
 from .. import one_by_one, pressed
 from ..case_results import CaseResults
 from . import lane_check, lane_numbers, lane_steps, lanes, sheared

@@ -25,8 +25,8 @@ from ....formatting import format_length
 from ....response.errors import finer_errors
 from ....response.measures import compute_acceleration_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
+from ..evaluation import Reader, compute_work_check, sample_friction_works
 from ..interface import make_single_contact
-from ..reading import Reader, compute_work_check, sample_friction_works
 from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 

@@ -128,9 +128,9 @@ def make_missing_point(drive) -> CurvePoint:
 class TracedCurve:
     """Base class of curves of steady motions over frequency; subclasses compute the points.
 
-    leaves: see `top.refine_peak`.
+    leaves: see `peak.refine_peak`.
 
-    leaves: see `top.refine_peak`.
+    leaves: see `peak.refine_peak`.
     """
 
     leaves = 1e-2, 0.1

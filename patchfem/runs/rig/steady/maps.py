@@ -21,7 +21,7 @@ from ....response.measures import measure_half_range
 from ....response.spectrum import harmonic_measures
 from ....structure.drive_sizes import find_max_acceleration
 from ....structure.response import compute_receptance
-from ..pieces import PieceReader, RigidElements, YieldingElements
+from ..event_driven import PieceReader, RigidElements, YieldingElements
 from .curves import (
     COLUMN_MEASURES,
     CurvePoint,

@@ -3,14 +3,14 @@
 In: a Model, its Numerics and its pressed patch. Out: the Solution of a motion that repeats with
 the drive, with its regime, multipliers and stability, under a sine, or the largest one over
 frequency or level. Coulomb interfaces and elastic-plastic elements are solved by shooting with
-the map of their events and yields (`maps`), grooves by a march (`marched`), other laws by
+the map of their events and yields (`maps`), grooves by a march (`periodic_march`), other laws by
 harmonic balance (`balance`).
 """
 
 from ....core import NotConverged, SineDrive
 from ..engines import PIECES, choose_steady_method
 from ..solution import Solution
-from . import balance, maps, marched
+from . import balance, maps, periodic_march
 from .curves import solve_levels
 from .peak import solve_peak
 
@@ -41,7 +41,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
     elif method.name == "yields":
         finder_class = maps.YieldFinder
     elif method.name == "march":
-        finder_class = marched.MarchFinder
+        finder_class = periodic_march.MarchFinder
     else:
         finder_class = balance.BalanceFinder
     try:

@@ -31,8 +31,8 @@ from ...structure.drive_sizes import (
 )
 from ..bench import averaged_law
 from . import interface, strips
+from .evaluation import Reader
 from .levels import remove_incomplete_cycle, run_levels
-from .reading import Reader
 from .solution import Solution, mode_stiffness, normal_load
 
 # measures of the motion, which exist without an interface
