@@ -17,7 +17,7 @@ import numba
 import pytest
 from limits import limit_file_size
 from scene_texts import PLASTIC, POINT, TRIANGLE
-from test_inner import CALLS, KERNELS
+from test_compiled_callers import CALLS, KERNELS
 
 import patchfem
 from patchfem import compiled

@@ -248,7 +248,7 @@ ITEMS = (
         "prescribed initial displacements and velocities",
         "studies/report/free.toml",
         _figure("_15"),
-        "tests/structure/test_starts.py",
+        "tests/structure/test_initial_conditions.py",
         "works",
     ),
     Item(
@@ -615,7 +615,7 @@ ITEMS = (
         "the friction of many asperities, derived from that of one",
         "",
         "studies/misalignment/rough_skin.py",
-        "tests/contact/test_skin.py",
+        "tests/contact/test_asperity_layer.py",
         "in part: stiffness and pressure of many asperities are computed, but no "
         "friction law is derived from them",
     ),

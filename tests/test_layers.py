@@ -2,7 +2,7 @@
 
 The reading order is the numbered list in the docstring of the package; that of a folder in ORDERED, the list in the
 docstring of its own `__init__`, binds inside it. Every import counts, inside functions too.
-`python tests/test_ladder.py [ROOT]` prints every breach in a checkout.
+`python tests/test_layers.py [ROOT]` prints every breach in a checkout.
 """
 
 import ast

@@ -31,8 +31,8 @@ CASES = (
 AS_PYTHON = """\
 import pickle, sys
 sys.path[:0] = {paths!r}
-import test_as_python
-motions = [test_as_python.compute_motion(*case) for case in test_as_python.CASES]
+import test_event_loop_in_python
+motions = [test_event_loop_in_python.compute_motion(*case) for case in test_event_loop_in_python.CASES]
 assert "numba" not in sys.modules
 with open({file!r}, "wb") as file:
     pickle.dump(motions, file)
