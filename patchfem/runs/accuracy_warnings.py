@@ -112,7 +112,7 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
             """Return the accuracy warnings on the patch of one interface."""
             return tolerance_warnings(_select_interface_measures(finding, face), face.patches[1:])
 
-        warnings = faces.merge_sentences(model, warn_of_face)
+        warnings = faces.merge_interface_sentences(model, warn_of_face)
     elif static:
         at_rest = finding
         meshes = coarse
@@ -302,7 +302,7 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
     if cause == "mesh" and finding.patch is not None:
         return _mesh_remedy(model, [(finding, coarse)])
     if cause == "mesh":
-        soft = [face for face in faces.press_faces(model) if face.partial_slip]
+        soft = [face for face in faces.solve_interface_patches(model) if face.partial_slip]
         return _mesh_remedy(
             model, [(_select_interface_measures(finding, face), face.patches[1:]) for face in soft]
         )

@@ -125,7 +125,7 @@ def _run_plan(
         notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
     if model.has_interface_patches:
         if fresh:
-            faces.condense_again(model)
+            faces.recondense_interface_pieces(model)
         warnings += faces.collect_warnings(model)
         notes += faces.collect_notes(model)
         seconds["contact"] = perf_counter() - begin
@@ -243,7 +243,7 @@ def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> R
         result = replace(result, measures=static | motion)
     if model.has_interface_patches:
         static = faces.static_measures(model)
-        frames = faces.faces_with_frames(model, result.extra.get("shots", ()))
+        frames = faces.solve_faces_with_slip_fields(model, result.extra.get("shots", ()))
         result = replace(
             result,
             extra=result.extra | {"faces": frames},

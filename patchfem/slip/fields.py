@@ -39,7 +39,7 @@ def element_fields(patch, elements, states, length: float) -> ShearFields:
         force = np.zeros(patch.x.size)
         force[elements.points] = elements.force_matrix @ stretch
         traction[i] = force / weight
-        local_slip[i] = rel_disp - patch.giving @ force
+        local_slip[i] = rel_disp - patch.slip_compliance @ force
         local_slip[i, elements.points] -= length * force[elements.points] / elements.limit
     return ShearFields(traction, local_slip)
 
@@ -100,7 +100,9 @@ def bond_shear_modes(
     limit = law.static * pressure * patch.pieces.interface.weight
     weakening = 1 / law.ratio if law.ratio > 0 else np.inf
     if count is not None:
-        return shear_modes(patch.giving, limit, law.length, count, weakening)
+        return shear_modes(patch.slip_compliance, limit, law.length, count, weakening)
     if fewest:
-        return fewest_modes(patch.giving, limit, law.length, tolerance, weakening)
-    return enough_modes(patch.giving, limit, law.length, N_SHEAR_MODES, tolerance, weakening)
+        return fewest_modes(patch.slip_compliance, limit, law.length, tolerance, weakening)
+    return enough_modes(
+        patch.slip_compliance, limit, law.length, N_SHEAR_MODES, tolerance, weakening
+    )

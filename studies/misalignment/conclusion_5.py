@@ -36,7 +36,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 from scipy.optimize import brentq
 
-from patchfem.runs.patch.press import press_patch
+from patchfem.runs.patch.press import solve_patch_contact
 
 PORTIONS = (0.9, 0.5, 0.2, 0.05)
 # [N m/rad] rotational stiffnesses of the fixture; None is a rigid fixture
@@ -68,7 +68,7 @@ def rigid(portion: float, skin: str, halvings: int = 2, *more: str) -> tuple:
     """
 
     def press(log_tilt: float):
-        return press_patch(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
+        return solve_patch_contact(tilted.case(10**log_tilt, skin, *more), tilted.pair(halvings))
 
     tilt = brentq(
         lambda log_tilt: tilted.rubbed_portion(press(log_tilt)) - portion, -6, -1.3, xtol=1e-5

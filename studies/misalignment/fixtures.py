@@ -29,8 +29,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 
 from patchfem.core import Measure
-from patchfem.runs.patch.press import press_patch
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.press import solve_patch_contact
+from patchfem.runs.patch.values import compute_static_values
 
 # [N m/rad] rotational stiffnesses of the fixture; None is a rigid fixture
 SPRINGS = (None, 1e6, 1e5, 1e4, 1e3, 1e2)
@@ -74,7 +74,7 @@ def free(offset: float, skin: str = "bare"):
 
 def case(angle: float, spring: float | None) -> dict:
     """Return the measures for a neutral angle [rad] and a stiffness [N m/rad] of the holder."""
-    return values(press_patch(held_pieces(angle, spring), tilted.pair(1)))
+    return compute_static_values(solve_patch_contact(held_pieces(angle, spring), tilted.pair(1)))
 
 
 def tilt_for(fraction: float, spring: float | None, steps: int = 30) -> float:

@@ -15,7 +15,7 @@ import tilted
 from drawing import drawing
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.runs.patch.press import press_patch
+from patchfem.runs.patch.press import solve_patch_contact
 
 FOLDER = Path(__file__).parent
 TILTS = 10.0 ** np.linspace(-6, -2, 61)
@@ -34,7 +34,7 @@ def portions(spring, skin: str, tilts=TILTS, halvings: int = 1) -> np.ndarray:
     return np.array(
         [
             tilted.rubbed_portion(
-                press_patch(fixtures.held_pieces(tilt, spring, skin), tilted.pair(halvings))
+                solve_patch_contact(fixtures.held_pieces(tilt, spring, skin), tilted.pair(halvings))
             )
             for tilt in tilts
         ]

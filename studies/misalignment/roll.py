@@ -23,8 +23,8 @@ import tilted
 from scipy.optimize import brentq
 
 from patchfem.runs import estimate_static_measures
-from patchfem.runs.patch.press import press_patch
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.press import solve_patch_contact
+from patchfem.runs.patch.values import compute_static_values
 
 FRICTION = 0.3  # friction coefficient of rig.toml
 COUNTS = (8, 16)
@@ -38,7 +38,7 @@ def rolled_pieces(roll: float, count: int, skin: str):
 
 def case(roll: float, count: int, skin: str = "bare") -> dict:
     """Return {name: Measure} of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
-    three = [press_patch(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
+    three = [solve_patch_contact(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
     return estimate_static_measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
 
 
@@ -46,7 +46,9 @@ def roll_for(centre: float, skin: str, count: int = 16) -> float:
     """Return the roll [rad] that moves the pressure sideways by `centre` [m]."""
 
     def short(log_roll: float) -> float:
-        found = values(press_patch(rolled_pieces(10**log_roll, count, skin), tilted.pair(0)))
+        found = compute_static_values(
+            solve_patch_contact(rolled_pieces(10**log_roll, count, skin), tilted.pair(0))
+        )
         return abs(found["pressure_centre_lateral"]) - centre
 
     return 10 ** brentq(short, -7, -1.5, xtol=1e-6)

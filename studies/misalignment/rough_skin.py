@@ -39,7 +39,7 @@ from asperities import MEAN
 from patchfem.closed_forms import contact as exact
 from patchfem.contact import press
 from patchfem.core import frozen_array
-from patchfem.runs.patch.press import with_linear_skin
+from patchfem.runs.patch.press import add_linear_skin_compliance
 
 SCATTERS = (0.0, 10e-9, 50e-9, 0.2e-6, 1e-6, 5e-6)
 SHAPES = ("uniform", "gaussian")
@@ -53,7 +53,7 @@ def opening(stiffness: float | None, halvings: int = 2) -> float:
         part = tilted.case(0.0, "linear").interface.skin.model_copy(
             update={"normal_stiffness": stiffness}
         )
-        pieces = with_linear_skin(part, pieces)
+        pieces = add_linear_skin_compliance(part, pieces)
     load = tilted.case(0.0).loading.load
     x = pieces.interface.x
     flat = np.zeros(pieces.interface.x.size)

@@ -15,8 +15,8 @@ from patchfem.mesh.tensor import graded_depth
 from patchfem.model import build
 from patchfem.model.patch import PatchModel
 from patchfem.runs import estimate_static_measures
-from patchfem.runs.patch.condensed import Pair, condense
-from patchfem.runs.patch.press import Patch, press_patch
+from patchfem.runs.patch.condensed import CondensedPair, condense
+from patchfem.runs.patch.press import Patch, solve_patch_contact
 from patchfem.scene import scene
 
 RIG = Path(__file__).parents[1] / "rig" / "rig.toml"
@@ -52,7 +52,7 @@ def case(angle: float | None = None, skin: str = "bare", *more: str) -> PatchMod
 
 
 @cache
-def pair(halvings: int = 2) -> Pair:
+def pair(halvings: int = 2) -> CondensedPair:
     """Return the condensed pieces on the coarsest mesh (110 columns), whose cells are halved `halvings` times."""
     asked = case(0.0)
     half = asked.pieces.length / 2
@@ -70,7 +70,7 @@ def pair(halvings: int = 2) -> Pair:
 
 def patches(asked: PatchModel) -> tuple:
     """Return the Patch of a model of `case` on the finest mesh, and on meshes with cells twice and four times as long."""
-    return tuple(press_patch(asked, pair(k)) for k in (2, 1, 0))
+    return tuple(solve_patch_contact(asked, pair(k)) for k in (2, 1, 0))
 
 
 def compute_measures(asked: PatchModel) -> dict:

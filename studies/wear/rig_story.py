@@ -30,7 +30,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model import build
 from patchfem.runs import choose_numerics
 from patchfem.runs import run as runner
-from patchfem.runs.patch.press import press_patch
+from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.rig import levels, solve
 from patchfem.scene import scene
 
@@ -80,7 +80,7 @@ def onset(worn, cycles: int, pair=None) -> float:
         )
     )
     model = build(scene.loads(text, SCENE))
-    patch = press_patch(model.patch, pair, worn)
+    patch = solve_patch_contact(model.patch, pair, worn)
     found = solve.solve(model, choose_numerics(model), patch)
     return levels.find_onset(found.levels, found.probe, 3e-3)[0] / G_N
 

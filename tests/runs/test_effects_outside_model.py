@@ -15,8 +15,8 @@ from patchfem.mesh import graded_grid
 from patchfem.mesh.files import EDGE_TAGS
 from patchfem.model import make_piece_meshes
 from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.press import press_patch
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.press import solve_patch_contact
+from patchfem.runs.patch.values import compute_static_values
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -194,7 +194,9 @@ def test_refuses_approach_if_load_opens_middle_of_patch(offset):
                 )
             ).patch
             approaches.append(
-                values(press_patch(model, condense(model, *make_piece_meshes(model))))["approach"]
+                compute_static_values(
+                    solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
+                )["approach"]
             )
     assert approaches[2:] == pytest.approx(2 * np.array(approaches[:2]), rel=1e-9)
     assert approaches[0] < 0 < approaches[1]

@@ -11,8 +11,8 @@ from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.limits import extrapolate_to_zero_cell_length
-from patchfem.runs.patch.press import press_patch
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.press import solve_patch_contact
+from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import loads
 
 BLOCKS = PIECE + 'substrate = "Ti-8Al-1Mo-1V"\n'
@@ -42,11 +42,13 @@ def compare_with_refined_meshes(scene: str) -> dict:
         *series, tolerance=model.accuracy.tolerance if model.patch.mesh.is_automatic else None
     )
     grids = [series[0].pair.grid, series[0].pair.upper_grid]
-    finest = [values(series[0])]
+    finest = [compute_static_values(series[0])]
     is_symmetric = grids[0] is grids[1]
     for _ in range(2):
         grids = [grid.refine() for grid in grids[: 2 - is_symmetric]]
-        finest.append(values(press_patch(model.patch, condense(model.patch, *grids))))
+        finest.append(
+            compute_static_values(solve_patch_contact(model.patch, condense(model.patch, *grids)))
+        )
     return {
         name: (m.value, m.error, extrapolate_or_last(*(value[name] for value in finest)))
         for name, m in measures.items()

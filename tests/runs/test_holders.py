@@ -10,7 +10,7 @@ from patchfem import build
 from patchfem.contact.gaps import step
 from patchfem.core import Outcome
 from patchfem.runs import solve_with_coarser
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import scene
 
 TEXT = (
@@ -31,7 +31,7 @@ def solve_patch(keys=LOAD, tables=""):
     """Return the solved patch of a scene and its values."""
     model = build(scene.loads(TEXT.format(keys, tables))).patch
     patch = solve_with_coarser(model, TOLERANCE, False)[0]
-    return patch, values(patch)
+    return patch, compute_static_values(patch)
 
 
 def test_exact_holder_limits_are_free_and_clamped():

@@ -194,12 +194,12 @@ def integrate_chain(model, cycles: int, steps: int) -> tuple:
     """
     yield_sequences = []
     for interface in model.rig.friction.interfaces:
-        patch = faces.press_on_meshes(interface, model.accuracy.tolerance)[0]
+        patch = faces.solve_contact_on_meshes(interface, model.accuracy.tolerance)[0]
         in_contact = patch.active
         load = patch.pressure.sigma_n * patch.pieces.interface.weight
         yield_sequences.append(
             compute_yield_sequence(
-                patch.giving[np.ix_(in_contact, in_contact)],
+                patch.slip_compliance[np.ix_(in_contact, in_contact)],
                 interface.numbers.static * load[in_contact],
             )
         )
@@ -333,7 +333,7 @@ def test_exact_contact_elements_of_strips_agree_with_patch():
         force = [
             float(k @ np.minimum(slide, limits))
             for k, limits, _ in (
-                faces.make_elements(interface, 1e-3)
+                faces.make_patch_elements(interface, 1e-3)
                 for interface in (strip_interface, patch_interface)
             )
         ]

@@ -5,7 +5,7 @@ import numpy as np
 
 from patchfem import run
 from patchfem.export import summarise_run
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.values import compute_static_values
 from patchfem.runs.results import patch_rows
 
 PATCH = """
@@ -35,7 +35,7 @@ def test_always_summary_names_method_of_each_measure():
     """A measure has the value of the finest mesh if and only if the summary names the finest mesh
     as its method."""
     result = run(PATCH.format(1e-3))
-    on_mesh = values(result.patch)
+    on_mesh = compute_static_values(result.patch)
     methods = summarise_run(result)["numerics"]["measures"]
     assert methods.keys() == {
         name for name, measure in result.measures.items() if measure.value is not None

@@ -20,7 +20,7 @@ from patchfem.model import make_piece_meshes
 from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch.measures import note_on_plane_state
 from patchfem.runs.patch.press import solve
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.values import compute_static_values
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -61,7 +61,7 @@ def solve_patch(*args, **kwargs) -> tuple:
     """Return the solved patch of a scene and its values."""
     model = build_patch_model(*args, **kwargs)
     patch = solve(model, *make_piece_meshes(model))
-    return patch, values(patch)
+    return patch, compute_static_values(patch)
 
 
 # ---- skins
@@ -281,13 +281,13 @@ def test_exact_unlike_meshes_transfer_load_to_both_pieces(tmp_path):
     for body, force in zip((lower, upper), forces):
         assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
         assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
-    like_meshes = values(
+    like_meshes = compute_static_values(
         solve(
             build_patch_model(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'),
             coarse,
         )
     )
-    unlike_meshes = values(patch)
+    unlike_meshes = compute_static_values(patch)
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
         assert unlike_meshes[name] == pytest.approx(like_meshes[name], rel=0.02), name
 
@@ -336,7 +336,7 @@ def test_exact_rounded_mesh_agrees_with_crown(tmp_path):
     patch = solve(model, *make_piece_meshes(model))
     x = patch.x
     assert patch.unloaded_gap == pytest.approx(x**2 / (2 * 5.0), rel=1e-9, abs=1e-18)
-    mesh_values = values(patch)
+    mesh_values = compute_static_values(patch)
     crown = solve_patch('[contact.crown]\nradius = "5 m"\n')[1]
     for name in ("pressure_peak", "contact_fraction", "normal_stiffness", "approach"):
         assert mesh_values[name] == pytest.approx(crown[name], rel=1e-3), name
@@ -367,8 +367,8 @@ def test_exact_plane_state_note_states_difference():
     patch = solve(model, *make_piece_meshes(model))
     [sentence] = note_on_plane_state(model, patch)
     in_stress = replace(model, pieces=replace(model.pieces, plane="stress"))
-    stress = values(solve(in_stress, *make_piece_meshes(model)))
-    strain = values(patch)
+    stress = compute_static_values(solve(in_stress, *make_piece_meshes(model)))
+    strain = compute_static_values(patch)
     assert "approach by +" + format_length(stress["approach"] - strain["approach"], 3) in sentence
     assert (
         f"normal_stiffness by {100 * (stress['normal_stiffness'] / strain['normal_stiffness'] - 1):+.2g} %"

@@ -16,7 +16,7 @@ import patchfem as pf
 from patchfem import build
 from patchfem.model import make_piece_meshes
 from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.press import press_patch
+from patchfem.runs.patch.press import solve_patch_contact
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = (
@@ -217,7 +217,7 @@ def test_always_alternating_pressure_gives_ripple_note(amplitude, n_notes):
     pair = replace(
         pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")
     )
-    patch = press_patch(
+    patch = solve_patch_contact(
         patch_model, pair, amplitude * (-1.0) ** np.arange(pair.compliance.interface.x.size)
     )
     assert [text for text in patch.notes if "ripple" in text] == n_notes * [

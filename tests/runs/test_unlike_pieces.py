@@ -20,7 +20,7 @@ from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, ma
 from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.result import warn_of_strains
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import loads
 
 BLOCK = """\
@@ -131,7 +131,7 @@ def test_order_of_rounded_punch_error_is_one():
     # The nodes at the contact ends limit the convergence to first order.
     assert errors[1] < 4e-3 and errors[0] / errors[1] > 1.8
     assert patch.pressure.sigma_n.max() == pytest.approx(expected.max(), rel=4e-3)
-    assert values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
+    assert compute_static_values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
     assert "steep" not in " ".join(warn_of_strains(model, patch))
 
 
@@ -156,7 +156,7 @@ def test_exact_narrow_piece_above_or_below_gives_same_pressure(text, outline):
         for sides in (("lower", "upper"), ("upper", "lower"))
     )
     assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n).max() <= 1e-9 * a.pressure.sigma_n.max()
-    assert values(b) == pytest.approx(values(a), rel=1e-8)
+    assert compute_static_values(b) == pytest.approx(compute_static_values(a), rel=1e-8)
 
 
 def test_exact_load_is_transferred_at_interface_and_bond_lines():
@@ -193,8 +193,8 @@ def test_exact_written_mesh_of_shaped_pieces_gives_same_patch(tmp_path):
             tmp_path / "scene.toml",
         )
     ).patch
-    a = values(solve(model, *bodies))
-    b = values(solve(read_model, *make_piece_meshes(read_model)))
+    a = compute_static_values(solve(model, *bodies))
+    b = compute_static_values(solve(read_model, *make_piece_meshes(read_model)))
     assert b == pytest.approx(a, rel=1e-8)
 
 
@@ -226,7 +226,7 @@ def test_always_errors_of_unresolved_rounding_cover_fine_mesh(radius, tilt):
     tables = UPPER + f'length = "8 mm"\nend_radius = "{radius}"\n' + tilt
     model = build_patch_model(BLOCK + tables)
     (*_, half), edge = find_rounded_edges(model)
-    reference = values(
+    reference = compute_static_values(
         solve_on_columns(model, graded_columns(half, model.pieces.length / 2, edge / 30))
     )
     for cells in (20, 150):

@@ -64,7 +64,7 @@ def test_exact_fields_of_sheared_patch_satisfy_friction_law():
     ):
         in_contact = sigma > 0
         assert (np.abs(tau) <= 0.3 * sigma * (1 + 1e-12)).all()
-        stretch = (slide - slip - result.patch.giving @ (tau * weight))[in_contact] / (
+        stretch = (slide - slip - result.patch.slip_compliance @ (tau * weight))[in_contact] / (
             1e-6 * tau[in_contact] / (0.3 * sigma[in_contact])
         )
         assert (stretch > 0).all() and stretch.max() <= 1 + 1e-6

@@ -9,8 +9,8 @@ import pytest
 from study_module import load_study, make_study_fixture
 
 from patchfem.closed_forms import contact as exact
-from patchfem.runs.patch.press import press_patch
-from patchfem.runs.patch.values import values
+from patchfem.runs.patch.press import solve_patch_contact
+from patchfem.runs.patch.values import compute_static_values
 
 LOAD, LENGTH = 26 * 4.4482216152605, 12.7e-3
 
@@ -44,7 +44,7 @@ def asperities(rough):
 
 def solve_coarse(tilted, pieces):
     """Return the measures of a pressed patch on the coarse meshes."""
-    return values(press_patch(pieces, tilted.pair(1)))
+    return compute_static_values(solve_patch_contact(pieces, tilted.pair(1)))
 
 
 @pytest.mark.share(2)
@@ -73,7 +73,7 @@ def test_always_error_estimates_cover_an_independent_solution(tilted, fixtures):
 
     pieces = fixtures.held_pieces(1e-3, None)
     measures = estimate_static_measures(
-        press_patch(pieces, tilted.pair(1)), press_patch(pieces, tilted.pair(0))
+        solve_patch_contact(pieces, tilted.pair(1)), solve_patch_contact(pieces, tilted.pair(0))
     )
     # values of an independent program with elements of order 5
     reference = {
@@ -159,7 +159,7 @@ def test_exact_fixture_spring_adds_its_rotation(tilted, conclusion, fixtures):
     for skin in tilted.SKINS:
         for spring in (1e4, 300.0):
             angle = conclusion.neutral(0.5, skin, spring, 0)
-            patch = press_patch(fixtures.held_pieces(angle, spring, skin), tilted.pair(0))
+            patch = solve_patch_contact(fixtures.held_pieces(angle, spring, skin), tilted.pair(0))
             assert tilted.rubbed_portion(patch) == pytest.approx(0.5, abs=1e-4)
             assert patch.pressure.rotation == pytest.approx(
                 conclusion.rigid(0.5, skin, 0)[0], rel=1e-3
@@ -199,10 +199,15 @@ def test_always_admissible_fixture_stiffness_has_stated_limits(conclusion):
 def test_exact_roll_by_strips_agrees_with_linear_foundation(tilted, roll):
     """A patch divided into strips and rolled agrees with a wedge on a linear foundation."""
     pair = tilted.pair(0)
-    k = values(press_patch(tilted.case(0.0), pair))["normal_stiffness"] / LENGTH**2
+    k = (
+        compute_static_values(solve_patch_contact(tilted.case(0.0), pair))["normal_stiffness"]
+        / LENGTH**2
+    )
     for angle in (5e-6, 1e-4):
         fraction, centre, _, _ = exact.wedge_on_linear_foundation(angle, LOAD, LENGTH, LENGTH, k)
-        measures = values(press_patch(roll.rolled_pieces(angle, 128, "bare"), pair))
+        measures = compute_static_values(
+            solve_patch_contact(roll.rolled_pieces(angle, 128, "bare"), pair)
+        )
         assert measures["pressure_centre_lateral"] == pytest.approx(centre, rel=2e-4)
         assert measures["contact_fraction"] == pytest.approx(fraction, abs=1 / 128)
 

@@ -119,7 +119,7 @@ def with_shear_modes(
     weakening = 1.0
     length = law.length
     if not length:
-        gross_slip_slide = limit.sum() / tangential_stiffness(patch.giving, force > 0)
+        gross_slip_slide = limit.sum() / tangential_stiffness(patch.slip_compliance, force > 0)
         law = make_elastic_plastic_law(
             law.static, COULOMB_LENGTH_RATIO * tolerance * gross_slip_slide
         )
@@ -127,9 +127,11 @@ def with_shear_modes(
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
     found = (
-        shear_modes(patch.giving, limit, length, count, weakening)
+        shear_modes(patch.slip_compliance, limit, length, count, weakening)
         if count is not None
-        else enough_modes(patch.giving, limit, length, N_SHEAR_MODES, 0.1 * tolerance, weakening)
+        else enough_modes(
+            patch.slip_compliance, limit, length, N_SHEAR_MODES, 0.1 * tolerance, weakening
+        )
     )
     return replace(model, law=law, shear=found, share=tuple(force[found.points] / force.sum()))
 

@@ -1,8 +1,7 @@
-"""Prescribed approach of a piece that is free to rotate: find the load that reaches it.
+"""Search for the load that gives a prescribed approach of a piece that is free to rotate.
 
-In: a `PatchModel` with an approach, and a function that solves the contact under a load. Out:
-the solution under the load found by a bracketing search, or an error if no load or several
-loads belong to the approach.
+In: a `PatchModel` with an approach, and a function that solves the contact under a load. Out: the
+solution under the load that gives the approach, or an error if no load or several loads give it.
 """
 
 from dataclasses import replace
@@ -13,18 +12,19 @@ from ...contact.unilateral import press
 from ...core import Compliance, NotConverged, PatchfemError, frozen_array
 from ...formatting import format_length
 
-APPROACH_TOL = 1e-6  # Relative error of the reached approach above which the search has failed.
-# Same error relative to the range of the gap, whose round-off limits the accuracy.
+# Largest relative error of the approach at which the search counts as successful.
+APPROACH_TOL = 1e-6
+# The same error relative to the range of the gap, whose round-off limits the accuracy.
 GAP_ROUND_OFF_TOL = 1e-9
 
 
-def press_to_approach_with_rotation(
+def solve_contact_at_approach(
     patch_model, pieces: Compliance, gap, solve_under_load, stiffened_pieces: Compliance
 ):
-    """Solve the contact of a piece that is free to rotate under a prescribed approach.
+    """Solve the contact of a freely rotating piece under a prescribed approach.
 
-    A bracketing search finds the load that gives the approach. If even a millionth of the load that
-    flat pieces would need gives more than this approach, the pieces do not touch.
+    The load that gives the approach is found by bracketing. If a millionth of the load that flat
+    pieces would need already gives a larger approach, the pieces do not touch.
 
     Parameters
     ----------
@@ -33,9 +33,9 @@ def press_to_approach_with_rotation(
     gap : (m,) or (s, m)
         Unloaded gap [m], of strips (s, m).
     solve_under_load : callable
-        Function (patch_model, pieces, gap) that solves the contact under the load of the model.
+        Function (patch_model, pieces, gap) that solves the contact under a prescribed load.
     stiffened_pieces : Compliance
-        Pieces with their skin as under a large load.
+        Compliance of the pieces with the asperity layer as stiff as under a large load.
 
     Returns
     -------
@@ -44,25 +44,25 @@ def press_to_approach_with_rotation(
     Raises
     ------
     PatchfemError
-        If the middle of the piece does not close as the load increases (`refuse_opening_gap`).
+        If the gap in the middle does not close under an increasing load (`require_closing_gap`).
     NotConverged
-        If the approach jumps past the distance: a single node under the load line carries the load
-        at any rotation between two bounds.
+        If the approach is discontinuous at the prescribed value: a single node under the load line
+        carries the load at any rotation between two bounds.
     """
     from scipy.optimize import brentq
 
-    refuse_opening_gap(patch_model, stiffened_pieces)
+    require_closing_gap(patch_model, stiffened_pieces)
     distance = patch_model.loading.approach
     solutions = []
     min_load = _min_stable_load(patch_model, np.ptp(pieces.interface.x))
 
-    def excess(log_load: float) -> float:
+    def approach_difference(log_load: float) -> float:
         """Return the difference [m] between the approach under a trial load and the prescribed one.
 
-        log_load is the logarithm of the load [N] in excess of the least stable load.
+        log_load: logarithm of the load [N] minus the smallest stable load.
         """
-        # The unknown is the excess over the least load, because near it the piece rotates ever
-        # faster until it tips over.
+        # The unknown is the load minus the smallest stable load, because near that load the piece
+        # tips over.
         load = min_load + float(np.exp(log_load))
         solutions.append(
             solve_under_load(patch_model.with_loading(load=load, approach=None), pieces, gap)
@@ -73,11 +73,11 @@ def press_to_approach_with_rotation(
     low = top = max(top, np.log(min_load) if min_load > 0 else top)
     bottom = top - np.log(1e6) if min_load == 0 else np.log(min_load * 1e-9)
     for _ in range(60):
-        if excess(top) >= 0:
+        if approach_difference(top) >= 0:
             break
         low = top
         top = top + 2
-    while low == top or excess(low) >= 0:
+    while low == top or approach_difference(low) >= 0:
         if low == bottom:
             unloaded_model = patch_model.with_loading(
                 load=0.0, approach=None, can_rotate=False, rotational_stiffness=0.0
@@ -88,7 +88,7 @@ def press_to_approach_with_rotation(
             return unloaded._replace(pressure=pressure)
         top = low
         low = max(low - 2, bottom)
-    brentq(excess, low, top, xtol=1e-13, rtol=1e-14)
+    brentq(approach_difference, low, top, xtol=1e-13, rtol=1e-14)
     approaches = [solution.pressure.approach for solution in solutions]
     nearest = int(np.argmin(np.abs(np.array(approaches) - distance)))
     error = abs(approaches[nearest] - distance)
@@ -115,33 +115,36 @@ def _min_stable_load(patch_model, length: float) -> float:
     return 2 * abs(patch_model.loading.line_moment) / length if tips else 0.0
 
 
-def refuse_opening_gap(patch_model, pieces: Compliance) -> None:
-    """Raise PatchfemError if a larger load on the load line opens the gap at mid-length.
+def require_closing_gap(patch_model, pieces: Compliance) -> None:
+    """Raise PatchfemError if an increasing load off the middle opens the gap there.
 
-    Under large loads the shapes of the surfaces become irrelevant. The problem of flat pieces, also
-    on a rotational spring, has a single scale: twice the load doubles forces, rotation and
-    approach. Therefore the approach tends to a constant times the load, and this constant is the
-    approach of flat pieces under 1 N on the same line. If it is not positive, no load or more than
-    one belongs to a distance. For pieces much softer at the surface than below it (Winkler
-    foundation) this begins at a third of the length. A moment that does not increase with the load
-    does not have this effect.
+    Under large loads the shapes of the surfaces become irrelevant. The contact of flat pieces, also
+    with a rotational spring, is homogeneous: twice the load doubles forces, rotation and approach.
+    The approach therefore tends to a constant times the load, and the constant is the approach of
+    flat pieces under 1 N on the same load line. If it is not positive, an approach belongs to no
+    load or to more than one. For pieces that are much softer at the surface than below it (Winkler
+    foundation), this begins at a third of the length from the middle. A moment that does not
+    increase with the load has no such effect.
     """
     if not patch_model.loading.can_rotate or not patch_model.loading.offset:
         return
     flat = np.zeros(pieces.interface.x.size)
 
-    def closing(offset: float) -> float:
-        """Return the approach [m] of flat pieces under 1 N at a given position along the interface."""
+    def approach_under_unit_load(offset: float) -> float:
+        """Return the approach [m] of flat pieces under 1 N at a given offset from the middle [m]."""
         return press(
             pieces, flat, 1.0, float(offset), spring=patch_model.loading.rotational_stiffness
         ).approach
 
-    if closing(patch_model.loading.offset) > 0:
+    if approach_under_unit_load(patch_model.loading.offset) > 0:
         return
     from scipy.optimize import brentq
 
     limit = brentq(
-        closing, 0.0, patch_model.loading.offset, xtol=1e-4 * abs(patch_model.loading.offset)
+        approach_under_unit_load,
+        0.0,
+        patch_model.loading.offset,
+        xtol=1e-4 * abs(patch_model.loading.offset),
     )
     holder = "raise" if patch_model.loading.rotational_stiffness > 0 else "name"
     raise PatchfemError(

@@ -1,8 +1,8 @@
-"""Two pieces of a patch condensed to the compliance of their common interface.
+"""Compliance of the two pieces of a patch, condensed to their common interface.
 
-In: a `PatchModel` and the meshes of its pieces. Out: a `Pair` with meshes, assembled pieces and
-compliance; large ones are cached on disk. Pieces whose interface nodes do not match are joined
-by a mortar method.
+In: a `PatchModel` and the meshes of its pieces. Out: a `CondensedPair` with the meshes, the
+assembled pieces and their compliance. Large compliance matrices are cached on disk. A mortar method
+joins pieces whose interface nodes do not match.
 """
 
 from dataclasses import dataclass
@@ -23,21 +23,22 @@ from ...mesh.tensor import TensorGrid
 from ...model.pieces import make_elastic_layers
 from . import store
 
-# Smallest number of interface nodes for which the condensed operator is cached on disk.
+# Smallest number of interface nodes at which the compliance is cached on disk.
 MIN_CACHED_NODES = 150
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Pair:
+class CondensedPair:
     """Two elastic pieces condensed to their interface, independent of load and surface shape.
 
-    - grid, piece: mesh and assembled piece of the lower side: TensorGrid with Piece, or PieceMesh
+    - grid, piece: mesh and assembled piece on the lower side: TensorGrid with Piece, or PieceMesh
       with Substructure.
-    - upper_grid, upper: the same of the upper side; identical objects if the pieces are alike.
-    - compliance: sum over both pieces, for all pairs together.
-    - closing (m, m): normal closing per shear force on the interface [m/N]; zero for alike pieces.
-    - joint: Mortar of pieces whose interface nodes do not match, else None.
-    - rise (m,): gap [m] due to rounded ends of the interface.
+    - upper_grid, upper: the same on the upper side; identical objects if the pieces are alike.
+    - compliance: sum of the compliances of both pieces, for all contact pairs together.
+    - closing (m, m): normal approach of the surfaces per shear force [m/N]; zero for alike
+      pieces.
+    - joint: Mortar of pieces with non-matching interface nodes, else None.
+    - end_gap (m,): gap [m] due to the rounded ends of the pieces.
     - seconds: CPU seconds by name.
     """
 
@@ -48,43 +49,43 @@ class Pair:
     compliance: Compliance
     closing: np.ndarray
     joint: object
-    rise: np.ndarray
+    end_gap: np.ndarray
     seconds: dict
 
     @property
     def coupling(self) -> float:
-        """Return the largest ratio of normal to tangential displacement under a shear force.
+        """Largest ratio of normal to tangential displacement under a shear force [1].
 
-        The ratio [1] is 0 for mirrored pieces.
+        It is 0 for alike pieces.
         """
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
     @property
     def row(self) -> float:
-        """Mean height [m] of the elements next to the interface, averaged over both pieces."""
+        """Height [m] of the elements next to the interface, averaged over both pieces."""
         return float(self.grid.first_row_height + self.upper_grid.first_row_height) / 2
 
     @property
     def round_off_error(self) -> float:
-        """Relative round-off error of the compliance [1]; 0 if it is negligible."""
+        """Relative round-off error of the compliance; 0 if it is negligible."""
         return max(self.piece.round_off_error, self.upper.round_off_error)
 
     def forces(self, nodal) -> tuple:
-        """Return the interface forces (..., m) as nodal forces of the lower and of the upper piece."""
+        """Distribute interface forces (..., m) to the nodes of the lower and of the upper piece."""
         if self.joint is None:
             return nodal, nodal
         return self.joint.distribute_forces(nodal)
 
 
-def finite_elements(body, layers: Layers):
-    """Return the assembled piece of a tensor grid (Piece) or of any other mesh (Substructure)."""
+def assemble_piece(body, layers: Layers):
+    """Assemble a piece: a Piece from a tensor grid, a Substructure from any other mesh."""
     if isinstance(body, TensorGrid):
         return make_piece(body.x, body.depth, body.coating_rows, layers)
     return substructure.Substructure(body, layers)
 
 
-def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
-    """Return the interface compliance of a piece, read from the disk cache if possible.
+def get_interface_compliance(body, piece, ignore_cache: bool) -> InterfaceCompliance:
+    """Return the interface compliance of a piece, from the disk cache if it is there.
 
     It has the normal, tangential and coupling parts nn, tt and nt.
 
@@ -92,8 +93,8 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
     ----------
     body : TensorGrid or PieceMesh
     piece : Piece or Substructure
-    fresh : bool
-        Whether to ignore the cache.
+    ignore_cache : bool
+        Whether to ignore the disk cache.
     """
     is_grid = isinstance(body, TensorGrid)
     if (body.x.size if is_grid else len(body.points) ** 0.5) < MIN_CACHED_NODES:
@@ -103,7 +104,7 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
     else:
         key = cache.mesh_key(body, piece.layers)
     shapes = dict.fromkeys(InterfaceCompliance._fields, 2 * (body.x.size,))
-    cached_arrays = None if fresh else cache.load_arrays(key, shapes)
+    cached_arrays = None if ignore_cache else cache.load_arrays(key, shapes)
     if cached_arrays is not None:
         return InterfaceCompliance(**cached_arrays)
     compliance = interface_compliance(piece)
@@ -112,7 +113,7 @@ def load_compliance(body, piece, fresh: bool) -> InterfaceCompliance:
     return compliance
 
 
-def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
+def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> CondensedPair:
     """Assemble the two pieces of a `PatchModel` and condense them to their interface.
 
     Parameters
@@ -120,24 +121,26 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
     patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
-    fresh : bool
-        Whether to ignore operators kept on disk.
+    ignore_cache : bool
+        Whether to ignore the disk cache.
 
     Returns
     -------
-    Pair
+    CondensedPair
     """
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
-    piece = finite_elements(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
+    piece = assemble_piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
     upper = piece
     if upper_grid is not None:
-        upper = finite_elements(
+        upper = assemble_piece(
             upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper)
         )
-    lower_compliance = load_compliance(grid, piece, fresh)
+    lower_compliance = get_interface_compliance(grid, piece, ignore_cache)
     upper_compliance = (
-        lower_compliance if upper is piece else load_compliance(upper_grid, upper, fresh)
+        lower_compliance
+        if upper is piece
+        else get_interface_compliance(upper_grid, upper, ignore_cache)
     )
     joint = None
     x = grid.x
@@ -150,8 +153,8 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
         x = joint.x
         tributary_lengths = joint.tributary_lengths
         compliances = joint.compliance
-    # Equal shear forces raise the interface of the upper piece as much as they lower that of an
-    # equal lower piece, so that the coupling nt cancels.
+    # Equal and opposite shear forces raise the interface of one of two alike pieces as much as they
+    # lower that of the other, so that the coupling nt cancels.
     else:
         compliances = (
             lower_compliance.nn + upper_compliance.nn,
@@ -163,7 +166,7 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
     end_gap = sum(_rounded_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
     seconds = {"condense": perf_counter() - start}
     pieces = Compliance(interface, normal, tangential)
-    return Pair(
+    return CondensedPair(
         grid,
         upper_grid or grid,
         piece,
@@ -176,36 +179,37 @@ def condense(patch_model, grid, upper_grid=None, fresh: bool = False) -> Pair:
     )
 
 
-def shared_pairs(patch_model) -> tuple:
-    """Return the condensed pieces (Pair) of a model on every level of its shared meshes."""
+def condense_on_shared_meshes(patch_model) -> tuple:
+    """Return the condensed pieces of a model on all levels of its shared meshes."""
     return tuple(
-        shared_pair(patch_model, level) for level in range(len(patch_model.mesh.shared.levels))
+        condense_on_shared_level(patch_model, level)
+        for level in range(len(patch_model.mesh.shared.levels))
     )
 
 
-def shared_pair(patch_model, level: int) -> Pair:
-    """Return the condensed pieces (Pair) of a model on one level of its shared meshes."""
+def condense_on_shared_level(patch_model, level: int) -> CondensedPair:
+    """Return the condensed pieces of a model on one level of its shared meshes."""
     bodies = patch_model.mesh.shared.levels[level]
     return store.get_or_compute(
         _condensed_pair_key(patch_model, patch_model.mesh.shared.name, level),
-        lambda: delete_factors(condense(patch_model, *bodies)),
+        lambda: delete_matrix_factors(condense(patch_model, *bodies)),
     )
 
 
-def cache_pairs(patch_model, meshes, pairs) -> None:
-    """Store the condensed pieces of new shared meshes in the cache, level by level.
+def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
+    """Store the condensed pieces on all levels of new shared meshes in the cache.
 
     Parameters
     ----------
     patch_model : PatchModel
-        One of the patches that share the meshes.
+        One of the patches that use the meshes.
     meshes : SharedMeshes
-    pairs : sequence of Pair
-        Condensed pieces, fine to coarse.
+    sequence of CondensedPair
+        From fine to coarse.
     """
     for level, pair in enumerate(pairs):
         store.store_result(
-            _condensed_pair_key(patch_model, meshes.name, level), delete_factors(pair)
+            _condensed_pair_key(patch_model, meshes.name, level), delete_matrix_factors(pair)
         )
 
 
@@ -222,10 +226,11 @@ def _condensed_pair_key(patch_model, name: str, level: int) -> tuple:
     )
 
 
-def delete_factors(pair: Pair) -> Pair:
-    """Delete the factorized matrices of the pieces in a Pair to free memory; return the Pair.
+def delete_matrix_factors(pair: CondensedPair) -> CondensedPair:
+    """Delete the factorized stiffness matrices of condensed pieces, and return the pieces.
 
-    The factors need far more memory than the compliance, and are recomputed for fields.
+    The factors need far more memory than the compliance. They are computed again if fields are
+    needed.
     """
     for piece in (pair.piece, pair.upper):
         if isinstance(piece, Piece) and not piece.round_off_error:
@@ -233,10 +238,10 @@ def delete_factors(pair: Pair) -> Pair:
     return pair
 
 
-def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
-    """Return the pieces of a `PatchModel`, condensed on the meshes of a given Pair.
+def condense_on_same_meshes(patch_model, pair: CondensedPair) -> CondensedPair:
+    """Condense the pieces of a `PatchModel` on the meshes of another CondensedPair.
 
-    Shared pieces are reused if the meshes are shared.
+    On shared meshes the cached pieces are used.
     """
     for k, level in enumerate(
         () if patch_model.mesh.shared is None else patch_model.mesh.shared.levels
@@ -244,12 +249,12 @@ def pair_on_same_meshes(patch_model, pair: Pair) -> Pair:
         if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (
             pair.upper is pair.piece
         ):
-            return shared_pair(patch_model, k)
+            return condense_on_shared_level(patch_model, k)
     return condense(patch_model, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
 def _rounded_end_gap(body, x) -> np.ndarray:
-    """Return the gap (m,) [m] at positions x (m,) [m] due to the rounded ends of a body."""
+    """Return the gap (m,) [m] at positions x (m,) [m] due to the rounded ends of a piece."""
     depths = getattr(body, "interface_depths", None)
     return np.zeros(x.size) if depths is None else np.interp(x, body.x, depths)
 

@@ -1,7 +1,7 @@
-"""Patches of the interfaces of a rig: pressed once, then represented by parallel elements.
+"""Patches of the interfaces of a rig, each replaced by parallel elements in the motion.
 
-In: a model whose interfaces have patches. Out: `Face`s with pressed patches on two or more
-meshes, their Jenkins elements for the motion, static measures, warnings and fields.
+In: a model whose interfaces have patches. Out: `Face`s with solved patches on two or more meshes,
+their Jenkins elements for the motion, static measures, warnings and fields.
 """
 
 import re
@@ -19,7 +19,7 @@ from ...slip import fields as slip_fields
 from ..results.result import SlipRule, collect_rest_frame, make_interface_frames, patch_surface
 from . import jenkins_elements, result, store
 from .press import Patch
-from .values import values
+from .values import compute_static_values
 
 
 class Face(NamedTuple):
@@ -27,8 +27,8 @@ class Face(NamedTuple):
 
     - number: index of the interface.
     - name: nodes of the interface as the scene writes them, "1-0".
-    - model: model of the rig, with this patch and friction law as its own.
-    - patches: the pressed Patch and those on coarser meshes; None for a missing one.
+    - model: model of the rig whose patch and friction law are those of this interface.
+    - patches: the solved Patch and those on coarser meshes; None for a missing one.
     - fields: frames of the interface by name (see `Result`); None before its run.
     """
 
@@ -55,7 +55,7 @@ class Face(NamedTuple):
 
     @property
     def partial_slip(self) -> str:
-        """Scene key that enables partial slip of the patch; "" if the patch moves as one point."""
+        """Scene key that enables partial slip of the patch; "" if the patch slips as a whole."""
         return self.model.patch.interface.partial_slip
 
     def slide(self, response) -> np.ndarray:
@@ -64,8 +64,8 @@ class Face(NamedTuple):
         return response.slide if slides is None else slides[:, self.number]
 
 
-def press_faces(model) -> Iterator[Face]:
-    """Yield every interface of a model that has a patch, with its contact solved."""
+def solve_interface_patches(model) -> Iterator[Face]:
+    """Solve the contact of each interface that has a patch, and yield the interface with its patch."""
     rig = model.rig
     for number, interface in enumerate(rig.friction.interfaces if rig is not None else ()):
         if interface.patch is not None:
@@ -74,20 +74,20 @@ def press_faces(model) -> Iterator[Face]:
                 number,
                 rig.friction.names[number],
                 interface_model,
-                press_on_meshes(interface, model.accuracy.tolerance),
+                solve_contact_on_meshes(interface, model.accuracy.tolerance),
             )
 
 
-def press_on_meshes(interface, tolerance: float) -> tuple:
+def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
     """Solve the contact of an interface on its mesh and on coarser meshes.
 
-    The solution is computed once for all runs of a process with the same patch. A patch with files,
-    which may change, is solved once per model.
+    Runs with equal patches use one cached solution. The solution of a patch with files is cached
+    for its own model only, because the files may change.
 
     Raises
     ------
     PatchfemError
-        With the key of the interface at fault.
+        With the scene key of the interface that is in error.
     """
     patch_model = interface.patch
     files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
@@ -99,35 +99,35 @@ def press_on_meshes(interface, tolerance: float) -> tuple:
         raise
 
 
-def condense_again(model) -> None:
-    """Condense the pieces of every interface again, without the cached stiffness."""
+def recondense_interface_pieces(model) -> None:
+    """Condense the pieces of all interfaces without using cached stiffness matrices."""
     store.clear_cache()
     for interface in model.rig.friction.interfaces if model.rig is not None else ():
         if interface.patch is not None:
             result.solve_with_coarser(interface.patch, model.accuracy.tolerance, fresh=True)
 
 
-def make_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
-    """Return the parallel Jenkins elements of an interface whose patch slips partially.
+def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
+    """Return the parallel Jenkins elements of an interface with partial slip.
 
-    A patch without load has a single element that yields at once.
+    An unloaded patch has a single element, which yields at once.
 
     Parameters
     ----------
     interface : InterfaceLaw
     tolerance : float
     coarser : bool
-        Whether to use the coarser mesh of the error estimate.
+        Whether to use the coarser mesh, for the error estimate.
 
     Returns
     -------
     tuple
         Stiffness (t,) [N/m], yield displacement (t,) [m], and the JenkinsSet (None for strips).
     """
-    patch = press_on_meshes(interface, tolerance)[int(coarser)]
+    patch = solve_contact_on_meshes(interface, tolerance)[int(coarser)]
     static = interface.numbers.static
     if not patch.pressure.load > 0:
-        return np.array([1 / patch.giving.mean()]), np.zeros(1), None
+        return np.array([1 / patch.slip_compliance.mean()]), np.zeros(1), None
     length = record.make_law(interface.numbers, interface.load).element(interface.load).length
     if patch.strips is not None:
         return *map(
@@ -137,43 +137,45 @@ def make_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
     return jenkins_set.stiffness, jenkins_set.yield_displacement, jenkins_set
 
 
-def interfaces_with_coarse_mesh(model) -> list:
-    """Return the indices of interfaces with a coarser mesh, grouped by distinct patch."""
+def group_interfaces_with_coarse_mesh(model) -> list:
+    """Return the indices of the interfaces with a coarser mesh, grouped by distinct patch."""
     out = {}
-    for face in press_faces(model):
+    for face in solve_interface_patches(model):
         if face.partial_slip and face.patches[1] is not None:
             out.setdefault(face.patches, []).append(face.number)
     return [tuple(numbers) for numbers in out.values()]
 
 
-def faces_with_frames(model, snapshots) -> tuple:
-    """Return the patches of all interfaces with snapshots of their slip and shear stress.
+def solve_faces_with_slip_fields(model, snapshots) -> tuple:
+    """Return all interfaces that have a patch, with frames of their slip and shear stress.
 
-    The frames of a patch without elements, or without shots, show the pressed state only.
+    Without elements or snapshots, an interface has the fields of the pressed patch only.
 
     Parameters
     ----------
     model : Model
     snapshots : list
-        Snapshots of the event engine: time [s], and (slide [m], stretch (t,) [m]) of every
-        interface.
+        States of the event-driven engine: time [s], and for each interface its slide [m] and the
+        stretch (t,) [m] of its elements.
     """
     out = []
-    for face in press_faces(model):
+    for face in solve_interface_patches(model):
         interface = model.rig.friction.interfaces[face.number]
         fields = collect_rest_frame(face.patch)
         jenkins_set = (
-            make_elements(interface, model.accuracy.tolerance)[2] if face.partial_slip else None
+            make_patch_elements(interface, model.accuracy.tolerance)[2]
+            if face.partial_slip
+            else None
         )
         if jenkins_set is not None and snapshots:
-            states = [shot["faces"][face.number] for shot in snapshots]
+            states = [snapshot["faces"][face.number] for snapshot in snapshots]
             length = (
                 record.make_law(interface.numbers, interface.load).element(interface.load).length
             )
             tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
             fields = make_interface_frames(
                 face.patch,
-                np.array([shot["time"] for shot in snapshots]),
+                np.array([snapshot["time"] for snapshot in snapshots]),
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
@@ -184,30 +186,32 @@ def faces_with_frames(model, snapshots) -> tuple:
 
 
 def has_error_meshes(model) -> bool:
-    """Return whether every patch with partial slip has a coarser mesh for its error estimate."""
-    return all(face.patches[1] is not None for face in press_faces(model) if face.partial_slip)
+    """Return whether all patches with partial slip have a coarser mesh for the error estimate."""
+    return all(
+        face.patches[1] is not None for face in solve_interface_patches(model) if face.partial_slip
+    )
 
 
 def static_measures_without_errors(model) -> dict:
-    """Return the static measures of all patches of a model as a dict, without errors."""
+    """Return the static measures of all patches of a model by name, without error estimates."""
     if model.patch is not None:
         return result.static_measures_without_errors(model)
     with locate_errors(model.source):
         return {
             rows.add_interface_number(name, face.number): value
-            for face in press_faces(model)
-            for name, value in values(face.patch).items()
+            for face in solve_interface_patches(model)
+            for name, value in compute_static_values(face.patch).items()
         }
 
 
 def static_measures(model) -> dict:
-    """Return the static measures of all patches of a model as a dict, with error estimates.
+    """Return the static measures of all patches of a model by name, with error estimates.
 
-    From the second interface on, the number of the interface follows the name.
+    From the second interface on, the name ends with the number of the interface.
     """
     return {
         rows.add_interface_number(name, face.number): measure
-        for face in press_faces(model)
+        for face in solve_interface_patches(model)
         for name, measure in result.static_measures(
             face.model, face.patch, face.patches[1:]
         ).items()
@@ -215,8 +219,8 @@ def static_measures(model) -> dict:
 
 
 def collect_warnings(model) -> list:
-    """Return the warnings on strains and missing error estimates of the patches of a model."""
-    return merge_sentences(
+    """Return warnings on large strains and missing error estimates of the patches of a model."""
+    return merge_interface_sentences(
         model,
         lambda face: [
             *result.warn_of_strains(face.model.patch, face.patch),
@@ -229,26 +233,26 @@ NO_ERROR_ESTIMATE = "the interface has too few elements for an estimate of the e
 
 
 def collect_notes(model) -> list:
-    """Return notes on the effects that the static model of the patches neglects."""
-    return merge_sentences(
+    """Return notes on effects that the static model of the patches neglects."""
+    return merge_interface_sentences(
         model,
         lambda face: result.notes_on_neglected_effects(face.model, face.patch, face.patches[1:]),
     )
 
 
-def merge_sentences(model, list_sentences: Callable) -> list:
-    """Join equal sentences on several patches, each with the names of its interfaces.
+def merge_interface_sentences(model, list_sentences: Callable) -> list:
+    """Merge sentences that are equal for several interfaces, and name these interfaces.
 
-    Keys are written as they occur in the scene.
+    Scene keys are written as they occur in the scene.
 
     Parameters
     ----------
     model : Model
     list_sentences : callable
-        Function of a Face that returns its sentences.
+        Function that returns the sentences on a Face.
     """
     out: dict = {}
-    for face in press_faces(model):
+    for face in solve_interface_patches(model):
         for text in list_sentences(face):
             out.setdefault(use_scene_keys(model, text), []).append(face.name)
     return [
@@ -258,9 +262,9 @@ def merge_sentences(model, list_sentences: Callable) -> list:
 
 
 def use_scene_keys(model, text: str) -> str:
-    """Replace the [contact] keys in a sentence by the keys of the interface in the scene.
+    """Replace keys of [contact] in a sentence by those of the interface in the scene.
 
-    If the model has no patch of its own, these keys belong to [structure.interface.contact].
+    In a model without [contact], they are keys of [structure.interface.contact].
     """
     if model.patch is not None:
         return text

@@ -37,7 +37,7 @@ from .measures import (
     widen_error_by_peak_error,
 )
 from .press import PointSolution, Surface
-from .values import peak_pressures, static_values
+from .values import assemble_static_values, estimate_peak_pressures
 
 MIN_LEVELS = 3  # Smallest number of refinement levels from which an order of convergence is seen.
 # Largest number of points of a level, because more would exceed the CPU time of a patch.
@@ -326,8 +326,8 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
     # The pressure at an end of the interface is taken from the point there.
-    peak = float(peak_pressures(x, sigma[None], node_fraction=unit)[0])
-    values = static_values(length, normal.area * count, state, peak, edge_values)
+    peak = float(estimate_peak_pressures(x, sigma[None], node_fraction=unit)[0])
+    values = assemble_static_values(length, normal.area * count, state, peak, edge_values)
     if np.isnan(tangential):
         del values["tangential_stiffness"]
     cell = length / count

@@ -18,8 +18,8 @@ from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
-from .condensed import Pair, condense, delete_factors
-from .press import Patch, press_patch
+from .condensed import CondensedPair, condense, delete_matrix_factors
+from .press import Patch, solve_patch_contact
 from .values import contact_ends
 
 # Number of equal columns of the grid with which the search for the contact starts.
@@ -93,7 +93,7 @@ class ContactExtent:
         return self.span[1] - self.span[0]
 
 
-def condense_on_search_grid(patch_model) -> Pair:
+def condense_on_search_grid(patch_model) -> CondensedPair:
     """Return the pieces condensed on equal columns, on which the contact search starts.
 
     Patches of the same geometry share them.
@@ -110,7 +110,7 @@ def condense_on_search_grid(patch_model) -> Pair:
         patch_model.gap.jumps,
     )
     return store.get_or_compute(
-        key, lambda: delete_factors(condense(patch_model, *make_grids(patch_model, layout)))
+        key, lambda: delete_matrix_factors(condense(patch_model, *make_grids(patch_model, layout)))
     )
 
 
@@ -160,7 +160,7 @@ def _search_contact(patch_model) -> BaseGrids:
         x = pair.grid.x
         extents = []
         for loaded_model in (patch_model, *sweep):
-            patch = press_patch(loaded_model, pair)
+            patch = solve_patch_contact(loaded_model, pair)
             extents.append(contact_extent(patch, patch_model.mesh.slip))
         contact = extents[0]
         last = layout

@@ -1,7 +1,7 @@
-"""Parallel Jenkins elements of a patch with partial slip, computed once for all its runs.
+"""Parallel Jenkins elements of a patch with partial slip, cached for all runs of the patch.
 
-In: a pressed `Patch`, coefficient of friction and bond length. Out: a JenkinsSet, or
-`StripElements` of each strip (`slip.shear_modes`).
+In: a solved `Patch`, coefficient of friction and bond length. Out: a JenkinsSet, or `StripElements`
+of each strip (`slip.shear_modes`).
 """
 
 from typing import NamedTuple
@@ -14,10 +14,10 @@ from .press import Patch
 
 
 class StripElements(NamedTuple):
-    """Parallel Jenkins elements of a single strip of a patch.
+    """Parallel Jenkins elements of one strip of a patch.
 
     - stiffness (t,): [N/m].
-    - yield_displacement (t,): slide at which each element yields [m].
+    - yield_displacement (t,): displacement at which each element yields [m].
     """
 
     stiffness: np.ndarray
@@ -25,10 +25,10 @@ class StripElements(NamedTuple):
 
 
 def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
-    """Return the parallel elements of a patch whose points yield at their friction limits.
+    """Return the parallel Jenkins elements of a patch whose nodes yield at their friction limits.
 
-    The limit of a point is the coefficient of friction times its load. Coulomb elements of
-    different coefficients have the same springs, so they are computed once and scaled.
+    The limit of a node is the coefficient of friction times its normal force. Coulomb elements with
+    different coefficients have equal springs, so that they are computed once and scaled.
 
     Parameters
     ----------
@@ -36,16 +36,16 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     static : float
         Coefficient of static friction.
     length : float
-        Length [m] of bonds in series with the pieces; 0 for Coulomb's law.
+        Length [m] of the bonds in series with the pieces; 0 for Coulomb's law.
     """
     load = patch.pressure.sigma_n * patch.pieces.interface.weight
 
     def make() -> "shear_modes.JenkinsSet":
-        """Compute the Jenkins elements of a patch; Coulomb elements are scaled from mu = 1."""
+        """Compute the Jenkins elements; Coulomb elements are scaled from a coefficient of 1."""
         if length or not static > 0:
-            return shear_modes.jenkins_set(patch.giving, static * load, length)
+            return shear_modes.jenkins_set(patch.slip_compliance, static * load, length)
         unit_elements = store.get_or_compute(
-            ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.giving, load)
+            ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.slip_compliance, load)
         )
         return shear_modes.scale_limits(unit_elements, static)
 
@@ -53,10 +53,10 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
 
 
 def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripElements, ...]:
-    """Return the parallel Jenkins elements of every strip of a patch that is divided in strips.
+    """Return the parallel Jenkins elements of each strip of a patch.
 
-    The strips are not coupled: each one has its own part of the compliance of the pieces and its
-    own pressure. An open strip has one element that yields at once.
+    The strips are not coupled: each one has its fraction of the compliance of the pieces and its
+    own pressure. An unloaded strip has one element, which yields at once.
 
     Parameters
     ----------
@@ -64,16 +64,16 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     static : float
         Coefficient of friction [1].
     length : float
-        Length of a bond [m].
+        Bond length [m].
     """
-    # The compliance of a strip is that of its fraction of the width.
-    giving = patch.giving * len(patch.strips.offsets)
+    # The compliance of a strip is inversely proportional to its fraction of the width.
+    slip_compliance = patch.slip_compliance * len(patch.strips.offsets)
 
     def make_strip_elements(force) -> StripElements:
         """Return the Jenkins elements of a strip under nodal normal forces (m,) [N]."""
         if not (static > 0 and force.any()):
-            return StripElements(np.array([1 / giving.mean()]), np.zeros(1))
-        found = shear_modes.jenkins_set(giving, static * force, length)
+            return StripElements(np.array([1 / slip_compliance.mean()]), np.zeros(1))
+        found = shear_modes.jenkins_set(slip_compliance, static * force, length)
         return StripElements(found.stiffness, found.yield_displacement)
 
     return store.get_or_compute(

@@ -11,10 +11,10 @@ from functools import partial
 from ...core import NotConverged, Outcome
 from ...model.pieces import make_piece_meshes
 from . import fine, slip_zones, store
-from .condensed import condense, shared_pairs
+from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import estimate_static_measures, max_mesh_error_ratio
-from .press import press_patch, solve
+from .press import solve, solve_patch_contact
 
 # Tolerance [1] at which a patch under prescribed partial slip may take the CPU time of a patch in a rig. The
 # allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times as much time.
@@ -80,12 +80,12 @@ def solve_with_coarser(
             return solve_on_ladder(patch_model, tolerance, estimate, fresh)
         return _solve_with_coarser(patch_model, make_piece_meshes(patch_model), estimate, fresh)
     if fresh:
-        pairs = [condense(patch_model, *level, fresh=True) for level in mesh.shared.levels]
+        pairs = [condense(patch_model, *level, ignore_cache=True) for level in mesh.shared.levels]
         return solve_on_pairs(patch_model, pairs, estimate)
     patches = store.get_or_compute_in_sweep(
         patch_model,
         ("patches", store.content_key(patch_model), estimate),
-        lambda: solve_on_pairs(patch_model, shared_pairs(patch_model), estimate),
+        lambda: solve_on_pairs(patch_model, condense_on_shared_meshes(patch_model), estimate),
     )
     if estimate and _misses_tolerance_with_profile(patch_model, patches, tolerance):
         return solve_on_ladder(patch_model.with_mesh(shared=None), tolerance)
@@ -108,7 +108,7 @@ def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
     Parameters
     ----------
     patch_model : PatchModel
-    pairs : sequence of Pair
+    pairs : sequence of CondensedPair
         Fine to coarse.
     estimate : bool
         Whether the coarser pieces are used as well.
@@ -119,7 +119,7 @@ def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
         Patches as in `solve_with_coarser`.
     """
     return _pad_to_three(
-        press_patch(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
+        solve_patch_contact(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
     )
 
 
@@ -193,7 +193,9 @@ def solve_on_ladder(
         patch = None
         if estimate or len(patches) == MIN_LEVELS - 1:
             try:
-                patch = press_patch(patch_model, condense(patch_model, *grids, fresh=fresh))
+                patch = solve_patch_contact(
+                    patch_model, condense(patch_model, *grids, ignore_cache=fresh)
+                )
             # The cells are too short for double precision, so that the coarser meshes are kept.
             except NotConverged:
                 if not patches or patches[0] is None:

@@ -19,10 +19,15 @@ from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
 from ..results.patch_rows import MESH_MEASURES, TABLE
-from .condensed import pair_on_same_meshes
+from .condensed import condense_on_same_meshes
 from .limits import extrapolate_to_zero_cell_length
-from .press import Patch, press_patch
-from .values import edge_cells, open_ends, unresolved_rounding, values
+from .press import Patch, solve_patch_contact
+from .values import (
+    compute_static_values,
+    edge_cell_lengths,
+    open_rounded_length,
+    unresolved_rounding_pressure,
+)
 
 # Smallest width/height of a piece for plane strain without doubt; the inverse holds for plane
 # stress.
@@ -102,14 +107,14 @@ def estimate_static_measures(
     dict
         Measure by name. The error is None without a coarser mesh, and 0 without a load.
     """
-    finest = values(fine)
+    finest = compute_static_values(fine)
     coarse = _select_meshes_with_same_contact_intervals(
         fine, [patch for patch in coarse if patch is not None]
     )
     if coarse and finest["normal_load"] > 0:
-        missed_peak = unresolved_rounding(fine)
+        missed_peak = unresolved_rounding_pressure(fine)
         estimates = extrapolate_static_measures(
-            [*(values(patch) for patch in reversed(coarse)), finest],
+            [*(compute_static_values(patch) for patch in reversed(coarse)), finest],
             estimate_hidden_errors(_compute_patch_resolution(fine, missed_peak), finest),
             tolerance,
             all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
@@ -366,7 +371,7 @@ def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool)
 
     Parameters
     ----------
-    pair : Pair
+    pair : CondensedPair
     pieces : Compliance
         Compliance of the pieces with their asperity layer.
     force : (q, m) ndarray
@@ -403,7 +408,7 @@ def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool)
 def _compute_patch_resolution(patch: Patch, missed_peak: float) -> Resolution:
     """Return how well the mesh of a solved patch resolves its contact.
 
-    missed_peak: pressure [Pa] from `unresolved_rounding`.
+    missed_peak: pressure [Pa] from `unresolved_rounding_pressure`.
     """
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     can_rotate = "moment_balance" in patch.pressure.residuals
@@ -411,14 +416,14 @@ def _compute_patch_resolution(patch: Patch, missed_peak: float) -> Resolution:
         patch.pair, patch.pieces, force[None], np.ptp(patch.unloaded_gap), can_rotate
     )
     out = Resolution(*(np.ravel(value)[0] for value in out))
-    cells = edge_cells(patch.x, patch.active)
+    cells = edge_cell_lengths(patch.x, patch.active)
     first, last = ~patch.active[[0, -1]]
     is_unresolved = out.n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
     return out._replace(
         edge_offset=out.edge_offset if patch.skin is None else None,
         wedge_pressure=_wedge_indentation_pressure(patch) if is_unresolved else 0.0,
         rounding_pressure=missed_peak,
-        open_ends=float(open_ends(patch)),
+        open_ends=float(open_rounded_length(patch)),
         inner_cells=float(cells[int(first) : cells.size - int(last)].sum()),
     )
 
@@ -506,7 +511,7 @@ def _unresolved_corner_pressure(pair, sigma, cells):
 
     Parameters
     ----------
-    pair : Pair
+    pair : CondensedPair
     sigma : (..., 2)
         Pressures at both ends [Pa].
     cells : (2,)
@@ -543,10 +548,10 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
     if other_model is None:
         return []
     try:
-        own_values = values(patch)
-        pair = pair_on_same_meshes(other_model, patch.pair)
+        own_values = compute_static_values(patch)
+        pair = condense_on_same_meshes(other_model, patch.pair)
         return note_on_plane_state_changes(
-            patch_model, own_values, values(press_patch(other_model, pair))
+            patch_model, own_values, compute_static_values(solve_patch_contact(other_model, pair))
         )
     except PatchfemError as error:
         return [
@@ -636,9 +641,9 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) ->
     other_model, ratio = with_other_strip_count(patch_model)
     if other_model is patch_model:
         return measures_by_name
-    other_values = values(press_patch(other_model, patch.pair))
+    other_values = compute_static_values(solve_patch_contact(other_model, patch.pair))
     out = dict(measures_by_name)
-    for name, value in values(patch).items():
+    for name, value in compute_static_values(patch).items():
         measure = measures_by_name[name]
         if measure.value is not None:
             change = value - other_values[name]

@@ -184,7 +184,7 @@ def stiffness_chain(patch_model) -> dict:
         area = patch_model.pieces.length * patch_model.pieces.width * patch_model.pieces.pairs
         stiffnesses["asperities"] = (
             patch_model.interface.skin.tangential_ratio
-            * skin.mean_layer_stiffness(patch_model, patch_model.nominal_load / area)
+            * skin.asperity_layer_stiffness(patch_model, patch_model.nominal_load / area)
             * area
         )
     return stiffnesses
@@ -253,7 +253,7 @@ def write_verdict(dimensionless_groups: dict, patch_model) -> list:
     if patch_model.interface.skin is not None:
         pieces = patch_model.pieces
         mean_pressure = patch_model.nominal_load / (pieces.length * pieces.width * pieces.pairs)
-        rough = skin.note_on_peak_stiffness(patch_model, mean_pressure)
+        rough = skin.note_on_asperity_stiffness(patch_model, mean_pressure)
     return [
         *_tilt_sentence(dimensionless_groups, patch_model),
         *rough,

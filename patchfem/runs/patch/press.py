@@ -1,6 +1,6 @@
-"""Solution of the static contact of a patch: condensed pieces, gap, and load or approach.
+"""Static contact problem of a patch: condensed pieces, gap, and load or approach.
 
-In: a `PatchModel` and its condensed pieces (`Pair`). Out: a `Patch` with pressure, gap and
+In: a `PatchModel` and its condensed pieces (`CondensedPair`). Out: a `Patch` with pressure, gap and
 compliance.
 """
 
@@ -18,16 +18,16 @@ from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
 from . import skin as skin_press
 from . import strips as strip_press
-from .approach import press_to_approach_with_rotation
-from .condensed import Pair, condense
+from .approach import solve_contact_at_approach
+from .condensed import CondensedPair, condense
 
-# Smallest ripple of the pressure over its peak, on pieces with non-matching nodes, that a note
-# states.
+# Smallest ratio of pressure ripple to peak pressure that a note reports, for pieces with
+# non-matching nodes.
 MIN_RIPPLE = 1e-2
 
 
 class Surface(NamedTuple):
-    """Pressure and gap at the points of an interface.
+    """Pressure and gap at the nodes or points of an interface.
 
     - x (n,): positions [m].
     - weight (n,): areas [m2].
@@ -44,11 +44,11 @@ class Surface(NamedTuple):
 
 
 class PointSolution(NamedTuple):
-    """Contact solution on equally spaced points of a profile, finer than the mesh.
+    """Contact solution on equally spaced points of a profile, which are finer than the mesh.
 
-    - measures: `measures.Estimate` by name; only those that these points resolve.
-    - surface: Surface on the finest points.
-    - intervals (k, 2): parts in contact on these points [m].
+    - measures: `measures.Estimate` by name, of the measures that the points resolve.
+    - surface: Surface of the finest refinement level.
+    - intervals (k, 2): contact intervals [m].
     """
 
     measures: dict
@@ -57,16 +57,17 @@ class PointSolution(NamedTuple):
 
     @property
     def spacing(self) -> float:
-        """Distance [m] between the points."""
+        """Distance [m] between neighbouring points."""
         return float(self.surface.x[1] - self.surface.x[0])
 
 
 class SolvedContact(NamedTuple):
     """Contact solution of two pieces for a given unloaded gap.
 
-    - pieces: Compliance with its skin; a smooth skin is linearised at the operating point.
-    - pressure: ContactState; of a patch in strips, the means over the width.
-    - skin: StripsState with a single strip of a smooth skin, else None.
+    - pieces: Compliance including the asperity layer, a nonlinear layer being linearised at the
+      operating point.
+    - pressure: ContactState; for strips its mean over the width.
+    - skin: StripsState with a single strip, for a nonlinear asperity layer; else None.
     - strips: StripsState of a patch in strips, else None.
     """
 
@@ -80,36 +81,36 @@ class SolvedContact(NamedTuple):
 class Patch:
     """Contact patch with the solution of its static contact problem.
 
-    Forces, areas and stiffnesses are those of all pairs together.
+    Forces, areas and stiffnesses are sums over all contact pairs.
 
     - model: PatchModel.
     - pair: condensed pieces.
     - pieces, pressure, skin, strips: see `SolvedContact`.
-    - giving (m, m): tangential compliance [m/N] by which the patch slips in part: that of the skin,
-      of the pieces with [contact.shear], and of the spring of the holder, which is equal in all
-      entries.
+    - slip_compliance (m, m): tangential compliance [m/N] of nodes that slip one by one: that of
+      the asperity layer, that of the pieces if the scene has [contact.shear], and that of the
+      holder spring, which is equal in all entries.
     - unloaded_gap (m,): gap of the unloaded surfaces [m]; (s, m) for worn strips.
-    - notes: sentences for the warnings.
+    - notes: notes on the gap and on the pressure.
     - seconds: CPU seconds by name.
     - averaging: length [m] over which a profile in contact is averaged; None without a profile.
-    - either: if a step of the gap is at a node, which belongs half to each side: (weight, Patch)
-      with the whole node on the higher side, and the same on the lower side; else ().
-    - points: PointSolution of a patch under a profile; None if the mesh is the finest solution.
-    - frames: frames of the interface in a run (`Result.fields`); {} before its end.
+    - step_variants: for a gap with a step at a node: (weight, Patch) with this node on the higher
+      side of the step, and the same on the lower side; else ().
+    - points: PointSolution of a patch with a profile; None if the mesh has the finest solution.
+    - frames: frames of the interface (`Result.fields`); {} before the end of the run.
     """
 
     model: object
-    pair: Pair
+    pair: CondensedPair
     pieces: Compliance
     pressure: ContactState
     skin: object
     strips: object
-    giving: np.ndarray
+    slip_compliance: np.ndarray
     unloaded_gap: np.ndarray
     notes: tuple
     seconds: dict
     averaging: float | None = None
-    either: tuple = ()
+    step_variants: tuple = ()
     points: PointSolution | None = None
     frames: dict = field(default_factory=dict)
 
@@ -125,27 +126,27 @@ class Patch:
 
     @property
     def gap(self) -> np.ndarray:
-        """Gap under load at the nodes (m,) [m]; the smallest of all strips."""
+        """Gap under load at the nodes (m,) [m]; for strips their smallest gap."""
         return self.pressure.gap
 
     @property
     def shear_stress(self) -> np.ndarray | None:
-        """Shear stress at the nodes (m,) [Pa] at the end of the run, opposed to slip.
+        """Shear stress at the nodes (m,) [Pa] at the end of the run, positive against positive slip.
 
-        It is 0 in a static run, and None if the run has no traction on the nodes.
+        It is 0 in a static run, and None if the run does not compute it.
         """
         return self._last_frame("shear_stress")
 
     @property
     def slip(self) -> np.ndarray | None:
-        """Slip of the nodes (m,) [m] at the end of the run, upper minus lower surface.
+        """Slip at the nodes (m,) [m] at the end of the run, upper minus lower surface.
 
-        It is 0 in a static run, and None if the run has no slip of the nodes.
+        It is 0 in a static run, and None if the run does not compute it.
         """
         return self._last_frame("slip")
 
     def _last_frame(self, name: str) -> np.ndarray | None:
-        """Return the last stored values (m,) of a nodal field; 0 in a static run, None if unknown."""
+        """Return the values (m,) of a nodal field at the end of the run; None if unknown."""
         if name in self.frames:
             return self.frames[name][-1]
         return np.zeros(self.x.size) if self.model.mesh.is_static else None
@@ -158,7 +159,7 @@ class Patch:
 
     @property
     def finest_surface(self) -> Surface:
-        """Pressure and gap of the finest solution, on profile points or else on the mesh."""
+        """Pressure and gap of the finest solution, on the profile points or else on the mesh."""
         return self.surface if self.points is None else self.points.surface
 
     @property
@@ -168,7 +169,7 @@ class Patch:
 
     @property
     def skin_fraction(self) -> np.ndarray | None:
-        """Fraction (m,) [1] of the nodal compliance due to the asperity layer; None without layer."""
+        """Fraction (m,) of the nodal compliance due to the asperity layer; None without a layer."""
         if not self.has_skin:
             return None
         bare = np.diag(self.pair.compliance.normal)
@@ -179,20 +180,20 @@ class Patch:
 
     @property
     def active(self) -> np.ndarray:
-        """Contact set (m,) of bool: True for nodes that carry pressure."""
+        """Contact set (m,) of bool: whether each node carries pressure."""
         return self.pressure.sigma_n > 0
 
 
-def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
-    """Assemble and condense the pieces of a `PatchModel`, and solve its contact.
+def solve(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> Patch:
+    """Assemble and condense the pieces of a `PatchModel`, and solve its contact problem.
 
     Parameters
     ----------
     patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
-    fresh : bool
-        Whether to ignore operators kept on disk.
+    ignore_cache : bool
+        Whether to ignore compliance matrices cached on disk.
 
     Returns
     -------
@@ -201,22 +202,22 @@ def solve(patch_model, grid, upper_grid=None, fresh: bool = False) -> Patch:
     Raises
     ------
     PatchfemError
-        As in `press_patch`, and by the contact solver.
+        See `solve_patch_contact` and the contact solver.
     """
-    return press_patch(patch_model, condense(patch_model, grid, upper_grid, fresh))
+    return solve_patch_contact(patch_model, condense(patch_model, grid, upper_grid, ignore_cache))
 
 
-def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
-    """Solve the contact of condensed pieces (Pair) under the shapes and the load of a model.
+def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
+    """Solve the contact problem of condensed pieces with the gap and the load of a model.
 
-    The same Pair serves any number of models.
+    Many models can use the same condensed pieces.
 
     Parameters
     ----------
     patch_model : PatchModel
-    pair : Pair
+    pair : CondensedPair
     worn : (m,) or (s, m), optional
-        Depth [m] that wear has added to the gap, of strips (s, m).
+        Worn depth [m], which is added to the gap.
 
     Returns
     -------
@@ -235,44 +236,45 @@ def press_patch(patch_model, pair: Pair, worn=None) -> Patch:
 
         advice = "".join(f"; or {text}" for text in advise_split(patch_model))
         raise PatchfemError(f"{error}{advice}", error.key) from None
-    gap = heights + pair.rise if worn is None else heights + pair.rise + worn
+    gap = heights + pair.end_gap if worn is None else heights + pair.end_gap + worn
 
-    def press_gap(unloaded_gap) -> Patch:
-        """Solve the contact for an unloaded gap (m,) [m]."""
+    def solve_gap(unloaded_gap) -> Patch:
+        """Solve the contact problem for an unloaded gap (m,) [m]."""
         begin = perf_counter()
         contact = solve_contact(patch_model, pair.compliance, unloaded_gap)
         times = seconds | {"press": perf_counter() - begin}
         return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
 
-    patch = press_gap(gap)
+    patch = solve_gap(gap)
     has_ripple = (
         pair.joint is not None
         and pair.joint.ripple > MIN_RIPPLE
-        and pressure_ripple(x, patch.normal_stress) > MIN_RIPPLE
+        and relative_pressure_ripple(x, patch.normal_stress) > MIN_RIPPLE
     )
     if has_ripple:
         patch = replace(patch, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
     half_steps = patch_model.gap.half_step_heights(x)
     if not half_steps.any():
         return patch
-    # A contact set ends less than half a cell beyond its last node. The two sets, with and without
-    # the node at the step, are weighted such that the mean end is the step.
+    # A contact set ends less than half a cell beyond its last node. The solutions with and without
+    # the node at the step are weighted such that the mean contact edge is at the step.
     node = int(np.argmax(half_steps))
     bare_fraction = 1.0 if patch.skin_fraction is None else 1 - float(patch.skin_fraction[node])
     cell = float(np.diff(x[node - 1 : node + 2]).min())
     row_over_cell = 1.0 if pair.row is None else pair.row / cell
-    lean = bare_fraction * edges.edge_offset_fraction(row_over_cell)
-    shifts = _gap_changes_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
-    parts = [(0.5 - side * lean, press_gap(gap + shift)) for side, shift in zip((-1, 1), shifts)]
-    return replace(patch, either=tuple(parts))
+    weight_shift = bare_fraction * edges.edge_offset_fraction(row_over_cell)
+    shifts = _gap_variants_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
+    variants = [
+        (0.5 - side * weight_shift, solve_gap(gap + shift)) for side, shift in zip((-1, 1), shifts)
+    ]
+    return replace(patch, step_variants=tuple(variants))
 
 
-def _gap_changes_at_step(node: int, gap, half_steps, worn) -> tuple:
-    """Return the gap changes (m,) [m] that move a node on a step to either side of it.
+def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
+    """Return the changes (m,) [m] of the gap that put a node at a step on either side of it.
 
-    The worn depth of the node belongs to a gap at half the height of the step. If the node carries
-    pressure, it has worn like its neighbour on the higher side of the step, else like the one on
-    the lower side.
+    The worn depth of the node belongs to a gap at half the height of the step. On the higher side
+    of the step, the node takes the worn depth of its neighbour there; on the lower side likewise.
     """
     if worn is None:
         return -half_steps, half_steps
@@ -288,31 +290,31 @@ def _gap_changes_at_step(node: int, gap, half_steps, worn) -> tuple:
     return tuple(shifts)
 
 
-def pressure_ripple(x, sigma) -> float:
-    """Return the largest ripple of nodal pressures (m,) [Pa] relative to their peak [1].
+def relative_pressure_ripple(x, sigma) -> float:
+    """Return the largest ripple of nodal pressures (m,) [Pa] relative to their peak.
 
-    Three loaded nodes in sequence lie above, below and above the lines through their neighbours, or
-    the other way round. The ripple is half the smallest distance from these lines.
+    A ripple is three successive loaded nodes that lie above, below and above the lines through
+    their neighbours, or vice versa. Its size is half the smallest distance from these lines.
     """
     fraction = np.diff(x)[:-1] / (x[2:] - x[:-2])
     distance = sigma[1:-1] - (1 - fraction) * sigma[:-2] - fraction * sigma[2:]
-    three = np.stack([distance[:-2], -distance[1:-1], distance[2:]])
-    five = [sigma[k : sigma.size - 4 + k] for k in range(5)]
-    is_loaded = np.min(five, axis=0, initial=np.inf) > 0
-    is_zigzag = is_loaded & ((three > 0).all(axis=0) | (three < 0).all(axis=0))
-    smallest = np.abs(three[:, is_zigzag]).min(axis=0)
+    distances = np.stack([distance[:-2], -distance[1:-1], distance[2:]])
+    windows = [sigma[k : sigma.size - 4 + k] for k in range(5)]
+    is_loaded = np.min(windows, axis=0, initial=np.inf) > 0
+    is_zigzag = is_loaded & ((distances > 0).all(axis=0) | (distances < 0).all(axis=0))
+    smallest = np.abs(distances[:, is_zigzag]).min(axis=0)
     return float(smallest.max(initial=0.0) / 2 / sigma.max(initial=1e-300))
 
 
 def make_patch(
-    patch_model, pair: Pair, gap, contact: SolvedContact, notes: tuple, seconds: dict
+    patch_model, pair: CondensedPair, gap, contact: SolvedContact, notes: tuple, seconds: dict
 ) -> Patch:
     """Assemble the Patch record of a solved contact.
 
     Parameters
     ----------
     patch_model : PatchModel
-    pair : Pair
+    pair : CondensedPair
     gap : (m,)
         Unloaded gap [m].
     contact : SolvedContact
@@ -324,18 +326,20 @@ def make_patch(
     -------
     Patch
     """
-    giving = contact.pieces.tangential
+    slip_compliance = contact.pieces.tangential
     if not patch_model.interface.has_shear:
-        giving = frozen_array(giving - pair.compliance.tangential)
+        slip_compliance = frozen_array(slip_compliance - pair.compliance.tangential)
     if patch_model.loading.tangential_stiffness:
-        giving = frozen_array(giving + 1 / patch_model.loading.tangential_stiffness)
+        slip_compliance = frozen_array(
+            slip_compliance + 1 / patch_model.loading.tangential_stiffness
+        )
     x = contact.pieces.interface.x
     averaging = patch_model.gap.averaging_length(x, contact.pressure.sigma_n > 0)
     return Patch(
         patch_model,
         pair,
         *contact,
-        giving=giving,
+        slip_compliance=slip_compliance,
         unloaded_gap=frozen_array(gap),
         notes=notes,
         seconds=pair.seconds | seconds,
@@ -351,12 +355,12 @@ def nodal_areas(patch_model, interface) -> np.ndarray:
     return np.repeat(interface.weight[None] / count, count, axis=0)
 
 
-def make_force_function(patch_model, pair: Pair):
+def make_contact_force_function(patch_model, pair: CondensedPair):
     """Return a function that computes the contact forces between worn surfaces.
 
     It maps worn depth (m,) [m], which is added to the gap, and softening (m,) [m/N], which is added
-    to the diagonal of the compliance, to forces (m,) [N]; all are (s, m) for strips. Everything
-    that the calls have in common is computed once.
+    to the diagonal of the compliance, to nodal forces (m,) [N]. For strips all arrays are (s, m).
+    Terms that do not change between calls are computed once.
 
     Raises
     ------
@@ -364,9 +368,9 @@ def make_force_function(patch_model, pair: Pair):
         If a profile does not fit the mesh.
     """
     bare = pair.compliance
-    gap = patch_model.gap.evaluate(bare.interface.x).heights + pair.rise
+    gap = patch_model.gap.evaluate(bare.interface.x).heights + pair.end_gap
     if patch_model.interface.strips is not None:
-        return PressedStrips(patch_model, bare, gap)
+        return StripForceSolver(patch_model, bare, gap)
 
     def compute_forces(worn, softening):
         """Return the contact forces (m,) [N] for worn depth (m,) [m] and softening (m,) [m/N]."""
@@ -377,16 +381,16 @@ def make_force_function(patch_model, pair: Pair):
 
 
 @dataclass(eq=False, slots=True)
-class PressedStrips:
-    """Contact solver of worn strips, which starts each time from the previous contact set.
+class StripForceSolver:
+    """Solver for the contact forces of worn strips, started from the previous contact set.
 
-    `begin` sets the contact set of the start, so that a run that continues after an interruption
-    gives the same bits.
+    A run that continues from a saved state calls `start_from_forces` first, so that its results are bitwise
+    those of an uninterrupted run.
 
     - model: PatchModel.
-    - bare: compliance of the pieces without skin.
+    - bare: compliance of the pieces without asperity layer.
     - gap (m,): unloaded gap [m].
-    - warm_start: contact set and factors of the last solution.
+    - warm_start: contact set and matrix factors of the previous solution.
     """
 
     model: object
@@ -394,8 +398,8 @@ class PressedStrips:
     gap: np.ndarray
     warm_start: WarmStart = field(default_factory=WarmStart)
 
-    def begin(self, force) -> None:
-        """Set the contact set from which the next solution starts to the loaded nodes."""
+    def start_from_forces(self, force) -> None:
+        """Start the next solution from the contact set of given nodal forces."""
         self.warm_start.contact_set = np.asarray(force) > 0
 
     def __call__(self, worn, softening) -> np.ndarray:
@@ -408,17 +412,17 @@ class PressedStrips:
 def solve_contact(
     patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> SolvedContact:
-    """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
+    """Solve the contact problem of condensed pieces with the skin, load and holder of a model.
 
     Parameters
     ----------
     patch_model : PatchModel
     pieces : Compliance
-        Pieces without skin.
+        Compliance of the pieces without asperity layer.
     gap : (m,) or (s, m)
         Unloaded gap [m].
     added, warm_start
-        Parameters of `StripCompliance`, for strips only.
+        See `StripCompliance`; for strips only.
 
     Returns
     -------
@@ -428,17 +432,17 @@ def solve_contact(
     skin = patch_model.interface.skin
     can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
     if loading.approach is not None and can_rotate:
-        # A search finds the load that gives the prescribed approach.
+        # The load that gives the prescribed approach is found by a search.
         under_load = partial(solve_contact, added=added, warm_start=warm_start)
-        stiff = with_linear_skin(skin, pieces)
-        return press_to_approach_with_rotation(patch_model, pieces, gap, under_load, stiff)
+        stiff = add_linear_skin_compliance(skin, pieces)
+        return solve_contact_at_approach(patch_model, pieces, gap, under_load, stiff)
     if patch_model.interface.strips is not None:
         return SolvedContact(
             pieces, *strip_press.solve_strip_contact(patch_model, pieces, gap, added, warm_start)
         )
     if skin is not None and skin.law != "linear":
-        return SolvedContact(*skin_press.press_through_asperities(patch_model, pieces, gap))
-    pieces = with_linear_skin(skin, pieces)
+        return SolvedContact(*skin_press.solve_contact_through_asperities(patch_model, pieces, gap))
+    pieces = add_linear_skin_compliance(skin, pieces)
     angle = patch_model.gap.angle
     if loading.approach is not None:
         return SolvedContact(pieces, press_to_approach(pieces, gap, loading.approach, angle))
@@ -447,18 +451,20 @@ def solve_contact(
     return SolvedContact(pieces, pressure)
 
 
-def with_linear_skin(skin, pieces: Compliance) -> Compliance:
-    """Add the compliance of a linear asperity layer to that of the pieces.
+def add_linear_skin_compliance(skin, pieces: Compliance) -> Compliance:
+    """Return the compliance of pieces with a linear asperity layer between them.
 
-    Without a layer, or with another law, these are the pieces themselves. A layer without a
+    Without a layer, or with another law, the compliance is returned unchanged. A layer without a
     tangential ratio is rigid in shear.
     """
     if skin is None or skin.law != "linear":
         return pieces
-    crush = 1 / (skin.normal_stiffness * pieces.interface.weight)
+    layer_compliance = 1 / (skin.normal_stiffness * pieces.interface.weight)
     tangential = pieces.tangential
     if skin.tangential_ratio is not None:
-        tangential = tangential + np.diag(crush / skin.tangential_ratio)
+        tangential = tangential + np.diag(layer_compliance / skin.tangential_ratio)
     return Compliance(
-        pieces.interface, frozen_array(pieces.normal + np.diag(crush)), frozen_array(tangential)
+        pieces.interface,
+        frozen_array(pieces.normal + np.diag(layer_compliance)),
+        frozen_array(tangential),
     )

@@ -21,7 +21,7 @@ from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
 from .ladder import solve_static_ladder, solve_with_coarser
 from .measures import add_strip_count_errors, estimate_static_measures, note_on_plane_state
-from .values import reaches_steep_end, values
+from .values import compute_static_values, contact_reaches_steep_end
 
 # Poisson's ratio up to which the errors of volumetrically locking elements are reliable.
 MAX_POISSON = 0.499
@@ -50,7 +50,9 @@ MIN_COMPLETE_FRACTION = 1 - 1e-6
 def static_measures_without_errors(model) -> dict:
     """Solve the contact patch of a model and return its static measures without their errors."""
     with locate_errors(model.source):
-        return values(solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0])
+        return compute_static_values(
+            solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+        )
 
 
 def make_bodies(model) -> tuple:
@@ -163,7 +165,7 @@ def make_static_result(inputs: RunInputs) -> Result:
 def warn_of_strains(patch_model, patch) -> list:
     """Return warnings on large strains, locking elements and an excessive gap."""
     steep_end = []
-    if reaches_steep_end(patch):
+    if contact_reaches_steep_end(patch):
         steep_end = [
             "on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
             "contact is computed; lower the tilt or the load"
@@ -294,7 +296,9 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         )
     if patch.has_skin and patch.pressure.load > 0:
         loaded_area = patch.pieces.interface.weight @ patch.active
-        out += skin.note_on_peak_stiffness(patch_model, float(patch.pressure.load / loaded_area))
+        out += skin.note_on_asperity_stiffness(
+            patch_model, float(patch.pressure.load / loaded_area)
+        )
     if patch.strips is not None:
         out.append(patch.strips.note)
     if model.kind == "patch":

@@ -1,7 +1,7 @@
-"""Asperity layer (skin) with a smooth pressure law between the pieces of a patch.
+"""Asperity layer (skin) between the pieces of a patch.
 
-In: a `PatchModel` with a skin. Out: the skin law, the pressure through it, the compliance
-linearised at the operating point, and a note on the stiffness of peaks from a profile.
+In: a `PatchModel` with a skin. Out: its pressure law, the contact pressure, the compliance
+linearised at the operating point, and a note on asperity stiffnesses that come from a profile.
 """
 
 from dataclasses import replace
@@ -20,7 +20,7 @@ from ...surface.roughness import peaks
 
 
 def make_skin_law(patch_model):
-    """Return the pressure-separation law of the asperity layer of a patch."""
+    """Return the law of pressure against separation of the asperity layer of a patch."""
     skin = patch_model.interface.skin
     if skin.law == "linear":
         return asperity_laws.LinearAsperities(skin.normal_stiffness)
@@ -30,12 +30,12 @@ def make_skin_law(patch_model):
             pressure = skin.normal_stiffness * skin.decay_length
         return asperity_laws.ExponentialAsperities(skin.decay_length, pressure)
     return asperity_laws.HertzAsperities(
-        skin.radius, skin.density, skin.height_deviation, combined_modulus(patch_model)
+        skin.radius, skin.density, skin.height_deviation, combined_surface_modulus(patch_model)
     )
 
 
-def combined_modulus(patch_model) -> float:
-    """Return the combined modulus E* [Pa] of the faces, 1/E* = sum of (1 - nu^2)/E."""
+def combined_surface_modulus(patch_model) -> float:
+    """Return the combined modulus E* [Pa] of the two surfaces, 1/E* = sum of (1 - nu^2)/E."""
     faces = [
         piece.coating.material if piece.coating else piece.substrate
         for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
@@ -43,10 +43,10 @@ def combined_modulus(patch_model) -> float:
     return 1 / sum((1 - face.poisson**2) / face.young for face in faces)
 
 
-def mean_layer_stiffness(patch_model, pressure: float) -> float:
+def asperity_layer_stiffness(patch_model, pressure: float) -> float:
     """Return the normal stiffness [Pa/m] of the asperity layer under a uniform pressure [Pa].
 
-    It is 0 for a smooth skin without pressure.
+    It is 0 for a nonlinear law without pressure.
     """
     if patch_model.interface.skin.law == "linear":
         return patch_model.interface.skin.normal_stiffness
@@ -56,10 +56,10 @@ def mean_layer_stiffness(patch_model, pressure: float) -> float:
     return float(law.stiffness(law.separation(np.array([pressure])))[0]) if pressure > 0 else 0.0
 
 
-def note_on_peak_stiffness(patch_model, pressure: float) -> list:
-    """Return a note, as a list, on the reliability of an asperity stiffness from a profile.
+def note_on_asperity_stiffness(patch_model, pressure: float) -> list:
+    """Return a note, as a list, on how reliable the stiffness of Hertzian asperities is.
 
-    It also covers peaks from root mean squares, and is [] for any other layer. pressure: mean
+    The list is empty unless the asperities come from a profile or from rms values. pressure: mean
     pressure [Pa].
     """
     skin = patch_model.interface.skin
@@ -82,7 +82,7 @@ def note_on_peak_stiffness(patch_model, pressure: float) -> list:
         ]
     return [
         f"contact.asperities: under the mean pressure of {format_quantity(pressure, 'Pa', 3)} the peaks{waves} have "
-        f"a stiffness of {mean_layer_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
+        f"a stiffness of {asperity_layer_stiffness(patch_model, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
         "waves of all lengths, "
         f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
         f'decay_length = "{sum(peaks.PERSSON) / 2 * skin.rms_height * 1e6:.3g} um"',
@@ -91,7 +91,7 @@ def note_on_peak_stiffness(patch_model, pressure: float) -> list:
 
 
 def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
-    """Return as text the asperity stiffness that every second sample of a profile gives."""
+    """Format the asperity stiffness that every second sample of a profile gives."""
     try:
         surface_peaks = peaks.gaussian_peaks(coarse) if coarse else None
     except PatchfemError:
@@ -106,23 +106,25 @@ def _format_coarse_stiffness(patch_model, coarse, pressure: float) -> str:
     interface = replace(
         patch_model.interface, skin=patch_model.interface.skin.model_copy(update=new)
     )
-    return f"{mean_layer_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
+    return (
+        f"{asperity_layer_stiffness(replace(patch_model, interface=interface), pressure):.3g} Pa/m"
+    )
 
 
-def cut_off_pressure(pressure) -> np.ndarray:
+def cut_off_negligible_pressure(pressure) -> np.ndarray:
     """Set pressures (..., m) [Pa] of a smooth layer to 0 where they are negligible.
 
-    The law never reaches 0, but the pressure that is cut off is below the residual of the load
-    balance, and underflows farther out. The limit is relative to the largest pressure.
+    The pressure law never reaches 0. The pressure that is set to 0 is smaller than the residual of
+    the load balance. The limit is relative to the largest pressure.
     """
     return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
 
 
-def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
-    """Solve the contact of two pieces through an asperity layer with a smooth pressure law.
+def solve_contact_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
+    """Solve the contact of two pieces with a smooth asperity layer between them.
 
-    The gap of the ContactState is the separation of the mean planes, which is negative if the skin
-    is crushed.
+    The gap of the ContactState is the separation of the mean planes; it is negative where the layer
+    is compressed beyond its mean height.
 
     Parameters
     ----------
@@ -134,8 +136,8 @@ def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
     Returns
     -------
     tuple
-        Compliance with the skin linearised at the operating point, ContactState, and StripsState of
-        a single strip.
+        Compliance with the layer linearised at the operating point, ContactState, and StripsState
+        with a single strip.
     """
     interface = pieces.interface
     loading = patch_model.loading
@@ -147,7 +149,7 @@ def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
     angle = patch_model.gap.angle
     state = press_strips(strips, gap, loads, approach=loading.approach, rotation=angle)
     pressure = ContactState(
-        frozen_array(cut_off_pressure(state.pressure[0])),
+        frozen_array(cut_off_negligible_pressure(state.pressure[0])),
         state.gap[0],
         state.delta,
         state.theta,
@@ -159,11 +161,15 @@ def press_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
     )
     stiffness = np.maximum(state.stiffness[0] * interface.weight, 1e-300)
     # The lower bound keeps the compliance of unloaded nodes finite.
-    crush = np.diag(1 / np.maximum(stiffness, MIN_RELATIVE_PRESSURE * stiffness.max()))
+    layer_compliance = np.diag(1 / np.maximum(stiffness, MIN_RELATIVE_PRESSURE * stiffness.max()))
     ratio = patch_model.interface.skin.tangential_ratio
-    tangential = pieces.tangential + crush / ratio if ratio is not None else pieces.tangential
+    tangential = (
+        pieces.tangential + layer_compliance / ratio if ratio is not None else pieces.tangential
+    )
     return (
-        Compliance(interface, frozen_array(pieces.normal + crush), frozen_array(tangential)),
+        Compliance(
+            interface, frozen_array(pieces.normal + layer_compliance), frozen_array(tangential)
+        ),
         pressure,
         state,
     )

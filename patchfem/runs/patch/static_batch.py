@@ -17,7 +17,7 @@ from ...contact.unilateral import RESIDUAL_TOL
 from ...core import ContactState, Outcome, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
-from .condensed import Pair, shared_pair, shared_pairs
+from .condensed import CondensedPair, condense_on_shared_level, condense_on_shared_meshes
 from .edge_values import EdgeValues
 from .measures import (
     MAX_UNRESOLVED_NODES,
@@ -30,8 +30,8 @@ from .measures import (
     note_on_plane_state_changes,
     with_opposite_plane_state,
 )
-from .press import SolvedContact, make_patch, with_linear_skin
-from .values import peak_pressures, static_values
+from .press import SolvedContact, add_linear_skin_compliance, make_patch
+from .values import assemble_static_values, estimate_peak_pressures
 
 # Number of cells beyond the contact end on the coarser mesh within which the end is searched for.
 MAX_END_CELLS = 2
@@ -226,13 +226,13 @@ def loads_from_columns(patch_model, count: int) -> PatchLoads:
     )
 
 
-def solve_patches_on_pair(patch_models, pair: Pair) -> list:
+def solve_patches_on_pair(patch_models, pair: CondensedPair) -> list:
     """Solve the contacts of several patches of equal geometry on the same condensed pieces.
 
     Parameters
     ----------
     patch_models : sequence of PatchModel
-    pair : Pair
+    pair : CondensedPair
 
     Returns
     -------
@@ -252,7 +252,7 @@ def solve_patches_on_pair(patch_models, pair: Pair) -> list:
     return out
 
 
-def _has_plain_grids(pair: Pair) -> bool:
+def _has_plain_grids(pair: CondensedPair) -> bool:
     """Return whether the meshes of both pieces are plain tensor grids."""
     return isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid)
 
@@ -272,7 +272,7 @@ def solve_alike_patches(patch_models, tolerance: float) -> list:
 
     They share their pieces and `batch_key`. tolerance: see `solve_batch`.
     """
-    pairs = shared_pairs(patch_models[0])
+    pairs = condense_on_shared_meshes(patch_models[0])
     solution = solve_batch(collect_loads(patch_models), tolerance)
     out = [None] * len(patch_models)
     for case in np.flatnonzero(solution.is_solved).tolist():
@@ -295,7 +295,7 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     ----------
     patch_models : sequence of PatchModel
         Of one geometry.
-    pairs : list of Pair
+    pairs : list of CondensedPair
         Condensed pieces, fine to coarse.
     tolerance : float
 
@@ -325,7 +325,7 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
     loads : PatchLoads
     tolerance : float
         Relative error above which values are extrapolated.
-    pairs : list of Pair, optional
+    pairs : list of CondensedPair, optional
         Pieces, fine to coarse, that replace the shared ones; the other plane state is then not
         solved.
 
@@ -335,7 +335,7 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
     """
     first = loads.first
     other_model = with_opposite_plane_state(first) if pairs is None else None
-    pairs = pairs or shared_pairs(first)
+    pairs = pairs or condense_on_shared_meshes(first)
     levels = []
     other_level = None
     with one_thread():
@@ -343,7 +343,9 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
             levels.insert(0, solve_on_pair(loads, pair, levels[0] if levels else None))
         if other_model is not None:
             other_loads = loads._replace(first=other_model)
-            other_level = solve_on_pair(other_loads, shared_pair(other_model, 1), levels[1])
+            other_level = solve_on_pair(
+                other_loads, condense_on_shared_level(other_model, 1), levels[1]
+            )
     fine = levels[0]
     is_solved = fine.contacts.n_nodes > MAX_UNRESOLVED_NODES
     for level in levels if other_level is None else (*levels, other_level):
@@ -352,7 +354,7 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
         is_solved = np.zeros_like(is_solved)
     resolution = compute_contact_resolution(
         pairs[0],
-        with_linear_skin(first.interface.skin, pairs[0].compliance),
+        add_linear_skin_compliance(first.interface.skin, pairs[0].compliance),
         fine.contacts.force,
         fine.gap_range,
         first.loading.moment is not None,
@@ -368,7 +370,7 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
     return BatchSolution(estimates, is_solved, plane_values, levels)
 
 
-def _make_patch(patch_model, pair: Pair, level: BatchLevel, case: int):
+def _make_patch(patch_model, pair: CondensedPair, level: BatchLevel, case: int):
     """Convert the solution of one patch of a batch to a Patch."""
     gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
@@ -383,18 +385,20 @@ def _make_patch(patch_model, pair: Pair, level: BatchLevel, case: int):
         1,
         MappingProxyType({}),
     )
-    pieces = with_linear_skin(patch_model.interface.skin, pair.compliance)
+    pieces = add_linear_skin_compliance(patch_model.interface.skin, pair.compliance)
     contact = SolvedContact(pieces, pressure)
-    return make_patch(patch_model, pair, gap + pair.rise, contact, notes, seconds)
+    return make_patch(patch_model, pair, gap + pair.end_gap, contact, notes, seconds)
 
 
-def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: BatchLevel | None = None) -> BatchLevel:
+def solve_on_pair(
+    loads: PatchLoads, pair: CondensedPair, coarse: BatchLevel | None = None
+) -> BatchLevel:
     """Solve the contacts of q patches in one batch on one pair of condensed pieces.
 
     Parameters
     ----------
     loads : PatchLoads
-    pair : Pair
+    pair : CondensedPair
     coarse : BatchLevel, optional
         The same patches on coarser cells, near whose ends of contact the search starts.
 
@@ -404,10 +408,10 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: BatchLevel | None = Non
     """
     bare = pair.compliance
     skin = loads.first.interface.skin
-    pieces = with_linear_skin(skin, bare)
+    pieces = add_linear_skin_compliance(skin, bare)
     x = bare.interface.x
     has_fixed_rotation = loads.moment is None
-    gap = loads.gaps(x) + pair.rise
+    gap = loads.gaps(x) + pair.end_gap
     gap_range = np.ptp(gap, axis=1)
     angle = np.zeros(loads.load.size) if has_fixed_rotation else loads.angle
     # The rotation of a free piece is measured from zero, so that it keeps its digits.
@@ -446,9 +450,9 @@ def solve_on_pair(loads: PatchLoads, pair: Pair, coarse: BatchLevel | None = Non
         normal.stiffness(contacts, is_rotation=True),
     )
     skin_fraction = None if skin is None else softness / normal.c.diagonal()
-    peak = peak_pressures(x, sigma, skin_fraction)
+    peak = estimate_peak_pressures(x, sigma, skin_fraction)
     area = bare.interface.weight.sum()
-    values = static_values(np.ptp(x), area, pressure, peak, edge_values)
+    values = assemble_static_values(np.ptp(x), area, pressure, peak, edge_values)
     return BatchLevel(values, pressure, contacts, gap_range, x)
 
 

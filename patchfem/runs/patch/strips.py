@@ -20,7 +20,7 @@ from ...contact.strips import (
 )
 from ...core import Compliance, ContactState, frozen_array
 from .edge_values import EdgeValues
-from .skin import MIN_RELATIVE_PRESSURE, cut_off_pressure, make_skin_law
+from .skin import MIN_RELATIVE_PRESSURE, cut_off_negligible_pressure, make_skin_law
 
 
 def solve_strip_contact(patch_model, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
@@ -57,7 +57,7 @@ def solve_strip_contact(patch_model, pieces: Compliance, gap, added=None, warm_s
         strips, gap, loads, approach=loading.approach, rotation=patch_model.gap.angle, roll=roll
     )
     is_smooth = isinstance(skin, SmoothAsperities)
-    pressure = cut_off_pressure(state.pressure) if is_smooth else state.pressure
+    pressure = cut_off_negligible_pressure(state.pressure) if is_smooth else state.pressure
     mean_state = ContactState(
         frozen_array(pressure.mean(axis=0)),
         frozen_array(state.gap.min(axis=0)),

@@ -17,9 +17,9 @@ from ...mesh.grading import Layout
 from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, ladder
-from .condensed import cache_pairs, condense
+from .condensed import cache_condensed_pairs, condense
 from .measures import estimate_static_measures, max_mesh_error_ratio
-from .press import press_patch
+from .press import solve_patch_contact
 from .static_batch import max_error_ratios, solve_patches_on_pair
 
 # Largest number of cases that determine the mesh; of more, the most different ones are taken.
@@ -122,7 +122,7 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
                     for pair in pairs
                 ]
             )
-            cache_pairs(cases[0], meshes, pairs)
+            cache_condensed_pairs(cases[0], meshes, pairs)
             return meshes
         # Factor on the cells above which no mesh meets the tolerance.
         enough = cell_factor * missed_by ** (-1 / MAX_ORDER)
@@ -267,7 +267,9 @@ def _find_contact_extent(patch_model, pair, patch):
     The single run of the case then reports the error.
     """
     try:
-        return grids.contact_extent(patch or press_patch(patch_model, pair), patch_model.mesh.slip)
+        return grids.contact_extent(
+            patch or solve_patch_contact(patch_model, pair), patch_model.mesh.slip
+        )
     except PatchfemError:
         return None
 

@@ -17,7 +17,7 @@ from ...formatting import format_length, format_quantity
 from ...model import profile
 from ...surface.fine import wave_spectrum
 from ...surface.roughness.peaks import PERSSON, trace_moments
-from .skin import combined_modulus
+from .skin import combined_surface_modulus
 
 PROFILE_KEY = "contact.profile.file"
 
@@ -93,7 +93,7 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
     ends = np.array([-0.5, 0.5]) * pieces.length
     trace = profile.level_profile(gap.profile, ends, element, is_material=False).profile
     pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
-    modulus = combined_modulus(patch_model)
+    modulus = combined_surface_modulus(patch_model)
     is_given = cutoff is not None
     if not is_given:
         spectrum = wave_spectrum(trace)

@@ -1,7 +1,7 @@
-"""Values of the static measures of a pressed patch, without errors.
+"""Values of the static measures of a solved patch, without error estimates.
 
-In: a `Patch`. Out: values by name: peak pressure, edges, half-width, stiffnesses; and the peak
-pressure at rounded ends that the cells do not resolve.
+In: a `Patch`. Out: values by name, such as peak pressure, contact length and stiffnesses; and the
+peak pressure at rounded ends that the mesh does not resolve.
 """
 
 import numpy as np
@@ -14,19 +14,20 @@ from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
 
-# Largest ratio of the curvatures of neighbouring parabolas on a smooth pressure curve.
+# Largest ratio of the curvatures of neighbouring parabolas at which the pressure curve counts as
+# smooth.
 MAX_CURVATURE_RATIO = 2.0
-# Smallest number of contact cells on a rounding for which its pressure peak converges.
+# Smallest number of contact cells on a rounded end at which its pressure peak is resolved.
 MIN_ROUNDING_CELLS = 4
 
 
-def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
-    """Estimate the largest pressures (q,) [Pa] of q patches from their nodal pressures.
+def estimate_peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
+    """Estimate the peak pressures (q,) [Pa] of q patches from their nodal pressures.
 
-    Inside the interface it is the vertex of the parabola through the largest node and its
-    neighbours. At an end of the interface the nodal forces of bare pieces are means over half a
-    cell, so that it is the end of the curve that has these means; with a skin it is the pressure
-    of the node.
+    Inside the interface, the peak is the vertex of the parabola through the largest nodal pressure
+    and its neighbours. At an end of the interface, the nodal pressures of bare pieces are means
+    over cells, and the peak is the end value of the curve with these means; with an asperity layer
+    it is the nodal pressure.
 
     Parameters
     ----------
@@ -35,8 +36,8 @@ def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
     sigma : (q, m) ndarray
         Nodal pressures [Pa].
     node_fraction : (m,) ndarray or None
-        Weight [1] of the pressure of a node at an end: the fraction of the skin in its compliance.
-        None for bare pieces.
+        Weight of the nodal pressure at an end of the interface: the fraction of the asperity layer
+        in the nodal compliance. None for bare pieces.
     """
     peak_node = np.argmax(sigma, axis=1)
     peaks = sigma.max(axis=1)
@@ -44,7 +45,7 @@ def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
     peaks[is_inner] = _parabola_vertices(x, sigma[is_inner], peak_node[is_inner])
     for border, step in ((0, 1), (x.size - 1, -1)):
         rows = np.flatnonzero(peak_node == border)
-        bare = _extrapolate_to_ends(np.abs(x[::step] - x[border]), sigma[rows, ::step])
+        bare = _extrapolate_pressure_to_ends(np.abs(x[::step] - x[border]), sigma[rows, ::step])
         fraction = 0.0 if node_fraction is None else node_fraction[border]
         peaks[rows] = fraction * peaks[rows] + (1 - fraction) * bare
     return peaks
@@ -53,9 +54,9 @@ def peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
 def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
     """Return the vertices (q,) [Pa] of parabolas through the largest nodal pressures.
 
-    A parabola passes through the largest node and its neighbours, if the parabolas of the next
-    nodes have a similar curvature. Next to a jump they differ: the smaller the lower curvature, the
-    closer the value is to that of the node.
+    The parabola passes through the largest nodal pressure and its neighbours. If the neighbouring
+    parabolas have a much smaller curvature, as beside a jump, the value is moved towards the nodal
+    pressure.
 
     Parameters
     ----------
@@ -64,9 +65,9 @@ def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
     sigma : (q, m)
         Nodal pressures [Pa].
     peak_node : (q,)
-        Inner nodes with the largest pressure.
+        Index of the largest nodal pressure; an inner node.
     """
-    # At an end of the interface, the parabola itself replaces its missing neighbour.
+    # At an end of the interface, the parabola replaces its missing neighbour.
     rows = np.arange(peak_node.size)
     nodes = np.clip(peak_node[:, None] + [-1, 0, 1], 1, x.size - 2)
     left = x[nodes] - x[nodes - 1]
@@ -86,13 +87,13 @@ def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
     return sigma[rows, peak_node] + rise
 
 
-def _extrapolate_to_ends(x, sigma) -> np.ndarray:
-    """Extrapolate nodal pressures, as cell averages, to the end of the interface (q,) [Pa].
+def _extrapolate_pressure_to_ends(x, sigma) -> np.ndarray:
+    """Extrapolate nodal pressures, which are cell means, to the end of the interface (q,) [Pa].
 
-    The averaged curve is a parabola through three loaded nodes, or a line through two.
+    The curve with these means is a parabola if three nodes are loaded, or a line if two are.
     """
     peaks = sigma[:, 0].copy()
-    # The result is the number of loaded nodes from the end of the interface to the first open one.
+    # The first False follows the loaded nodes, so that its index is their number.
     n_loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
     n_used = np.minimum(n_loaded, min(3, x.size - 1))
     for count in (2, 3):
@@ -105,15 +106,17 @@ def _extrapolate_to_ends(x, sigma) -> np.ndarray:
     return peaks
 
 
-def static_values(length: float, area: float, state, peak, edge_values: EdgeValues) -> dict:
-    """Return the static contact measures as a dict of numbers, or of columns (q,) for q patches.
+def assemble_static_values(
+    length: float, area: float, state, peak, edge_values: EdgeValues
+) -> dict:
+    """Return the static measures as a dict of numbers, or of arrays (q,) for q patches.
 
     Parameters
     ----------
     length, area : float
         Length [m] and area [m2] of the interface.
     state : object
-        Its load, moment, rotation and approach are numbers or (q,), as in a ContactState.
+        Has load, moment, rotation and approach, as a ContactState; numbers or (q,).
     peak : float or (q,) ndarray
         Largest pressure [Pa].
     edge_values : EdgeValues
@@ -125,7 +128,7 @@ def static_values(length: float, area: float, state, peak, edge_values: EdgeValu
     is_loaded = np.greater(state.load, 0)
 
     def quotient(divisor, numerator):
-        """Return numerator/divisor, with 0 for patches without a load."""
+        """Return numerator/divisor; 0 for patches without load."""
         zero = np.zeros(np.shape(peak))
         return np.divide(numerator, divisor, out=zero, where=is_loaded)[()]
 
@@ -145,14 +148,14 @@ def static_values(length: float, area: float, state, peak, edge_values: EdgeValu
     }
 
 
-def values(patch: Patch) -> dict:
-    """Return the values of all static measures of a solved patch as a dict, in SI units.
+def compute_static_values(patch: Patch) -> dict:
+    """Return the values of all static measures of a solved patch by name, in SI units.
 
-    A node at the edge of a step represents half a cell on either side: the value is the weighted
-    mean of the patches with and without contact of this node. `patch_rows` has the definitions.
+    If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
+    this node on either side of the step. `patch_rows` defines the measures.
     """
-    if patch.either:
-        parts = [(weight, values(part)) for weight, part in patch.either]
+    if patch.step_variants:
+        parts = [(weight, compute_static_values(part)) for weight, part in patch.step_variants]
         names = parts[0][1]
         return {name: float(sum(weight * part[name] for weight, part in parts)) for name in names}
     state = patch.strips
@@ -160,14 +163,14 @@ def values(patch: Patch) -> dict:
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
     if state is None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         with one_thread():
-            edge_values = _edge_values(patch)
+            edge_values = _compute_edge_values(patch)
     elif state is not None and state.load > 0:
         edge_values = strips.compute_strip_edge_values(patch)
-    out = static_values(
+    out = assemble_static_values(
         np.ptp(patch.x),
         patch.pieces.interface.weight.sum(),
         patch.pressure,
-        peak_pressures(patch.x, sigma, patch.skin_fraction).max(),
+        estimate_peak_pressures(patch.x, sigma, patch.skin_fraction).max(),
         edge_values,
     )
     if state is not None:
@@ -179,8 +182,8 @@ def values(patch: Patch) -> dict:
     return {name: float(value) for name, value in out.items()}
 
 
-def _edge_values(patch: Patch) -> EdgeValues:
-    """Return contact length and stiffnesses of a patch without strips."""
+def _compute_edge_values(patch: Patch) -> EdgeValues:
+    """Return contact length and contact stiffnesses of a patch without strips."""
     x = patch.x
     ends = contact_ends(patch)
     intervals = contact_intervals(patch, ends)
@@ -188,24 +191,24 @@ def _edge_values(patch: Patch) -> EdgeValues:
         length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
         normal=edges.set_stiffness(patch.pieces.normal, patch.active, np.ones(x.size), ends),
-        tangential=_shear_stiffness(patch, ends),
+        tangential=_full_stick_stiffness(patch, ends),
         rotational=edges.set_stiffness(patch.pieces.normal, patch.active, x, ends),
     )
 
 
 def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
-    """Return the contact intervals (k, 2) [m] of the interface, by increasing x.
+    """Return the contact intervals (k, 2) [m] of a patch in the order of increasing x.
 
-    ends: ends of the contact from `contact_ends`.
+    ends: contact edges from `contact_ends`.
     """
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     return edges.contact_intervals(patch.x, force, ends)
 
 
 def contact_ends(patch: Patch) -> list:
-    """Return the contact ends between nodes as a list of `ContactEdge`.
+    """Return the contact edges between nodes as a list of `ContactEdge`.
 
-    The list is empty for means over strips.
+    The list is empty for a patch in strips.
     """
     if patch.strips is not None:
         return []
@@ -223,18 +226,18 @@ def contact_ends(patch: Patch) -> list:
     return edges.snap_to_steps(ends, x, patch.unloaded_gap, jumps) if jumps else ends
 
 
-def _shear_stiffness(patch: Patch, ends: list) -> float:
-    """Return the tangential contact stiffness dT/dq [N/m] in full stick.
+def _full_stick_stiffness(patch: Patch, ends: list) -> float:
+    """Return the tangential contact stiffness [N/m] in full stick.
 
-    Approach and rotation are fixed. For unlike pieces it contains the closing that shear causes.
-    ends: ends of the contact.
+    Approach and rotation are fixed. For unlike pieces, the stiffness includes the coupling of shear
+    and normal displacement. ends: contact edges.
     """
     active = patch.active
     if not patch.pair.closing.any():
         return edges.set_stiffness(patch.pieces.tangential, active, np.ones(patch.x.size), ends)
 
     def coupled_stiffness(contact_set) -> float:
-        """Return the tangential stiffness [N/m] for a contact set (m,) of nodes."""
+        """Return the tangential stiffness [N/m] for a contact set (m,)."""
         return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, contact_set)
 
     at_nodes = coupled_stiffness(active)
@@ -252,47 +255,48 @@ def _shear_stiffness(patch: Patch, ends: list) -> float:
     return float(out)
 
 
-def edge_cells(x, active) -> np.ndarray:
-    """Return the lengths (e,) [m] of the cells in which contact edges lie; none in full contact."""
+def edge_cell_lengths(x, active) -> np.ndarray:
+    """Return the lengths (e,) [m] of the cells in which contact edges lie."""
     return np.diff(x)[active[1:] != active[:-1]]
 
 
-def unresolved_rounding(patch: Patch) -> float:
-    """Return the largest pressure [Pa] at rounded ends that the mesh does not resolve.
+def unresolved_rounding_pressure(patch: Patch) -> float:
+    """Return the largest pressure [Pa] at rounded ends that the mesh does not resolve, or 0.
 
-    It is 0 if there is no such end.
-
-    The cells where the contact ends carry the pressure of a sharp end, K = sigma_n sqrt(cell); a
-    rounding smaller than these cells has the peak of `rounded_corner_contact`.
+    On a mesh that does not resolve the rounding, the cells at the contact edge carry the pressure
+    of a sharp end, K = sigma_n sqrt(cell). The peak on the rounding then follows from
+    `rounded_corner_contact`.
     """
     pair = patch.pair
     x = patch.x
     sigma = patch.pressure.sigma_n
     rounded = _rounded_bodies(pair)
     loaded = np.flatnonzero(patch.active)
-    # A compliant layer of asperities (skin) bounds the pressure.
+    # An asperity layer (skin) bounds the pressure.
     if not rounded or not loaded.size or patch.pieces is not pair.compliance:
         return 0.0
-    flat = min(body.half_flat_length for body in rounded)
+    half_flat_length = min(body.half_flat_length for body in rounded)
     radius = 1 / sum(1 / body.end.size for body in rounded)
     coatings = [piece.layers.coating for piece in (pair.piece, pair.upper)]
     modulus = 1 / sum((1 - nu**2) / young for young, nu in coatings)
     largest = 0.0
     for node in (loaded[0], loaded[-1]):
         cell = np.diff(x)[max(node - 1, 0) : node + 1].max()
-        if abs(abs(x[node]) - flat) > 2 * cell:  # The contact does not end at the rounding.
+        if (
+            abs(abs(x[node]) - half_flat_length) > 2 * cell
+        ):  # The contact does not end at the rounded end.
             continue
-        sharp_end = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
-        reach, peak = contact.rounded_corner_contact(sharp_end, radius, modulus)
-        if MIN_ROUNDING_CELLS * cell > reach:
+        stress_intensity = sigma[max(node - 2, 0) : node + 3].max() * np.sqrt(cell)
+        peak_width, peak = contact.rounded_corner_contact(stress_intensity, radius, modulus)
+        if MIN_ROUNDING_CELLS * cell > peak_width:
             largest = max(largest, peak)
     return largest
 
 
-def open_ends(patch: Patch) -> float:
+def open_rounded_length(patch: Patch) -> float:
     """Return the length [m] of rounded surface on which a contact edge may lie.
 
-    It counts an end whose last node is in contact.
+    It is the length beyond the flat part, for each end whose last node is in contact.
     """
     rounded = _rounded_bodies(patch.pair)
     if not rounded:
@@ -301,17 +305,17 @@ def open_ends(patch: Patch) -> float:
     return patch.active[[0, -1]].sum() * rounded_length
 
 
-def reaches_steep_end(patch: Patch) -> bool:
-    """Return whether the contact reaches a rounded end that is too steep for the model.
+def contact_reaches_steep_end(patch: Patch) -> bool:
+    """Return whether the contact reaches the steep part of a rounded end, where the model ends.
 
-    A single loaded node whose cell is longer than the whole rounding does not count.
+    A single loaded node whose cell is longer than the whole rounded end does not count.
     """
     cells = np.diff(patch.x)[[0, -1]]
-    return bool((patch.active[[0, -1]] & (cells < open_ends(patch))).any())
+    return bool((patch.active[[0, -1]] & (cells < open_rounded_length(patch))).any())
 
 
 def _rounded_bodies(pair) -> list:
-    """Return the bodies with a rounding at the end of the interface."""
+    """Return the meshes of the pieces whose interface ends are rounded."""
     return [
         body
         for body in (pair.grid, pair.upper_grid)

@@ -33,7 +33,7 @@ def note_on_groove_slope(model, patch) -> list:
     if model.grooves is None or not model.partial_slip:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
-    apart = float((patch.giving @ limit).max())
+    apart = float((patch.slip_compliance @ limit).max())
     return [
         f"{model.partial_slip} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
         "and are the same for all points; a point at its friction limit slides by up to "

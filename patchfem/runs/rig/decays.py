@@ -134,7 +134,7 @@ def make_laws_on_coarse_meshes(model, coarse) -> list:
         *([] if coarse is None else [make_laws_on_mesh(model, coarse)]),
         *(
             make_laws_on_mesh(model, None, numbers)
-            for numbers in faces.interfaces_with_coarse_mesh(model)
+            for numbers in faces.group_interfaces_with_coarse_mesh(model)
         ),
     ]
 

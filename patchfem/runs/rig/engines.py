@@ -248,7 +248,7 @@ def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
     """List numerical settings that differ by a coarser mesh of one interface patch each."""
     if not model.rig.friction.has_partial_slip:
         return []
-    meshes = faces.interfaces_with_coarse_mesh(model)
+    meshes = faces.group_interfaces_with_coarse_mesh(model)
     return [replace(numerics, meshed=interfaces) for interfaces in meshes]
 
 

@@ -98,7 +98,7 @@ def make_interface_elements(model: Model, meshed: tuple) -> list:
     elements = []
     for k, interface in enumerate(model.rig.friction.interfaces):
         if interface.partial_slip:
-            parts = faces.make_elements(interface, model.accuracy.tolerance, k in meshed)
+            parts = faces.make_patch_elements(interface, model.accuracy.tolerance, k in meshed)
             elements.append(parallel_element(*parts[:2]))
         else:
             elements.append(make_element(interface, interface.load, model.rig.speed_scale))
@@ -152,7 +152,7 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
         return varying_load.make_varying_load_model(model, numerics, patch)
     if model.rig.friction.has_partial_slip:
         return models.jenkins_model(
-            *faces.make_elements(
+            *faces.make_patch_elements(
                 model.rig.friction.interfaces[0], model.accuracy.tolerance, 0 in numerics.meshed
             )
         )

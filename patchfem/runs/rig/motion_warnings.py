@@ -88,7 +88,7 @@ def collect_warnings(run) -> list:
         warnings.append(solution.message)
     warnings += warn_of_large_slide(patch, solution.response.slide) if patch is not None else ()
     if model.has_interface_patches:
-        warnings += faces.merge_sentences(
+        warnings += faces.merge_interface_sentences(
             model, lambda face: _warn_of_face(face, solution.response)
         )
     return warnings

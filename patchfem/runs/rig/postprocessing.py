@@ -223,7 +223,7 @@ def judge_outcome_on_pieces(run: CoupledRun) -> Outcome:
     response = run.solution.response
     outcome = judge_outcome_on_piece(run.outcome, model.patch, run.patch, response.slide)
     if model.has_interface_patches:
-        for face in faces.press_faces(model):
+        for face in faces.solve_interface_patches(model):
             outcome = judge_outcome_on_piece(
                 outcome, face.model.patch, face.patch, face.slide(response)
             )

@@ -212,5 +212,5 @@ def _expected_steps(inputs: RunInputs, numerics: Numerics) -> float:
         steps |= {run: run.steps for run in kind.runs}
     n_meshes = int(inputs.coarse[0] is not None and bool(model.partial_slip))
     if model.rig.friction.has_partial_slip:
-        n_meshes += len(faces.interfaces_with_coarse_mesh(model))
+        n_meshes += len(faces.group_interfaces_with_coarse_mesh(model))
     return sum(steps.values()) + n_meshes * min(steps.values())

@@ -47,7 +47,7 @@ def make_varying_load_model(model: Model, numerics: Numerics, patch):
     if model.partial_slip:
         weight = patch.pieces.interface.weight
         shear = march.choose_shear_modes(
-            patch.giving,
+            patch.slip_compliance,
             law,
             patch.pressure.sigma_n * weight,
             weight,

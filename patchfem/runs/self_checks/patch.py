@@ -177,7 +177,7 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         + STATED_ERROR_FACTOR * run.error("moment"),
         "N m",
     )
-    cells = float(values.edge_cells(patch.x, patch.active).sum())
+    cells = float(values.edge_cell_lengths(patch.x, patch.active).sum())
     bearing = float(weight[patch.active].sum()) / run.area
     yield Finding(
         "contact_fraction",

@@ -23,8 +23,8 @@ from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
 from ..patch.measures import with_other_strip_count
-from ..patch.press import make_force_function, nodal_areas, press_patch
-from ..patch.values import values
+from ..patch.press import make_contact_force_function, nodal_areas, solve_patch_contact
+from ..patch.values import compute_static_values
 from ..rig import numerics
 from .slip import (
     CycleSlip,
@@ -128,7 +128,7 @@ class _Motion:
         """Return the slip path [m] per cycle, (m,) or (s, m) for strips, at a worn depth [m]."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
-            patch = press_patch(self.model.patch, self.pair, worn)
+            patch = solve_patch_contact(self.model.patch, self.pair, worn)
             slip = compute_cycle_slip(worn_model(self.model, patch, worn), patch, self.frames)
             if slip.outcome is not None:
                 raise _UnboundedMotion(slip.outcome.sentence)
@@ -209,7 +209,7 @@ def compute_wear(
     clock = perf_counter()
     motion = _Motion(model, patch)
     problem = WearProblem(
-        make_force_function(model.patch, patch.pair),
+        make_contact_force_function(model.patch, patch.pair),
         motion,
         nodal_areas(model.patch, patch.pieces.interface),
         model.wear.coefficient,
@@ -222,7 +222,7 @@ def compute_wear(
             state, moments = _start_state(model, patch, problem, motion)
         else:
             state, moments = initial
-            patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
+            patch = solve_patch_contact(model.patch, patch.pair, frozen_array(state.depth))
     except _UnboundedMotion as reason:
         worn = tuple(mesh and _with_earlier_wear(model, mesh) for mesh in coarse)
         stopped = f"nothing was worn: {reason}"
@@ -237,7 +237,7 @@ def compute_wear(
                 f"{reason}"
             )
             break
-        patch = press_patch(model.patch, patch.pair, frozen_array(state.depth))
+        patch = solve_patch_contact(model.patch, patch.pair, frozen_array(state.depth))
         moments = (*moments, _record_moment(patch, state, motion))
         if store is not None:
             store(state, moments)
@@ -321,7 +321,7 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
     if model.patch.interface.strips is not None:
-        problem.press.begin(state.force)
+        problem.press.start_from_forces(state.force)
     after = jump_to(next_row_cycle(model.wear, problem, state))
     low = state.cycle
     high = np.inf
@@ -404,7 +404,7 @@ def _with_earlier_wear(model, patch):
             "run in which this coating was not worn through",
             "wear.start",
         )
-    return press_patch(model.patch, patch.pair, depth)
+    return solve_patch_contact(model.patch, patch.pair, depth)
 
 
 def _start_state(model, patch, problem: WearProblem, motion: _Motion) -> tuple:
@@ -421,7 +421,7 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> WearMoment:
     model = motion.model
     area = nodal_areas(model.patch, patch.pieces.interface)
     worn = worn_model(model, patch, state.depth)
-    measures = values(patch) | motion.last.values
+    measures = compute_static_values(patch) | motion.last.values
     measures["worn_volume"] = float(np.vdot(state.depth, area))
     measures["worn_depth_max"] = float(state.depth.max(initial=0.0))
     if model.grooves is not None:
@@ -472,13 +472,13 @@ def _repeat_on_mesh(patch_model, model, patch, other_patch, moments) -> tuple:
         (after.cycle - before.cycle, interpolate(after.used)) for before, after in pairwise(moments)
     ]
     depth = replay_jumps(
-        make_force_function(patch_model, other_patch.pair),
+        make_contact_force_function(patch_model, other_patch.pair),
         area,
         model.wear.coefficient,
         jumps,
         model.wear.compute_earlier_depth(other_patch.x, area),
     )
-    return press_patch(patch_model, other_patch.pair, frozen_array(depth)), depth
+    return solve_patch_contact(patch_model, other_patch.pair, frozen_array(depth)), depth
 
 
 def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None) -> WornPatch:

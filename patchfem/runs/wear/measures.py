@@ -13,8 +13,8 @@ from ...core import Measure, Outcome, frozen_array
 from ...formatting import format_length, format_number
 from ...response.errors import convergence_errors, error_of_change
 from ..patch.measures import with_other_strip_count
-from ..patch.press import nodal_areas, press_patch
-from ..patch.values import values
+from ..patch.press import nodal_areas, solve_patch_contact
+from ..patch.values import compute_static_values
 from ..results.patch_rows import TABLE, WORN_SOURCE
 from .evolve import THIN_FRACTION, find_worn_through_coating, mean_worn_depth
 from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
@@ -141,9 +141,11 @@ def _widen_by_jumps(result, evolved):
     """
     patch_model = result.plan.model.patch
     coarse_depth = frozen_array(evolved.state.coarse_depth)
-    coarse = values(press_patch(patch_model, evolved.patch.pair, coarse_depth))
-    fine_values = values(evolved.patch)
-    other_values = values(evolved.stripped[0]) if evolved.stripped else fine_values
+    coarse = compute_static_values(
+        solve_patch_contact(patch_model, evolved.patch.pair, coarse_depth)
+    )
+    fine_values = compute_static_values(evolved.patch)
+    other_values = compute_static_values(evolved.stripped[0]) if evolved.stripped else fine_values
     ratio = with_other_strip_count(patch_model)[1]
     measures = dict(result.measures)
     for name, value in fine_values.items():
@@ -292,7 +294,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
         (before, depth_before), (after, depth_after) = pair
         if depth_after > depth_before:
             jumps.append((before.values, after.values, depth_after - depth_before))
-    static_names = values(evolved.patch)
+    static_names = compute_static_values(evolved.patch)
     for name, measure in motion.items():
         if measure.error is None or name in static_names:
             continue

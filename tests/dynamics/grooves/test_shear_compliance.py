@@ -129,7 +129,9 @@ def make_coulomb_model(grooves, tolerance, compliance=COMPLIANCE):
     """Return a climbing model with Coulomb friction at the points."""
     bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
     patch = SimpleNamespace(
-        pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION), pieces=bodies, giving=compliance
+        pressure=SimpleNamespace(sigma_n=LOAD * LOAD_FRACTION),
+        pieces=bodies,
+        slip_compliance=compliance,
     )
     return climbing.with_shear_modes(
         climbing.make_model(grooves, LOAD, make_elastic_plastic_law(MU, 0.0), None),
