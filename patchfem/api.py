@@ -632,7 +632,7 @@ def sweep(
     else:
         target = sweep_run.SweepTarget(Path(out), resume)
         results = sweep_run.sweep_into(sweep_scene, cases, target, pool, _print_to_stderr)
-        names = [] if target.kept_files(len(cases)) == "none" else cases.names(sweep_scene)
+        names = [] if target.kept_files(len(cases)) == "none" else cases.compute_hashes(sweep_scene)
     keys = [folder.case_folder_name(name) for name in names]
     table = page.sweep_table(sweep_scene, cases, results, (), Path(out or ""))
     answer = headline.summarise_sweep(table).answer()

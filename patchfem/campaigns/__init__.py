@@ -85,7 +85,7 @@ PUBLIC = {
     "sweeps.executors.cluster": ("environment_versions",),
     "sweeps.parse_request": (
         "Request",
-        "contradictions",
+        "warn_of_invalid_cases",
         "read_cases",
         "read_sweep",
     ),

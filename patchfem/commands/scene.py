@@ -124,7 +124,7 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
     """Print the plan of a sweep."""
     sweep_scene, cases = _read_sweep(scene, sets, what)
     plan_data = estimate.estimate_sweep(sweep_scene, cases)
-    if wrong := parse_request.contradictions(sweep_scene, cases):
+    if wrong := parse_request.warn_of_invalid_cases(sweep_scene, cases):
         note(wrong)
     if json_:
         print(json.dumps(plan_data))

@@ -194,7 +194,7 @@ def sweep(
     if not quiet:
         for text in axes.describe_ranges(what.over if what else ()):
             note(text)
-        if wrong := parse_request.contradictions(sweep_scene, cases):
+        if wrong := parse_request.warn_of_invalid_cases(sweep_scene, cases):
             note(wrong)
     line = Progress(quiet)
     try:

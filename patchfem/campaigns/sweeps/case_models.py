@@ -1,7 +1,7 @@
-"""Models of the cases of a sweep, or the reason why a case has none.
+"""Models of the cases of a sweep.
 
-In: the text of a scene, and the keys of a case as strings. Out: a Model. A case that differs from
-an earlier one only in plain numbers is derived from that one without reading the scene again.
+In: the text of a scene, and the keys of a case as strings. Out: a Model. If a case differs from an
+earlier one only in plain numbers, its model is derived without parsing the scene again.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
 
 @dataclass(frozen=True, slots=True)
 class SweepScene:
-    """Scene of a sweep as text, with the settings that all cases share.
+    """Scene text of a sweep, with the settings common to all cases.
 
     Attributes
     ----------
     path : Path
-        File of the scene; other files are relative to it.
+        File of the scene, whose folder is the base of relative file names.
     text : str
     sets : tuple of str
-        --set strings that all cases share.
+        --set strings of all cases.
     of : str
-        Measure that the sweep was requested for; "" if none was named.
+        Requested measure; "" for the default measure.
     """
 
     path: Path
@@ -47,16 +47,16 @@ class SweepScene:
     sets: tuple = ()
     of: str = ""
 
-    def scene(self, sets: Sequence[str]) -> Scene:
-        """Return the scene with given `table.key=value` strings; SceneError lists every mistake."""
-        base = _get_base(self).scene
-        return base.override(sets) if base is not None else self._read(sets)
+    def read_scene(self, sets: Sequence[str]) -> Scene:
+        """Return the scene with additional `table.key=value` strings."""
+        base = _get_cached_base(self).scene
+        return base.override(sets) if base is not None else self._parse_scene(sets)
 
-    def _read(self, sets: Sequence[str]) -> Scene:
-        """Parse the scene with given `table.key=value` strings."""
+    def _parse_scene(self, sets: Sequence[str]) -> Scene:
+        """Parse the scene text with additional `table.key=value` strings."""
         return replace(require_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
 
-    def model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
+    def build_model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
         """Build the model of a single case of the sweep.
 
         Parameters
@@ -64,33 +64,32 @@ class SweepScene:
         sets : sequence of str
             ``table.key=value`` strings of the case.
         values : sequence
-            Values of the same keys in SI, if they are known: a case that differs from an earlier
-            one only in plain numbers is then derived from that one.
+            Values of the same keys in SI, if they are known. They allow the model to be derived
+            from that of an earlier case that differs only in plain numbers.
 
         Raises
         ------
         PatchfemError
-            With every mistake of the scene, if there is no model.
+            With all validation errors of the scene.
         """
         try:
-            return self._derive_model(sets, values) or build(self.scene(sets))
+            return self._derive_model(sets, values) or build(self.read_scene(sets))
         except SceneError as error:
-            raise PatchfemError("; ".join(_case_mistakes(error))) from None
+            raise PatchfemError("; ".join(_format_case_errors(error))) from None
         except PatchfemError:
             raise
-        except (
-            Exception
-        ) as error:  # A defect in one case must not lose the results of a thousand others.
+        except Exception as error:
+            # A defect in one case must not discard the results of all other cases.
             raise PatchfemError(
                 f"internal fault, please report it: {type(error).__name__}: {error}"
             ) from error
 
-    def similar_models(
+    def make_similar_models(
         self, keys: Sequence[str], values: np.ndarray, sets: Callable, cases: np.ndarray
     ) -> SimilarModels | None:
-        """Return models of cases that differ only in the numbers of some keys.
+        """Return the models of cases that differ only in the numbers of some keys.
 
-        None if the rules of a scene must check one of the values.
+        Returns None if one of the values requires a validation of the scene.
 
         Parameters
         ----------
@@ -98,14 +97,14 @@ class SweepScene:
         values : (n, k) array
             Values of the keys [SI].
         sets : callable
-            Number of a case -> its ``table.key=value`` strings.
+            Function from the number of a case to its ``table.key=value`` strings.
         cases : (n,) array
             Numbers of the cases.
         """
         keys = tuple(keys)
-        base, models = _get_base(self)
+        base, models = _get_cached_base(self)
         if keys not in models:
-            scene = base and self.scene(sets(int(cases[0])))
+            scene = base and self.read_scene(sets(int(cases[0])))
             plain = base and base.plain_numbers(scene, keys)
             models[keys] = plain and (plain, build(scene))
         if not models[keys] or not models[keys][0].are_plain(values):
@@ -113,35 +112,35 @@ class SweepScene:
         return SimilarModels(*models[keys], values, sets, cases)
 
     def _derive_model(self, sets: Sequence[str], values: Sequence) -> Model | None:
-        """Derive the model of a case from the first valid model with the same keys.
+        """Derive the model of a case from an earlier model with the same keys.
 
-        It returns None if the rules of a scene must check the case.
+        Returns None if the case requires a validation of its scene.
         """
         if not values or not all(isinstance(value, float) for value in values):
             return None
         keys = [text.partition("=")[0] for text in sets]
-        models = self.similar_models(
+        models = self.make_similar_models(
             keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int)
         )
         return models and models[0]
 
-    def mistakes(self, sets: Sequence[str]) -> list[str]:
-        """Return every mistake of the scene of a case; [] if it is valid."""
+    def find_errors(self, sets: Sequence[str]) -> list[str]:
+        """Return the validation errors of the scene of a case; [] if it is valid."""
         try:
-            self.scene(sets)
+            self.read_scene(sets)
         except SceneError as error:
-            return _case_mistakes(error)
+            return _format_case_errors(error)
         return []
 
-    def axes(self) -> tuple[list, list[str]]:
-        """Return the axes of the table [sweep] and its mistakes; both are empty without it."""
+    def read_axes(self) -> tuple[list, list[str]]:
+        """Return the axes of the table [sweep] and its validation errors; both are [] without it."""
         try:
             return read_sweep_axes(self.text, self.path)
         except SceneError as error:
             return [], error.mistakes
 
-    def numbered_key(self, key: str) -> str:
-        """Replace the name of a mode in a key by its number."""
+    def replace_mode_name(self, key: str) -> str:
+        """Replace the name of a mode in a key by the index of the mode."""
         pieces = key.split(".")
         modes = tomllib.loads(self.text).get("structure", {})
         modes = modes.get("mode") if isinstance(modes, dict) else None
@@ -150,11 +149,11 @@ class SweepScene:
             pieces[2] = str(names.index(pieces[2])) if pieces[2] in names else pieces[2]
         return ".".join(pieces)
 
-    def digest(self) -> str:
-        """Return a hash of everything that all cases of the sweep share.
+    def hash_common_data(self) -> str:
+        """Return a hash of all data that the cases of the sweep have in common.
 
-        It covers the version, all tables as written except [sweep], the --set strings, and the
-        content of the files.
+        The hash covers the program version, all tables except [sweep], the --set strings, and the
+        contents of the files.
         """
         tables = tomllib.loads(self.text)
         tables.pop("sweep", None)
@@ -162,10 +161,10 @@ class SweepScene:
         shared = [__version__, tables, self.sets, files]
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
-    def shares_meshes(self, keys: Sequence[str]) -> bool:
-        """Return whether the cases have patches with a mesh chosen for all of them together.
+    def has_shared_meshes(self, keys: Sequence[str]) -> bool:
+        """Return whether the cases have a mesh that is chosen for all of them together.
 
-        keys: those that change from case to case.
+        `keys` are the swept keys.
         """
         set_keys = set(keys)
         set_keys |= {text.partition("=")[0].strip() for text in self.sets}
@@ -175,16 +174,16 @@ class SweepScene:
         has_contact = any(key.startswith("contact.") for key in set_keys)
         return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys
 
-    def content(self, text: str) -> str:
-        """Return hashes of the contents of the files that a value names; "" if it names none."""
+    def hash_file_contents(self, text: str) -> str:
+        """Return the hashes of the files that a value names; "" if it names none."""
         return " ".join(sign for _, sign in hash_named_files([text], self.path.parent))
 
 
 class _SweepBase(NamedTuple):
-    """Base from which the scenes and models of all cases of a sweep derive.
+    """Base from which the scenes and models of all cases of a sweep are derived.
 
-    scene: None if the text is no valid scene without the values of a case; models: by the names of
-    the keys of the cases, None if no models can be derived.
+    scene: None if the scene is invalid without the values of a case; models: base models by the
+    swept keys, None if no models can be derived from them.
     """
 
     scene: BaseScene | None
@@ -192,17 +191,17 @@ class _SweepBase(NamedTuple):
 
 
 @lru_cache(maxsize=2)
-def _get_base(sweep_scene: SweepScene) -> _SweepBase:
-    """Return the cached base of the cases of a sweep.
+def _get_cached_base(sweep_scene: SweepScene) -> _SweepBase:
+    """Return the base of the cases of a sweep, which is cached for the last two sweeps.
 
     Those of the last two sweeps are kept.
     """
     try:
-        return _SweepBase(BaseScene(sweep_scene._read(())), {})
+        return _SweepBase(BaseScene(sweep_scene._parse_scene(())), {})
     except SceneError:
         return _SweepBase(None, {})
 
 
-def _case_mistakes(error: SceneError) -> list[str]:
-    """Return the mistakes of a case without the prefix of assigned values."""
+def _format_case_errors(error: SceneError) -> list[str]:
+    """Return the validation errors of a case without the prefix "--set: "."""
     return [text.removeprefix("--set: ") for text in error.mistakes]

@@ -1,6 +1,6 @@
-"""Estimate of the time and disk space of a sweep from the plans of a few of its cases.
+"""Prediction of the computing time and disk space of a sweep from the plans of a few cases.
 
-Nothing is run.
+No case is run.
 """
 
 from __future__ import annotations
@@ -14,33 +14,33 @@ from ...scene.axes import Axis
 from .case_models import SweepScene
 from .cases import Cases
 
-# Number of cases, spread over the sweep, whose plans estimate the cost of all.
+# Number of cases, spread over the sweep, whose plans are extrapolated to all cases.
 MAX_PLANNED_CASES = 9
-SWEEP_SECONDS = 0.75  # CPU time [s] of a sweep to start and to write its files and its page
-CASE_SECONDS = 8e-3  # CPU time [s] of a case outside a batch, in addition to that of its plan
-RANKING_SECONDS = 0.8  # CPU time [s] to rank the keys by their influence, from random cases.
-# Largest number of groups of the planned cases that is assumed to hold for all cases.
+SWEEP_SECONDS = 0.75  # CPU time [s] to start a sweep and to write its files and its report page
+CASE_SECONDS = 8e-3  # CPU time [s] of a case outside a batch, in addition to its planned time
+RANKING_SECONDS = 0.8  # CPU time [s] of the Sobol indices of a sweep with random cases.
+# Largest number of batch groups among the planned cases that is not extrapolated to all cases.
 MAX_GROUPS = 3
-# CPU time [s] to compute the columns of a case in a batch from its values (0.8 to 1.5 ms, measured on 2000
-# lumped cases).
+# CPU time [s] per case to compute the result columns of a batch (0.8 to 1.5 ms, measured on 2000 lumped
+# cases).
 BATCHED_CASE_SECONDS = 1.2e-3
-# Largest number of cases for which a sweep writes individual summaries by default.
+# Largest number of cases with individual summaries by default.
 MAX_CASES_WITH_SUMMARY = 1000
-# Largest number of cases for which a sweep writes tables by default.
+# Largest number of cases with tables by default.
 MAX_CASES_WITH_TABLES = 200_000
-# Bytes on disk per case with a summary; with tables, page and columns (10 000 cases); with columns
-# alone (a million cases).
+# Bytes on disk per case: with summaries; with tables, page and result columns (measured on 10 000
+# cases); with result columns only (a million cases).
 SUMMARY_BYTES = 6000
 TABLE_BYTES = 1600
 COLUMN_BYTES = 400
 
 
 def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
-    """Estimate time, memory and disk space of a sweep, as a dict that can be written as JSON.
+    """Predict computing time, memory and disk space of a sweep, as a dict that JSON can represent.
 
-    It is the plan of the first valid case, which `case` {key: value as written} names, with seconds
-    for all cases on one core, the largest number of bytes of memory that a case needs, the number
-    of cases, the number of values of each key, and bytes on disk.
+    The dict is the plan of the first valid case, whose keys and values are in `case`. In addition it
+    contains the CPU seconds of all cases on one core, the largest memory of a case in bytes, the
+    number of cases, the number of values of each key, and the bytes on disk.
 
     Raises
     ------
@@ -50,9 +50,9 @@ def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
     plans = []
     numbers = []
     first_error = None
-    for number in cases.representative_cases(MAX_PLANNED_CASES):
+    for number in cases.representative_case_numbers(MAX_PLANNED_CASES):
         try:
-            plans.append(plan(sweep_scene.model(cases.sets(number))))
+            plans.append(plan(sweep_scene.build_model(cases.assignments(number))))
             numbers.append(number)
         except PatchfemError as error:
             first_error = first_error or error
@@ -60,7 +60,7 @@ def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
         raise first_error
     batches = [choose_batch(case_plan.model, len(cases)) for case_plan in plans]
     seconds = _predict_seconds(plans, batches, len(cases))
-    if cases.drawn and len(cases.axes) > 1:
+    if cases.is_random and len(cases.axes) > 1:
         seconds += RANKING_SECONDS
     compile_seconds = plans[0].compile_seconds
     if batches[0] is not None:
@@ -72,8 +72,8 @@ def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
         "bytes": max(case_plan.bytes for case_plan in plans),
         "cases": len(cases),
         "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
-        "disk_bytes": _bytes_per_case(len(cases)) * len(cases),
-        "values": {axis.key: _count_values(axis) for axis in cases.axes},
+        "disk_bytes": _disk_bytes_per_case(len(cases)) * len(cases),
+        "values": {axis.key: _count_distinct_values(axis) for axis in cases.axes},
     }
 
 
@@ -85,11 +85,11 @@ def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
     plans : list of Plan
         Plans of some cases.
     batches : list of Batch or None
-        The batch of each of these cases; None for a case that is computed alone.
+        Batch of each of these cases; None for a case that is computed individually.
     n_cases : int
-        Number of all cases.
+        Number of cases of the sweep.
     """
-    shared, single_seconds = _split_shared_seconds(plans)
+    shared_seconds, single_seconds = _split_shared_seconds(plans)
     case_seconds = []
     batch_starts = []
     groups = set()
@@ -98,50 +98,50 @@ def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
         if key is None:
             case_seconds.append(seconds)
             continue
-        in_batch = max(BATCHED_CASE_SECONDS, batch.share * seconds)
-        case_seconds.append(in_batch)
-        batch_starts.append(seconds - in_batch)
+        batched_seconds = max(BATCHED_CASE_SECONDS, batch.share * seconds)
+        case_seconds.append(batched_seconds)
+        batch_starts.append(seconds - batched_seconds)
         groups.add((batch.name, key if batch.share else ()))
     if groups:
         # The first case of each group takes as long as a single run.
         n_groups = float(len(groups))
         if len(groups) > MAX_GROUPS:
             n_groups *= n_cases / len(plans)
-        shared += n_groups * max(float(np.mean(batch_starts)), 0.0)
-    return shared + sum(case_seconds) / len(plans) * n_cases
+        shared_seconds += n_groups * max(float(np.mean(batch_starts)), 0.0)
+    return shared_seconds + sum(case_seconds) / len(plans) * n_cases
 
 
-def _bytes_per_case(n_cases: int) -> int:
-    """Return the bytes on disk per case in a sweep of `n_cases` cases."""
+def _disk_bytes_per_case(n_cases: int) -> int:
+    """Return the bytes on disk per case of a sweep with `n_cases` cases."""
     if n_cases <= MAX_CASES_WITH_SUMMARY:
         return SUMMARY_BYTES
     return TABLE_BYTES if n_cases <= MAX_CASES_WITH_TABLES else COLUMN_BYTES
 
 
 def _split_shared_seconds(plans: list) -> tuple[float, list]:
-    """Split the CPU time [s] of planned cases into a shared and an individual part.
+    """Split the CPU time [s] of planned cases into a common part and a part for each case.
 
-    A case of a sweep needs no start and no fields. Pieces that are the same in all cases are
-    condensed once.
+    The time to start the program and to compute fields does not apply to a case of a sweep. Pieces
+    that are equal in all cases are condensed only once.
     """
-    shared = 0.0
-    left_out = {"start", "code", "fields"}
+    shared_seconds = 0.0
+    excluded_stages = {"start", "code", "fields"}
     patches = [case_plan.model.patch for case_plan in plans]
     if None not in patches:
-        # This module is imported here, because sweeps of a point need no mesh.
+        # The import is local because sweeps of a point contact need no mesh.
         from ...runs.patch.sweep_meshes import geometry_key
 
         if len({geometry_key(patch) for patch in patches}) == 1:
-            left_out.add("condensing")
-            shared = max(case_plan.cost.times["condensing"] for case_plan in plans)
+            excluded_stages.add("condensing")
+            shared_seconds = max(case_plan.cost.times["condensing"] for case_plan in plans)
     single_seconds = []
     for case_plan in plans:
         times = case_plan.cost.times
-        own_times = [seconds for name, seconds in times.items() if name not in left_out]
+        own_times = [seconds for name, seconds in times.items() if name not in excluded_stages]
         single_seconds.append(sum(own_times) + CASE_SECONDS)
-    return shared, single_seconds
+    return shared_seconds, single_seconds
 
 
-def _count_values(axis: Axis) -> int:
+def _count_distinct_values(axis: Axis) -> int:
     """Return the number of distinct values of a key, compared in SI units."""
     return np.unique(axis.values).size if axis.unit else len(set(axis.texts))

@@ -1,4 +1,4 @@
-"""Parser of the request for a sweep, which reports all mistakes at once.
+"""Parser and validation of the request for a sweep, which reports all errors at once.
 
 In: a file, --set strings and a `Request`. Out: `SweepScene` and `Cases`, or a SceneError.
 """
@@ -24,29 +24,31 @@ from . import samples, table
 from .case_models import SweepScene
 from .cases import Cases, combine_cases
 
-N_CHECKED = 32  # Number of cases that are read before a sweep starts, to find a valid one.
-MAX_PRINTED = 12  # Largest number of mistakes that are printed.
-MAX_SUGGESTIONS = 4  # Largest number of measures that a mistyped name may mean.
-MAX_CASES = 3_000_000  # Largest number of cases; the names and columns of more take gigabytes.
+N_CHECKED = 32  # Largest number of cases that are validated before a sweep starts.
+MAX_PRINTED = 12  # Largest number of validation errors that are printed.
+MAX_SUGGESTIONS = 4  # Largest number of measures that are suggested for an unknown name.
+MAX_CASES = (
+    3_000_000  # Largest number of cases; the hashes and columns of more cases take gigabytes.
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Request for a sweep: its swept keys, table of cases and random sampling.
+    """Request for a sweep: swept keys, table of cases and random sampling.
 
     Attributes
     ----------
     over : sequence of str
-        Texts "table.key=values".
+        Swept keys as "table.key=values" strings.
     file : Path or None
-        Table with a case per row.
+        CSV table with a row for each case.
     count : int
-        Number of random cases between the ends of the ranges of `over`; 0 for all combinations.
+        Number of random cases within the ranges of `over`; 0 for all combinations.
     sobol : bool
-        Whether the random cases are points of a Sobol sequence.
+        Whether the random cases form a Sobol sequence.
     seed : int
     of : str
-        Measure that the summary of the sweep begins with; "" for the default one.
+        Measure at the beginning of the summary; "" for the default measure.
     """
 
     over: Sequence[str] = ()
@@ -75,15 +77,15 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     Raises
     ------
     SceneError
-        As from `read_cases`, and if a key is both set for all cases and swept.
+        As for `read_cases`, and if a key is both set for all cases and swept.
     """
     sweep_scene = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
     cases = read_cases(sweep_scene, request)
-    swept = {sweep_scene.numbered_key(axis.key): axis.key for axis in cases.axes}
+    swept_keys = {sweep_scene.replace_mode_name(axis.key): axis.key for axis in cases.axes}
     mistakes = []
     for text in sets:
         key = ".".join(split_key(text.partition("=")[0]))
-        swept_key = swept.get(sweep_scene.numbered_key(key))
+        swept_key = swept_keys.get(sweep_scene.replace_mode_name(key))
         if swept_key:
             mistakes.append(
                 f"--set {text}: the sweep already sets {swept_key} in every case; remove this --set, "
@@ -95,14 +97,14 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
 
 
 def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
-    """Return the cases of a request: all combinations of the values that it names.
+    """Return the cases of a request: all combinations of the requested values.
 
-    If it names none, the values are those of the table [sweep].
+    If it names no values, those of the table [sweep] are used.
 
     Raises
     ------
     SceneError
-        With the mistakes of scene and request, and if none of the cases that are checked is valid.
+        With all validation errors of scene and request; also if none of the checked cases is valid.
     """
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
         raise SceneError(
@@ -119,11 +121,11 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
         if listed is not None:
             parts.append(listed)
             file_axes = listed.axes
-    mistakes += _check_measure(request.of)
+    mistakes += _validate_measure_name(request.of)
     axes, axis_mistakes = read_axes(request.over, sampled=request.count > 0)
     mistakes += [f"--over {mistake.removeprefix('--over ')}" for mistake in axis_mistakes]
     if not request.over and request.file is None:
-        axes, axis_mistakes = sweep_scene.axes()
+        axes, axis_mistakes = sweep_scene.read_axes()
         mistakes += axis_mistakes
         if not axes and not axis_mistakes:
             mistakes.append(
@@ -135,11 +137,11 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
             "this --over"
         )
     every_axis = [*axes, *file_axes]
-    mistakes = mistakes or _find_equal_keys(sweep_scene, [axis.key for axis in every_axis])
+    mistakes = mistakes or _find_duplicate_keys(sweep_scene, [axis.key for axis in every_axis])
     if mistakes:
         listed_axes = [axis for axis in every_axis if isinstance(axis, Axis)]
         first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
-        raise SceneError([*sweep_scene.mistakes(first_case), *mistakes])
+        raise SceneError([*sweep_scene.find_errors(first_case), *mistakes])
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_CASES:
@@ -154,35 +156,36 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = combine_cases(parts)
-    if cases.rows:
-        cases = replace(cases, words=_repeat_words(request, sweep_scene.path.parent))
-    _refuse_all(sweep_scene, cases)
+    if cases.is_table:
+        cases = replace(
+            cases, request_arguments=_format_request_arguments(request, sweep_scene.path.parent)
+        )
+    _require_valid_case(sweep_scene, cases)
     return cases
 
 
-def _repeat_words(request: Request, folder: Path) -> tuple[str, ...]:
-    """Return the arguments of a command that computes the same cases again from a folder.
+def _format_request_arguments(request: Request, folder: Path) -> tuple[str, ...]:
+    """Return the command-line arguments that request the same cases again, relative to a folder.
 
-    They are () if the file of cases is a pipe, which cannot be read again.
+    Returns () if the table of cases is a pipe, which cannot be read again.
     """
-    words = []
+    arguments = []
     if request.file is not None:
         if not request.file.is_file():
             return ()
-        words += ["--cases", os.path.relpath(request.file, folder)]
+        arguments += ["--cases", os.path.relpath(request.file, folder)]
     for text in request.over:
-        words += ["--over", text]
+        arguments += ["--over", text]
     if request.count:
-        words.append("--sobol" if request.sobol else "--random")
-        words += [str(request.count), "--seed", str(request.seed)]
-    return tuple(words)
+        arguments.append("--sobol" if request.sobol else "--random")
+        arguments += [str(request.count), "--seed", str(request.seed)]
+    return tuple(arguments)
 
 
-def _check_measure(measure: str) -> list[str]:
-    """Return a mistake if no run has a requested measure, with similar names as suggestions.
+def _validate_measure_name(measure: str) -> list[str]:
+    """Return a validation error for an unknown measure, with a suggestion; [] if it is known.
 
-    Suggested are the measures whose name contains the word, or else the one with the most similar
-    name.
+    The suggestion contains the measures whose name contains the word, or else the most similar name.
     """
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.remove_interface_number(measure) in known:
@@ -197,15 +200,15 @@ def _check_measure(measure: str) -> list[str]:
     return [f"--of {measure}: unknown measure; {advice}"]
 
 
-def _find_equal_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
-    """Return a mistake for each swept key that means the same value as an earlier key.
+def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
+    """Return a validation error for each swept key that is equivalent to an earlier key.
 
-    Two keys mean the same if they name a mode by its name and by its number.
+    Two keys are equivalent if they denote a mode by its name and by its index.
     """
     first_keys: dict = {}
     mistakes = []
     for key in keys:
-        first = first_keys.setdefault(sweep_scene.numbered_key(key), key)
+        first = first_keys.setdefault(sweep_scene.replace_mode_name(key), key)
         if first != key:
             mistakes.append(
                 f"--over {key}: this key is the same as {first}, which is given already; remove one of them"
@@ -213,16 +216,16 @@ def _find_equal_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[str]:
     return mistakes
 
 
-def _refuse_all(sweep_scene: SweepScene, cases: Cases) -> None:
-    """Raise SceneError if none of several cases spread over the sweep is a valid scene."""
+def _require_valid_case(sweep_scene: SweepScene, cases: Cases) -> None:
+    """Raise SceneError if none of the representative cases of a sweep is valid."""
     messages: dict = {}
-    for number in cases.representative_cases(N_CHECKED):
-        mistakes = sweep_scene.mistakes(cases.sets(number))
+    for number in cases.representative_case_numbers(N_CHECKED):
+        mistakes = sweep_scene.find_errors(cases.assignments(number))
         if not mistakes:
             return
         for mistake in mistakes:
-            # Random values differ from case to case, but the mistake that they cause is the same.
-            kind = re.sub(NUMBER_PATTERN, "", mistake) if cases.drawn else mistake
+            # Errors that differ only in their random values are reported once.
+            kind = re.sub(NUMBER_PATTERN, "", mistake) if cases.is_random else mistake
             messages.setdefault(kind, mistake)
     lines = list(messages.values())
     if len(lines) > MAX_PRINTED:
@@ -230,23 +233,24 @@ def _refuse_all(sweep_scene: SweepScene, cases: Cases) -> None:
     raise SceneError(lines)
 
 
-def contradictions(sweep_scene: SweepScene, cases: Cases) -> str:
-    """Return a warning that cases will fail because a swept key contradicts another key.
+def warn_of_invalid_cases(sweep_scene: SweepScene, cases: Cases) -> str:
+    """Return a warning if some of the representative cases of a sweep are invalid; "" otherwise.
 
-    It says how to avoid this. It is "" if each of the N_CHECKED cases that are checked is a valid
-    scene.
+    The cause is a swept key that contradicts another key; the warning says how to avoid this.
     """
-    numbers = cases.representative_cases(N_CHECKED)
-    failing = list(filter(None, (sweep_scene.mistakes(cases.sets(number)) for number in numbers)))
-    if not failing:
+    numbers = cases.representative_case_numbers(N_CHECKED)
+    invalid_cases = list(
+        filter(None, (sweep_scene.find_errors(cases.assignments(number)) for number in numbers))
+    )
+    if not invalid_cases:
         return ""
-    mistake = failing[0][0]
-    swept = {sweep_scene.numbered_key(axis.key) for axis in cases.axes}
+    mistake = invalid_cases[0][0]
+    swept = {sweep_scene.replace_mode_name(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", mistake)
     advice = "give other values in --over"
-    if key and sweep_scene.numbered_key(key[1]) not in swept:
+    if key and sweep_scene.replace_mode_name(key[1]) not in swept:
         advice = f"sweep {key[1]}, too, remove this key from the scene, or {advice}"
-    extent = f"{len(failing)} of {len(numbers)} cases"
+    extent = f"{len(invalid_cases)} of {len(numbers)} cases"
     if len(numbers) != len(cases):
         extent += " that were checked"
     return f"{extent} will fail: {mistake}; {advice}"

@@ -1,4 +1,4 @@
-"""Random cases of a sweep: independent ones, or points of a Sobol sequence."""
+"""Random cases of a sweep, either independent or from a Sobol sequence."""
 
 from __future__ import annotations
 
@@ -12,50 +12,50 @@ from .cases import Cases
 
 
 def draw_cases(
-    parts: Sequence[Axis | SampledRange], count: int, seed: int, *, sobol: bool = False
+    axes: Sequence[Axis | SampledRange], count: int, seed: int, *, sobol: bool = False
 ) -> Cases:
     """Draw random cases from ranges and lists of values, reproducibly for a given seed.
 
-    A range is sampled uniformly between its ends, or uniformly in its logarithm; the values of a
-    list are equally likely.
+    A range is sampled uniformly, either linearly or logarithmically. The values of a list have equal
+    probabilities.
 
     Parameters
     ----------
-    parts : sequence of Axis or SampledRange
+    axes : sequence of Axis or SampledRange
     count : int
         Number of cases.
     seed : int
     sobol : bool
-        Whether to use the scrambled sequence of Sobol (Owen 1995), which covers the space best if
-        `count` is a power of two, in place of independent samples.
+        Whether to use a scrambled Sobol sequence (Owen 1995) instead of independent samples. It is
+        most uniform if `count` is a power of two.
 
     Returns
     -------
     Cases
     """
     if sobol:
-        fractions = _sobol_points(len(parts), count, seed)
+        fractions = _draw_sobol_points(len(axes), count, seed)
     else:
-        fractions = np.random.default_rng(seed).random((count, len(parts)))
-    return Cases(tuple(map(_select_values, parts, fractions.T)), rows=True, drawn=True)
+        fractions = np.random.default_rng(seed).random((count, len(axes)))
+    return Cases(tuple(map(_map_to_values, axes, fractions.T)), is_table=True, is_random=True)
 
 
-def _sobol_points(width: int, count: int, seed: int) -> np.ndarray:
-    """Return `count` points (count, width) of a scrambled Sobol sequence."""
+def _draw_sobol_points(n_axes: int, count: int, seed: int) -> np.ndarray:
+    """Return `count` points (count, n_axes) of a scrambled Sobol sequence."""
     from scipy.stats import qmc
 
     with warnings.catch_warnings():
-        # SciPy warns of counts that are no power of two.
+        # SciPy warns if the number of points is not a power of two.
         warnings.simplefilter("ignore", UserWarning)
-        return qmc.Sobol(width, scramble=True, rng=np.random.default_rng(seed)).random(count)
+        return qmc.Sobol(n_axes, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
-def _select_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
-    """Return the values of a key that correspond to uniform random numbers (n,)."""
+def _map_to_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
+    """Return the values of a key that correspond to uniform random numbers (n,) in [0, 1)."""
     if isinstance(axis, SampledRange):
         return axis.make_axis(fractions.tolist())
     n_values = len(axis.texts)
-    places = np.minimum((fractions * n_values).astype(int), n_values - 1)
-    texts = tuple(axis.texts[place] for place in places)
-    values = tuple(axis.values[place] for place in places)
+    indices = np.minimum((fractions * n_values).astype(int), n_values - 1)
+    texts = tuple(axis.texts[place] for place in indices)
+    values = tuple(axis.values[place] for place in indices)
     return Axis(axis.key, texts, values, axis.unit)

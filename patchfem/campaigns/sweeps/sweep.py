@@ -1,8 +1,8 @@
 """Computation of the cases of a sweep in chunks by an executor.
 
-A chunk whose worker dies is repeated in halves.
+If a worker dies, its chunk is split into halves and repeated.
 
-In: `Work`, numbers of cases and an executor of `executors/`. Out: chunk after chunk from `iterate_chunks`.
+In: `Work`, case numbers and an executor of `executors/`. Out: results by chunk from `iterate_chunks`.
 """
 
 from __future__ import annotations
@@ -25,39 +25,37 @@ from ...runs.batch.meshes import SharedMeshes
 from .case_models import SweepScene
 from .cases import Cases
 
-# Number of failures of a case, the last as the only case of a chunk, after which it is abandoned.
+# Number of failures after which a case is abandoned; in the last one it is alone in its chunk.
 MAX_DEATHS = 3
-# Target time of a chunk [s]: long compared with its transfer to a worker, short compared with a
-# sweep.
+# Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
+# with a sweep.
 CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 4096  # Largest number of cases of a chunk.
-MAX_MESH_CASES = 256  # Largest number of cases from which the meshes of a sweep are chosen.
+MAX_CASES_PER_CHUNK = 4096  # Largest number of cases in a chunk.
+MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.
 
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """Common data from which a worker computes any case of a sweep.
+    """Data that a worker process needs to compute any case of a sweep.
 
-    Each worker receives them once.
-
-    All functions are functions of a module or objects that can be pickled.
+    Each worker receives the data once. All functions must support pickling.
 
     Attributes
     ----------
     sweep_scene : SweepScene
     cases : Cases
     extract : callable, optional
-        extract(number, model or error, CaseResults, index in them) returns what is kept of a case
-        besides its columns.
+        extract(number, model or error, results, index) returns additional data of the case at an
+        index of the CaseResults.
     keep : callable, optional
         keep(number, Result) is called after each run.
     write : callable, optional
-        write(numbers, CaseResults, extras) returns whether they were written to the folder of the
-        sweep, so that they need not be sent back.
+        write(numbers, results, extras) returns whether it has written the CaseResults to the
+        folder of the sweep, so that they are not sent back.
     estimate : bool
-        Whether errors are computed for cases that run one by one.
+        Whether to estimate the errors of cases that are computed one by one.
     meshes : SharedMeshes or None
-        Meshes that the cases share, chosen from all of them by `choose_meshes`.
+        Meshes common to all cases, from `choose_shared_meshes`.
     """
 
     sweep_scene: SweepScene
@@ -70,19 +68,19 @@ class Work:
 
 
 @dataclass(frozen=True, slots=True)
-class Died:
-    """Marker that an executor returns for a lost chunk, with a short reason."""
+class WorkerDeath:
+    """Result of a chunk whose worker process died, with the reason."""
 
     reason: str
 
 
-def warm_up(work: Work) -> None:
-    """Compile and import what the first case needs before the meshes are chosen.
+def compile_for_first_case(work: Work) -> None:
+    """Compile and import in advance the code that the first case of a sweep needs.
 
-    Errors are ignored, because the run of the case reports them.
+    This happens while the meshes are chosen. Errors are ignored here and reported by the run.
     """
     try:
-        model = work.sweep_scene.model(work.cases.sets(0))
+        model = work.sweep_scene.build_model(work.cases.assignments(0))
         if batches.choose_batch(model, len(work.cases)) is None:
             plan.plan(model)
     except Exception:
@@ -105,8 +103,8 @@ def compute_chunk(
     Returns
     -------
     tuple
-        CaseResults and a list of what `work.extract` returns for each case; None and [] if
-        `work.write` has written them.
+        CaseResults and a list of the data that `work.extract` returns for each case; None and []
+        if `work.write` has written them.
     """
     models = _build_similar_models(work, numbers)
     if models is None:
@@ -117,11 +115,13 @@ def compute_chunk(
     if work.extract is not None:
         for case, (number, model) in enumerate(zip(numbers, models)):
             extras.append(work.extract(number, model, results, case))
-    return write_or_return(work, numbers, results, extras)
+    return output_results(work, numbers, results, extras)
 
 
-def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple:
-    """Compute the results of a chunk of cases, and measure the time.
+def compute_chunk_with_time(
+    work: Work, numbers: Sequence[int], say: Callable | None = None
+) -> tuple:
+    """Compute the results of a chunk of cases, and measure the elapsed time.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = Non
     Returns
     -------
     tuple
-        Time [s] without compilation, which no later case needs, and the result of `compute_chunk`.
+        Elapsed time [s] without compilation, and the result of `compute_chunk`.
     """
     begin = perf_counter()
     compile_seconds = compiled.COMPILE_SECONDS[0]
@@ -140,7 +140,7 @@ def compute_timed(work: Work, numbers: Sequence[int], say: Callable | None = Non
     return perf_counter() - begin - compile_seconds, answer
 
 
-def write_or_return(
+def output_results(
     work: Work, numbers: Sequence[int], results: CaseResults, extras: list
 ) -> tuple[CaseResults | None, list]:
     """Write the results of a chunk to the folder of the sweep, or return them.
@@ -152,7 +152,7 @@ def write_or_return(
         Numbers of the cases.
     results : CaseResults
     extras : list
-        What `work.extract` returned for each case.
+        Data that `work.extract` returned for each case.
 
     Returns
     -------
@@ -165,17 +165,17 @@ def write_or_return(
 
 
 def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
-    """Return models of cases that differ only in plain numbers; None if they differ in more.
+    """Return the models of cases that differ only in plain numbers; None if this is not possible.
 
-    It is None as well for pressed patches in motion, and if `work.keep` needs every single run.
+    It is also None for patches in motion, and if `work.keep` is called with the result of each run.
     """
     cases = np.asarray(numbers)
-    values = work.cases.columns(numbers)
+    values = work.cases.value_matrix(numbers)
     if work.keep is not None or values is None:
         return None
     try:
         keys = [axis.key for axis in work.cases.axes]
-        models = work.sweep_scene.similar_models(keys, values, work.cases.sets, cases)
+        models = work.sweep_scene.make_similar_models(keys, values, work.cases.assignments, cases)
     except PatchfemError:  # The first case has no model.
         return None
     if models is None or models.first.patch is None:
@@ -188,22 +188,24 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
 
 
 def _build_case_model(work: Work, number: int):
-    """Return the model of a case with the shared meshes, or the error of its scene."""
+    """Return the model of a case with the shared meshes, or the validation error of its scene."""
     try:
-        model = work.sweep_scene.model(work.cases.sets(number), work.cases.values(number))
+        model = work.sweep_scene.build_model(
+            work.cases.assignments(number), work.cases.values(number)
+        )
     except PatchfemError as error:
         return error
     return model if work.meshes is None else work.meshes.with_shared_meshes(model)
 
 
-def choose_meshes(work: Work) -> Work:
-    """Choose the meshes that all cases share, and return the work data with these meshes.
+def choose_shared_meshes(work: Work) -> Work:
+    """Return the data of a sweep with meshes that are chosen for all cases together.
 
-    Cases already computed are included.
+    Cases that are already computed are included in this choice.
     """
     if work.meshes is not None:
         return work
-    numbers = work.cases.spread_cases(MAX_MESH_CASES)
+    numbers = work.cases.spread_case_numbers(MAX_MESH_CASES)
     models = []
     for number in numbers:
         models.append(_build_case_model(work, number))
@@ -212,10 +214,10 @@ def choose_meshes(work: Work) -> Work:
     return replace(work, meshes=SharedMeshes(models, len(numbers) == len(work.cases)))
 
 
-def _min_chunk_size(work: Work) -> int:
-    """Return the smallest number of cases of a chunk, for which a batch pays off.
+def _find_min_chunk_size(work: Work) -> int:
+    """Return the smallest number of cases per chunk for which a batch is efficient.
 
-    The time of fewer cases than a batch needs does not predict the time of many.
+    The time of a smaller chunk does not predict the time of a large one.
     """
     try:
         batch = batches.choose_batch(_build_case_model(work, 0), len(work.cases))
@@ -224,8 +226,8 @@ def _min_chunk_size(work: Work) -> int:
     return batch.together if work.keep is None and batch is not None else 1
 
 
-class Chunks:
-    """Remaining cases, in chunks of neighbours whose size follows from the measured time.
+class ChunkQueue:
+    """Queue of the remaining cases, in chunks whose size is adapted to the measured time.
 
     Parameters
     ----------
@@ -233,7 +235,7 @@ class Chunks:
         Numbers of the cases.
     workers : int
     min_size : int
-        Smallest number of cases of a chunk, if there is only one worker.
+        Smallest number of cases per chunk, used with a single worker.
     """
 
     def __init__(self, numbers: Sequence[int], workers: int, min_size: int = 1):
@@ -242,36 +244,35 @@ class Chunks:
         self.suspects: deque = deque()
         self.workers = max(workers, 1)
         self.deaths: dict[int, int] = {}
-        # This is the time of the last chunk per case; the first value is a guess.
+        # Elapsed time per case of the last chunk, with a guess before the first chunk.
         self.seconds_per_case = CHUNK_SECONDS
 
-    def take(self, *, idle: bool = True) -> list | None:
-        """Return the numbers of the next chunk of cases; None if there is none for now.
+    def take_chunk(self, *, is_idle: bool = True) -> list | None:
+        """Return the case numbers of the next chunk; None if none is available at present.
 
-        idle: whether no chunk is being computed. Only then is a case handed out that was in a chunk
-        that died, alone and after all others, because otherwise it would not be known which case
-        killed a worker.
+        Cases of failed chunks are returned last, and only if `is_idle`, that is, if no other chunk
+        is being computed. This identifies the case that kills a worker.
         """
         n_remaining = len(self.remaining)
         if not n_remaining:
-            return self.suspects.popleft() if self.suspects and idle else None
+            return self.suspects.popleft() if self.suspects and is_idle else None
         max_size = n_remaining
         if self.workers > 1:
-            # A chunk has at most half of the remaining cases per worker, so that the last chunks
-            # end at the same time.
+            # A chunk has at most half of the remaining cases per worker, so that all workers finish
+            # at about the same time.
             max_size = -(-n_remaining // (2 * self.workers))
         size = max(int(CHUNK_SECONDS / max(self.seconds_per_case, 1e-9)), self.min_size)
         size = max(1, min(size, MAX_CASES_PER_CHUNK, max_size))
         return [self.remaining.popleft() for _ in range(size)]
 
     def record_time(self, numbers: Sequence[int], seconds: float) -> None:
-        """Record the time [s] that a chunk took."""
+        """Record the elapsed time [s] of a chunk."""
         self.seconds_per_case = seconds / len(numbers)
 
     def record_death(self, numbers: Sequence[int]) -> list:
-        """Return the cases to abandon; split the other cases of a failed chunk into halves.
+        """Record the failure of a chunk: return the cases to abandon, and requeue the others in halves.
 
-        A case is abandoned if it was the only one of its chunk and has failed MAX_DEATHS times.
+        A case is abandoned if it was alone in its chunk and has failed MAX_DEATHS times.
         """
         for number in numbers:
             self.deaths[number] = self.deaths.get(number, 0) + 1
@@ -285,7 +286,7 @@ class Chunks:
 def iterate_chunks(
     work: Work, numbers: Sequence[int], executor, say: Callable | None = None
 ) -> Iterator[tuple]:
-    """Compute cases chunk by chunk and yield the results as they arrive.
+    """Compute cases chunk by chunk, and yield the results as they arrive.
 
     Parameters
     ----------
@@ -293,39 +294,39 @@ def iterate_chunks(
     numbers : sequence of int
         Numbers of the cases.
     executor : object
-        Has `workers` and run(work, take, say), which yields (chunk, seconds, result of `compute_chunk` or
-        Died) of every chunk that `take` returns until it returns None. If it has begin(work, count,
-        say), this is called before the meshes of all cases are chosen, and end() is called at the
-        end.
+        Has the attribute `workers` and the method run(work, next_chunk, say), which yields (chunk,
+        seconds, result of `compute_chunk` or WorkerDeath) until `next_chunk` returns None. The optional
+        method begin(work, count, say) is called before the shared meshes are chosen, and the optional
+        method end() at the end.
     say : callable, optional
         Takes a line of text.
 
     Yields
     ------
     tuple
-        (numbers, CaseResults or None, extras, seconds) of a chunk; `extras` is None for cases that
-        died.
+        (numbers, CaseResults or None, extras, seconds) of a chunk; `extras` is None for abandoned
+        cases.
     """
     if not len(numbers):
         return
     try:
         if hasattr(executor, "begin"):
             executor.begin(work, len(numbers), say)
-        work = choose_meshes(work)
-        # With several workers, only the workers import the code that `_min_chunk_size` needs to run
-        # a case.
-        min_size = _min_chunk_size(work) if executor.workers == 1 else 1
-        chunks = Chunks(work.cases.neighbours(numbers), executor.workers, min_size)
-        yield from _iterate_executor_results(chunks, executor.run(work, chunks.take, say))
+        work = choose_shared_meshes(work)
+        # With several workers, this process does not import the code that runs a case, which
+        # `_find_min_chunk_size` needs.
+        min_size = _find_min_chunk_size(work) if executor.workers == 1 else 1
+        chunks = ChunkQueue(work.cases.sort_by_pieces(numbers), executor.workers, min_size)
+        yield from _process_executor_results(chunks, executor.run(work, chunks.take_chunk, say))
     finally:
         if hasattr(executor, "end"):
             executor.end()
 
 
-def _iterate_executor_results(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
-    """Yield the results of the chunks that an executor has computed."""
+def _process_executor_results(chunks: ChunkQueue, done: Iterator) -> Iterator[tuple]:
+    """Yield the results of finished chunks, and requeue the cases of failed chunks."""
     for chunk, seconds, answer in done:
-        if not isinstance(answer, Died):
+        if not isinstance(answer, WorkerDeath):
             chunks.record_time(chunk, seconds)
             yield chunk, *answer, seconds
             continue
@@ -338,34 +339,34 @@ def _iterate_executor_results(chunks: Chunks, done: Iterator) -> Iterator[tuple]
 
 
 class RemainingTime:
-    """Estimator of the remaining time of a sweep from its finished chunks.
+    """Estimator of the remaining time of a sweep from the times of its finished chunks.
 
-    The weight of a chunk halves with every later chunk. total: number of cases.
+    The weight of a chunk is halved by every later chunk. `total` is the number of cases.
     """
 
     def __init__(self, total: int, workers: int):
-        self.left = total
+        self.n_remaining = total
         self.workers = max(workers, 1)
         self.chunks = 0
         self.work = 0.0
         self.cases = 0.0
 
     def __call__(self, count: int, seconds: float) -> float | None:
-        """Return the remaining time [s] after a chunk; None if it is not known yet.
+        """Return the remaining time [s] after a finished chunk; None if it is still unknown.
 
-        count: cases of the chunk; seconds: time that it took.
+        count: number of cases of the chunk; seconds: its elapsed time.
         """
-        self.left -= count
+        self.n_remaining -= count
         self.chunks += 1
-        # The first chunk of each worker includes imports and compilation.
+        # The first chunk of each worker is ignored, because it includes imports and compilation.
         if self.chunks > self.workers:
             self.work = self.work / 2 + seconds
             self.cases = self.cases / 2 + count
-        return self.left * self.work / self.cases / self.workers if self.cases else None
+        return self.n_remaining * self.work / self.cases / self.workers if self.cases else None
 
 
 def format_duration(seconds: float) -> str:
-    """Format a time [s] in seconds, minutes or hours."""
+    """Format a duration [s] in seconds, minutes or hours."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

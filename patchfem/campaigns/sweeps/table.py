@@ -1,7 +1,7 @@
-"""Cases of a sweep from a CSV file with a column per key and a case per row.
+"""Cases of a sweep from a CSV table with a column for each key and a row for each case.
 
-The unit of a key is in the header or in the cells. The tables that a sweep writes can be read as
-well.
+The unit of a key is given in the header or in the cells. The tables that a sweep writes are accepted
+as well.
 """
 
 from __future__ import annotations
@@ -18,25 +18,25 @@ from ...scene.axes import Axis, make_axis
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
-# First result column of a sweep.csv; it and the columns after it are ignored.
+# Name of the first result column of a sweep.csv; this and all later columns are ignored.
 OUTCOME_COLUMN = "outcome"
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
 def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
-    """Read the cases of a CSV file, and the mistakes in it.
+    """Read the cases of a CSV table, and its validation errors.
 
     Returns
     -------
     tuple
-        Cases, or None if there are mistakes, and a list of mistakes with file, line and key.
+        Cases, or None if there are errors, and a list of errors with file, line and key.
     """
     try:
         with (
             open_for_reading(path) as raw,
             io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file,
         ):
-            lines = _read_lines(file)
+            lines = _read_nonempty_lines(file)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         return None, [f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"]
     if len(lines) < 2:
@@ -48,8 +48,8 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     key_cells = header.cells
     if OUTCOME_COLUMN in key_cells:
         key_cells = key_cells[: key_cells.index(OUTCOME_COLUMN)]
-    heads = list(map(_HEAD.fullmatch, key_cells))
-    if not heads or not all(heads):
+    header_matches = list(map(_HEAD.fullmatch, key_cells))
+    if not header_matches or not all(header_matches):
         return None, [
             f"{path}:{header.number}: the first line must be a header such as `{HEADER}`, not "
             f"'{','.join(header.cells)[:80]}'"
@@ -62,7 +62,7 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
                 f"{path}:{line.number}: the line must have {n_columns} cells, as the header has, not "
                 f"{len(line.cells)}"
             )
-    keys = [head[1] for head in heads]
+    keys = [head[1] for head in header_matches]
     for key in dict.fromkeys(keys):
         if keys.count(key) > 1:
             mistakes.append(
@@ -71,7 +71,7 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     if mistakes:
         return None, mistakes
     axes = []
-    for column, head in enumerate(heads):
+    for column, head in enumerate(header_matches):
         key, unit = head.groups()
         cells = [(line.number, line.cells[column]) for line in lines]
         axis, wrong_cells = _parse_column(key, unit, cells)
@@ -81,25 +81,25 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
     return (None, mistakes) if mistakes else (Cases(tuple(axes), True), [])
 
 
-class _Line(NamedTuple):
-    """Line of a file: its number, from 1, and its cells."""
+class _TableLine(NamedTuple):
+    """Line of a CSV table: its number, counted from 1, and its cells."""
 
     number: int
     cells: list
 
 
-def _read_lines(file) -> list:
-    """Return the lines of a file that are not empty."""
+def _read_nonempty_lines(file) -> list:
+    """Return the lines of a CSV table that are not empty."""
     lines = []
     for number, row in enumerate(csv.reader(file), 1):
         cells = [cell.strip() for cell in row]
         if any(cells):
-            lines.append(_Line(number, cells))
+            lines.append(_TableLine(number, cells))
     return lines
 
 
 def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
-    """Parse a column of (line, cell) to an axis, with its mistakes as (line or 0, message)."""
+    """Parse a column of (line number, cell) pairs to an axis, or return its validation errors."""
     axes = {}
     mistakes = []
     for number, cell in cells:

@@ -85,8 +85,8 @@ def sweep_table(
         "command": sweep_command(sweep_scene, cases),
         "scene": sweep_scene.text,
         "first": sweep_scene.of,
-        "grid": not cases.rows,
-        "drawn": cases.drawn,
+        "grid": not cases.is_table,
+        "drawn": cases.is_random,
         "keys": columns,
         "measures": measures,
         "outcome": [str(outcome) for outcome in results.outcome],
@@ -98,14 +98,14 @@ def sweep_table(
 def key_columns(cases: Cases) -> list:
     """Return the swept keys, each with its values in SI and as written in every case."""
     all_cases = np.arange(len(cases))
-    places = (
-        [all_cases] * len(cases.axes) if cases.rows else np.unravel_index(all_cases, cases.shape)
-    )
+    places = [all_cases] * len(cases.axes)
+    if not cases.is_table:
+        places = np.unravel_index(all_cases, cases.shape)
     return [
         {
             "name": axis.key,
             "unit": axis.unit or "1",
-            "texts": axis.texts if cases.rows else [axis.texts[k] for k in place],
+            "texts": axis.texts if cases.is_table else [axis.texts[k] for k in place],
             "values": axis_numbers(axis.values)[place],
             "log": suits_log_axis(axis.values),
         }
@@ -184,8 +184,8 @@ def sweep_command(sweep_scene: SweepScene, cases: Cases) -> str:
         *(word for assignment in sweep_scene.sets for word in ("--set", assignment)),
         *(("--of", sweep_scene.of) if sweep_scene.of else ()),
     ]
-    if cases.rows:
-        return shlex.join([*words, *(cases.words or REPEAT_WORDS)])
+    if cases.is_table:
+        return shlex.join([*words, *(cases.request_arguments or REPEAT_WORDS)])
     return shlex.join(
         [
             *words,

@@ -90,7 +90,7 @@ def sweep_into(
     """
     is_shard = place.shard is not None
     keep = place.kept_files(len(cases))
-    with Folder(place.target, cases.names(sweep_scene), is_shard) as folder:
+    with Folder(place.target, cases.compute_hashes(sweep_scene), is_shard) as folder:
         if place.resume:
             folder.refuse_another(sweep_identity(sweep_scene, cases))
             if folder.chunks.others and folder.is_complete() and say is not None:
@@ -146,7 +146,7 @@ def sweep_into(
 
 def sweep_identity(sweep_scene: SweepScene, cases: Cases) -> dict:
     """Return scene (as a hash) and keys of a sweep, by which `--resume` recognises it."""
-    return {"scene": sweep_scene.digest(), "keys": [axis.key for axis in cases.axes]}
+    return {"scene": sweep_scene.hash_common_data(), "keys": [axis.key for axis in cases.axes]}
 
 
 def _left_out(count: int) -> str:
@@ -225,7 +225,7 @@ def _compute_cases(
             writer.put(chunk, results, texts)
         seconds_left = clock(len(chunk), seconds)
         if report_progress is not None:
-            report_progress(numbers.size - clock.left, seconds_left)
+            report_progress(numbers.size - clock.n_remaining, seconds_left)
     return dead_cases
 
 
@@ -277,7 +277,7 @@ def collect_shards(
     Missing
         If cases have no result yet.
     """
-    with Folder(target, cases.names(sweep_scene)) as folder:
+    with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
         results = folder.answers(CaseResults.blank(len(cases), folder.target))
         missing = int(np.sum(results.outcome == ""))
         if missing:

@@ -173,16 +173,16 @@ def table_contents(
     -------
     netcdf.Contents
     """
-    dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
+    dims = ("case",) if cases.is_table else tuple(axis.name for axis in cases.axes)
     coordinates = {
         axis.name: (
-            "case" if cases.rows else axis.name,
+            "case" if cases.is_table else axis.name,
             _to_array(axis.values),
             _key_attributes(axis),
         )
         for axis in cases.axes
     }
-    if cases.rows:
+    if cases.is_table:
         coordinates["case"] = (
             "case",
             np.arange(len(cases)),
@@ -225,8 +225,8 @@ def _file_attributes(sweep_scene: SweepScene, cases: Cases, answer: str) -> dict
         "scene_file": sweep_scene.path.name,
         "sets": json.dumps(list(sweep_scene.sets)),
         "answer": answer,
-        "drawn": int(cases.drawn),
-        "words": json.dumps(list(cases.words)),
+        "drawn": int(cases.is_random),
+        "words": json.dumps(list(cases.request_arguments)),
         **shared_facts(sweep_scene, cases),
         "scene_sha256": hashlib.sha256(sweep_scene.text.encode()).hexdigest(),
         "versions": json.dumps(package_versions()),
@@ -240,7 +240,7 @@ def shared_facts(sweep_scene: SweepScene, cases: Cases) -> dict:
     """
     for number in range(min(len(cases), MAX_CASES_TRIED)):
         try:
-            tables = tomllib.loads(sweep_scene.scene(cases.sets(number)).resolved())
+            tables = tomllib.loads(sweep_scene.read_scene(cases.assignments(number)).resolved())
             break
         except PatchfemError:  # this case has no model
             continue

@@ -31,7 +31,7 @@ def test_exact_cases_are_all_combinations():
         3,
         2,
     )
-    assert cases.sets(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
+    assert cases.assignments(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
 
 
 def test_exact_combined_cases_equal_direct_product():
@@ -42,9 +42,9 @@ def test_exact_combined_cases_equal_direct_product():
 
 def test_exact_rows_are_combined_with_axes():
     """Rows of a table are combined with every value of an axis."""
-    rows = replace(make_cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), rows=True)
+    rows = replace(make_cases("normal.load=1 N,2 N", "friction.static=0.3,0.4"), is_table=True)
     cases = combine_cases([rows, make_cases("slide.speed=1 mm/s,2 mm/s")])
-    assert cases.rows and cases.shape == (4,)
+    assert cases.is_table and cases.shape == (4,)
     assert [cases.texts(number) for number in range(4)] == [
         ("1 N", "0.3", "1 mm/s"),
         ("1 N", "0.3", "2 mm/s"),
@@ -56,17 +56,21 @@ def test_exact_rows_are_combined_with_axes():
 def test_exact_case_name_depends_on_values_only():
     """The name of a case depends on its values, not on their order, their units or the other cases."""
     scene = SweepScene(Path("a.toml"), BENCH)
-    names = make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").names(scene).tolist()
+    names = (
+        make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2").compute_hashes(scene).tolist()
+    )
     assert len(set(names)) == 4
-    reordered = make_cases("friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN").names(scene)
+    reordered = make_cases(
+        "friction.static=0.1,0.2", "normal.load=1000e-3 N,0.002 kN"
+    ).compute_hashes(scene)
     assert reordered.tolist() == [names[0], names[2], names[1], names[3]]
-    assert set(make_cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").names(scene)) & set(
-        names
-    ) == set(names[:2])
+    assert set(
+        make_cases("normal.load=1 N,3 N", "friction.static=0.1,0.2").compute_hashes(scene)
+    ) & set(names) == set(names[:2])
     swept = BENCH + '[sweep]\n"normal.load" = "1 N"\n'
     assert (
         make_cases("normal.load=1 N,2 N", "friction.static=0.1,0.2")
-        .names(SweepScene(Path("a.toml"), swept))
+        .compute_hashes(SweepScene(Path("a.toml"), swept))
         .tolist()
         == names
     )
@@ -75,20 +79,22 @@ def test_exact_case_name_depends_on_values_only():
 def test_exact_cases_with_same_pieces_are_neighbours():
     """Cases with the same pieces are computed one after another."""
     cases = make_cases("contact.load=1 N,2 N,3 N", "contact.height=1 mm,2 mm")
-    assert cases.neighbours(range(6)) == [0, 2, 4, 1, 3, 5]
-    assert make_cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").neighbours(range(4)) == [
+    assert cases.sort_by_pieces(range(6)) == [0, 2, 4, 1, 3, 5]
+    assert make_cases("contact.height=1 mm,2 mm", "contact.load=1 N,2 N").sort_by_pieces(
+        range(4)
+    ) == [
         0,
         1,
         2,
         3,
     ]
-    assert make_cases(*THREE).neighbours([3, 1, 2]) == [3, 1, 2]
+    assert make_cases(*THREE).sort_by_pieces([3, 1, 2]) == [3, 1, 2]
     cases = make_cases(
         "drive.acceleration=1 g,2 g", "contact.load=1 N,2 N", "contact.height=1 mm,2 mm"
     )
     # Cases with the same patch are adjacent.
-    assert cases.neighbours(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]
-    assert replace(make_cases("contact.height=1 mm,2 mm,3 mm"), rows=True).neighbours(
+    assert cases.sort_by_pieces(range(8)) == [0, 4, 2, 6, 1, 5, 3, 7]
+    assert replace(make_cases("contact.height=1 mm,2 mm,3 mm"), is_table=True).sort_by_pieces(
         [2, 0, 1]
     ) == [
         0,
@@ -103,16 +109,17 @@ def test_exact_cases_with_shared_mesh_are_named_by_sweep():
     chosen = SweepScene(Path("a.toml"), PATCH)
     one = make_cases("contact.load=1 N,2 N")
     two = make_cases("contact.load=1 N,3 N")
-    assert one.names(pinned)[0] == two.names(pinned)[0]
-    assert one.names(chosen)[0] != two.names(chosen)[0]
+    assert one.compute_hashes(pinned)[0] == two.compute_hashes(pinned)[0]
+    assert one.compute_hashes(chosen)[0] != two.compute_hashes(chosen)[0]
     assert (
-        one.names(chosen).tolist()
-        == make_cases("contact.load=2 N,1e-3 kN").names(chosen)[::-1].tolist()
+        one.compute_hashes(chosen).tolist()
+        == make_cases("contact.load=2 N,1e-3 kN").compute_hashes(chosen)[::-1].tolist()
     )
     sets = SweepScene(Path("a.toml"), PATCH, ("contact.element_size=1 mm",))
-    assert one.names(sets)[0] == two.names(sets)[0]
+    assert one.compute_hashes(sets)[0] == two.compute_hashes(sets)[0]
     sizes = [
-        make_cases(f"contact.element_size=1 mm,{other} mm").names(chosen)[0] for other in (2, 3)
+        make_cases(f"contact.element_size=1 mm,{other} mm").compute_hashes(chosen)[0]
+        for other in (2, 3)
     ]
     assert sizes[0] == sizes[1]  # each case sets its own element size
 
@@ -126,9 +133,12 @@ def test_exact_case_name_depends_on_file_content(tmp_path):
     cases = make_cases("normal.load=1 N")
     asked_beside = SweepScene(tmp_path / "a.toml", BENCH)
     beside = make_cases("slide.file=path.csv")
-    before = cases.names(scene), beside.names(asked_beside)
+    before = cases.compute_hashes(scene), beside.compute_hashes(asked_beside)
     path.write_text("time [s],displacement [m]\n0,0\n1,2e-6\n")
-    assert cases.names(scene)[0] != before[0][0] and beside.names(asked_beside)[0] != before[1][0]
+    assert (
+        cases.compute_hashes(scene)[0] != before[0][0]
+        and beside.compute_hashes(asked_beside)[0] != before[1][0]
+    )
 
 
 def test_exact_case_equals_scene_with_settings():
@@ -139,7 +149,7 @@ def test_exact_case_equals_scene_with_settings():
         BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n',
     ):
         for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
-            case = SweepScene(Path("a.toml"), text).scene(sets)
+            case = SweepScene(Path("a.toml"), text).read_scene(sets)
             want = loads(BENCH, "a.toml", sets)
             assert case.tables() == want.tables() and case.sweep == () and case.kind == want.kind
 
@@ -149,13 +159,13 @@ def test_always_spread_cases_contain_axis_ends():
     cases = make_cases(
         "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
     )
-    some = cases.spread_cases(100)
+    some = cases.spread_case_numbers(100)
     assert len(set(some)) == len(some)
     assert 50 < len(some) <= 100
     assert all(0 <= one < len(cases) for one in some)
     for axis, size in enumerate(cases.shape):
-        assert {0, size - 1} <= {cases.places(one)[axis] for one in some}
-    assert cases.spread_cases(720) == list(range(720))
+        assert {0, size - 1} <= {cases.axis_indices(one)[axis] for one in some}
+    assert cases.spread_case_numbers(720) == list(range(720))
 
 
 def test_exact_common_mistake_is_reported_once():

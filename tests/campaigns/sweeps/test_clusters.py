@@ -13,7 +13,7 @@ from scene_texts import BENCH
 
 from patchfem.campaigns import Cases, SweepScene, Work, environment_versions
 from patchfem.campaigns.sweeps.executors import cluster
-from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer
+from patchfem.campaigns.sweeps.executors.cluster import Cluster, _compute_on_worker
 from patchfem.campaigns.sweeps.sweep import compute_chunk
 from patchfem.core import Missing
 from patchfem.scene import read_axes
@@ -52,12 +52,12 @@ def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
     there = make_work(scene_path, BY_FILE)
     mine = environment_versions(work)
     monkeypatch.chdir(scene_path.parents[1] / "there")
-    _, (found, _) = _answer(there, [0, 1, 2], (mine, Path("bench.toml")))
+    _, (found, _) = _compute_on_worker(there, [0, 1, 2], (mine, Path("bench.toml")))
     assert found.messages == want.messages and len(want.messages) == 1
     assert found.values["friction_work"].tolist()[:2] == want.values["friction_work"].tolist()[:2]
     assert Path.cwd().name == "there"
     (scene_path.parent / "path.csv").write_text(PATH.replace("5", "6"))
-    assert _answer(there, [0], (mine, Path("bench.toml")))["files"] != mine["files"]
+    assert _compute_on_worker(there, [0], (mine, Path("bench.toml")))["files"] != mine["files"]
 
 
 class FailedFuture:
@@ -90,8 +90,8 @@ def test_always_worker_differences_are_named():
         here._worker_error(AttributeError("no own_of"), mine)
     )
     with pytest.raises(Missing, match="the connection to the scheduler is lost"):
-        here._report_death(FailedFuture("cancelled"))
-    assert "OSError: no" in here._report_death(FailedFuture("error", OSError("no")))[1].reason
+        here._make_failed_result(FailedFuture("cancelled"))
+    assert "OSError: no" in here._make_failed_result(FailedFuture("error", OSError("no")))[1].reason
 
 
 SEEN = []
@@ -123,7 +123,9 @@ def test_refuses_worker_with_other_version(monkeypatch):
             Cluster(one.scheduler.address)
         with pytest.raises(Missing, match=message):
             list(
-                ready.run(make_work(Path("a.toml")), lambda idle=True: left.pop() if left else None)
+                ready.run(
+                    make_work(Path("a.toml")), lambda is_idle=True: left.pop() if left else None
+                )
             )
 
 
@@ -185,11 +187,13 @@ def test_always_local_cluster_serves_no_web_pages():
     """A local cluster listens only on 127.0.0.1 and serves no web pages."""
     one = Cluster("", 1)
     try:
-        places = [held.getsockname() for held in one.own.scheduler.http_server._sockets.values()]
+        places = [
+            held.getsockname() for held in one.local_cluster.scheduler.http_server._sockets.values()
+        ]
         assert {place[0] for place in places} == {"127.0.0.1"}
         for page in ("status", "info/main/workers.html", "json/counts.json", "health"):
             with pytest.raises(urllib.error.HTTPError, match="404"):
                 urllib.request.urlopen(f"http://127.0.0.1:{places[0][1]}/{page}", timeout=10)
     finally:
         one.client.close()
-        one.own.close()
+        one.local_cluster.close()

@@ -88,7 +88,7 @@ def are_identical(a, b) -> bool:
 def model_or_reason(sweep_scene: SweepScene, sets: tuple, values: tuple):
     """Return the model of a case, or the message of the error that prevents it."""
     try:
-        return sweep_scene.model(sets, values)
+        return sweep_scene.build_model(sets, values)
     except PatchfemError as error:
         return str(error)
 
@@ -252,7 +252,7 @@ def test_exact_columns_of_similar_models_agree_with_each_model(name):
         )
         keys = [key for key in keys if name in OF_LAW.get(key.rpartition(".")[2], name)] or KEYS[:1]
         values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
-        models = sweep_scene.similar_models(
+        models = sweep_scene.make_similar_models(
             keys, values, partial(format_case, keys, values), np.arange(7)
         )
         single_models = list(models)
@@ -288,7 +288,7 @@ def test_exact_derived_models_follow_a_changed_load(monkeypatch):
     sets = ("normal.load=3 N",)
     values = (3.0,)
     assert sweep_scene._derive_model(sets, values) is not None
-    assert sweep_scene.model(sets, values).point.load == 6.0
+    assert sweep_scene.build_model(sets, values).point.load == 6.0
     assert are_identical(
         model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
     )

@@ -6,7 +6,13 @@ import pytest
 from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
 from patchfem import plan
-from patchfem.campaigns import Request, SweepScene, contradictions, estimate_sweep, read_cases
+from patchfem.campaigns import (
+    Request,
+    SweepScene,
+    estimate_sweep,
+    read_cases,
+    warn_of_invalid_cases,
+)
 from patchfem.campaigns.sweeps.estimate import SWEEP_SECONDS
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.export import SweepTarget, sweep_into
@@ -24,7 +30,7 @@ def test_exact_sweep_time_is_sum_of_cases(text, over):
     scene = SweepScene(Path("a.toml"), text)
     cases = read_cases(scene, Request([over]))
     estimate = estimate_sweep(scene, cases)
-    plans = [plan(scene.model(cases.sets(number))) for number in range(3)]
+    plans = [plan(scene.build_model(cases.assignments(number))) for number in range(3)]
     seconds = [one.seconds for one in plans]
     margin = 0.05  # time [s] for the work that no plan contains
     assert (
@@ -105,7 +111,7 @@ def test_exact_contradiction_in_part_of_range_is_reported(more, count, of, helps
         scene,
         Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True),
     )
-    message = contradictions(scene, cases)
+    message = warn_of_invalid_cases(scene, cases)
     assert message.startswith(f"{of} will fail: a.toml:" if of else "")
     assert bool(message) == bool(of)
     assert helps in message

@@ -26,7 +26,7 @@ from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, Chunks
+from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, ChunkQueue
 from patchfem.core import Missing, PatchfemError
 from patchfem.export import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
@@ -99,9 +99,9 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
 
 def test_exact_chunks_contain_each_case_once():
     """The chunks contain every case exactly once."""
-    chunks = Chunks(range(1000), 2)
+    chunks = ChunkQueue(range(1000), 2)
     seen = []
-    while (chunk := chunks.take()) is not None:
+    while (chunk := chunks.take_chunk()) is not None:
         seen += chunk
         chunks.record_time(chunk, 0.01 * len(chunk))
     assert seen == list(range(1000))
@@ -109,12 +109,12 @@ def test_exact_chunks_contain_each_case_once():
 
 def test_exact_chunk_size_follows_time_per_case():
     """The size of a chunk follows the measured time per case."""
-    chunks = Chunks(range(1000), 2)
-    assert len(chunks.take()) == 1
+    chunks = ChunkQueue(range(1000), 2)
+    assert len(chunks.take_chunk()) == 1
     chunks.record_time([0], 0.02)
-    assert len(chunks.take()) == 50  # chunks of one second
+    assert len(chunks.take_chunk()) == 50  # chunks of one second
     chunks.record_time([0], 1e-6)
-    assert len(chunks.take()) == 238  # a quarter of the remaining cases for two workers
+    assert len(chunks.take_chunk()) == 238  # a quarter of the remaining cases for two workers
 
 
 def test_exact_batched_cases_are_given_in_full_batches():
@@ -126,10 +126,14 @@ def test_exact_batched_cases_are_given_in_full_batches():
         len(next(iterate_chunks(one, range(len(one.cases)), IdleExecutor()))[0])
         for one in (few, many, with_kept_runs)
     ] == [1, 300, 1]
-    chunks = Chunks(range(200), 1, 64)
-    chunks.take()
+    chunks = ChunkQueue(range(200), 1, 64)
+    chunks.take_chunk()
     chunks.record_time(range(64), 640.0)
-    assert len(chunks.take()) == 64 and len(chunks.take()) == 64 and len(chunks.take()) == 8
+    assert (
+        len(chunks.take_chunk()) == 64
+        and len(chunks.take_chunk()) == 64
+        and len(chunks.take_chunk()) == 8
+    )
 
 
 class IdleExecutor:
@@ -144,22 +148,28 @@ class IdleExecutor:
 
 def test_exact_failed_case_is_retried_last():
     """A case that killed its worker is retried alone after all others, and then given up."""
-    chunks = Chunks(range(3), 1)
-    assert chunks.take() == [0] and chunks.record_death([0]) == [] and chunks.take() == [1]
-    chunks.take()
-    assert chunks.take(idle=False) is None and chunks.take() == [0] and chunks.take() is None
+    chunks = ChunkQueue(range(3), 1)
+    assert (
+        chunks.take_chunk() == [0] and chunks.record_death([0]) == [] and chunks.take_chunk() == [1]
+    )
+    chunks.take_chunk()
+    assert (
+        chunks.take_chunk(is_idle=False) is None
+        and chunks.take_chunk() == [0]
+        and chunks.take_chunk() is None
+    )
     assert chunks.record_death([0]) == []
-    assert chunks.take() == [0]
+    assert chunks.take_chunk() == [0]
     assert chunks.record_death([0]) == [0]
-    assert chunks.take() is None
+    assert chunks.take_chunk() is None
 
 
 def test_exact_failed_chunk_is_bisected():
     """A chunk of 1000 cases with a failing case is bisected into at most 10 chunks of the others."""
-    chunks = Chunks(range(1000), 1, 1000)
+    chunks = ChunkQueue(range(1000), 1, 1000)
     attempts = []
     lost = []
-    while (chunk := chunks.take()) is not None:
+    while (chunk := chunks.take_chunk()) is not None:
         attempts.append(chunk)
         lost += chunks.record_death(chunk) if 617 in chunk else []
     assert lost == [617] and [617] in attempts
@@ -175,7 +185,7 @@ def test_exact_remaining_time_after_first_chunks():
         clock(1, 7.0) is None and clock(1, 9.0) is None
     )  # The first chunk of each worker also loads code.
     assert clock(998, 9.98) == pytest.approx(15.0)  # 3000 cases of 10 ms on two workers
-    assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.left == 2000
+    assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.n_remaining == 2000
 
 
 def test_exact_cluster_equals_local_executor():

@@ -9,7 +9,7 @@ from scene_texts import PATCH
 from patchfem.campaigns import Cases, SweepScene, Work, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
-from patchfem.campaigns.sweeps.sweep import choose_meshes
+from patchfem.campaigns.sweeps.sweep import choose_shared_meshes
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_axes
 
@@ -21,8 +21,8 @@ WORK = Work(
 
 def test_exact_meshes_are_chosen_once_for_all_cases():
     """The mesh of a sweep is chosen once and stored with its work."""
-    work = choose_meshes(WORK)
-    assert choose_meshes(work) is work and len(work.meshes.meshes) == 1
+    work = choose_shared_meshes(WORK)
+    assert choose_shared_meshes(work) is work and len(work.meshes.meshes) == 1
 
 
 @pytest.mark.slow
@@ -36,7 +36,7 @@ def test_exact_early_processes_use_the_chosen_meshes():
     )
     pool = Pool(2)
     joined = join_case_results(4, [part[:2] for part in iterate_chunks(WORK, range(4), pool)])
-    assert pool.ready == [] and joined.numerics == local.numerics
+    assert pool.waiting_workers == [] and joined.numerics == local.numerics
     for name, values in local.values.items():
         np.testing.assert_allclose(joined.values[name], values, rtol=1e-9)
 
@@ -45,6 +45,6 @@ def test_exact_processes_are_at_most_as_many_as_cases():
     """A pool starts at most as many processes as there are cases."""
     pool = Pool(3)
     pool.begin(WORK, 2)
-    assert len(pool.ready) == 2
+    assert len(pool.waiting_workers) == 2
     pool.end()
-    assert not pool.ready
+    assert not pool.waiting_workers

@@ -21,7 +21,7 @@ def test_exact_units_in_header_or_cells_are_read(tmp_path):
             "26,1 mrad,0.3,coulomb\n\n10,2e-3 rad,0.3,tanh\n",
         )
     )
-    assert mistakes == [] and cases.rows and len(cases) == 2
+    assert mistakes == [] and cases.is_table and len(cases) == 2
     assert cases.texts(0) == ("26 lbf", "1 mrad", "0.3", "coulomb")
     load, tilt, static, law = cases.axes
     assert load.values == (115.653761996773, 44.482216152605) and load.unit == "N"

@@ -1,8 +1,8 @@
 """Executors that compute the chunks of a sweep: in this process, in several, or with Dask.
 
-Each has `workers` and `run(work, take, say)`, which yields (chunk, seconds, answer or Died) of
-every chunk that `take` returns; the answer is the result of `sweep.compute_chunk`. `make_executor`
-returns an executor by its name.
+Each executor has the attribute `workers` and the method `run(work, next_chunk, say)`. The method yields
+(chunk, seconds, answer) for every chunk that `next_chunk` returns, where the answer is the result of
+`sweep.compute_chunk` or a WorkerDeath. `make_executor` returns an executor by its name.
 
 Read `LocalExecutor` first.
 """
@@ -10,33 +10,33 @@ Read `LocalExecutor` first.
 from collections.abc import Callable, Iterator
 
 from ....core import PatchfemError
-from ..sweep import Work, compute_timed
+from ..sweep import Work, compute_chunk_with_time
 from . import cluster, pool
 
 
 class LocalExecutor:
-    """Executor that computes chunks one after the other in this process."""
+    """Executor that computes the chunks of a sweep sequentially in this process."""
 
     workers = 1
 
-    def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Compute the chunks of cases that the callback `take` supplies.
+    def run(self, work: Work, next_chunk: Callable, say: Callable | None = None) -> Iterator[tuple]:
+        """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
         work : Work
-        take : callable
-            Returns the next chunk, or None.
+        next_chunk : callable
+            Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional
-            Takes a line of text.
+            Called with a line of text.
 
         Yields
         ------
         tuple
             Chunk, seconds, and the result of `compute_chunk`.
         """
-        while (chunk := take()) is not None:
-            yield chunk, *compute_timed(work, chunk, say)
+        while (chunk := next_chunk()) is not None:
+            yield chunk, *compute_chunk_with_time(work, chunk, say)
 
 
 def make_executor(name: str = "", jobs: int = 1):
@@ -45,8 +45,8 @@ def make_executor(name: str = "", jobs: int = 1):
     Parameters
     ----------
     name : str
-        "" for processes of this machine, "dask" for a Dask cluster that is started here,
-        "dask:ADDRESS" for that of a scheduler.
+        "" for processes on this machine, "dask" for a new Dask cluster on this machine,
+        "dask:ADDRESS" for the cluster of an existing scheduler.
     jobs : int
         Number of processes. For "", 1 means this process alone; for "dask", 1 means one process per
         core.
@@ -54,9 +54,9 @@ def make_executor(name: str = "", jobs: int = 1):
     Raises
     ------
     PatchfemError
-        For another name, or less than one process.
+        For an unknown name, or less than one process.
     Missing
-        If Dask is not installed or does not answer.
+        If Dask is not installed or its scheduler does not answer.
     """
     if jobs < 1:
         raise PatchfemError(f"-j {jobs}: the number of processes must be at least 1")

@@ -1,6 +1,6 @@
-"""Executor of a sweep on the workers of a Dask cluster.
+"""Executor that computes the cases of a sweep on the workers of a Dask cluster.
 
-The cluster is a local one, or that of a scheduler with an address.
+The cluster is started on this machine, or belongs to a scheduler at a given address.
 """
 
 from __future__ import annotations
@@ -18,33 +18,31 @@ import numpy as np
 
 from .... import __version__
 from ....core import Missing, PatchfemError
-from ..sweep import Died, Work, compute_timed, write_or_return
+from ..sweep import Work, WorkerDeath, compute_chunk_with_time, output_results
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
-CHUNKS_PER_WORKER = (
-    # number of chunks a worker holds besides the present one, so that it never waits for the next
-    2
-)
-CONNECT_TIMEOUT = "10s"  # Longest time to wait for the scheduler.
+# Number of chunks that are assigned to each worker, so that it does not wait for the next one.
+CHUNKS_PER_WORKER = 2
+CONNECT_TIMEOUT = "10s"  # Longest time to wait for a connection to the scheduler.
 
 
 class Cluster:
-    """Executor that computes chunks on the workers of a Dask cluster.
+    """Executor that computes the chunks of a sweep on the workers of a Dask cluster.
 
     Parameters
     ----------
     address : str
         Address of the scheduler; "" to start a cluster on this machine.
     workers : int
-        Number of processes of such a cluster; 0 for one per core.
+        Number of processes of a new cluster; 0 for one per core.
 
     Raises
     ------
     Missing
         If Dask is not installed, no scheduler answers, or a worker has another version.
     PatchfemError
-        If TLS has no certificates.
+        If the certificates for TLS are missing.
     """
 
     def __init__(self, address: str = "", workers: int = 0):
@@ -55,12 +53,12 @@ class Cluster:
                 "--executor dask: the package dask.distributed is not installed; pip install "
                 '"patchfem[cluster]", or use -j N'
             ) from None
-        self.own = None
+        self.local_cluster = None
         if not address:
             import dask
 
-            # The sweep counts repeated attempts itself. The profile of a worker, which nobody
-            # reads, would take a third of the time in which a chunk is sent and received.
+            # Dask must not repeat failed tasks, because `ChunkQueue` does this. The profiler of the
+            # workers is disabled because it takes a third of the transfer time of a chunk.
             dask.config.set(
                 {
                     "distributed.scheduler.allowed-failures": 0,
@@ -70,9 +68,9 @@ class Cluster:
                     "distributed.nanny.pre-spawn-environ.PYTHONSAFEPATH": 1,
                 }
             )
-            # The cluster has no dashboard and uses a port of this machine.
+            # The cluster has no dashboard and listens only on a port of this machine.
             scheduler_options = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
-            self.own = distributed.LocalCluster(
+            self.local_cluster = distributed.LocalCluster(
                 workers or os.cpu_count() or 1,
                 threads_per_worker=1,
                 processes=True,
@@ -80,7 +78,7 @@ class Cluster:
                 silence_logs="CRITICAL",
             )
         self.name = f"--executor dask{':' * bool(address)}{address}"
-        # The messages of these loggers are reported by this class.
+        # This class reports the errors that these loggers would print.
         loggers = (getLogger("tornado"), getLogger("asyncio"))
         for logger in (*getLogger("distributed").handlers, *loggers):
             logger.setLevel(CRITICAL)
@@ -92,7 +90,7 @@ class Cluster:
             )
         try:
             self.client = distributed.Client(
-                self.own or address, timeout=CONNECT_TIMEOUT, set_as_default=False
+                self.local_cluster or address, timeout=CONNECT_TIMEOUT, set_as_default=False
             )
         except (OSError, TimeoutError, ValueError) as error:
             raise Missing(f"{self.name}: no scheduler answers at this address ({error})") from None
@@ -103,21 +101,21 @@ class Cluster:
                 self.client.close()
                 raise self._worker_error(worker_versions, environment_versions())
 
-    def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Compute the chunks of cases that the callback `take` supplies.
+    def run(self, work: Work, next_chunk: Callable, say: Callable | None = None) -> Iterator[tuple]:
+        """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
         work : Work
-        take : callable
-            Returns the next chunk, or None.
+        next_chunk : callable
+            Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional
-            Takes a line of text.
+            Called with a line of text.
 
         Yields
         ------
         tuple
-            (chunk, seconds, answer or Died), as they come in.
+            (chunk, seconds, answer or WorkerDeath), in the order in which the chunks finish.
         """
         from distributed import as_completed
         from distributed.client import ClosedClientError
@@ -128,17 +126,17 @@ class Cluster:
             work, sweep_scene=replace(work.sweep_scene, path=Path(os.path.abspath(path)))
         )
         try:
-            # Dask repeats this task if all workers that store its result have died.
+            # Dask repeats this task if the workers that store its result die.
             shared = self.client.submit(_identity, shared_work, pure=False)
             ready = as_completed(loop=self.client.loop, with_results=True, raise_errors=False)
             pending = {}
             while True:
                 while len(pending) < CHUNKS_PER_WORKER * self.workers:
-                    chunk = take(idle=not pending)
+                    chunk = next_chunk(is_idle=not pending)
                     if chunk is None:
                         break
                     future = self.client.submit(
-                        _answer, shared, chunk, (versions, path), pure=False
+                        _compute_on_worker, shared, chunk, (versions, path), pure=False
                     )
                     pending[future] = chunk
                     ready.add(future)
@@ -149,34 +147,34 @@ class Cluster:
                 if isinstance(answer, dict):
                     raise self._worker_error(answer, versions)
                 if future.status != "finished":
-                    answer = self._report_death(future)
+                    answer = self._make_failed_result(future)
                 yield chunk, *answer
         except ClosedClientError:
             raise self._connection_error() from None
         finally:
             self.client.close()
-            if self.own is not None:
-                self.own.close()
+            if self.local_cluster is not None:
+                self.local_cluster.close()
 
     def _connection_error(self) -> Missing:
         """Return the error for a lost connection to the scheduler."""
         return Missing(f"{self.name}: the connection to the scheduler is lost")
 
-    def _worker_error(self, on_worker: dict | Exception, here: dict) -> Missing:
-        """Return the error for a worker that cannot compute the cases.
+    def _worker_error(self, on_worker: dict | Exception, local: dict) -> Missing:
+        """Return the error for a worker whose software or files do not match.
 
-        on_worker: versions of the worker, or the exception in place of them; here: those of this
+        on_worker: versions of the worker, or an exception instead; local: versions of this
         machine.
         """
         if isinstance(on_worker, Exception):
             reason = f"{type(on_worker).__name__}: {on_worker}"
             return Missing(
-                f"{self.name}: patchfem {here['patchfem']} is not installed on a worker ({reason})"
+                f"{self.name}: patchfem {local['patchfem']} is not installed on a worker ({reason})"
             )
-        names = [name for name in here if on_worker[name] != here[name] and name != "files"]
+        names = [name for name in local if on_worker[name] != local[name] and name != "files"]
         if names:
             other_versions = ", ".join(f"{name} {on_worker[name]}" for name in names)
-            own_versions = ", ".join(f"{name} {here[name]}" for name in names)
+            own_versions = ", ".join(f"{name} {local[name]}" for name in names)
             return Missing(
                 f"{self.name}: a worker has {other_versions}, but this machine has {own_versions}; install "
                 "the same version on all machines"
@@ -186,21 +184,21 @@ class Cluster:
             "files where all machines can read them"
         )
 
-    def _report_death(self, future) -> tuple:
-        """Return (0 s, Died) for a chunk whose worker died or failed.
+    def _make_failed_result(self, future) -> tuple:
+        """Return (0 s, WorkerDeath) for a chunk whose worker died or failed.
 
-        Missing if the connection to the scheduler is lost.
+        Raises Missing if the connection to the scheduler is lost.
         """
-        if future.status == "cancelled":  # Nothing in this process cancels a chunk.
+        if future.status == "cancelled":  # This process never cancels a task itself.
             raise self._connection_error()
         error = future.exception()
         kind = type(error).__name__
         reason = f"the worker of this case failed ({kind}: {error})"
-        return 0.0, Died("its worker died" if kind == "KilledWorker" else reason)
+        return 0.0, WorkerDeath("its worker died" if kind == "KilledWorker" else reason)
 
 
 @cache
-def _source() -> str:
+def _hash_source_files() -> str:
     """Return a hash of the source files of this package."""
     root = Path(__file__).parents[3]
     paths = root.rglob("*.py")
@@ -209,46 +207,46 @@ def _source() -> str:
 
 
 def environment_versions(work: Work | None = None) -> dict:
-    """Return the versions and file hashes that a worker must share with this process.
+    """Return the versions and file hashes that must be equal on a worker and in this process.
 
-    The versions are given by name, the hash of the scene with the files that it names as `files`.
+    Returns a dict of versions by name; `files` is the hash of the scene and the files that it names.
     """
     versions = {
-        "patchfem": f"{__version__} (sources {_source()})",
+        "patchfem": f"{__version__} (sources {_hash_source_files()})",
         "numpy": np.__version__,
         "python": "{}.{}".format(*sys.version_info),
     }
     if work is not None:
-        versions["files"] = work.sweep_scene.digest()
+        versions["files"] = work.sweep_scene.hash_common_data()
     return versions
 
 
 def _identity(work: Work) -> Work:
-    """Return the work unchanged; calling this function stores the work on the cluster."""
+    """Return the data of a sweep unchanged; a call as a Dask task stores them on the cluster."""
     return work
 
 
-def _answer(work: Work, chunk: list, origin: tuple) -> tuple | dict:
-    """Compute a chunk in a worker; return (CPU time [s], results).
+def _compute_on_worker(work: Work, chunk: list, origin: tuple) -> tuple | dict:
+    """Compute a chunk on a Dask worker; return (CPU time [s], results).
 
-    If the worker has another version or other files, it returns its `environment_versions` instead.
+    If the worker has other versions or files, its `environment_versions` are returned instead.
 
     Parameters
     ----------
     work : Work
     chunk : list
-        Numbers of cases.
+        Case numbers.
     origin : tuple
-        `environment_versions` of the process that runs the sweep, and the path of the scene there, which messages
-        must name.
+        `environment_versions` and scene path of the process that started the sweep; error messages
+        contain this path.
     """
     versions, path = origin
     worker_versions = environment_versions(work)
     if worker_versions != versions:
         return worker_versions
-    seconds, (results, extras) = compute_timed(replace(work, write=None), chunk)
+    seconds, (results, extras) = compute_chunk_with_time(replace(work, write=None), chunk)
     folder = f"{work.sweep_scene.path.parent}{os.sep}"
     origin_folder = str(path.parent / "_")[:-1]
     for case, text in results.messages.items():
         results.messages[case] = text.replace(folder, origin_folder)
-    return seconds, write_or_return(work, chunk, results, extras)
+    return seconds, output_results(work, chunk, results, extras)

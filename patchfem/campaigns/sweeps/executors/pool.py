@@ -1,8 +1,8 @@
-"""Executor with several processes of this machine, which replaces processes that die.
+"""Executor with several processes on this machine, which replaces processes that die.
 
-A death loses only the chunk of that process. The standard pools give up all chunks when one process
-dies, and run the script of the caller again if processes are spawned; therefore each worker is a
-new interpreter that is connected by a pipe.
+If a process dies, only its current chunk is lost. The standard pools of Python abandon all chunks in
+this case, and they run the main script of the caller again in spawned processes. Therefore each worker
+is a new interpreter that is connected by a pipe.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ....core import Missing
-from ..sweep import Died, Work
+from ..sweep import Work, WorkerDeath
 
 ONE_THREAD = {
     name: "1"
@@ -25,9 +25,8 @@ ONE_THREAD = {
 }
 PACKAGE = Path(__file__).parents[3]
 MODULE = __name__.rpartition(".")[0] + ".worker"
-# The worker imports this package from its file, and nothing from the current folder. The folder
-# that contains the package comes last in the path: it may be the folder in which all dependencies
-# were installed.
+# The worker imports this package from its file, and nothing from the current folder. The parent folder
+# of the package is appended to the path, because all dependencies may be installed there.
 WORKER_SCRIPT = f"""\
 import sys
 from importlib.util import module_from_spec, spec_from_file_location
@@ -41,15 +40,15 @@ main()
 
 
 class ComputedChunk(NamedTuple):
-    """Chunk of cases, the time [s] that it took, and its results, or Died."""
+    """Result of a chunk: its cases, its elapsed time [s], and its results or a WorkerDeath."""
 
     chunk: list
     seconds: float
-    answer: tuple | Died
+    answer: tuple | WorkerDeath
 
 
 class Worker:
-    """Worker process that computes chunks one after the other."""
+    """Worker process that computes chunks sequentially."""
 
     def __init__(self, work: Work, *, silent: bool = False):
         here, there = Pipe()
@@ -66,40 +65,40 @@ class Worker:
         self.process = subprocess.Popen(
             words, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, env=os.environ | ONE_THREAD
         )
-        there.close()  # The pipe then closes when the process dies.
+        there.close()  # The pipe is then closed by the death of the process.
         self.pipe: Connection = here
         self.chunk = None
         self.pipe.send(work)
 
     def send_work(self, work: Work) -> None:
-        """Send the common data of all cases, with their shared meshes, to the worker process."""
+        """Send the data of the sweep with the shared meshes to the worker process."""
         try:
             self.pipe.send(work)
         except OSError:
-            pass  # The process is dead; `receive` notices this once it has a chunk.
+            pass  # The process is dead, which `receive_result` detects once a chunk was sent.
 
     def send_chunk(self, chunk: list) -> None:
-        """Send the numbers of a chunk of cases to the worker process."""
+        """Send the case numbers of a chunk to the worker process."""
         self.chunk = chunk
         try:
             self.pipe.send(chunk)
         except OSError:
-            pass  # The process is dead, which `receive` notices next.
+            pass  # The process is dead, which `receive_result` detects next.
 
-    def receive(self) -> ComputedChunk:
-        """Receive the results of a chunk, or Died if the worker process died."""
+    def receive_result(self) -> ComputedChunk:
+        """Receive the results of the current chunk, or a WorkerDeath if the process died."""
         try:
             seconds, answer = self.pipe.recv()
         except (EOFError, OSError):
             seconds = 0.0
-            answer = Died(
-                f"the process that ran this case died ({_describe_status(self.process.wait())})"
+            answer = WorkerDeath(
+                f"the process that ran this case died ({_describe_exit_status(self.process.wait())})"
             )
         chunk = self.chunk
         self.chunk = None
         return ComputedChunk(chunk, seconds, answer)
 
-    def end(self) -> None:
+    def kill(self) -> None:
         """Kill the worker process."""
         self.pipe.close()
         self.process.kill()
@@ -107,19 +106,19 @@ class Worker:
 
 
 class Pool:
-    """Executor that computes chunks in several processes of this machine."""
+    """Executor that computes the chunks of a sweep in several processes on this machine."""
 
     def __init__(self, workers: int):
         self.workers = workers
-        self.ready = []
+        self.waiting_workers = []
 
     def begin(self, work: Work, count: int, say: Callable | None = None) -> None:
-        """Start the processes, which import their code while the shared meshes are chosen.
+        """Start worker processes in advance, so that they import their code while meshes are chosen.
 
         Parameters
         ----------
         work : Work
-            Common data of all cases, without these meshes.
+            Data of the sweep without the shared meshes.
         count : int
             Number of cases.
         say : callable, optional
@@ -127,63 +126,64 @@ class Pool:
         """
         self.end()
         for _ in range(min(self.workers, count)):
-            self.ready.append(_start_worker(work, silent=say is None))
+            self.waiting_workers.append(_start_worker(work, silent=say is None))
 
     def end(self) -> None:
-        """Kill the processes that wait for the shared meshes."""
-        while self.ready:
-            self.ready.pop().end()
+        """Kill the processes that still wait for the shared meshes."""
+        while self.waiting_workers:
+            self.waiting_workers.pop().kill()
 
-    def run(self, work: Work, take: Callable, say: Callable | None = None) -> Iterator[tuple]:
-        """Compute the chunks of cases that the callback `take` supplies.
+    def run(self, work: Work, next_chunk: Callable, say: Callable | None = None) -> Iterator[tuple]:
+        """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
         work : Work
-        take : callable
-            Returns the next chunk, or None.
+        next_chunk : callable
+            Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional
-            Takes a line of text.
+            Called with a line of text.
 
         Yields
         ------
         ComputedChunk
-            As they come in.
+            In the order in which the chunks finish.
         """
-        workers = self.ready
-        self.ready = []
+        workers = self.waiting_workers
+        self.waiting_workers = []
         try:
             for worker in workers:
                 worker.send_work(work)
             while True:
-                self._hand_out(workers, lambda: _start_worker(work, silent=say is None), take)
+                self._assign_chunks(
+                    workers, lambda: _start_worker(work, silent=say is None), next_chunk
+                )
                 busy = {worker.pipe: worker for worker in workers if worker.chunk is not None}
                 if not busy:
                     return
                 for pipe in wait(list(busy)):
                     worker = busy[pipe]
-                    computed = worker.receive()
-                    if isinstance(computed.answer, Died):
+                    computed = worker.receive_result()
+                    if isinstance(computed.answer, WorkerDeath):
                         workers.remove(worker)
-                        worker.end()
-                    elif (chunk := take()) is not None:
-                        # The worker receives its next chunk before the result is written, which
-                        # takes time.
+                        worker.kill()
+                    elif (chunk := next_chunk()) is not None:
+                        # The worker continues with its next chunk while the result is written.
                         worker.send_chunk(chunk)
                     yield computed
         finally:
             for worker in workers:
-                worker.end()
+                worker.kill()
 
-    def _hand_out(self, workers: list, start: Callable, take: Callable) -> None:
-        """Give every idle process a chunk, and start new processes while chunks remain."""
-        idle = [worker for worker in workers if worker.chunk is None]
-        while idle or len(workers) < self.workers:
-            chunk = take()
+    def _assign_chunks(self, workers: list, start: Callable, next_chunk: Callable) -> None:
+        """Assign chunks to all idle processes, and start new processes while chunks remain."""
+        idle_workers = [worker for worker in workers if worker.chunk is None]
+        while idle_workers or len(workers) < self.workers:
+            chunk = next_chunk()
             if chunk is None:
                 return
-            if idle:
-                worker = idle.pop(0)
+            if idle_workers:
+                worker = idle_workers.pop(0)
             else:
                 worker = start()
                 workers.append(worker)
@@ -191,7 +191,7 @@ class Pool:
 
 
 def _start_worker(work: Work, *, silent: bool) -> Worker:
-    """Start a worker process; Missing if the system refuses."""
+    """Start a worker process; raise Missing if the operating system refuses it."""
     try:
         return Worker(work, silent=silent)
     except OSError as error:
@@ -200,7 +200,7 @@ def _start_worker(work: Work, *, silent: bool) -> Worker:
         ) from None
 
 
-def _describe_status(status: int) -> str:
+def _describe_exit_status(status: int) -> str:
     """Describe the exit status of a worker process."""
     if status == -9:
         return "killed by a user, or for lack of memory"

@@ -1,4 +1,4 @@
-"""Worker process of the pool, which computes chunks from a pipe until the pipe is closed."""
+"""Main program of a worker process, which computes the chunks that arrive through a pipe."""
 
 import signal
 import sys
@@ -8,32 +8,32 @@ from .. import sweep
 
 
 def main() -> None:
-    """Compute the chunks of cases that arrive through a pipe.
+    """Compute the chunks that arrive through a pipe, until the pipe is closed.
 
-    The first word of the command line is the file descriptor of the pipe; a second word that is not
-    empty suppresses messages.
+    The first argument of the command line is the file descriptor of the pipe. A nonempty second
+    argument suppresses messages.
     """
-    # An interrupt is handled by the process that started the sweep.
+    # The process that started the sweep handles interrupts.
     for name in ("SIGINT", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
     pipe = Connection(int(sys.argv[1]))
     try:
         work = pipe.recv()
-        sweep.warm_up(work)
-        say = None if sys.argv[2] else _print_line
+        sweep.compile_for_first_case(work)
+        say = None if sys.argv[2] else _print_to_stderr
         while True:
             message = pipe.recv()
             if isinstance(message, sweep.Work):
-                # Here the data of all cases arrives again, now with the meshes that they share.
+                # The data of the sweep arrive a second time, now with the shared meshes.
                 work = message
             else:
-                pipe.send(sweep.compute_timed(work, message, say))
+                pipe.send(sweep.compute_chunk_with_time(work, message, say))
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        # The process that started the sweep has ended.
+        # The pipe is closed because the process that started the sweep has ended.
         return
 
 
-def _print_line(text: str) -> None:
-    """Print a line of text and flush the output."""
+def _print_to_stderr(text: str) -> None:
+    """Print a line of text to the standard error stream."""
     print(text, file=sys.stderr, flush=True)
