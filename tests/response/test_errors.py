@@ -79,7 +79,7 @@ def coverage_of_errors(count, seed, finest=12800):
         model = build(make_random_scene(rng))
         numerics = choose_numerics(model)
         runs = {
-            n: rig_march.run_march(model, replace(numerics, steps=n), None).values
+            n: rig_march.march_in_time(model, replace(numerics, steps=n), None).values
             for n in (400, 200, 100, finest)
         }
         errors = step_errors(runs[400], runs[200], runs[100], steps=400)

@@ -9,7 +9,7 @@ from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 from patchfem import build
 from patchfem.core import G_N, Outcome
 from patchfem.runs import choose_numerics
-from patchfem.runs.rig.march import run_march
+from patchfem.runs.rig.march import march_in_time
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -173,7 +173,7 @@ def test_exact_short_history_has_measures_of_full_history(text):
     model = build(loads(text))
     numerics = replace(choose_numerics(model), engine="march", steps=100)
     full_run, short_run = (
-        run_march(model, replace(numerics, whole=is_whole), None) for is_whole in (True, False)
+        march_in_time(model, replace(numerics, whole=is_whole), None) for is_whole in (True, False)
     )
     sums = {
         name: full_run.values[name]

@@ -213,10 +213,10 @@ class MotionObserver:
         if ENGINES[self.numerics.engine] is not MARCH:
             return _observe_solution(solve.solve(model, few, self.patch, 0, self.say))
 
-        contact, done, *_ = march.march_model(model, few, self.patch, 0, self.say)
+        contact, done, *_ = march.march_without_evaluation(model, few, self.patch, 0, self.say)
         if done.outcome in UNBOUNDED_OUTCOMES:
             return None
-        values = march.MarchReader(model, few, self.patch, contact).values(done)
+        values = march.MarchEvaluator(model, few, self.patch, contact).evaluate_measures(done)
         return _measure_motion(done.window, values)
 
 

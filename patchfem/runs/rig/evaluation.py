@@ -1,7 +1,7 @@
-"""Evaluation of the run of any engine: measures, stick, ringing, outcome and levels.
+"""Evaluation of a run of any engine: measures, stick, ringing, outcome and drive levels.
 
-In: a run of an engine. Out: its Solution. Engines override the methods of `Reader` for values
-that they know better than their samples.
+In: a run of an engine. Out: its Solution. Subclasses of `RunEvaluator` override the methods for
+quantities that their engine computes more accurately than from samples.
 """
 
 from dataclasses import replace
@@ -24,13 +24,14 @@ from ...response.measures import (
 from ...response.outcome import estimate_steady
 from ...response.rows import ROWS_NEEDING_RUN, LastCycles, compute_measures, find_definition
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
-from .solution import Solution, find_release_amplitude, mode_stiffness, normal_load
+from .solution import Solution, find_release_amplitude, first_interface_load, first_mode_stiffness
 
 
-class Reader:
-    """Evaluation of the runs of a model by one engine.
+class RunEvaluator:
+    """Evaluation of the runs of a model that one engine has computed.
 
-    The methods `integrated_measures` and `further_fields` return what an engine computes itself.
+    The base class computes all measures from samples of the histories. Subclasses return more
+    accurate values of their engine by `compute_integrated_measures` and `collect_cycle_data`.
 
     Parameters
     ----------
@@ -38,11 +39,11 @@ class Reader:
     numerics : Numerics
     patch : Patch or None
     contact : optional
-        Contact that the engine moves.
+        Contact model of the engine.
     held : float
-        Slip in a cycle [m] below which the interface sticks in it.
+        Largest slip per cycle [m] at which the interface counts as stuck.
     steps : int, optional
-        Samples per cycle; None: those of `numerics`.
+        Samples per cycle; default: the steps per cycle of `numerics`.
     """
 
     def __init__(
@@ -54,70 +55,70 @@ class Reader:
         self.contact = contact
         self.steps = steps or numerics.steps
         self.has_friction = model.friction is not None
-        # a law that creeps never sticks
+        # A law that creeps never sticks.
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.held = 0.0 if self.creeps else held
 
-    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
-        """Return the measures that the engine itself integrates over the last cycles.
+    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the measures that the engine integrates over the last cycles.
 
         Parameters
         ----------
         run
-            Run or mark.
+            Run of the engine, or its mark at the end of a drive level.
         drive
             Drive of the run.
         stuck : bool
-            Whether the interface sticks.
+            Whether the interface is stuck during the last cycles.
         """
         return IntegratedMeasures()
 
-    def loops(self, run, drive) -> tuple:
-        """Return the friction loops that the engine itself integrates."""
-        return self.integrated_measures(run, drive).loops
+    def find_friction_loops(self, run, drive) -> tuple:
+        """Return the friction loops that the engine integrates over the last cycles."""
+        return self.compute_integrated_measures(run, drive).loops
 
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return data that the engine knows more accurately than samples, as fields of `LastCycles`.
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+        """Return fields of `LastCycles` that the engine knows more accurately than from samples.
 
         Parameters
         ----------
         run, drive, stuck
-            See `integrated_measures`.
+            See `compute_integrated_measures`.
         """
         return {}
 
-    def values(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
+    def evaluate_measures(self, run, drive=None, ledger=None, *, stuck: bool = False) -> dict:
         """Compute the measures of a run from its last cycles.
 
         Parameters
         ----------
         run
-            Run or mark.
+            Run of the engine, or its mark at the end of a drive level.
         drive : optional
-            Drive, if it is not that of the model.
+            Drive of the run; default: that of the model.
         ledger : (4, k), optional
             See `LastCycles`.
         stuck : bool
-            Whether the interface sticks.
+            Whether the interface is stuck during the last cycles.
         """
         model = self.model
         drive = drive or model.rig.drive.signal
         fields = {
             "window": run.window,
             "book": run.ledger,
-            "integrated": self.integrated_measures(run, drive, stuck=stuck),
-            "run": self.whole_run(run, drive),
+            "integrated": self.compute_integrated_measures(run, drive, stuck=stuck),
+            "run": self.find_uniform_histories(run, drive),
         }
         if self.has_friction:
             fields |= {"by": reversal_evaluation(model), "ledger": ledger}
-        fields |= self.further_fields(run, drive, stuck=stuck)
+        fields |= self.collect_cycle_data(run, drive, stuck=stuck)
         window = fields["window"]
         n_cycles = min(self.numerics.window, len(run.amplitudes))
         last_cycles = LastCycles(
             drive=drive,
             extremes=run.amplitudes[-n_cycles:],
-            load=normal_load(model, self.patch),
-            stiffness=mode_stiffness(model, window),
+            load=first_interface_load(model, self.patch),
+            stiffness=first_mode_stiffness(model, window),
             sine=is_sinusoidal(drive),
             **fields,
         )
@@ -127,25 +128,25 @@ class Reader:
             values[name] = find_release_amplitude(window, drive.period, values[name])
         return values
 
-    def sticks(self, run) -> bool:
+    def is_stuck(self, run) -> bool:
         """Return whether all interfaces stick during the last cycles of a run."""
         if not self.has_friction or self.creeps:
             return False
-        if loops := self.loops(run, self.model.rig.drive.signal):
+        if loops := self.find_friction_loops(run, self.model.rig.drive.signal):
             limit = max(self.held, slip_round_off(run.window))
             return all(loop.slip_range / 2 <= limit for loop in loops)
         return run_events.is_all_stuck(run.window, self.held)
 
-    def rings(self, run, drive) -> tuple:
-        """Measure frequency and damping of the ringing during stick, with errors."""
+    def measure_ringing(self, run, drive) -> tuple:
+        """Measure frequency and damping of the free vibration during stick, with error estimates."""
         if not self.has_friction or self.creeps:
             return {}, {}
         return run_events.measure_ringing_in_sticks(
             run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held
         )
 
-    def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors of measures that the run states itself, except those of ringing.
+    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+        """Estimate the errors of the measures from the run itself, except those of ringing.
 
         Parameters
         ----------
@@ -158,15 +159,15 @@ class Reader:
         """
         return {}
 
-    def with_half_the_samples(self, run):
-        """Return a run with every second sample removed."""
+    def thin_run(self, run):
+        """Return a run without every second sample of its window."""
         return replace(run, window=thin_samples(run.window))
 
-    def sampling_errors(self, run, drive, values: dict) -> dict:
-        """Estimate the errors of the measures of an exact motion due to sampling.
+    def estimate_sampling_errors(self, run, drive, values: dict) -> dict:
+        """Estimate the errors of measures due to sampling of an exact motion.
 
-        The errors follow from the change with every second sample. Measures that the engine integrated
-        have no such error.
+        They follow from the changes when every second sample is removed. Measures that the engine
+        integrates have no such error.
 
         Parameters
         ----------
@@ -177,10 +178,10 @@ class Reader:
         values : dict
             Measures by name.
         """
-        if not self.loops(run, drive) and not hasattr(drive, "band"):
+        if not self.find_friction_loops(run, drive) and not hasattr(drive, "band"):
             return {}
         ledger = run.response.extra.get("ledger")
-        coarse_values = self.values(self.with_half_the_samples(run), drive, ledger)
+        coarse_values = self.evaluate_measures(self.thin_run(run), drive, ledger)
         errors = {}
         for name, change in absolute_change(values, coarse_values).items():
             if change > 0 and name not in ERROR_MEASURES:
@@ -189,11 +190,8 @@ class Reader:
                 errors[name] = error + row.sample_error / self.steps
         return errors
 
-    def whole_run(self, run, drive):
-        """Return the histories of all cycles, or None if they are not equally sampled.
-
-        None if they are not kept at equal steps.
-        """
+    def find_uniform_histories(self, run, drive):
+        """Return the histories of the whole run if they are uniformly sampled, otherwise None."""
         histories = getattr(run, "response", None)
         kept = (
             ROWS_NEEDING_RUN
@@ -202,11 +200,11 @@ class Reader:
         )
         return histories if kept and histories.time.size and histories.time[0] == 0 else None
 
-    def between_samples(self, run, drive, values: dict) -> dict:
+    def estimate_history_sampling_errors(self, run, drive, values: dict) -> dict:
         """Estimate the sampling errors of measures that depend on all cycles of a run.
 
-        The changes without the even and without the odd samples are added, because each reversal
-        has neighbours of one kind.
+        The changes without the even samples and without the odd samples are added, because the
+        neighbours of a reversal are all even or all odd.
 
         Parameters
         ----------
@@ -223,35 +221,38 @@ class Reader:
         errors = dict.fromkeys([row.name for row in rows], 0.0)
         for parity in (0, 1):
             thinned = replace(run, response=_thin_between_reversals(run.response, parity))
-            coarse_values = self.values(thinned, drive)
+            coarse_values = self.evaluate_measures(thinned, drive)
             for row in rows:
                 change = values[row.name] - coarse_values[row.name]
                 errors[row.name] += error_of_change(change, order=row.order)
         return errors
 
-    def solution_fields(self, run, drive) -> dict:
-        """Return fields of a Solution that only this engine provides."""
+    def collect_solution_fields(self, run, drive) -> dict:
+        """Return fields of the Solution that only this engine provides."""
         return {}
 
-    def solution(self, run, seconds: float, drive=None, **more) -> Solution:
-        """Evaluate a run and return it as a Solution.
+    def make_solution(self, run, seconds: float, drive=None, **more) -> Solution:
+        """Evaluate a run and return its Solution.
 
         Parameters
         ----------
         run
             Run of the engine.
         seconds : float
-            CPU seconds of the run.
+            CPU time of the run [s].
         drive : optional
-            Drive, if it is not that of the model.
+            Drive of the run; default: that of the model.
         more
-            Other fields of the Solution.
+            Further fields of the Solution.
         """
         drive = drive or self.model.rig.drive.signal
         n_cycles = self.numerics.window
-        stuck = self.sticks(run)
-        rings, ring_errors = self.rings(run, drive)
-        values = self.values(run, drive, run.response.extra.get("ledger"), stuck=stuck) | rings
+        stuck = self.is_stuck(run)
+        rings, ring_errors = self.measure_ringing(run, drive)
+        values = (
+            self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
+            | rings
+        )
         ends = window_end_values(run.amplitudes, run.phasors, n_cycles)
         fields = {
             "message": getattr(run, "message", ""),
@@ -259,7 +260,7 @@ class Reader:
             "snapshots": getattr(run, "snapshots", []),
             "steady": estimate_steady(drive, *ends),
         }
-        fields |= self.solution_fields(run, drive)
+        fields |= self.collect_solution_fields(run, drive)
         return Solution(
             values=values,
             response=run.response,
@@ -270,39 +271,39 @@ class Reader:
             seconds=seconds,
             contact=self.contact,
             held=self.held,
-            stated_errors=ring_errors
-            | self.stated_errors(run, drive, values)
-            | self.between_samples(run, drive, values),
+            run_errors=ring_errors
+            | self.estimate_run_errors(run, drive, values)
+            | self.estimate_history_sampling_errors(run, drive, values),
             extremes=run.amplitudes,
             **(fields | more),
         )
 
-    def level(self, size: float, run, drive=None, relative_error: float = 0.0) -> Level:
+    def evaluate_level(self, size: float, run, drive=None, relative_error: float = 0.0) -> Level:
         """Evaluate a run as one level of the drive.
 
         Parameters
         ----------
         size : float
-            Level of the drive [m s-2].
+            Drive level [m s-2].
         run
-            Run or mark.
+            Run of the engine, or its mark at the end of a drive level.
         drive : optional
-            Drive, if it is not that of the model.
+            Drive of the run; default: that of the model.
         relative_error : float
             Relative error of the measures.
         """
-        values = self.values(run, drive)
+        values = self.evaluate_measures(run, drive)
         values = {name: values[name] for name in LEVEL_MEASURES if name in values}
         errors = {}
         if relative_error:
             errors = {name: relative_error * abs(value) for name, value in values.items()}
-        return Level(size, self.sticks(run), values, errors)
+        return Level(size, self.is_stuck(run), values, errors)
 
 
 def _thin_between_reversals(histories, parity: int):
-    """Remove every second sample of histories, except the ends and the reversals.
+    """Remove every second sample of histories except the first, the last and the reversals.
 
-    parity: 0 or 1, remainder of the index of the samples that are kept on division by 2.
+    Samples whose index modulo 2 is `parity` (0 or 1) remain.
     """
     step = np.diff(histories.slide)
     kept = np.arange(histories.time.size) % 2 == parity
@@ -312,9 +313,9 @@ def _thin_between_reversals(histories, parity: int):
 
 
 def thin_samples(window):
-    """Remove every second sample of an equally sampled window.
+    """Remove every second sample of a uniformly sampled window.
 
-    The last sample, and those of events between the others, are kept.
+    The last sample and the samples of events in between remain.
     """
     place = (window.time - window.time[0]) / np.diff(window.time).max()
     number = np.round(place).astype(int)
@@ -323,10 +324,10 @@ def thin_samples(window):
     return window.select(kept)
 
 
-def sample_friction_works(response) -> dict:
-    """Return the friction work of a response and the sum of its absolute values [J] as a dict.
+def compute_sampled_work(response) -> dict:
+    """Return the friction work and the integral of its absolute value [J] as a dict.
 
-    They follow from the samples of all interfaces by the trapezoidal rule.
+    Both follow from the samples of all interfaces by the trapezoidal rule.
     """
     slides = response.extra.get("slides", response.slide[:, None])
     forces = response.extra.get("forces", response.force[:, None])
@@ -336,13 +337,13 @@ def sample_friction_works(response) -> dict:
 
 
 def compute_work_check(energies: dict) -> float:
-    """Return the relative difference [1] of the friction work from samples and from energies.
+    """Return the relative difference of the friction work from samples and from the energy balance.
 
     Parameters
     ----------
     energies : dict
-        Energies of a run, with its friction work from samples, from energies and the sum of |work|
-        as "sampled", "booked" and "passed" [J].
+        Energies of a run [J]. "sampled" is the friction work from samples, "booked" that of the
+        energy balance, and "passed" the integral of its absolute value.
     """
     scale = energies["power"] + energies["peak_stored"]
     return relative_gap(energies["sampled"], energies["booked"], energies["passed"], scale)

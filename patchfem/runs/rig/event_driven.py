@@ -1,7 +1,8 @@
-"""Engines that are exact between events: Coulomb or no friction, elastic-plastic elements.
+"""Runs of a rig by engines that are exact between events.
 
-In: a Model, its Numerics and its pressed patch. Out: a Solution whose measures come from the
-power series of the pieces (`dynamics.events`).
+In: a Model, its Numerics and its Patch. Out: a Solution whose measures come from the power series
+of the time intervals between events (`dynamics.events`). The interfaces have Coulomb friction,
+elastic-plastic elements or no friction.
 """
 
 from dataclasses import replace
@@ -31,27 +32,28 @@ from ...structure.drive_sizes import (
 )
 from ..bench import averaged_law
 from . import interface, strips
-from .evaluation import Reader
+from .evaluation import RunEvaluator
 from .levels import remove_incomplete_cycle, run_levels
-from .solution import Solution, mode_stiffness, normal_load
+from .solution import Solution, first_interface_load, first_mode_stiffness
 
-# measures of the motion, which exist without an interface
+# Measures of the motion that also exist without an interface.
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
     "absolute_acceleration_fundamental",
     "acceleration_distortion",
 )
-MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a settled motion to the tolerance
-N_CHANGE_WINDOWS = 3  # number of last windows whose extremes show the change of the motion
-# Relative decay of a free motion over the last windows that is assumed if there is less damping.
+MAX_CHANGE_RATIO = 1e-2  # Largest ratio of the change of a steady motion to the tolerance.
+# Number of windows at the end of a run from which the change of the motion is determined.
+N_CHANGE_WINDOWS = 3
+# Assumed relative decay of a free motion over the last windows at smaller damping.
 MIN_RELATIVE_DECAY = 1e-6
 
 
-def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Compute the motion of a rig from event to event, level after level of the drive.
+def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """Compute the motion of a rig from event to event, for one drive level after another.
 
-    Coulomb friction, or none, has rigid elements, which keep no snapshots.
+    Rigid elements (Coulomb friction or none) store no snapshots.
 
     Parameters
     ----------
@@ -69,7 +71,7 @@ def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None)
     Solution
     """
     contact_elements = RigidElements if numerics.engine == "exact" else YieldingElements
-    reader = PieceReader(model, numerics, patch, contact_elements(model, numerics, patch))
+    reader = EventEvaluator(model, numerics, patch, contact_elements(model, numerics, patch))
     rig = model.rig
     begin = perf_counter()
     more = {}
@@ -78,17 +80,17 @@ def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None)
     begin = perf_counter()
 
     def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
-        """Integrate the motion under a drive from a given state.
+        """Integrate the motion under a drive from a given initial state.
 
         Parameters
         ----------
         drive
         state : tuple
-            State of the rig and memory of the elements at the start.
+            Initial state of the rig, and initial memory of the elements.
         watch : callable or None
             Callback for the completed fraction.
         is_last : bool
-            Whether the run has snapshots of the interface.
+            Whether this is the last run, which stores snapshots of the interface.
         cycles : float
         """
         done = histories.simulate(
@@ -111,13 +113,13 @@ def run_pieces(model, numerics, patch, frames: int = 0, say=None, progress=None)
         done = integrate(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
         done = remove_incomplete_cycle(done)
     more |= {} if reader.rigid else {"prepare": prepare}
-    return reader.solution(done, perf_counter() - begin, **more)
+    return reader.make_solution(done, perf_counter() - begin, **more)
 
 
-class PieceReader(Reader):
+class EventEvaluator(RunEvaluator):
     """Evaluation of the runs of the event-driven engines.
 
-    found: RigidElements or YieldingElements of the run.
+    `found` are the RigidElements or YieldingElements of the run.
     """
 
     def __init__(self, model, numerics, patch, found):
@@ -130,39 +132,40 @@ class PieceReader(Reader):
         self.apart = found.rigid and model.rig.friction.strips_slide_apart
 
     def average_over_strips(self, run):
-        """Average the histories of strips that slide independently over the patch."""
+        """Average the histories of strips that slide independently."""
         if not self.apart:
             return run
         loads = strips.strip_loads(self.patch)
         offsets = self.patch.strips.offsets
         return replace(
             run,
-            response=strips.average_strips(run.response, loads, offsets),
-            window=strips.average_strips(run.window, loads, offsets),
+            response=strips.average_histories_over_strips(run.response, loads, offsets),
+            window=strips.average_histories_over_strips(run.window, loads, offsets),
         )
 
-    def sticks(self, run) -> bool:
-        """Return whether the interface sticks; independent strips must all stick."""
+    def is_stuck(self, run) -> bool:
+        """Return whether the interface sticks; strips that slide independently must all stick."""
         if self.apart and self.has_friction:
             return run_events.is_all_stuck(run.window, self.held)
-        return super().sticks(run)
+        return super().is_stuck(run)
 
-    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
-        """Return the measures that the event-driven engine computes between its events.
+    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the measures that the engine computes from the intervals between events.
 
-        Strips that slide independently have a single loop, that of their mean, from samples.
+        Strips that slide independently have a single loop of their mean displacement, which is
+        computed from samples.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.integrated_measures`.
+            See `RunEvaluator.compute_integrated_measures`.
         """
-        values = evaluate_reading(
+        values = compute_event_measures(
             run.reading,
             run.ledger,
             sine=is_sinusoidal(drive),
             whole=bool(has_full_cycle(run.reading.span, drive)),
-            stiffness=mode_stiffness(self.model, run.window),
+            stiffness=first_mode_stiffness(self.model, run.window),
             size=find_max_acceleration(drive),
         )
         known = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
@@ -173,31 +176,31 @@ class PieceReader(Reader):
             names = [*MOTION_MEASURES, "slip_start_phase"]
         return IntegratedMeasures(
             {name: known[name] for name in names},
-            loops=self.loops(run, drive),
+            loops=self.find_friction_loops(run, drive),
         )
 
-    def loops(self, run, drive) -> tuple:
-        """Return the loop of each interface; that of the mean of strips that slide independently."""
+    def find_friction_loops(self, run, drive) -> tuple:
+        """Return the friction loop of each interface, or that of the mean of independent strips."""
         return (_compute_strips_loop(run, drive),) if self.apart else run.loops
 
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the ledger of rigid elements, which dissipate all work of friction.
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+        """Return the energies of rigid elements, which dissipate all friction work.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.further_fields`.
+            See `RunEvaluator.collect_cycle_data`.
         """
         if not (self.has_friction and self.rigid):
             return {}
         lost = run.ledger["friction"]
         return {"ledger": np.array([[lost], [0.0], [lost], [0.0]]), "together": self.apart}
 
-    def rings(self, run, drive) -> tuple:
-        """Compute frequency and damping of the ringing during stick, with errors.
+    def measure_ringing(self, run, drive) -> tuple:
+        """Compute frequency and damping of the free vibration during stick, with error estimates.
 
-        It is known in closed form for a single element, and if every interface sticks until the end
-        of a run without a sine. For a periodic motion, the stick intervals of one cycle are used.
+        Both have a closed form for a single element, and if every interface sticks until the end of
+        a run without sinusoidal drive. In other runs they are measured in the stick intervals.
         """
         if not self.has_friction:
             return {}, {}
@@ -214,16 +217,16 @@ class PieceReader(Reader):
         )
 
     def compute_stuck_vibration(self, run, motion, drive) -> list:
-        """Return the free vibration of the modes while every interface sticks on a single spring.
+        """Return the free vibration of the modes while every interface sticks until the end.
 
-        The list is empty unless only a constant force acts in this part of the run, and every
-        interface is a single spring that sticks until the end.
+        The list is empty unless every interface is a single spring that sticks until the end, and
+        the drive is constant in this part of the run.
 
         Parameters
         ----------
         run : EventRunResult
         motion : Response
-            Part of its histories.
+            Part of its histories in which the interfaces stick.
         drive
             Drive of the run.
         """
@@ -239,8 +242,8 @@ class PieceReader(Reader):
             return []
         return compute_stuck_vibration(self.model.rig.modes, np.concatenate(springs), motion)
 
-    def tail(self, run, drive) -> dict:
-        """Return the mode that vibrates after the last slip of a release, as a dict."""
+    def find_remaining_vibration(self, run, drive) -> dict:
+        """Return the strongest mode of vibration after the last slip of a release, as a dict."""
         if (
             self.model.rig.drive.kind != "free"
             or run.response is None
@@ -252,24 +255,25 @@ class PieceReader(Reader):
         held = self.compute_stuck_vibration(run, after, drive)
         return {"tail": select_strongest(held, "displacement")} if held else {}
 
-    def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors due to sampling, and the error of the drift of rigid elements.
+    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+        """Estimate the errors due to sampling, and the error of the drift of rigid elements.
 
-        The drift of rigid elements has the round-off of the difference of two means; below 1.5
-        cycles there are no means, only the ends of the window. The means of independent strips are
-        those of cubics through 400 samples per cycle, with an error of h^4/384 times the fourth
-        derivative: 2e-14 of the range compared with 8000 samples per cycle, because both cycles
-        have nearly the same error. The vibration that jumps excite in a mode r times as fast as the
-        drive falls with 1/r^2, and its fourth derivative grows with r^2.
+        The drift of rigid elements has the round-off of the difference of two means; a window
+        shorter than 1.5 cycles has no means, only its ends. The means of independent strips are
+        those of cubics through 400 samples per cycle. Their error is h^4/384 times the fourth
+        derivative, and a comparison with 8000 samples per cycle gave 2e-14 of the range, because
+        both cycles have nearly the same error. A jump excites a mode with r times the drive
+        frequency in proportion to 1/r^2, and the fourth derivative increases with r^4, so the error
+        increases with r^2.
 
         Parameters
         ----------
         run, drive, values
-            See `Reader.stated_errors`.
+            See `RunEvaluator.estimate_run_errors`.
         """
         window = run.window
         modes = self.model.rig.modes
-        left = {} if self.apart else self.sampling_errors(run, drive, values)
+        left = {} if self.apart else self.estimate_sampling_errors(run, drive, values)
         if not self.rigid or window.time[-1] - window.time[0] < 1.5 * drive.period:
             return left
         if not self.apart:
@@ -277,10 +281,10 @@ class PieceReader(Reader):
         faster = max(1.0, float(modes.omega.max()) / find_drive_omega(drive)) ** 2
         return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
-    def solution_fields(self, run, drive) -> dict:
-        """Return the ringing of a release, and the steady amplitude of a motion that still changes."""
+    def collect_solution_fields(self, run, drive) -> dict:
+        """Return the vibration after a release, and the steady amplitude of an unsteady run."""
         fields = {}
-        if tail := self.tail(run, drive):
+        if tail := self.find_remaining_vibration(run, drive):
             fields["extra"] = tail
         numerics = self.numerics
         modes = self.model.rig.modes
@@ -291,7 +295,7 @@ class PieceReader(Reader):
             find_min_decay_rate(modes) * drive.period,
         )
         may_settle = numerics.whole and run.outcome is None and not self.rigid
-        if may_settle and unsettled and not self.sticks(run):
+        if may_settle and unsettled and not self.is_stuck(run):
             steady = find_steady_motion(modes, drive, self.groups, run)
             if steady is not None:
                 fields |= {"steady": steady, "bounded": True}
@@ -301,8 +305,8 @@ class PieceReader(Reader):
 def _compute_strips_loop(run, drive) -> InterfaceLoop:
     """Compute the friction loop of a patch from the samples of its independent strips.
 
-    The samples are those on both sides of every event; the yaw does work in addition to the mean
-    slide.
+    Each event has samples on both sides. The yaw does work in addition to that of the mean
+    displacement.
     """
     window = run.window
     omega = find_drive_omega(drive)
@@ -322,21 +326,21 @@ def _compute_strips_loop(run, drive) -> InterfaceLoop:
 
 
 def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may change by more than a fraction of the tolerance in future.
+    """Return whether a motion may still change by more than a fraction of the tolerance.
 
-    It may if the run is too short, or if the extremes of its cycles have moved too much in the last
-    N_CHANGE_WINDOWS windows, divided by the fraction of the slowest free motion that decays in this time.
-    The extremes of a slow beat hardly move while it is largest.
+    This is the case if the run is too short. Otherwise, the change of the extremes in the last
+    N_CHANGE_WINDOWS windows is divided by the fraction by which the slowest free motion decays in
+    this time, because the extremes of a slow beat hardly change near its maximum.
 
     Parameters
     ----------
     extremes : (c, 2)
-        Smallest and largest output of each cycle [m].
+        Minimum and maximum output of each cycle [m].
     window : int
-        Cycles of a window.
+        Number of cycles in a window.
     tolerance : float
     decay : float
-        Decay of the slowest free motion over a cycle [1].
+        Exponent of the decay of the slowest free motion per cycle [1].
     """
     last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
     if len(last) < N_CHANGE_WINDOWS * window:
@@ -347,9 +351,9 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
 
 
 def find_steady_motion(modes, drive, groups, done) -> tuple | None:
-    """Compute the steady amplitude [m] and its error to which a run converges.
+    """Compute the amplitude [m] of the steady motion to which a run converges, and its error.
 
-    It is found by the map of the yields over a period.
+    It is the fixed point of the map over a drive period, which is linear between yield events.
 
     Parameters
     ----------
@@ -358,13 +362,14 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
     drive
         Drive.
     groups : tuple
-        Elements of every interface.
+        Elements of each interface.
     done : EventRunResult
 
     Returns
     -------
     tuple or None
-        None if the run does not end with a whole period of a sine, or no stable motion was found.
+        None if the run does not end with a complete period of a sine, or if no stable motion was
+        found.
     """
     last = drive.segments[-1] if drive.segments else None
     if (
@@ -384,17 +389,17 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
 
 
 def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tuple:
-    """Return the amplitude [m] and error of a periodic motion; NaN if it is unstable.
+    """Return the amplitude [m] of a periodic motion and its error; NaN if it is unstable.
 
     Parameters
     ----------
     amplitude : float
         [m].
     residual : float
-        Difference of the states after a period, relative to the motion.
+        Change of the state over a period, relative to the motion.
     multipliers : (m,)
-        Floquet multipliers over a period. The error in the motion is the residual over their
-        distance from 1.
+        Floquet multipliers of the period. The error of the motion is the residual divided by the
+        smallest distance of a multiplier from 1.
     """
     if np.abs(multipliers).max(initial=0.0) >= 1:
         return np.nan, np.nan
@@ -407,8 +412,8 @@ class YieldingElements:
 
     - groups: elements of each interface.
     - contact: ContactModel of a single interface.
-    - held: slip in a cycle [m] below which the interface sticks in it.
-    - seconds: CPU seconds of the reduction.
+    - held: largest slip per cycle [m] at which the interface counts as stuck.
+    - seconds: CPU time of the reduction [s].
     """
 
     rigid = False
@@ -424,7 +429,7 @@ class YieldingElements:
             parts = [self.contact.element]
         lengths = [element.length for element in parts if element.limit > 0]
         self.held = 1e-3 * min(lengths, default=0.0)
-        self.groups = tuple(make_elements_of_law(element) for element in parts)
+        self.groups = tuple(convert_to_elements(element) for element in parts)
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.merge_elements, self.groups))
         if numerics.joined:
@@ -439,7 +444,7 @@ class YieldingElements:
 class RigidElements:
     """Rigid friction elements of all Coulomb interfaces of a model.
 
-    Any slip counts as slip.
+    There is no elastic displacement, so any motion of the interface counts as slip.
     """
 
     rigid = True
@@ -453,7 +458,7 @@ class RigidElements:
 
 
 def coulomb_limits(model, patch) -> list:
-    """Return the static and kinetic friction limits [N] of every Coulomb interface."""
+    """Return the static and kinetic friction limits [N] of each Coulomb interface."""
     rig = model.rig
     friction = model.friction
     if rig.friction.strips_slide_apart:
@@ -464,7 +469,7 @@ def coulomb_limits(model, patch) -> list:
     if rig.friction.names:
         laws = rig.friction.interfaces
         return [tuple(map(float, law.friction_limits(law.load))) for law in laws]
-    static, kinetic = model.friction_limits(normal_load(model, patch))
+    static, kinetic = model.friction_limits(first_interface_load(model, patch))
     if law_has_trait(friction.law, "averaged"):
         static = static * averaged_law.slip_force_ratio(model, patch)
     if friction.kinetic is None:
@@ -472,18 +477,20 @@ def coulomb_limits(model, patch) -> list:
     return [(float(static), float(kinetic))]
 
 
-def make_elements_of_law(element) -> elements.Elements:
-    """Return the elastic-plastic elements of a law of parallel springs and sliders."""
+def convert_to_elements(element) -> elements.Elements:
+    """Convert a law of parallel springs and sliders to elastic-plastic elements."""
     count = int(element.numbers[1])
     return elements.make_elements(
         element.numbers[2 : 2 + count], element.numbers[2 + count : 2 + 2 * count]
     )
 
 
-def evaluate_reading(
+def compute_event_measures(
     reading: Reading, book: dict, *, sine: bool, whole: bool, stiffness, size
 ) -> dict:
-    """Return measures of the motion and the first interface of one or many event-driven runs.
+    """Compute measures of the motion and of the first interface of event-driven runs.
+
+    Arrays evaluate several runs at once.
 
     Parameters
     ----------
@@ -491,18 +498,19 @@ def evaluate_reading(
     book : dict
         Energies of the run [J].
     sine : bool
-        Whether the drive is a sine at the end.
+        Whether the drive is sinusoidal at the end of the run.
     whole : bool
         Whether the evaluated cycles are complete.
     stiffness : float or (n,)
-        K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to it.
+        Stiffness of the first mode referred to the contact [N/m]; 0 if the run has no damping
+        ratio.
     size : float or (n,)
-        Acceleration of the drive [m s-2].
+        Acceleration amplitude of the drive [m s-2].
 
     Returns
     -------
     dict
-        NaN for a measure that a run does not have.
+        Measures by name; NaN if a run does not have a measure.
     """
     none = np.full(np.shape(reading.output_amplitude), np.nan)[()]
     has_waves = sine and whole
@@ -520,11 +528,11 @@ def evaluate_reading(
         "friction_force_peak": loop.max_force,
         "stick_fraction": stick_fraction(loop.stuck_time, reading.span),
     }
-    return values | _loop_measures(reading, stiffness, sine=sine) if whole else values
+    return values | _compute_loop_measures(reading, stiffness, sine=sine) if whole else values
 
 
-def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
-    """Return the measures of the friction loop of the first interface."""
+def _compute_loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
+    """Compute the measures of the friction loop of the first interface."""
     loop = reading.loop()
     moves = (
         reading.interface_value(InterfaceMeasure.MAX_SLIDE)
@@ -541,9 +549,9 @@ def _loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
 
 
 def _compute_work_check(reading: Reading, book: dict):
-    """Return the relative difference [1] of friction work from samples and energy balance.
+    """Return the relative difference of the friction work from samples and from the energy balance.
 
-    The samples are the ends of the time intervals; their work follows from the trapezoidal rule.
+    The samples are the ends of the time intervals, between which the trapezoidal rule is used.
     """
     sampled = reading.faces[..., InterfaceMeasure.END_WORK].sum(axis=-1)
     booked = reading.faces[..., InterfaceMeasure.WORK].sum(axis=-1)

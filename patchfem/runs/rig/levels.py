@@ -1,7 +1,7 @@
-"""Drive in levels: the amplitude changes in steps with the state carried over.
+"""Drive whose amplitude changes in levels, with the state continued from level to level.
 
-In: the runs of successive levels. Out: `Level`s with errors, the onset between two levels by
-bisection, and the joined run.
+In: the runs of successive levels. Out: a `Level` with errors for each of them, the onset level
+found by bisection, and the joined run.
 """
 
 from dataclasses import replace
@@ -23,20 +23,21 @@ from ...response.levels import (
 from ...response.rows import TABLE
 from ...structure.drive_sizes import find_drive_omega
 
-# Relative error of the measures of an event-driven run, whose motion has round-off only.
+# Relative error of the measures of an event-driven run, which has round-off only.
 EXACT_RELATIVE_ERROR = 1e-9
-MAX_BISECTIONS = 40  # largest number of bisections of an onset, to 1e-12 of its bracket
+# Largest number of bisections of an onset; 40 of them reduce the bracket to 1e-12.
+MAX_BISECTIONS = 40
 
 
 def list_level_ends(rig) -> tuple:
-    """Return the cycles (l,) after which the levels of a drive end."""
+    """Return the cycle numbers (l,) at which the drive levels end."""
     return tuple(rig.drive.levels.cycles * (k + 1) for k in range(len(rig.drive.levels.amplitudes)))
 
 
 def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
-    """Widen the errors at every drive level by the differences from coarse runs.
+    """Add the differences from coarse runs to the errors of each drive level.
 
-    The error of a measure that a coarse run does not have is its absolute value.
+    A measure that a coarse run does not have gets its absolute value as error.
 
     Parameters
     ----------
@@ -52,8 +53,8 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
         for kind in coarser_runs:
             reference = level.values
             if kind.beside is not None:
-                reference = _values_at_level(solutions[kind.beside], number)
-            coarse_values = [_values_at_level(solutions[run], number) for run in kind.runs]
+                reference = _find_level_values(solutions[kind.beside], number)
+            coarse_values = [_find_level_values(solutions[run], number) for run in kind.runs]
             parts.append(kind.rule(reference, *coarse_values))
         errors = {}
         for name, value in level.values.items():
@@ -63,36 +64,36 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
     return tuple(levels_with_errors)
 
 
-def _values_at_level(solution, number: int) -> dict:
-    """Return the measures at one drive level; {} if the run ended before this level."""
+def _find_level_values(solution, number: int) -> dict:
+    """Return the measures of a Solution at one drive level, or {} if the run ended earlier."""
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 
-def find_onset(levels, probe, tolerance: float, past=None) -> tuple | None:
-    """Find the drive level [m s-2] at which slip starts by bisection, with its uncertainty.
+def find_onset(levels, probe, tolerance: float, is_past_onset=None) -> tuple | None:
+    """Find the drive level [m s-2] of the onset by bisection, with its uncertainty.
 
-    The bracket is the last level below the onset and the first level above it. The bisection ends when
-    the bracket is `tolerance` times the level; if all levels down to 0 are above the onset, times the
-    first level above it. A law for which every level is above the onset (bonds that chatter) has no
-    onset.
+    The bisection starts between the last level before the onset and the first level after it, and
+    ends when the bracket is smaller than `tolerance` times the level. If there is no level before
+    the onset, the lower limit is 0 and the tolerance refers to the first level after the onset.
 
     Parameters
     ----------
     levels : sequence of Level
     probe : callable
-        Function (index of the previous level or -1, level) -> Level that runs another level from
-        the end of the previous one.
+        Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
+        with this index, or from rest for the index -1.
     tolerance : float
-    past : callable, optional
-        Function of a Level from `make_onset_test`; by default that of slip.
+    is_past_onset : callable, optional
+        Function of a Level that returns whether the onset is reached, see `make_onset_test`;
+        default: onset of slip.
 
     Returns
     -------
     tuple or None
-        None if no level is above the onset.
+        None if no level reaches the onset.
     """
-    past = make_onset_test("slip") if past is None else past
-    bracket = bracket_onset(levels, past)
+    is_past_onset = make_onset_test("slip") if is_past_onset is None else is_past_onset
+    bracket = bracket_onset(levels, is_past_onset)
     if bracket is None:
         return None
     before, first = bracket
@@ -103,7 +104,7 @@ def find_onset(levels, probe, tolerance: float, past=None) -> tuple | None:
         if high - low <= tolerance * (high if low else first.drive):
             break
         middle = (low + high) / 2
-        if past(probe(before, middle)):
+        if is_past_onset(probe(before, middle)):
             high = middle
         else:
             low = middle
@@ -111,14 +112,14 @@ def find_onset(levels, probe, tolerance: float, past=None) -> tuple | None:
 
 
 def replace_level(drive, number: int, level: float):
-    """Return a drive that ends after one of its levels, with another amplitude there.
+    """Return a drive in levels that ends after level `number`, whose amplitude is replaced.
 
     Parameters
     ----------
     drive
         Drive in levels.
     number : int
-        Index of the level that is replaced.
+        Index of the level.
     level : float
         [m s-2].
     """
@@ -129,39 +130,42 @@ def replace_level(drive, number: int, level: float):
 def compute_level_measures(
     rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()
 ) -> dict:
-    """Compute onset, largest jump and hysteresis over all levels of a drive.
+    """Compute onset level, largest jump and hysteresis of a drive in levels.
 
-    These are onset_level, jump_level and level_hysteresis, with a reason if there is no value.
+    The measures are onset_level, jump_level and level_hysteresis; a measure without a value has a
+    reason.
 
     Parameters
     ----------
     rig : Rig
-        Has the kind of onset.
+        Defines the kind of onset.
     levels : sequence of Level
     probe : callable
         See `find_onset`.
     tolerance : float
     has_friction : bool
-        Whether friction acts.
+        Whether the rig has friction.
     coarser : sequence
-        See `Solution`; the distance between the onsets of each pair is added to the error.
+        Pairs of `Solution.coarser`; the difference of their onset levels is added to the error.
     """
-    unit = _level_unit(rig)
-    size = _level_factor(rig)
+    unit = _find_level_unit(rig)
+    unit_factor = _find_level_factor(rig)
     measures = {}
-    past = make_onset_test(*rig.drive.levels.onset)
-    lowest = find_onset(levels, probe, tolerance, past) if has_friction else None
+    is_past_onset = make_onset_test(*rig.drive.levels.onset)
+    lowest = find_onset(levels, probe, tolerance, is_past_onset) if has_friction else None
     if lowest is not None:
         level, half_width = lowest
         change = 0.0
         for run, beside in coarser:
-            coarse_onset = find_onset(run.levels, run.probe, tolerance, past)
+            coarse_onset = find_onset(run.levels, run.probe, tolerance, is_past_onset)
             reference = lowest
             if beside is not None:
-                reference = find_onset(beside.levels, beside.probe, tolerance, past)
+                reference = find_onset(beside.levels, beside.probe, tolerance, is_past_onset)
             is_missing = coarse_onset is None or reference is None
             change += level if is_missing else abs(coarse_onset[0] - reference[0])
-        measures["onset_level"] = Measure(size * level, unit, size * (half_width + change), 1e-9)
+        measures["onset_level"] = Measure(
+            unit_factor * level, unit, unit_factor * (half_width + change), 1e-9
+        )
     elif has_friction:
         measures["onset_level"] = Measure(
             None,
@@ -170,9 +174,9 @@ def compute_level_measures(
             TABLE["onset_level"].floor,
             reason=make_no_onset_reason(*rig.drive.levels.onset),
         )
-    if (leap := largest_jump(levels)) is not None:
-        width = size * float(leap[2])  # the jump lies anywhere between two levels
-        measures["jump_level"] = Measure(size * leap[0], unit, width, width)
+    if (jump := largest_jump(levels)) is not None:
+        width = unit_factor * float(jump[2])  # The jump may lie anywhere between two levels.
+        measures["jump_level"] = Measure(unit_factor * jump[0], unit, width, width)
     else:
         measures["jump_level"] = Measure(
             None,
@@ -188,40 +192,40 @@ def compute_level_measures(
 
 
 def convert_to_scene_units(rig, levels) -> tuple:
-    """Convert drive levels to the unit of the scene, [m s-2] or [N]."""
-    size = _level_factor(rig)
-    unit = _level_unit(rig)
-    return tuple(replace(level, drive=size * level.drive, unit=unit) for level in levels)
+    """Convert drive levels [m s-2] to the unit of the scene, [m s-2] or [N]."""
+    unit_factor = _find_level_factor(rig)
+    unit = _find_level_unit(rig)
+    return tuple(replace(level, drive=unit_factor * level.drive, unit=unit) for level in levels)
 
 
-def _level_unit(rig) -> str:
-    """Return the unit in which the scene gives the drive levels."""
+def _find_level_unit(rig) -> str:
+    """Return the unit of the drive levels in the scene."""
     return "N" if rig.drive.kind == "force" else "m s-2"
 
 
-def _level_factor(rig) -> float:
+def _find_level_factor(rig) -> float:
     """Return the factor that converts a drive level [m s-2] to the unit of the scene."""
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
-def run_levels(reader, integrate, state, end, progress=None) -> tuple:
+def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple:
     """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
     ----------
-    reader : Reader
+    reader : RunEvaluator
     integrate : callable
-        Function (sine, state, watch, is_last) -> run.
+        Function (sine, state, watch, is_last) that returns a run.
     state
         Initial state.
-    end : callable
+    find_end_state : callable
         Function of a run that returns its final state.
     progress : callable, optional
 
     Returns
     -------
     tuple
-        The joined run, and the fields `levels` and `probe` of its Solution.
+        Joined run, and the fields `levels` and `probe` of its Solution.
     """
     rig = reader.model.rig
     omega = find_drive_omega(rig.drive.signal)
@@ -231,10 +235,10 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
     level_results = []
 
     def probe(number: int, level: float) -> Level:
-        """Run a level from the end of an earlier one; number -1 means a start from rest."""
+        """Run a level from the final state of level `number`, or from rest if it is -1."""
         sine = SineDrive(level, omega, moving)
         run = integrate(sine, states[number + 1], None, False)
-        return reader.level(level, run, sine, EXACT_RELATIVE_ERROR)
+        return reader.evaluate_level(level, run, sine, EXACT_RELATIVE_ERROR)
 
     amplitudes = rig.drive.levels.amplitudes
     n_levels = len(amplitudes)
@@ -245,8 +249,8 @@ def run_levels(reader, integrate, state, end, progress=None) -> tuple:
         sine = SineDrive(amplitude, omega, moving)
         run = integrate(sine, states[-1], watch, k + 1 == n_levels)
         runs.append(run)
-        level_results.append(reader.level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
-        states.append(end(run))
+        level_results.append(reader.evaluate_level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
+        states.append(find_end_state(run))
         if run.outcome is not None:
             break
     joined = join_runs(runs, rig.drive.levels.cycles * rig.drive.signal.period)
@@ -259,7 +263,7 @@ def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> No
 
 
 def remove_incomplete_cycle(done):
-    """Remove the extremes and the Fourier coefficient of an incomplete last cycle from a run."""
+    """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
     count = int(done.cycles_done + 1e-9)
     if not count or count >= len(done.amplitudes):
         return done
@@ -269,7 +273,7 @@ def remove_incomplete_cycle(done):
 def join_runs(runs: list, duration: float):
     """Join the runs of successive drive levels to a single run.
 
-    Window and loop are those of the last run.
+    The window and the friction loop are those of the last level.
     """
     shifts = [k * duration for k in range(len(runs))]
     last = runs[-1]
@@ -289,13 +293,13 @@ def join_runs(runs: list, duration: float):
 
 
 def _join_histories(histories: list, shifts: list):
-    """Join the histories of successive runs, each shifted by its start time [s]."""
+    """Join the histories of successive runs and shift them by their start times [s]."""
     last = histories[-1]
-    # the last sample of a run is the first one of the next
+    # The last sample of a run equals the first sample of the next run.
     samples = [slice(None, -1)] * (len(histories) - 1) + [slice(None)]
 
     def join(arrays) -> np.ndarray:
-        """Join one history of all runs without repeating the sample at each border."""
+        """Concatenate one history of all runs without repeating the common samples."""
         return np.concatenate([array[part] for array, part in zip(arrays, samples)])
 
     columns = {}
@@ -314,7 +318,7 @@ def _join_histories(histories: list, shifts: list):
 
 
 def _shift_times(time, shift: float):
-    """Shift times by `shift` [s] and keep both sides of each event distinct."""
+    """Shift times by `shift` [s] so that both samples of each event remain distinct."""
     moved = time + shift
     before = np.flatnonzero(moved[1:] <= moved[:-1])
     moved[before] = np.nextafter(moved[before], -np.inf)

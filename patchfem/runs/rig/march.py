@@ -1,7 +1,7 @@
-"""March of a rig: contact, time integration, and its Solution.
+"""Run of a rig by time integration with constant steps (march), and its Solution.
 
-In: a Model, its Numerics and its pressed patch. Out: a Solution whose measures come from
-samples, except the work of the energy balance and the harmonics of the loop.
+In: a Model, its Numerics and its Patch. Out: a Solution. The measures come from samples, except the
+work of the energy balance and the harmonics of the loop.
 """
 
 from time import perf_counter
@@ -27,21 +27,22 @@ from ...structure.drive_sizes import (
 from . import levels as rig_levels
 from . import strips
 from .bond_lists import ListGuard, choose_bond_summation, has_list
-from .evaluation import Reader, compute_work_check
+from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
-from .solution import CycleLoop, Solution, compute_sampled_loop, normal_load
+from .solution import CycleLoop, Solution, compute_sampled_loop, first_interface_load
 
-# Safety factor on the first-order error of a run that ends beside its requested end.
+# Safety factor on the first-order error due to a run that does not end exactly at the requested
+# time.
 END_ERROR_FACTOR = 1.5
 
 
 class March(NamedTuple):
-    """Finished march of a rig, with its contact model and CPU time.
+    """Completed march of a rig with its contact model and CPU time.
 
     - contact: contact model of the march.
     - result: MarchResult.
-    - seconds: CPU seconds of the march.
-    - prepare: CPU seconds of its preparation by name.
+    - seconds: CPU time of the march [s].
+    - prepare: CPU time of each part of the preparation [s].
     """
 
     contact: object
@@ -50,8 +51,8 @@ class March(NamedTuple):
     prepare: dict
 
 
-def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """March a rig in time and evaluate its measures.
+def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """Integrate the motion of a rig in time steps and evaluate its measures.
 
     Parameters
     ----------
@@ -63,18 +64,20 @@ def run_march(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    march = march_model(model, numerics, patch, frames, say, progress)
-    reader = MarchReader(model, numerics, patch, march.contact)
-    return reader.solution(march.result, march.seconds, prepare=march.prepare)
+    march = march_without_evaluation(model, numerics, patch, frames, say, progress)
+    reader = MarchEvaluator(model, numerics, patch, march.contact)
+    return reader.make_solution(march.result, march.seconds, prepare=march.prepare)
 
 
-def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None) -> March:
-    """March a rig in time without evaluating its measures.
+def march_without_evaluation(
+    model, numerics, patch, frames: int = 0, say=None, progress=None
+) -> March:
+    """Integrate the motion of a rig in time steps without evaluating its measures.
 
     Parameters
     ----------
     model, numerics, patch, frames, say, progress
-        See `run_march`.
+        See `march_in_time`.
     """
     rig = model.rig
     begin = perf_counter()
@@ -83,10 +86,10 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
     engine.warm_up(rig.modes, rig.drive.signal, contact, say)
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
-    # strips that slide independently have no common shear stress, so that no frames are kept
+    # Strips that slide independently have no common shear stress, so no output frames are stored.
     frames = 0 if rig.friction.strips_slide_apart else frames
     progress = ListGuard(progress) if has_list(model, numerics) else progress
-    # the histories of a patch reduced to few points are not used
+    # The histories of a patch that is reduced to a few points are not used.
     keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
     done = engine.march(
         rig.modes,
@@ -106,12 +109,14 @@ def march_model(model, numerics, patch, frames: int = 0, say=None, progress=None
         even=bool(ROWS_NEEDING_RUN),
     )
     seconds = perf_counter() - begin
-    done = strips.average_march(done, patch) if rig.friction.strips_slide_apart else done
+    done = (
+        strips.average_march_over_strips(done, patch) if rig.friction.strips_slide_apart else done
+    )
     return March(contact, done, seconds, {"reduce": reduced, "compiled_code": loaded})
 
 
-class MarchReader(Reader):
-    """Evaluation of the runs of the march."""
+class MarchEvaluator(RunEvaluator):
+    """Evaluation of the runs of a march."""
 
     def __init__(self, model, numerics, patch, contact):
         held = 0.0
@@ -122,90 +127,94 @@ class MarchReader(Reader):
             held = 1e-3 * contact.length
         super().__init__(model, numerics, patch, contact, held)
 
-    def solution_fields(self, run, drive) -> dict:
-        """Return the drive levels, the bond summation and the errors due to the end of the run."""
-        fields = {"summed": self.choose_bond_summation(), "extra": {"late": self.late(run.window)}}
+    def collect_solution_fields(self, run, drive) -> dict:
+        """Return drive levels, bond summation and errors due to the end of the run."""
+        fields = {
+            "summed": self.choose_bond_summation(),
+            "extra": {"late": self.estimate_end_errors(run.window)},
+        }
         if self.model.rig.drive.levels.amplitudes:
-            fields["levels"], fields["probe"] = self._levels(run)
+            fields["levels"], fields["probe"] = self._evaluate_levels(run)
         return fields
 
-    def stated_errors(self, run, drive, values: dict) -> dict:
-        """Return the errors due to peaks between samples and due to the end of the run.
+    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+        """Return the error estimates for peak sampling and for the end of the run.
 
         Parameters
         ----------
         run, drive, values
-            See `Reader.stated_errors`.
+            See `RunEvaluator.estimate_run_errors`.
         """
-        late = self.late(run.window)
-        between = self.peak_excesses(run.window)
+        late = self.estimate_end_errors(run.window)
+        between = self.estimate_peak_excesses(run.window)
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
-    def peak_excesses(self, window) -> dict:
-        """Estimate how far the peaks of a motion exceed its largest samples, as a dict."""
+    def estimate_peak_excesses(self, window) -> dict:
+        """Estimate by how much the peaks of a motion exceed its samples, as a dict by measure."""
         return peak_sampling_errors(window, self.model.grooves is not None)
 
-    def late(self, window) -> dict:
-        """Estimate the errors due to a last sample that is not exactly at the requested end."""
+    def estimate_end_errors(self, window) -> dict:
+        """Estimate the errors due to a last sample that is not at the requested end time."""
         steps = self.numerics.cycles * self.numerics.steps
         period = self.model.rig.drive.signal.period
         changes = estimate_window_error(window, period, steps - round(steps))
         return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
 
     def choose_bond_summation(self):
-        """Choose the bond summation of the run; None for a law without bonds."""
+        """Return the bond summation of the run, or None for a law without bonds."""
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return None
         return choose_bond_summation(self.model, self.numerics)
 
-    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the check of the friction work, and the measures of a stuck interface.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.integrated_measures`.
+            See `RunEvaluator.compute_integrated_measures`.
         """
         if not self.has_friction:
             return IntegratedMeasures()
-        book = self._energies(run, drive, stuck=stuck)
+        book = self._compute_energies(run, drive, stuck=stuck)
         values = {"work_check": compute_work_check(book)}
         if stuck and self.contact.set_valued:
-            # the remaining motion of the interface is round-off, not slip
+            # The remaining motion of a stuck interface is round-off, not slip.
             values |= {"slip_start_phase": None, "stick_fraction": 1.0}
         return IntegratedMeasures(values)
 
-    def _energies(self, run, drive, *, stuck: bool) -> dict:
-        """Return the energies of a run; those of a stuck interface are round-off of the kinetic energy."""
+    def _compute_energies(self, run, drive, *, stuck: bool) -> dict:
+        """Return the energies of a run, with a scale for the round-off of a stuck rigid interface.
+
+        This scale is the kinetic energy at the peak speed of the drive.
+        """
         if not (stuck and self.contact.set_valued):
             return run.ledger
         rig = self.model.rig
         moving = rig.modes.mass * estimate_peak_speed(drive, rig.start) ** 2
         return run.ledger | {"power": run.ledger["power"] + moving}
 
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the friction loop and the energies for the evaluation.
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+        """Return the friction loop and the energies of the last cycles.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.further_fields`.
+            See `RunEvaluator.collect_cycle_data`.
         """
         if not self.has_friction:
             return {}
         return {
-            "book": self._energies(run, drive, stuck=stuck),
-            "loop": self._loop(run, drive),
+            "book": self._compute_energies(run, drive, stuck=stuck),
+            "loop": self._compute_loop(run, drive),
             "still": self.held if self.contact.set_valued else 0.0,
             "together": self.model.rig.friction.strips_slide_apart,
-            "inside": self.inside_steps,
+            "inside": self.add_samples_inside_steps,
         }
 
-    def inside_steps(self, window, number: int):
-        """Add samples inside the time steps to the window, for laws whose force overshoots.
-
-        Samples are added for laws whose force exceeds its limit within a step.
+    def add_samples_inside_steps(self, window, number: int):
+        """Add samples inside the time steps for laws whose force exceeds its limit within a step.
 
         Parameters
         ----------
@@ -223,23 +232,23 @@ class MarchReader(Reader):
             return window
         load = interface.load
         if load is None:
-            load = normal_load(model, self.patch)
+            load = first_interface_load(model, self.patch)
         return motion_inside_steps(window, make_law(interface.numbers, load), load)
 
-    def _loop(self, part, drive) -> CycleLoop | None:
+    def _compute_loop(self, part, drive) -> CycleLoop | None:
         """Compute the first harmonics of displacement and friction force, and the work per cycle.
 
-        If no other forces act besides drive and friction, the harmonics of the force come from the
-        motion (`friction_harmonic`).
+        If only the drive and friction act, the harmonic of the force follows from the motion
+        (`friction_harmonic`).
         """
         window = part.window
         omega = find_drive_omega(drive)
         rig = self.model.rig
         work = getattr(part, "window_work", None)
         work = part.work if work is None else work
-        # the friction of strips that yaw does more work than the mean slide shows
+        # The friction of strips that yaw does more work than follows from the mean displacement.
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
-        # the work of this interface excludes other interfaces and impacts at stops
+        # The friction work of this interface excludes other interfaces and impacts at stops.
         if len(rig.friction.names) > 1 or together:
             work = float(part.step_force @ np.diff(window.slide)) + lateral_work(window, 0)
         span = window.time[-1] - window.time[0]
@@ -258,13 +267,13 @@ class MarchReader(Reader):
             force = compute_step_harmonic(window.time, part.step_force, omega)
         return compute_sampled_loop(window, drive, work, force)
 
-    def _levels(self, done) -> tuple:
-        """Return the drive levels of a run, and a function that runs a further level."""
+    def _evaluate_levels(self, done) -> tuple:
+        """Return the drive levels of a run, and a function that runs another level."""
         rig = self.model.rig
         numerics = self.numerics
 
         def probe(number, level):
-            """Run a level from the end of an earlier one; number -1 means a start from rest."""
+            """Run a level from the final state of level `number`, or from rest if it is -1."""
             other = rig_levels.replace_level(rig.drive.signal, number + 1, level)
             if number >= 0:
                 run = done.marks[number].after.fork(other)
@@ -274,8 +283,8 @@ class MarchReader(Reader):
                 )
             mark = run.march_to_mark(round(rig.drive.levels.cycles), numerics.window)
             if rig.friction.strips_slide_apart:
-                mark = strips.average_mark(mark, self.patch)
-            return self.level(level, mark, other)
+                mark = strips.average_mark_over_strips(mark, self.patch)
+            return self.evaluate_level(level, mark, other)
 
-        amplitudes = rig.drive.levels.amplitudes
-        return tuple(self.level(size, mark) for size, mark in zip(amplitudes, done.marks)), probe
+        marks = zip(rig.drive.levels.amplitudes, done.marks)
+        return tuple(self.evaluate_level(size, mark) for size, mark in marks), probe

@@ -24,7 +24,7 @@ from ..results.travel import warn_of_large_slide
 from . import event_driven, strips
 from .costs import reason_to_march_elements
 from .engines import ENGINES, PIECES
-from .solution import normal_load
+from .solution import first_interface_load
 
 # a release still decays if its largest motion in the last cycles exceeds the amplitude of its last cycle by
 # this fraction
@@ -271,7 +271,7 @@ def _note_on_bond_growth(model, patch, solution) -> list:
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
         return []
-    limit = f.static * normal_load(model, patch)
+    limit = f.static * first_interface_load(model, patch)
     steady = limit > 0 and not model.rig.friction.load_varies
     return note_on_growth(
         model.bonds, float(np.abs(solution.response.force).max()) / limit if steady else None

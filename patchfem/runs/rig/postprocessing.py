@@ -104,7 +104,7 @@ def add_outcome(run: CoupledRun) -> CoupledRun:
         run = replace(run, solution=solution)
     rig = run.model.rig
     end_errors = solution.extra.get("late", {})
-    measures = add_stated_errors(run.measures, solution.stated_errors, end_errors)
+    measures = add_stated_errors(run.measures, solution.run_errors, end_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
     outcome, measures = judge_outcome(

@@ -26,7 +26,7 @@ from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
 from .postprocessing import CoupledRun
 from .runner import Runner
-from .solution import Solution, compute_curve_measures
+from .solution import Solution, compute_peak_frequency
 from .solve import refuse_long_run
 
 # outcomes of runs that ended early, whose outcome more steps do not change
@@ -126,7 +126,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         numerics = replace(numerics, window=n_cycles)
         solution = runner.solve(numerics)
     if not inputs.estimate or solution.outcome is Outcome.NOT_CONVERGED:
-        measures = add_errors(solution.values, size=size) | compute_curve_measures(solution.extra)
+        measures = add_errors(solution.values, size=size) | compute_peak_frequency(solution.extra)
         return RefinedRun(numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
@@ -161,7 +161,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         inputs.seconds["march"] = solution.seconds
     if runner.error_seconds:
         inputs.seconds["error"] = runner.error_seconds
-    measures |= compute_curve_measures(solution.extra, runner.solutions.values())
+    measures |= compute_peak_frequency(solution.extra, runner.solutions.values())
     solution = replace(solution, extra=solution.extra | {"step_runs": step_runs})
     return RefinedRun(numerics, solution, measures)
 

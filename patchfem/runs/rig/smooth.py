@@ -1,7 +1,7 @@
-"""Run of a rig whose friction law is smooth between reversals, integrated at high order.
+"""Run of a rig whose friction law is smooth between reversals, by high-order integration.
 
-In: a Model, its Numerics and its pressed patch. Out: a Solution (`dynamics.smooth`) whose
-measures come from the polynomials of the steps.
+In: a Model, its Numerics and its Patch. Out: a Solution whose measures are integrals over the
+interpolating polynomials of the time steps (`dynamics.smooth`).
 """
 
 from dataclasses import replace
@@ -12,19 +12,21 @@ from ...dynamics.cycles import SAMPLES_PER_CYCLE
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_round_off
 from ...response.rows import ROWS_NEEDING_RUN, find_definition
-from .evaluation import Reader, compute_work_check, thin_samples
+from .evaluation import RunEvaluator, compute_work_check, thin_samples
 from .interface import make_contact
 from .solution import Solution
 
-# Smallest ratio of the slip to its round-off, with which the onset of slip is located within a step.
+# Smallest ratio of slip to its round-off at which the onset of slip is located within a step.
 MIN_SLIP_OVER_ROUND_OFF = 1e3
-# Error of the stick fraction [1] and of the phase at slip start [rad]: the dense output within a step is
-# less accurate than its end.
+# Error of the stick fraction [1] and of the phase at slip start [rad]. It is larger than the error
+# of a step, because the dense output within a step is less accurate than its end.
 CROSSING_FRACTION_ERROR = 1e-7
 
 
-def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Compute the motion of a rig with a smooth friction law by high-order integration.
+def integrate_smooth_motion(
+    model, numerics, patch, frames: int = 0, say=None, progress=None
+) -> Solution:
+    """Integrate the motion of a rig with a smooth friction law at high order.
 
     Parameters
     ----------
@@ -55,29 +57,29 @@ def run_smooth(model, numerics, patch, frames: int = 0, say=None, progress=None)
         progress,
         even=bool(ROWS_NEEDING_RUN),
     )
-    reader = SmoothReader(model, numerics, patch, contact)
-    solution = reader.solution(
+    reader = SmoothEvaluator(model, numerics, patch, contact)
+    solution = reader.make_solution(
         done,
         perf_counter() - begin,
         prepare={"compiled_code": loaded},
         extra={"step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])},
     )
-    return replace(solution, errors=reader.integration_errors(done, solution.values))
+    return replace(solution, errors=reader.estimate_integration_errors(done, solution.values))
 
 
-class SmoothReader(Reader):
+class SmoothEvaluator(RunEvaluator):
     """Evaluation of the runs of the smooth engine, whose measures are integrals over its steps."""
 
     def __init__(self, model, numerics, patch, contact):
         super().__init__(model, numerics, patch, contact, 1e-3 * contact.length, SAMPLES_PER_CYCLE)
 
-    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the measures integrated over the polynomials of the time steps.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.integrated_measures`.
+            See `RunEvaluator.compute_integrated_measures`.
         """
         integrated = run.integrated
         if not _has_clear_slip(run):
@@ -86,28 +88,28 @@ class SmoothReader(Reader):
         check = {"work_check": compute_work_check(run.ledger)}
         return replace(integrated, values=integrated.values | check)
 
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
-        """Return the last cycles with samples added at the reversals, for the evaluation.
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+        """Return the last cycles with additional samples at the reversals.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.further_fields`.
+            See `RunEvaluator.collect_cycle_data`.
         """
         return {"window": run.with_reversals, "even": run.window, "by": "rate"}
 
-    def with_half_the_samples(self, run):
-        """Return a run with every second sample removed."""
-        thinned = super().with_half_the_samples(run)
+    def thin_run(self, run):
+        """Return a run without every second sample of its window."""
+        thinned = super().thin_run(run)
         return replace(thinned, with_reversals=thin_samples(run.with_reversals))
 
-    def integration_errors(self, run, values: dict) -> dict:
-        """Estimate the errors of measures due to sampling and skipped cycles of a smooth run.
+    def estimate_integration_errors(self, run, values: dict) -> dict:
+        """Estimate the errors of the measures due to sampling and skipped cycles.
 
-        The errors are due to sampling, to peaks between samples, and to skipped cycles of a periodic
-        motion. values: measures by name.
+        The errors are those of the samples, of peaks between samples, and of cycles that were
+        skipped because the motion had become periodic. `values` are the measures by name.
         """
-        sampling = self.sampling_errors(run, self.model.rig.drive.signal, values)
+        sampling = self.estimate_sampling_errors(run, self.model.rig.drive.signal, values)
         for name in ("stick_fraction", "slip_start_phase"):
             if _has_clear_slip(run):
                 sampling[name] = CROSSING_FRACTION_ERROR
@@ -124,6 +126,6 @@ class SmoothReader(Reader):
 
 
 def _has_clear_slip(run) -> bool:
-    """Return whether the slip of a smooth run exceeds round-off."""
+    """Return whether the slip of a run clearly exceeds its round-off."""
     slip_range = run.integrated.loops[0].slip_range
     return slip_range > MIN_SLIP_OVER_ROUND_OFF * slip_round_off(run.window)

@@ -1,6 +1,6 @@
-"""Solution that an engine returns, and parts of it that several engines compute alike.
+"""Solution of one run of a rig, and quantities that several engines compute in the same way.
 
-In: a run of an engine. Out: `Solution`, and the loop, load and stiffness of its last cycles.
+In: a run of an engine. Out: `Solution`, and friction loop, load and stiffness of the last cycles.
 """
 
 from dataclasses import dataclass, field, replace
@@ -15,36 +15,37 @@ from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...structure.drive_sizes import find_drive_omega, has_full_cycle
 
 NO_PEAK_REASON = "the output does not move at any of the swept frequencies, so there is no peak"
-# Safety factor on the frequency shift of a peak by a coarser mesh or fewer modes.
+# Safety factor on the change of a peak frequency in a coarse run.
 PEAK_SHIFT_FACTOR = 3.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
-    """Output of an engine for one run, without error estimates from coarser runs.
+    """Result of an engine for one run, without error estimates from coarse runs.
 
     - values: measures by name.
-    - response, window: histories that are kept, and those of the last cycles.
-    - amplitudes: amplitude of each window [m].
-    - steady: steady amplitude [m] and its error [m], or (None, None).
-    - outcome: None if the amplitudes decide.
+    - response, window: stored histories, and those of the last cycles.
+    - amplitudes: amplitude of each window [m], from the first to the last.
+    - steady: extrapolated steady amplitude and its error [m], or (None, None).
+    - outcome: Outcome, or None if it is determined from the amplitudes.
     - snapshots: states of the interface in the last cycle.
     - book: energies [J] and counters by name.
     - seconds: CPU seconds of the run.
     - contact: contact model of the run.
     - prepare: CPU seconds of the preparation by name.
     - message: reason of an early end.
-    - levels, probe: levels of the drive, and the function that `levels.find_onset` calls.
-    - log: events of the exact engine.
-    - notes: warnings of the method.
-    - held: slip in a cycle [m] below which the interface sticks in it.
-    - stated_errors: errors by measure that the run itself states.
-    - errors: errors by measure, if the engine knows them itself.
-    - summed: Choice for the sum over bonds; None without a sum.
-    - coarser: coarse runs of levels, each with its reference run (None for this run).
-    - extremes (c, 2): smallest and largest output of every cycle [m], which decide the outcome;
-      None if the engine knows it.
-    - bounded: whether the steady amplitude is that of a motion known to exist.
+    - levels, probe: Level of each drive level, and a function that runs another level, see
+      `levels.find_onset`.
+    - log: events of an event-driven engine.
+    - notes: warnings of the engine.
+    - held: largest slip per cycle [m] at which the interface counts as stuck.
+    - run_errors: error estimates by measure from the run itself, without coarse runs.
+    - errors: error estimates by measure of an engine that needs no coarse runs, or None.
+    - summed: EngineChoice of the bond summation; None without bonds.
+    - coarser: pairs of a coarse run and its reference run (None for this run).
+    - extremes (c, 2): minimum and maximum output of every cycle [m], from which the outcome is
+      determined; None if the engine sets the outcome.
+    - bounded: whether a bounded steady motion is known to exist.
     - extra: further data of the result.
     """
 
@@ -65,7 +66,7 @@ class Solution:
     log: object = None
     notes: tuple = ()
     held: float = 0.0
-    stated_errors: dict = field(default_factory=dict)
+    run_errors: dict = field(default_factory=dict)
     errors: dict | None = None
     summed: object = None
     coarser: tuple = ()
@@ -75,9 +76,9 @@ class Solution:
 
 
 class CycleLoop(NamedTuple):
-    """Friction loop of one cycle.
+    """First harmonics and work of the friction loop of one cycle.
 
-    - slide, force: first harmonics of the slide [m] and of the friction force [N].
+    - slide, force: first harmonics of relative displacement [m] and friction force [N].
     - work: friction work per cycle [J].
     """
 
@@ -87,16 +88,16 @@ class CycleLoop(NamedTuple):
 
 
 def replace_output_by_gauge(model, raw: Solution) -> Solution:
-    """Return a Solution whose output is the motion of a gauge, not of the accelerometer.
+    """Return a Solution whose output is the motion at the gauge instead of the accelerometer.
 
-    Displacement and histories are those of the gauge. How the motion settles is judged at the
-    accelerometer; the steady amplitude at the gauge is not known.
+    Whether the motion has become steady is still judged at the accelerometer. The steady amplitude
+    at the gauge is unknown.
     """
     gauge = model.rig.modes.gauge
     if gauge is None:
         return raw
     name = "relative_displacement_amplitude"
-    window = _histories_at_gauge(raw.window, gauge)
+    window = _compute_gauge_histories(raw.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
         amplitude = find_release_amplitude(window, model.rig.drive.signal.period, amplitude)
@@ -106,17 +107,17 @@ def replace_output_by_gauge(model, raw: Solution) -> Solution:
     return replace(
         raw,
         values=values | {name: amplitude},
-        response=_histories_at_gauge(raw.response, gauge),
+        response=_compute_gauge_histories(raw.response, gauge),
         window=window,
         steady=(None, None),
         errors=errors,
     )
 
 
-def _histories_at_gauge(histories: Response, gauge) -> Response:
-    """Return histories whose output is the motion of a gauge.
+def _compute_gauge_histories(histories: Response, gauge) -> Response:
+    """Return histories whose output is the motion at the gauge.
 
-    gauge: participations (n,) of the modes in the motion of the gauge.
+    `gauge` (n,) is the participation of the modes in this motion.
     """
     sensor = {"sensor": histories.output, "sensor_rate": histories.output_rate}
     return replace(
@@ -136,23 +137,23 @@ def find_release_amplitude(window, period: float, window_amplitude: float) -> fl
     period : float
         Period of the drive [s].
     window_amplitude : float
-        Amplitude of the window [m], returned if it contains no whole cycle.
+        Amplitude of the window [m]; returned if the window contains no complete cycle.
     """
     swing = measure_last_cycle_amplitude(window.time, window.output, window.output_rate, period)
     return window_amplitude if swing is None else swing
 
 
-def normal_load(model, patch) -> float | None:
-    """Return the normal load [N] on the first interface; None without friction."""
+def first_interface_load(model, patch) -> float | None:
+    """Return the normal load [N] on the first interface, or None without friction."""
     if model.friction is None:
         return None
     return patch.pressure.load if patch is not None else model.point.load
 
 
-def mode_stiffness(model, window) -> float:
-    """Return the stiffness [N/m] of the first mode, referred to the motion at the contact.
+def first_mode_stiffness(model, window) -> float:
+    """Return the stiffness [N/m] of the first mode, referred to the displacement at the contact.
 
-    It is 0 if other modes carry more than MAX_OTHER_MODES_FRACTION of the slide.
+    It is 0 if other modes contribute more than MAX_OTHER_MODES_FRACTION of this displacement.
     """
     first_mode = model.rig.first_mode
     if first_mode.fraction_of_other_modes(window.modal) > MAX_OTHER_MODES_FRACTION:
@@ -163,7 +164,7 @@ def mode_stiffness(model, window) -> float:
 def compute_sampled_loop(
     window, drive, work: float, force: complex | None = None
 ) -> CycleLoop | None:
-    """Compute the friction loop of equally spaced samples by the trapezoidal rule.
+    """Compute the friction loop from equally spaced samples by the trapezoidal rule.
 
     Parameters
     ----------
@@ -172,12 +173,12 @@ def compute_sampled_loop(
     work : float
         Friction work per cycle [J].
     force : complex, optional
-        First harmonic of the force [N], if it is known better.
+        First harmonic of the force [N], if it is known more accurately.
 
     Returns
     -------
     CycleLoop or None
-        None if the window contains no whole cycle.
+        None if the window contains no complete cycle.
     """
     if not has_full_cycle(window.time[-1] - window.time[0], drive):
         return None
@@ -190,22 +191,22 @@ def compute_sampled_loop(
     return CycleLoop(slide, force, work)
 
 
-def compute_curve_measures(extra: dict, coarser=()) -> dict:
-    """Return the frequency [Hz] of the largest amplitude of a curve, as a dict with its error.
+def compute_peak_frequency(extra: dict, coarser=()) -> dict:
+    """Return the frequency [Hz] of the peak of a response curve with its error, as a dict.
 
-    It has no value if the amplitude is 0.
+    The measure has no value if the amplitude is 0. The dict is empty without a curve.
 
     Parameters
     ----------
     extra : dict
         `Solution.extra`.
     coarser : sequence of Solution
-        Coarse runs, whose peak lies elsewhere.
+        Coarse runs; the shift of their peaks is part of the error.
 
     Returns
     -------
     dict
-        {} without a curve.
+        `peak_frequency`, or {}.
     """
     if "at_error" not in extra:
         return {}

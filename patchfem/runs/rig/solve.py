@@ -28,11 +28,11 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     Solution
     """
     if numerics.engine in ("exact", "piecewise"):
-        run = event_driven.run_pieces
+        run = event_driven.run_event_driven
     elif numerics.engine == "smooth":
-        run = smooth.run_smooth
+        run = smooth.integrate_smooth_motion
     elif numerics.engine == "march":
-        run = march.run_march
+        run = march.march_in_time
     else:
         run = steady.run_steady
     solution = run(model, numerics, patch, frames, say, progress)

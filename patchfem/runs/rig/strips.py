@@ -1,7 +1,7 @@
-"""Histories of strips that slide independently, averaged to those of the patch.
+"""Average of the histories of strips that slide independently.
 
-In: a run in which each strip is an interface, and the pressed patch. Out: the run with the
-histories of a single interface.
+In: a run in which each strip is an interface, and the Patch. Out: the run with the histories of a
+single interface.
 """
 
 from dataclasses import replace
@@ -10,36 +10,36 @@ import numpy as np
 
 
 def strip_loads(patch) -> np.ndarray:
-    """Return the normal load (s,) [N] on each strip of a solved patch."""
+    """Return the normal load (s,) [N] on each strip of a patch."""
     return patch.strips.force.sum(axis=1)
 
 
-def average_march(done, patch):
-    """Average a march of independently sliding strips over the patch."""
+def average_march_over_strips(done, patch):
+    """Average the histories of a march of independently sliding strips."""
     loads = strip_loads(patch)
     offsets = patch.strips.offsets
-    window = average_strips(done.window, loads, offsets)
+    window = average_histories_over_strips(done.window, loads, offsets)
     return replace(
         done,
-        response=average_strips(done.response, loads, offsets),
+        response=average_histories_over_strips(done.response, loads, offsets),
         window=window,
-        marks=tuple(average_mark(mark, patch) for mark in done.marks),
+        marks=tuple(average_mark_over_strips(mark, patch) for mark in done.marks),
         step_force=(window.force[1:] + window.force[:-1]) / 2,
     )
 
 
-def average_mark(mark, patch):
-    """Average one stored cycle of independently sliding strips over the patch."""
-    window = average_strips(mark.window, strip_loads(patch), patch.strips.offsets)
+def average_mark_over_strips(mark, patch):
+    """Average the stored last cycles of a drive level of independently sliding strips."""
+    window = average_histories_over_strips(mark.window, strip_loads(patch), patch.strips.offsets)
     return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
-def average_strips(response, loads, offsets):
-    """Average the histories of independently sliding strips over the patch.
+def average_histories_over_strips(response, loads, offsets):
+    """Average the histories of independently sliding strips.
 
-    Slide, speed and slip are means weighted by the loads, the force is the resultant. `extra` keeps
-    the strips, and has the yaw moment (k,) [N m], the sum of y f of the friction about +z on the
-    upper piece.
+    Displacement, velocity and slip are means weighted by the loads; the force is the resultant.
+    `extra` retains the histories of the strips, and gets the yaw moment (k,) [N m], i.e. the sum of
+    y f of the friction on the upper piece.
 
     Parameters
     ----------
@@ -50,44 +50,45 @@ def average_strips(response, loads, offsets):
         Lateral positions y of the strips [m].
     """
     extra = response.extra
-    share = np.asarray(loads) / np.sum(loads)
+    weights = np.asarray(loads) / np.sum(loads)
     slides, rates, forces = (extra[name] for name in ("slides", "slide_rates", "forces"))
     slips = extra.get("slips", slides)
     return replace(
         response,
-        slide=slides @ share,
-        slide_rate=rates @ share,
+        slide=slides @ weights,
+        slide_rate=rates @ weights,
         force=forces.sum(axis=1),
-        slip=slips @ share,
+        slip=slips @ weights,
         extra=extra | {"yaw_moment": forces @ np.asarray(offsets)},
     )
 
 
 def estimate_lateral_motion(patch, window, period: float) -> tuple:
-    """Estimate the lateral amplitude and the longer slide path of a patch that yaws.
+    """Estimate the lateral amplitude and the lengthening of the slip path of a patch that yaws.
 
-    The yaw rotates the patch about its middle: a point slides by s_j along x, and by the rotation
-    times x across it.
+    The yaw rotates the patch about its centre. A point of strip j moves by its displacement s_j
+    along x, and by the rotation times x in the lateral direction.
 
     Returns
     -------
     tuple
-        Amplitude [m], and fraction by which the lateral motion makes the slide path of the last
-        cycle longer (mean over the patch, weighted by the pressure).
+        Lateral amplitude [m], and relative increase of the path of the last cycle due to the
+        lateral motion (mean over the patch, weighted by the pressure).
     """
     last = window.time >= window.time[-1] - period * (1 + 1e-9)
     slides = window.extra["slides"][last]
     y = patch.strips.offsets
     x = np.abs(patch.x)
-    turned = (slides[:, -1] - slides[:, 0]) / (y[-1] - y[0])
+    yaw = (slides[:, -1] - slides[:, 0]) / (y[-1] - y[0])
     steps = np.abs(np.diff(slides, axis=0))
-    turns = np.abs(np.diff(turned))
+    yaw_steps = np.abs(np.diff(yaw))
     along = 0.0
-    whole = 0.0
+    total = 0.0
     for step, force in zip(steps.T, patch.strips.force):
-        bears = force > 0
+        is_loaded = force > 0
         along += float(step.sum() * force.sum())
-        whole += float(
-            np.hypot(step[:, None], turns[:, None] * x[bears]).sum(axis=0) @ force[bears]
+        total += float(
+            np.hypot(step[:, None], yaw_steps[:, None] * x[is_loaded]).sum(axis=0)
+            @ force[is_loaded]
         )
-    return float(np.ptp(turned)) / 2 * float(x.max()), whole / along - 1 if along > 0 else 0.0
+    return float(np.ptp(yaw)) / 2 * float(x.max()), total / along - 1 if along > 0 else 0.0

@@ -18,7 +18,7 @@ from ....model.similar_models import collect_columns
 from ....response.errors import SUM_ROUND_OFF, convergence_error, signed_change
 from ....response.measures import energy_balance
 from ....response.settling import window_amplitude_means
-from ...rig.event_driven import evaluate_reading
+from ...rig.event_driven import compute_event_measures
 from .columns import N_FINAL_WINDOWS, Runs
 from .lane_numbers import Scales, count_evaluated_cycles, find_lane_law
 from .lane_ringing import find_ringing
@@ -87,7 +87,7 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
         law, cases, marched, scales.energy, scales.omega, extremes[:, -window:]
     )
     with np.errstate(all="ignore"):
-        values = evaluate_reading(
+        values = compute_event_measures(
             run_reading,
             energies,
             sine=True,

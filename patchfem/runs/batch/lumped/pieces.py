@@ -24,9 +24,9 @@ from ...rig.costs import count_merges
 from ...rig.engines import EXACT, PIECES, choose_engine
 from ...rig.event_driven import (
     RigidElements,
-    evaluate_reading,
+    compute_event_measures,
+    convert_to_elements,
     find_steady_motion,
-    make_elements_of_law,
     may_still_change,
 )
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
@@ -90,7 +90,7 @@ def make_case(model, n_merges: int = 0) -> Case:
     if is_rigid_law(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = make_law(model.friction, model.point.load).element(model.point.load)
-    group = make_elements_of_law(element)
+    group = convert_to_elements(element)
     for _ in range(n_merges):
         group = merge_elements(group)
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
@@ -200,7 +200,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     stiffness = np.array([model.rig.first_mode.stiffness for model in models])
     acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):
-        values = evaluate_reading(
+        values = compute_event_measures(
             reading, energies, sine=True, whole=True, stiffness=stiffness, size=acceleration
         )
     work = energies["friction"]

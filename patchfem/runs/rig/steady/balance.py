@@ -25,7 +25,7 @@ from ....formatting import format_length
 from ....response.errors import finer_errors
 from ....response.measures import compute_acceleration_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
-from ..evaluation import Reader, compute_work_check, sample_friction_works
+from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_contact
 from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
@@ -34,7 +34,7 @@ from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_in
 SAMPLES_PER_CYCLE = 4096
 
 
-class BalanceReader(Reader):
+class BalanceReader(RunEvaluator):
     """Evaluation of one cycle of a motion from harmonic balance.
 
     turns: reversals of this cycle, see `SteadyMotion.turns`.
@@ -42,7 +42,7 @@ class BalanceReader(Reader):
 
     turns: tuple = ()
 
-    def integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the check of the friction work, and peaks and reversals.
 
         A periodic motion has no drift.
@@ -50,13 +50,13 @@ class BalanceReader(Reader):
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.integrated_measures`.
+            See `RunEvaluator.compute_integrated_measures`.
         """
         values = {"drift_per_cycle": 0.0}
         if not self.has_friction:
             return IntegratedMeasures(values)
         book = run.ledger | {"booked": run.ledger["friction"]}
-        values["work_check"] = compute_work_check(book | sample_friction_works(run.response))
+        values["work_check"] = compute_work_check(book | compute_sampled_work(run.response))
         if not self.turns:
             return IntegratedMeasures(values)
         _, turn_forces, turn_slips = zip(*self.turns)
@@ -66,17 +66,17 @@ class BalanceReader(Reader):
         values["slip_amplitude"] = float(np.ptp(slips)) / 2
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
-    def loops(self, run, drive) -> tuple:
+    def find_friction_loops(self, run, drive) -> tuple:
         """Return (), because the loop of a balance is evaluated from samples."""
         return ()
 
-    def further_fields(self, run, drive, *, stuck: bool) -> dict:
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return the friction loop for the evaluation.
 
         Parameters
         ----------
         run, drive, stuck
-            See `Reader.further_fields`.
+            See `RunEvaluator.collect_cycle_data`.
         """
         return {"loop": compute_sampled_loop(run.window, drive, run.ledger["friction"])}
 
@@ -296,7 +296,7 @@ class BalanceFinder:
         run = EngineResult(response, response, extremes, np.zeros(1), book)
         reader = BalanceReader(self.model, self.numerics, self.patch, steps=samples)
         reader.turns = motion.find_reversals()
-        return CycleMeasures(reader.values(run, drive), response, book)
+        return CycleMeasures(reader.evaluate_measures(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
         """Trace the steady motions over frequency, continued through folds."""

@@ -21,7 +21,7 @@ from ....response.measures import measure_half_range
 from ....response.spectrum import harmonic_measures
 from ....structure.drive_sizes import find_max_acceleration
 from ....structure.response import compute_receptance
-from ..event_driven import PieceReader, RigidElements, YieldingElements
+from ..event_driven import EventEvaluator, RigidElements, YieldingElements
 from .curves import (
     COLUMN_MEASURES,
     CurvePoint,
@@ -99,7 +99,7 @@ class MapFinder(TracedCurve):
         begin = perf_counter()
         motion = self.repeating(drive, near)
         numerics = replace(self.numerics, cycles=2.0, window=1)
-        reader = PieceReader(self.model, numerics, self.patch, self.contact_elements)
+        reader = EventEvaluator(self.model, numerics, self.patch, self.contact_elements)
         run = histories.simulate(
             self.modes,
             drive,
@@ -113,7 +113,7 @@ class MapFinder(TracedCurve):
             self.start_memory(motion.memory),
         )
         run = reader.average_over_strips(run)
-        raw = reader.solution(run, perf_counter() - begin, drive)
+        raw = reader.make_solution(run, perf_counter() - begin, drive)
         outcome = raw.outcome or Outcome.STEADY
         if not motion.bounded:
             outcome = Outcome.GROWS
@@ -162,9 +162,9 @@ class MapFinder(TracedCurve):
             *map(float, run.reading.acceleration_harmonics), find_max_acceleration(drive)
         )
         values = _curve_measures(amplitude, run.acceleration, waves)
-        is_stuck = PieceReader(self.model, self.numerics, self.patch, self.contact_elements).sticks(
-            run
-        )
+        is_stuck = EventEvaluator(
+            self.model, self.numerics, self.patch, self.contact_elements
+        ).is_stuck(run)
         return CurvePoint(
             drive=drive,
             values=values,

@@ -17,7 +17,7 @@ from ....effects import SINE_WAVEFORM
 from ....model.rig import DriveLevels
 from ....response.measures import peak_sampling_errors
 from ..interface import make_contact
-from ..march import MarchReader
+from ..march import MarchEvaluator
 from ..solution import Solution
 from .curves import CurvePoint, TracedCurve, describe_instability, make_curve_point, trace_curve
 
@@ -69,8 +69,8 @@ def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | 
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few = replace(numerics, cycles=N_CYCLES_IN_GROOVES, steps=steps, window=1)
-        reader = MarchReader(replace(model, rig=rig), few, patch, contact)
-        solutions.append(reader.solution(done, perf_counter() - begin))
+        reader = MarchEvaluator(replace(model, rig=rig), few, patch, contact)
+        solutions.append(reader.make_solution(done, perf_counter() - begin))
     fine, half = solutions
     errors = {}
     for name, value in fine.values.items():
@@ -137,9 +137,9 @@ class MarchFinder(TracedCurve):
         """Evaluate one cycle of a periodic march."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
-        reader = MarchReader(self.model, numerics, self.patch, self.contact)
+        reader = MarchEvaluator(self.model, numerics, self.patch, self.contact)
         is_stuck = bool(np.ptp(mark.window.slip) <= reader.held) and not reader.creeps
-        values = reader.values(mark, run.drive, stuck=is_stuck)
+        values = reader.evaluate_measures(mark, run.drive, stuck=is_stuck)
         return CycleReading(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def point(self, drive, near=None) -> tuple:
