@@ -120,8 +120,7 @@ class Gap:
         """
         if self.profile is None:
             return None
-        beside = loaded_nodes[1:] | loaded_nodes[:-1]
-        longest = np.diff(x)[beside].max(initial=0.0) or np.diff(x).max()
+        longest = longest_loaded_cell(x, loaded_nodes)
         return float(max(longest, self.average or profiles.find_sample_spacing(self.profile)))
 
     def half_step_heights(self, x) -> np.ndarray:
@@ -157,6 +156,15 @@ class Gap:
             gap = gap + heights
             seconds["profile"] = perf_counter() - begin
         return ShapedGap(gap, notes, seconds)
+
+
+def longest_loaded_cell(x, loaded_nodes) -> float:
+    """Return the length [m] of the longest cell next to a node that carries pressure.
+
+    Without such nodes it is that of the longest cell.
+    """
+    beside = loaded_nodes[1:] | loaded_nodes[:-1]
+    return float(np.diff(x)[beside].max(initial=0.0) or np.diff(x).max())
 
 
 def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable) -> Gap:

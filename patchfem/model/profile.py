@@ -11,7 +11,7 @@ from ..exceptions import UnresolvedTrace
 from ..formatting import format_length
 from ..surface.files.read import read_profile
 from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
-from ..surface.nodes import average_at_nodes, place_over_patch
+from ..surface.nodes import MEANS_OVER_WAVES, average_at_nodes, place_over_patch
 from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
 from .file_cache import cache_by_file
@@ -140,7 +140,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
-    """Return a sentence about the waves shorter than a cut-off [m], () without such waves."""
+    """Return sentences about the waves shorter than a cut-off [m], () without such waves."""
     fraction = fine_fraction(trace, cutoff)
     if not fraction > 0:
         return ()
@@ -148,6 +148,8 @@ def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
         f"{trace.source}: waves longer than {format_length(cutoff)} give the shape of the gap; the shorter "
         f"waves ({100 * fraction:.2g} % of the rms height) are represented by [contact.asperities], whose "
         "key `cutoff` sets this limit",
+        f"{trace.source}: pressure_peak and contact_fraction are {MEANS_OVER_WAVES} shorter than "
+        f"{format_length(cutoff)}; the real contacts are smaller, and their pressure is higher",
     )
 
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from ..effects import law_has_trait
 from ..formatting import format_number
+from ..model.gap import longest_loaded_cell
 from ..response import rows
 from .patch import faces, ladder, press
 from .results import notes, patch_rows
@@ -130,7 +131,8 @@ def tolerance_warnings(finding: Finding, coarse=(), still=()) -> list[str]:
         ):
             from .patch import trace_split
 
-            warnings += trace_split.advise_split(model.patch)
+            element = longest_loaded_cell(finding.patch.x, finding.patch.active)
+            warnings += trace_split.advise_split(model.patch, element)
     if moving:
         warnings.append(_format_warning(finding, moving, _motion_remedy(finding, moving, coarse)))
     return warnings

@@ -10,9 +10,11 @@ from .profile import Profile
 
 AS_LONG = "the trace is as long as the patch"
 CENTRED_NOTE = "the trace is centred on the patch"
+MEANS_OVER_WAVES = "means over the waves of the trace"
 NOTES = (
     AS_LONG,
     CENTRED_NOTE,
+    MEANS_OVER_WAVES,
     "is rounded to",
 )  # parts of sentences that cast no doubt on a result
 ROUND_OFF = 1e-3  # fraction of the step; shorter lengths are round-off of x in the file

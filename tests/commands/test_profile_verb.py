@@ -11,6 +11,7 @@ from command_line import ALWAYS, FROM_SHELL, modules_after, run_cli
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
 from patchfem.export.results import FILES
+from patchfem.runs.patch import trace_split
 from patchfem.surface import make_report, read_surface
 
 UM = 1e-6
@@ -313,7 +314,9 @@ def test_exact_split_scene_keeps_other_text_and_runs(split_scene):
     contact = pf.load("split.toml").contact
     assert SHORT < contact.asperities.cutoff < LONG
     assert contact.asperities.tangential_ratio == 1.0 and contact.profile.heights == "surface"
-    assert run_cli("run", "split.toml", "--no-page").code == 0
+    answer = run_cli("run", "split.toml", "--no-page")
+    assert answer.code == 0
+    assert answer.err.count("pressure_peak and contact_fraction are means over the waves") == 1
     # the name of the trace is relative to the new scene
     Path("other").mkdir()
     assert (
@@ -339,6 +342,7 @@ def test_refuses_impossible_split(split_scene):
         (("inline.toml", "-o", "new.toml"), "inside [contact]; write them as tables"),
         (("skin.toml",), "without [contact.asperities]"),
         (("scene.toml", "--form", "2"), "--form"),
+        (("scene.toml", "-v"), "and --verbose"),
         (("scene.toml", "--set", "contact.load=1 N"), "--set"),
         (("scene.toml", "--cutoff", "50 mm"), "not shorter than the trace; give a shorter one"),
     ):
@@ -357,3 +361,32 @@ def test_always_run_prints_tables_of_split_for_unresolved_trace(split_scene):
         lines = answer.err.splitlines()
         assert answer.code == code and set(tables) <= set(lines), size
         assert sum("split the trace: waves longer than" in line for line in lines) == 1
+
+
+@pytest.mark.parametrize("size", ['element_size = "200 um"\n', ""])
+def test_run_does_not_advise_to_split_smooth_bumps(split_scene, size):
+    """Bumps ten elements long have no waves that the mesh cannot represent. The errors of a run with few elements
+    exceed the tolerance, but only finer elements help; `profile --split` says so."""
+    x = np.linspace(0, 12.7e-3, 6351)
+    z = 1e-6 * np.cos(2 * np.pi * x / 2.1e-3 + 0.4)
+    rows = "".join(f"{1e6 * a:.3f},{1e6 * b:.4f}\n" for a, b in zip(x, z))
+    Path("waves.csv").write_text(f"x [um],z [um]\n{rows}", "utf-8")
+    static = SPLIT_SCENE[: SPLIT_SCENE.index("[friction]")].replace("[contact.shear]\n", "")
+    text = static.replace('element_size = "63.5 um"  # even\n', size).replace("2 kN", "100 N")
+    split_scene.write_text(text, "utf-8")
+    answer = run_cli("profile", "waves.csv", "--split", "scene.toml")
+    assert answer.code == 2 and "nothing to split; reduce contact.element_size" in answer.err
+    if size:
+        answer = run_cli("run", "scene.toml", "--no-page")
+        assert "pressure_peak has an estimated error" in answer.err
+        assert "split the trace" not in answer.err
+
+
+def test_advice_names_the_elements_that_carry_load(split_scene):
+    """The advice to split belongs to the elements of the mesh at hand, not to those of an even mesh."""
+    patch_model = pf.build(pf.load(split_scene)).patch
+    (coarse,), (fine,) = (
+        trace_split.advise_split(patch_model, element) for element in (63.5e-6, 30e-6)
+    )
+    assert "shorter than an element (63.5 um)" in coarse
+    assert "shorter than an element (30 um)" in fine

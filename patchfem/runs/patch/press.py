@@ -234,7 +234,9 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
     except UnresolvedTrace as error:
         from .trace_split import advise_split
 
-        advice = "".join(f"; or {text}" for text in advise_split(patch_model))
+        advice = "".join(
+            f"; or {text}" for text in advise_split(patch_model, float(np.diff(x).max()))
+        )
         raise PatchfemError(f"{error}{advice}", error.key) from None
     gap = heights + pair.end_gap if worn is None else heights + pair.end_gap + worn
 

@@ -15,7 +15,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import profile
-from ...surface.fine import wave_spectrum
+from ...surface.fine import NEGLIGIBLE_LOST, unrepresented_fraction, wave_spectrum
 from ...surface.roughness.peaks import PERSSON, trace_moments
 from .skin import combined_surface_modulus
 
@@ -62,7 +62,9 @@ class TraceSplit:
         )
 
 
-def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
+def split_trace(
+    patch_model, cutoff: float | None = None, element: float | None = None
+) -> TraceSplit:
     """Split a trace at the shortest wavelength that the elements resolve, or at a given cutoff.
 
     Parameters
@@ -89,13 +91,20 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
             PROFILE_KEY,
         )
     pieces = patch_model.pieces
-    element = patch_model.uniform_element_size
+    element = element or patch_model.uniform_element_size
     ends = np.array([-0.5, 0.5]) * pieces.length
     trace = profile.level_profile(gap.profile, ends, element, is_material=False).profile
     pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
     modulus = combined_surface_modulus(patch_model)
     is_given = cutoff is not None
     if not is_given:
+        if unrepresented_fraction(trace, element) <= NEGLIGIBLE_LOST:
+            raise PatchfemError(
+                f"{trace.source}: elements of {format_length(element, 3)} represent "
+                f"{100 - 100 * NEGLIGIBLE_LOST:g} % of the rms height, so that there is nothing to split; reduce "
+                "contact.element_size if the errors are too large, or give a cutoff",
+                PROFILE_KEY,
+            )
         spectrum = wave_spectrum(trace)
         cutoff = float(f"{spectrum.shortest_resolved_wave(element, pressure / modulus):.3g}")
     if is_given and not cutoff < trace.length:
@@ -142,9 +151,12 @@ def split_trace(patch_model, cutoff: float | None = None) -> TraceSplit:
     )
 
 
-def advise_split(patch_model) -> list[str]:
-    """Return the advice to split the trace of a patch, as a list; [] if no split is possible."""
+def advise_split(patch_model, element: float) -> list[str]:
+    """Return the advice to split the trace of a patch, as a list; [] if it cannot be split.
+
+    element: length [m] of the elements that carry load.
+    """
     try:
-        return [split_trace(patch_model).describe()]
+        return [split_trace(patch_model, element=element).describe()]
     except PatchfemError:
         return []
