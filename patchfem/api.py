@@ -464,7 +464,9 @@ def cost(
     model = build(scene, **sets)
     tolerance = model.accuracy.tolerance
     setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
-    curve = cost_curves.setting_curve(model, setting, _print_to_stderr if say is None else say)
+    curve = cost_curves.compute_setting_costs(
+        model, setting, _print_to_stderr if say is None else say
+    )
     if out is not None:
         cost_files.write(Path(out), {setting: curve})
         cost_files.write_picture(Path(out), setting, curve, tolerance)

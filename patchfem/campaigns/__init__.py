@@ -1,9 +1,9 @@
-"""Studies of many runs of one scene: fits, error against cost, wear comparisons, sweeps.
+"""Studies with many runs of a scene: fits, error against cost, wear comparisons, sweeps.
 
 Read `cost` first.
 """
 
-# This table lists the names that other folders use, by module.
+# Names that other folders use, by the module that defines them.
 PUBLIC = {
     "backbone.curves": ("compute_backbone",),
     "backbone.records": (
@@ -13,16 +13,16 @@ PUBLIC = {
     "compare": (
         "SurfaceRuns",
         "run_both_surfaces",
-        "surface_runs_data",
+        "surface_runs_to_dict",
     ),
     "cost": (
         "Cost",
         "TOLERANCE",
-        "changed_measures",
-        "cost_sentence",
-        "fastest_by_measure",
-        "measures_with_error",
-        "setting_curve",
+        "find_affected_measures",
+        "describe_fastest_setting",
+        "find_fastest_settings",
+        "find_measures_with_error",
+        "compute_setting_costs",
         "worst_error",
         "worst_run_error",
     ),
@@ -57,7 +57,7 @@ PUBLIC = {
     ),
     "numerical_settings": (
         "NUMERICAL_SETTINGS",
-        "applicable_settings",
+        "find_applicable_settings",
     ),
     "rows.cells": ("compute_rms_scores",),
     "rows.condition_models": (

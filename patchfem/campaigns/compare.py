@@ -1,7 +1,7 @@
-"""Comparison of the measures of a scene with its surface before and after wear.
+"""Measures of a scene with its surface before and after wear.
 
-In: two models that differ only in the gap. Out: `SurfaceRuns`, the measures of both runs with their
-errors.
+In: two models that differ only in their gap. Out: the measures of both runs with their errors
+(`SurfaceRuns`).
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from ..runs.plan import plan
 from ..runs.results.result import patch_surface
 from ..runs.run import run
 
-# The table gives for each measure its text in a sentence, and what a scene needs for it.
+# Description of each compared measure, and the tables that a scene requires for it.
 COMPARED_MEASURES = {
     "pressure_peak": ("largest pressure", "[contact]"),
     "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
@@ -33,7 +33,7 @@ COMPARED_MEASURES = {
 
 
 class SurfaceResult(NamedTuple):
-    """Measures, stresses and outcome of a run with one of the two surfaces.
+    """Measures, normal stress and outcome of a run with one of the two surfaces.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class SurfaceResult(NamedTuple):
         Measures by name.
     outcome : str
     sentence : str
-        The outcome as a sentence.
+        Description of the outcome.
     x : (n,) array
         Positions of the nodes [m].
     stress : (n,) array
@@ -66,11 +66,11 @@ class SurfaceRuns(NamedTuple):
     title : str
         Title of the scene.
     before, after : SurfaceResult or None
-        None if the run failed.
+        Result of each run; None if the run failed.
     failed : tuple of str
-        Reasons why runs failed.
+        Error messages of failed runs.
     lacking : tuple of str
-        Measures that this scene cannot give, and why.
+        Messages about measures that this scene does not provide.
     """
 
     title: str
@@ -79,20 +79,20 @@ class SurfaceRuns(NamedTuple):
     failed: tuple
     lacking: tuple
 
-    def rows(self) -> list:
-        """Return the measures that at least one of the two runs has.
+    def measure_rows(self) -> list:
+        """Return a row for each measure with a value in at least one of the two runs.
 
-        They are tuples (name, text, measure before, measure after), where a measure may be None.
+        A row is a tuple (name, description, measure before, measure after); a measure may be None.
         """
         before, after = (getattr(side, "measures", {}) for side in (self.before, self.after))
         rows = []
         for name, (text, _) in COMPARED_MEASURES.items():
-            if _is_known(before.get(name)) or _is_known(after.get(name)):
+            if _has_value(before.get(name)) or _has_value(after.get(name)):
                 rows.append((name, text, before.get(name), after.get(name)))
         return rows
 
 
-def _is_known(measure: Measure | None) -> bool:
+def _has_value(measure: Measure | None) -> bool:
     """Return whether a measure exists and has a value."""
     return measure is not None and measure.value is not None
 
@@ -102,8 +102,7 @@ def run_both_surfaces(
 ) -> SurfaceRuns:
     """Run a model with the surface before and a model with the surface after wear.
 
-    All else is equal. A run that is refused or does not converge is described in `failed`; the
-    other run is still given.
+    If one of the runs fails, its error message is in `failed` and the other result is returned.
 
     Parameters
     ----------
@@ -111,33 +110,33 @@ def run_both_surfaces(
     title : str
         Title of the scene.
     say : callable, optional
-        Takes a line of progress.
+        Called with a line of text that reports the progress.
 
     Returns
     -------
     SurfaceRuns
     """
-    sides = []
+    results = []
     failed = []
     for name, model in (("before", before), ("after", after)):
         try:
-            sides.append(_run_side(model, say))
+            results.append(_run_surface(model, say))
         except (PatchfemError, NotConverged) as error:
-            sides.append(None)
+            results.append(None)
             failed.append(f"the surface {name}: {error}")
-    runs = SurfaceRuns(title, *sides, tuple(failed), ())
-    if not any(sides):
+    runs = SurfaceRuns(title, *results, tuple(failed), ())
+    if not any(results):
         return runs
-    known = {name for name, *_ in runs.rows()}
+    known_names = {name for name, *_ in runs.measure_rows()}
     lacking = []
-    for name, (text, need) in COMPARED_MEASURES.items():
-        if name not in known:
-            lacking.append(f"{text}: not computed, because the scene lacks {need}")
+    for name, (text, requirement) in COMPARED_MEASURES.items():
+        if name not in known_names:
+            lacking.append(f"{text}: not computed, because the scene lacks {requirement}")
     return runs._replace(lacking=tuple(lacking))
 
 
-def _run_side(model: Model, say) -> SurfaceResult:
-    """Run a model and return its measures, stresses and outcome."""
+def _run_surface(model: Model, say) -> SurfaceResult:
+    """Run a model and return its measures, normal stress and outcome."""
     result = run(plan(model), say)
     outcome = result.outcome
     surface = patch_surface(result.patch, result.fields)
@@ -151,27 +150,27 @@ def _run_side(model: Model, say) -> SurfaceResult:
     )
 
 
-def surface_runs_data(runs: SurfaceRuns) -> dict:
-    """Return both surface runs as plain data in SI units."""
+def surface_runs_to_dict(runs: SurfaceRuns) -> dict:
+    """Return the results with both surfaces as plain data in SI units."""
     measures = {}
-    for name, _, before, after in runs.rows():
-        measures[name] = {"before": _measure_data(before), "after": _measure_data(after)}
-    sides = {"before": runs.before, "after": runs.after}
+    for name, _, before, after in runs.measure_rows():
+        measures[name] = {"before": _measure_to_dict(before), "after": _measure_to_dict(after)}
+    results = {"before": runs.before, "after": runs.after}
     warnings = []
-    for name, side in sides.items():
-        if side is not None:
-            warnings += [f"{name}: {text}" for text in side.warnings]
+    for name, result in results.items():
+        if result is not None:
+            warnings += [f"{name}: {text}" for text in result.warnings]
     return {
         "scene": runs.title,
         "measures": measures,
         "failed": list(runs.failed),
         "lacking": list(runs.lacking),
-        "outcome": {name: getattr(side, "outcome", None) for name, side in sides.items()},
+        "outcome": {name: getattr(result, "outcome", None) for name, result in results.items()},
         "warnings": warnings,
     }
 
 
-def _measure_data(measure: Measure | None) -> dict | None:
+def _measure_to_dict(measure: Measure | None) -> dict | None:
     """Return value, error and unit of a measure; None if there is no measure."""
     if measure is None:
         return None

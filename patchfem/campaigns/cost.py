@@ -1,14 +1,14 @@
-"""Error of a scene against computing time, over tolerances or values of a numerical setting.
+"""Numerical error against computing time, for several tolerances or values of a setting.
 
 In: a model, and the setting that varies. Out: a list of `Cost`, one per run, and sentences about the
 cheapest setting that meets a tolerance.
 
-Read `tolerance_curve` first: it runs the scene at several tolerances, and if a run misses its
-tolerance, it tries the setting that the warnings of this run propose. `setting_curve` varies one setting
-alone.
+Read `compute_tolerance_costs` first. It runs the model at several tolerances. If a run misses its
+tolerance, the setting that its warnings propose is tried. `compute_setting_costs` varies a single
+setting.
 
-Times are CPU seconds of this process and its children, because other work on the machine does not
-change them.
+Times are CPU seconds of this process and its child processes, which are hardly affected by other
+programs.
 """
 
 import os
@@ -30,68 +30,70 @@ from ..runs.plan import plan
 from ..runs.run import run as run_plan
 from .numerical_settings import (
     Setting,
-    applicable_settings,
-    list_settings,
-    with_setting,
-    with_tolerance,
+    find_applicable_settings,
+    list_tolerances,
+    make_setting_values,
+    with_accuracy_key,
 )
 
-# Name of the curve over tolerances, which is accepted in addition to NUMERICAL_SETTINGS.
+# Name of the setting for a curve over tolerances, in addition to NUMERICAL_SETTINGS.
 TOLERANCE = "tolerance"
-# Number of timings of a short run; the shortest one counts, because other work only adds time.
+# Number of timings of a short run; the shortest one is used, because disturbances only add time.
 N_TIMINGS = 3
-# CPU time [s] above which a run is timed only once, because its timings differ by a few percent.
+# Smallest CPU time [s] of a run that is timed only once; longer runs scatter by a few percent.
 MIN_SECONDS_TIMED_ONCE = 0.3
-# CPU time [s] that runs with proposed settings may take in total, so that `cost` ends within
-# seconds.
+# Largest total CPU time [s] of runs with proposed settings.
 MAX_TRIAL_SECONDS = 10.0
-# A warning of a run ends with its tolerance and what to do; this second part may name a setting
-# that can be tried here.
+# The advice at the end of a warning about a missed tolerance, which may propose a setting.
 _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED_SETTING = re.compile(
     r"(?:set|.*try) accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)"
 )
-MIN_ELAPSED_TO_CPU_RATIO = 1.5  # Ratio of elapsed to CPU time above which both times are reported.
-EQUAL_COST_RATIO = 1.1  # Ratio of CPU times up to which two runs count as equally expensive.
-TIMING_SCATTER = 2e-3  # Difference of the CPU times of repeated runs of a short scene [s].
-NO_EFFECT_RATIO = 0.9  # Ratio of smallest to largest error above which a setting does not help.
-UNCHANGED_TOL = 1e-11  # Relative change of a measure below which a setting does not affect it.
-# Fraction of the floor of a measure below which a change of it is round-off.
+MIN_ELAPSED_TO_CPU_RATIO = (
+    1.5  # Largest ratio of elapsed to CPU time at which only the CPU time is reported.
+)
+EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
+TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
+NO_EFFECT_RATIO = (
+    0.9  # Smallest ratio of the smallest to the largest error at which a setting is ineffective.
+)
+UNCHANGED_TOL = 1e-11  # Largest relative change of an unaffected measure.
+# Largest change of a measure by round-off, as a fraction of its floor.
 ROUND_OFF_FRACTION = 1e-6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cost:
-    """Run of a cost curve: CPU time, measures and errors for a value of a setting.
+    """Run of a cost curve: CPU time, measures and errors for a value of a numerical setting.
 
     Attributes
     ----------
     label : str
-        Label of the setting, or of all settings that gave this run bit for bit.
+        Label of the setting, or of all settings with identical results.
     value : float or None
-        Value of the setting in SI; None if the tolerance of the scene chose it.
+        Value of the setting in SI; None if it follows from the tolerance of the scene.
     words : str
-        The setting as part of a sentence.
+        Description of the setting for use in a sentence.
     seconds : float
-        CPU seconds of the whole run with its error estimates: the smallest of `timings` timings.
+        CPU time of the run with its error estimates [s], the smallest of `timings` timings.
     wall_seconds : float
-        Elapsed seconds in the same timing.
+        Elapsed time of the same timing [s].
     timings : int
         Number of timings.
     values : dict
-        Values by measure.
+        Value of each measure.
     errors : dict
-        Errors by measure as the run states them, in the unit of the value.
+        Error estimate of each measure, in the unit of its value.
     floors : dict
-        Floors of the errors by measure.
+        Absolute floor of the allowed error of each measure.
     distances : dict
-        Distances to the best run by measure; empty for the best run.
+        Absolute difference of each measure to the best run; empty for the best run.
     tolerance : float
-        Tolerance that was set for the run.
+        Tolerance of the run.
     remedies : tuple of str
-        What the warnings of the run propose if it misses the tolerance.
+        Advice from the warnings of a run that misses its tolerance.
     steps : int or None
-        Time steps per cycle; None if the run has none.
+        Number of time steps per cycle; None if the method takes no time steps.
     """
 
     label: str
@@ -109,58 +111,59 @@ class Cost:
     steps: int | None = None
 
     def meets_tolerance(self) -> bool:
-        """Return whether every stated error is within the tolerance of the run."""
-        return all(self._allows(name, error, self.tolerance) for name, error in self.errors.items())
+        """Return whether every error estimate is within the tolerance of the run."""
+        errors = self.errors.items()
+        return all(self._is_allowed_error(name, error, self.tolerance) for name, error in errors)
 
     def known_error(self, name: str) -> float | None:
-        """Return the known error of a measure, stated or seen in the best run; None if unknown.
+        """Return the known error of a measure; None if it is unknown.
 
-        It is the larger of the error that the run states and its distance to the best run.
+        It is the larger one of the error estimate and the difference to the best run.
         """
         known = [errors[name] for errors in (self.errors, self.distances) if name in errors]
         return max(known, default=None)
 
-    def has_waited(self) -> bool:
-        """Return whether the elapsed time exceeds the CPU time so much that both are reported."""
+    def needs_elapsed_time(self) -> bool:
+        """Return whether the elapsed time is so much longer than the CPU time that it is reported, too."""
         return self.wall_seconds > MIN_ELAPSED_TO_CPU_RATIO * self.seconds
 
-    def is_same_run(self, other) -> bool:
-        """Return whether two numerical settings gave the same results bit for bit."""
+    def has_same_results(self, other) -> bool:
+        """Return whether two numerical settings gave bit-identical results."""
         if None in (self.value, other.value):
             return False
         return (self.values, self.errors) == (other.values, other.errors)
 
-    def is_within(self, name: str, tolerance: float) -> bool:
+    def is_within_tolerance(self, name: str, tolerance: float) -> bool:
         """Return whether the error of a measure is at most tolerance x |value| + floor."""
         error = self.known_error(name)
-        return error is not None and self._allows(name, error, tolerance)
+        return error is not None and self._is_allowed_error(name, error, tolerance)
 
-    def _is_changed(self, name: str, relative_change: float, floor_fraction: float) -> bool:
-        """Return whether a measure deviates from the best run by more than an allowed change."""
+    def _differs_from_best(self, name: str, relative_change: float, floor_fraction: float) -> bool:
+        """Return whether a measure differs from the best run by more than an allowed change."""
         if name not in self.values:
             return False
         size = relative_change * abs(self.values[name])
         return self.distances.get(name, 0.0) > max(size, floor_fraction * self.floors[name])
 
-    def _allows(self, name: str, error: float, tolerance: float) -> bool:
-        """Return whether a given error of a measure is at most tolerance x |value| + floor."""
+    def _is_allowed_error(self, name: str, error: float, tolerance: float) -> bool:
+        """Return whether an error of a measure is at most tolerance x |value| + floor."""
         return error <= compute_allowed_error(tolerance, self.values[name], self.floors[name])
 
 
-def tolerance_curve(model: Model, say=None) -> list:
+def compute_tolerance_costs(model: Model, say=None) -> list:
     """Run a model at several tolerances, including that of its scene.
 
     Parameters
     ----------
     model : Model
     say : callable, optional
-        Takes a line of text per run.
+        Called with a line of text for each run.
 
     Returns
     -------
     list of Cost
         From the largest to the smallest tolerance. A run that misses its tolerance is followed by
-        the runs with the proposed settings, which have the same `tolerance`.
+        runs with proposed settings, which have the same `tolerance`.
 
     Raises
     ------
@@ -168,7 +171,7 @@ def tolerance_curve(model: Model, say=None) -> list:
         If no run succeeds.
     """
     with locate_errors(model.source):
-        settings = with_tolerance(model)
+        settings = list_tolerances(model)
         # The first run includes imports and compilation, which the timings must not contain.
         _run_setting(settings[0], "first run, not timed", None)
         runs = []
@@ -176,15 +179,15 @@ def tolerance_curve(model: Model, say=None) -> list:
         for setting in settings:
             cost = _time_setting(setting, say)
             while cost is not None:
-                if runs and cost.is_same_run(runs[-1]):
-                    # The runs are identical, so that the faster timing holds for both.
+                if runs and cost.has_same_results(runs[-1]):
+                    # The shorter time is valid for both runs, because they are identical.
                     faster = min(runs[-1], cost, key=lambda run: run.seconds)
                     runs[-1] = _replace_timing(runs[-1], faster)
                     cost = _replace_timing(cost, faster)
                 runs.append(cost)
                 if cost.meets_tolerance():
                     break
-                setting = _proposed_setting(setting, cost, MAX_TRIAL_SECONDS - trial_seconds)
+                setting = _find_proposed_setting(setting, cost, MAX_TRIAL_SECONDS - trial_seconds)
                 if setting is None:
                     break
                 cost = _time_setting(setting, say)
@@ -195,24 +198,24 @@ def tolerance_curve(model: Model, say=None) -> list:
 
 
 def _replace_timing(cost: Cost, other: Cost) -> Cost:
-    """Return the record of a run with its CPU and elapsed times replaced."""
+    """Return a run with the CPU time and the elapsed time of another run."""
     return replace(cost, seconds=other.seconds, wall_seconds=other.wall_seconds)
 
 
-def _proposed_setting(setting: Setting, cost: Cost, seconds: float) -> Setting | None:
+def _find_proposed_setting(setting: Setting, cost: Cost, max_seconds: float) -> Setting | None:
     """Return the numerical setting that the warnings of a run propose, or None.
 
-    None if no warning proposes a setting that is larger than the present one, or if the run with it
-    would take longer than `seconds`.
+    Returns None if no warning proposes a larger value than the current one, or if the run would take
+    more than `max_seconds`.
 
     Parameters
     ----------
     setting : Setting
         Setting of the run.
     cost : Cost
-        The run.
-    seconds : float
-        CPU seconds that the next run may take.
+        Finished run.
+    max_seconds : float
+        Largest CPU time of the next run [s].
     """
     for remedy in cost.remedies:
         proposal = _PROPOSED_SETTING.match(remedy)
@@ -220,51 +223,50 @@ def _proposed_setting(setting: Setting, cost: Cost, seconds: float) -> Setting |
             continue
         key = proposal[1]
         count = int(proposal[2])
-        present = getattr(setting.model.accuracy, key)
-        if not present and key == "steps_per_cycle":
-            present = cost.steps
-        present = present or 1
-        # The time of a run grows about in proportion to its steps, modes or harmonics.
-        if present < count and cost.seconds * count / present <= seconds:
+        current = getattr(setting.model.accuracy, key)
+        if not current and key == "steps_per_cycle":
+            current = cost.steps
+        current = current or 1
+        # The time of a run is about proportional to its number of steps, modes or harmonics.
+        if current < count and cost.seconds * count / current <= max_seconds:
             label = f"{cost.tolerance:g}, {count} {key.replace('_', ' ')}"
-            model = with_setting(setting.model, key, count)
+            model = with_accuracy_key(setting.model, key, count)
             return Setting(label, cost.tolerance, f"tolerance {label}", model)
     return None
 
 
-def setting_curve(model: Model, knob: str, say=None) -> list:
+def compute_setting_costs(model: Model, setting_name: str, say=None) -> list:
     """Run a model with several values of a numerical setting, from coarse to fine.
 
     Parameters
     ----------
     model : Model
-    knob : str
+    setting_name : str
         One of NUMERICAL_SETTINGS, or TOLERANCE.
     say : callable, optional
-        Takes a line of text per run.
+        Called with a line of text for each run.
 
     Returns
     -------
     list of Cost
-        Identical neighbours are merged. The value that the tolerance chooses follows after the
-        fixed values.
+        Consecutive identical runs are merged. The automatic setting follows after the fixed values.
 
     Raises
     ------
     PatchfemError
-        If the scene does not have this setting, or if fewer than three values can be run.
+        If the scene does not have this setting, or if fewer than three runs succeed.
     """
-    if knob == TOLERANCE:
-        return tolerance_curve(model, say)
+    if setting_name == TOLERANCE:
+        return compute_tolerance_costs(model, say)
     with locate_errors(model.source):
-        possible = applicable_settings(model)
-        if knob not in possible:
+        possible = find_applicable_settings(model)
+        if setting_name not in possible:
             raise PatchfemError(
-                f"cost --over {knob}: the cost of this setting cannot be measured for this scene; "
+                f"cost --over {setting_name}: the cost of this setting cannot be measured for this scene; "
                 f"possible settings: {', '.join(possible) or 'none'}",
                 "",
             )
-        settings = list_settings(model, knob)
+        settings = make_setting_values(model, setting_name)
         # The first run includes imports and compilation, which the timings must not contain.
         _run_setting(settings[0], "first run, not timed", None)
         runs: list = []
@@ -275,45 +277,44 @@ def setting_curve(model: Model, knob: str, say=None) -> list:
             if cost is None:
                 continue
             n_succeeded += 1
-            if runs and cost.is_same_run(runs[-1]):
+            if runs and cost.has_same_results(runs[-1]):
                 runs[-1] = _merge_identical_runs(runs[-1], cost)
             else:
                 runs.append(cost)
         if n_succeeded < 3:
             raise PatchfemError(
-                f"cost --over {knob}: runs with fewer than three values of this setting succeeded",
+                f"cost --over {setting_name}: runs with fewer than three values of this setting succeeded",
                 "",
             )
-    best = _best_run(runs)
+    best = _find_best_run(runs)
     others = [replace(run, distances=_compute_distances(run, best)) for run in runs]
     return [best if run is best else other for run, other in zip(runs, others)]
 
 
-def _best_run(runs: list) -> Cost:
-    """Return the reference run: that of the finest value or that which the tolerance chooses.
+def _find_best_run(runs: list) -> Cost:
+    """Return the reference run: that of the finest value or that of the automatic setting.
 
-    Of these two it is the run whose stated errors are the smaller ones for most measures.
+    Of these two runs, it is the one with the smaller error estimates of most measures.
     """
     last = runs[-1]
     if last.value is not None:
         return last
     finest = runs[-2]
-    shared = last.errors.keys() & finest.errors.keys()
-    n_smaller = sum(last.errors[name] <= finest.errors[name] for name in shared)
-    return last if 2 * n_smaller >= len(shared) else finest
+    common_names = last.errors.keys() & finest.errors.keys()
+    n_smaller = sum(last.errors[name] <= finest.errors[name] for name in common_names)
+    return last if 2 * n_smaller >= len(common_names) else finest
 
 
 def _compute_distances(cost: Cost, best: Cost) -> dict:
-    """Return the distances of the values of a run from those of the best run, by measure."""
-    shared = [name for name in cost.values if name in best.values]
-    return {name: abs(cost.values[name] - best.values[name]) for name in shared}
+    """Return the absolute difference of each measure between a run and the best run."""
+    common_names = [name for name in cost.values if name in best.values]
+    return {name: abs(cost.values[name] - best.values[name]) for name in common_names}
 
 
 def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
-    """Merge two settings that gave the same results into a single run with both labels.
+    """Merge the runs of two settings with identical results into one run with both labels.
 
-    In a sentence it is named by the shorter text, which is that of the setting without a number,
-    chosen by the scene.
+    The description in a sentence is the shorter one, which is that of the automatic setting.
     """
     faster = min(first, second, key=lambda run: run.seconds)
     return replace(
@@ -324,52 +325,54 @@ def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
     )
 
 
-def _time_setting(setting: Setting, say, before=(), *, can_split: bool = True) -> Cost | None:
-    """Run a numerical setting several times and return its cost; None if it cannot be run.
+def _time_setting(
+    setting: Setting, say, previous_runs=(), *, can_split: bool = True
+) -> Cost | None:
+    """Run a model with a numerical setting several times, and return its cost or None.
 
-    It is timed N_TIMINGS times, or once if the run is long and nothing was compiled, or if it repeats
-    a run in `before`.
+    The run is timed N_TIMINGS times; once if it is long and nothing was compiled, or if its results
+    are identical to those of a previous run. None if the run fails.
 
     Parameters
     ----------
     setting : Setting
     say : callable or None
-        Takes a line of text.
-    before : sequence of Cost
-        Runs with which this one may be identical.
+        Called with a line of text.
+    previous_runs : sequence of Cost
+        Previous runs whose results may be identical.
     can_split : bool
-        Whether the mesh of a file may be split once more for its error estimate.
+        Whether the mesh of a file may be refined once more for its error estimate.
     """
     timings = []
     cost = None
-    same: list = []
-    while cost is None or (len(timings) < N_TIMINGS and not same):
-        n_compiled = _count_compiled()
-        begin = (_measure_cpu(), perf_counter())
+    identical_runs: list = []
+    while cost is None or (len(timings) < N_TIMINGS and not identical_runs):
+        n_compiled = _count_compiled_functions()
+        begin = (_measure_cpu_time(), perf_counter())
         finished = _run_setting(setting, setting.label, say, can_split=can_split)
         if finished is None:
             return None
-        timings.append((_measure_cpu() - begin[0], perf_counter() - begin[1]))
+        timings.append((_measure_cpu_time() - begin[0], perf_counter() - begin[1]))
         cost = _make_cost(setting, timings, finished)
-        same = [run for run in before if cost.is_same_run(run)]
-        if cost.seconds >= MIN_SECONDS_TIMED_ONCE and _count_compiled() == n_compiled:
+        identical_runs = [run for run in previous_runs if cost.has_same_results(run)]
+        if cost.seconds >= MIN_SECONDS_TIMED_ONCE and _count_compiled_functions() == n_compiled:
             break
     if say is not None:
         text = f"{cost.words}: {cost.seconds:.2f} CPU s"
-        if cost.has_waited():
+        if cost.needs_elapsed_time():
             text += f" ({cost.wall_seconds:.2f} s elapsed)"
-        for run in same:
+        for run in identical_runs:
             text += f", the same run as with {run.words}"
-        if not same and cost.timings == 1:
+        if not identical_runs and cost.timings == 1:
             text += ", timed once"
         say(text)
     return cost
 
 
 class _FinishedRun(NamedTuple):
-    """Measures, warnings and steps per cycle of a finished run.
+    """Measures, warnings and number of steps per cycle of a finished run.
 
-    The steps are None if the run has none.
+    The number of steps is None if the method takes no time steps.
     """
 
     measures: dict
@@ -378,7 +381,7 @@ class _FinishedRun(NamedTuple):
 
 
 def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
-    """Return the cost of a setting from its timings (CPU time, elapsed time) [s]."""
+    """Return the cost of a setting from its pairs of CPU time and elapsed time [s]."""
     values = {}
     errors = {}
     floors = {}
@@ -407,16 +410,16 @@ def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
     )
 
 
-def _measure_cpu() -> float:
-    """Return the CPU time [s] of this process, its threads and its finished child processes."""
+def _measure_cpu_time() -> float:
+    """Return the CPU time [s] of this process and its finished child processes."""
     children = os.times()
     return process_time() + children.children_user + children.children_system
 
 
-def _count_compiled() -> int:
-    """Return the number of functions whose compiled code is cached.
+def _count_compiled_functions() -> int:
+    """Return the number of compiled functions in the cache.
 
-    A run that increases this number has compiled a function.
+    An increase shows that a run has compiled a function.
     """
     try:
         return len(os.listdir(cache_folder() / "code"))
@@ -427,9 +430,10 @@ def _count_compiled() -> int:
 def _run_setting(
     setting: Setting, label: str, say, *, can_split: bool = True
 ) -> _FinishedRun | None:
-    """Run a setting; None if it does not converge or needs more memory than there is.
+    """Run a model with a numerical setting; return None if the run fails.
 
-    The pieces are condensed again instead of being taken from the cache.
+    A run fails if it does not converge or runs out of memory. The pieces are condensed again instead
+    of being loaded from the cache.
     """
     try:
         if setting.level:
@@ -444,68 +448,66 @@ def _run_setting(
         return None
 
 
-def changed_measures(runs: list) -> list:
-    """Return the names of the measures that the setting changes, in the order of the runs.
+def find_affected_measures(runs: list) -> list:
+    """Return the names of the measures that depend on the numerical setting.
 
-    A measure counts as changed if it differs by more than UNCHANGED_TOL times its value and by more than
-    the round-off of its floor.
+    A measure counts as dependent if it changes by more than UNCHANGED_TOL times its value, and by more
+    than the round-off of its floor.
     """
     names = []
     for name in runs[0].values:
-        if any(run._is_changed(name, UNCHANGED_TOL, ROUND_OFF_FRACTION) for run in runs):
+        if any(run._differs_from_best(name, UNCHANGED_TOL, ROUND_OFF_FRACTION) for run in runs):
             names.append(name)
     return names
 
 
-def fastest_by_measure(runs: list, tolerance: float) -> dict:
-    """Return, by measure, the label of the fastest run within the tolerance, or None.
+def find_fastest_settings(runs: list, tolerance: float) -> dict:
+    """Return the label of the fastest run within the tolerance for each measure, or None.
 
-    A coarse run that is accurate by chance does not count: no finer run may exceed the tolerance
-    again.
+    A coarse run that is accurate by chance is excluded: all finer runs must meet the tolerance as well.
     """
-    out = {}
-    for name in changed_measures(runs):
+    labels = {}
+    for name in find_affected_measures(runs):
         confirmed = _select_confirmed_runs(runs, [name], tolerance)
         fastest = min(confirmed, key=lambda run: run.seconds, default=None)
-        out[name] = None if fastest is None else fastest.label
-    return out
+        labels[name] = None if fastest is None else fastest.label
+    return labels
 
 
 def _select_confirmed_runs(runs: list, names: Sequence, tolerance: float) -> list:
-    """Select the runs that meet a tolerance and are confirmed by all finer runs.
+    """Select the runs that meet a tolerance, provided that all finer runs meet it as well.
 
-    The run that the tolerance chooses is judged on its own.
+    The run with the automatic setting is judged independently of the others.
 
     Parameters
     ----------
     runs : list of Cost
     names : sequence of str
-        Measures; a run may lack some of them.
+        Names of measures, which need not exist in every run.
     tolerance : float
     """
 
-    def is_good(run: Cost) -> bool:
-        """Return whether a run has all named measures within the tolerance."""
-        return all(run.is_within(name, tolerance) for name in names if name in run.values)
+    def is_accurate(run: Cost) -> bool:
+        """Return whether the named measures of a run are within the tolerance."""
+        return all(run.is_within_tolerance(name, tolerance) for name in names if name in run.values)
 
     confirmed = []
     for run in reversed([run for run in runs if run.value is not None]):
-        # The best run has no error if it only serves as the reference of the others.
+        # Without error estimates, the best run only serves as the reference of the others.
         if not run.errors and not run.distances:
             continue
-        if not is_good(run):
+        if not is_accurate(run):
             break
         confirmed.append(run)
-    return confirmed + [run for run in runs if run.value is None and is_good(run)]
+    return confirmed + [run for run in runs if run.value is None and is_accurate(run)]
 
 
-def fastest_run(runs: list, tolerance: float) -> Cost | None:
-    """Return the run with the least CPU time that has all measures within a tolerance.
+def find_fastest_run(runs: list, tolerance: float) -> Cost | None:
+    """Return the run with the shortest CPU time that meets a tolerance, or None.
 
-    Of runs that are equally expensive it is the one that comes first, with the coarsest setting.
-    None if there is no such run.
+    Among equally expensive runs, the one with the coarsest setting is returned.
     """
-    confirmed = _select_confirmed_runs(runs, measures_with_error(runs), tolerance)
+    confirmed = _select_confirmed_runs(runs, find_measures_with_error(runs), tolerance)
     shortest = min((run.seconds for run in confirmed), default=inf)
     for run in runs:
         if run in confirmed and run.seconds <= EQUAL_COST_RATIO * shortest + TIMING_SCATTER:
@@ -513,16 +515,16 @@ def fastest_run(runs: list, tolerance: float) -> Cost | None:
     return None
 
 
-def cost_sentence(runs: list, tolerance: float) -> str:
-    """Return the sentence on the fastest setting that meets a tolerance.
+def describe_fastest_setting(runs: list, tolerance: float) -> str:
+    """Describe the fastest setting that meets a tolerance, or the measure that misses it.
 
-    If none does, it names a measure that misses it.
+    If no setting meets the tolerance, the description contains the worst measure of the best run.
     """
-    names = measures_with_error(runs)
-    fastest = fastest_run(runs, tolerance)
+    names = find_measures_with_error(runs)
+    fastest = find_fastest_run(runs, tolerance)
     if fastest is not None:
-        cost = f"{_format_seconds(fastest)} per run"
-        if len(runs) > 1 and not _has_effect(runs, tolerance):
+        cost = f"{_format_cpu_time(fastest)} per run"
+        if len(runs) > 1 and not _setting_has_effect(runs, tolerance):
             return (
                 f"this setting changes no result by more than the tolerance {tolerance:g}; fastest in these timings: "
                 f"{fastest.words}, {cost}"
@@ -543,31 +545,31 @@ def cost_sentence(runs: list, tolerance: float) -> str:
         )
     return (
         f"no setting meets the tolerance {tolerance:g}: the best run, with {best.words}, has an error of "
-        f"{size} in {worst.name} and takes {_format_seconds(best)}"
+        f"{size} in {worst.name} and takes {_format_cpu_time(best)}"
     )
 
 
-def _has_effect(runs: list, tolerance: float) -> bool:
-    """Return whether a result of any run differs from that of the best run by more than the tolerance."""
-    names = changed_measures(runs)
+def _setting_has_effect(runs: list, tolerance: float) -> bool:
+    """Return whether any result differs from that of the best run by more than the tolerance."""
+    names = find_affected_measures(runs)
     for run in runs:
         for name in names:
             distance = run.distances.get(name, 0.0)
-            if name in run.values and not run._allows(name, distance, tolerance):
+            if name in run.values and not run._is_allowed_error(name, distance, tolerance):
                 return True
     return False
 
 
-def _format_seconds(run: Cost) -> str:
+def _format_cpu_time(run: Cost) -> str:
     """Format the CPU time of a run with two digits."""
     return f"{format_number(run.seconds, 2)} CPU s"
 
 
 class WorstError(NamedTuple):
-    """Measure of a run whose error is largest relative to its tolerance.
+    """Measure of a run with the largest error relative to its allowed error.
 
-    fraction: error / error that a tolerance of 1 would allow, to be compared with the tolerance;
-    name: of the measure, "" if no error is known.
+    fraction: error over the allowed error at a tolerance of 1, to be compared with the tolerance;
+    name: name of the measure, "" if no error is known.
     """
 
     fraction: float
@@ -575,13 +577,13 @@ class WorstError(NamedTuple):
 
 
 def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
-    """Find the measure whose error is largest relative to a tolerance.
+    """Find the measure with the largest error relative to a tolerance.
 
     Parameters
     ----------
     run : Cost
     names : sequence of str
-        Measures that are compared.
+        Names of the measures to compare.
     tolerance : float
 
     Returns
@@ -598,11 +600,11 @@ def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
 
 
 def worst_run_error(run: Cost) -> WorstError:
-    """Return the worst error of a run relative to the tolerance of that run."""
+    """Find the measure of a run with the largest error relative to the tolerance of the run."""
     return worst_error(run, list(run.values), run.tolerance)
 
 
-def measures_with_error(runs: list) -> list:
-    """Return the measures whose error is stated by any run; all measures if no run states one."""
+def find_measures_with_error(runs: list) -> list:
+    """Return the measures with an error estimate in any run; all measures if there is none."""
     names = list(runs[-1].values)
     return [name for name in names if any(name in run.errors for run in runs)] or names

@@ -1,4 +1,4 @@
-"""Numerical settings that can be varied in a model, and their values from coarse to fine."""
+"""Numerical settings that can be varied in a model, with values from coarse to fine."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,31 +11,31 @@ from ..runs.rig import numerics
 from ..scene.rules.accuracy import has_effect
 
 NUMERICAL_SETTINGS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
-N_VALUES = 5  # Number of values of a setting; each is twice as fine as the previous one.
-# Tolerances that choose the meshes of an automatic mesh study.
+N_VALUES = 5  # Number of values of a setting, each twice as fine as the previous one.
+# Tolerances for a series of automatic meshes.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
-# Tolerances of a complete scene; smaller ones take long, and few scenes meet them.
+# Tolerances for runs of a scene; smaller ones take long and are rarely met.
 SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
-MAX_CELLS = 1600  # Number of columns of the finest uniform mesh.
-MAX_STEPS = 12800
-# Middle value of a setting if the scene does not set its key.
+MAX_CELLS = 1600  # Largest number of cells of a uniform mesh along the interface.
+MAX_STEPS = 12800  # Largest number of time steps per cycle.
+# Middle value of a setting that the scene does not set.
 DEFAULT_SETTING_VALUES = {"shear_modes": 8, "jumps": 8}
 
 
 class Setting(NamedTuple):
-    """Value of a numerical setting together with its model.
+    """Value of a numerical setting, and the model with this value.
 
     Attributes
     ----------
     label : str
         Label for tables.
     value : float or None
-        Value in SI; None if the tolerance of the scene chooses it.
+        Value in SI; None if it follows from the tolerance of the scene.
     words : str
-        The setting as part of a sentence.
+        Description of the setting for use in a sentence.
     model : Model
     level : int
-        Number of times that the edges of a mesh file are halved.
+        Number of refinements of a mesh file, each of which halves the edges.
     """
 
     label: str
@@ -45,13 +45,13 @@ class Setting(NamedTuple):
     level: int = 0
 
 
-def applicable_settings(model: Model) -> list:
+def find_applicable_settings(model: Model) -> list:
     """Return the NUMERICAL_SETTINGS that have an effect on a model.
 
-    They are among the element size, time steps, shear modes, and the jumps over cycles of wear.
+    Possible settings are element size, time steps, shear modes and jumps over wear cycles.
     """
     settings = ["element_size"] if model.patch is not None else []
-    # The sum over the bonds takes the same steps as a bench.
+    # All engines of a bench, including the sum over bonds, take the same time steps.
     engine_name = "bench" if model.kind == "bench" else plan(model).engine
     if has_effect("steps_per_cycle", model.kind, engine_name):
         settings.append("steps_per_cycle")
@@ -63,22 +63,22 @@ def applicable_settings(model: Model) -> list:
     return settings
 
 
-def list_settings(model: Model, knob: str) -> list:
-    """Return the values of a numerical setting from coarse to fine, with that of the scene.
+def make_setting_values(model: Model, setting_name: str) -> list:
+    """Return the values of a numerical setting from coarse to fine, including that of the scene.
 
-    A value that the tolerance chooses comes last if the others are numbers.
+    An automatic value is the last one, unless the values are tolerances.
     """
-    if knob != "element_size":
-        return _list_integer_values(model, knob)
+    if setting_name != "element_size":
+        return _list_integer_values(model, setting_name)
     if model.patch.mesh.file is not None:
-        return _split_meshes(model)
+        return _list_split_meshes(model)
     if model.patch.mesh.is_automatic:
         return _list_tolerance_meshes(model)
     return _list_uniform_meshes(model)
 
 
-def _split_meshes(model: Model) -> list:
-    """Return the mesh of a file and meshes with its edges halved, as settings."""
+def _list_split_meshes(model: Model) -> list:
+    """Return settings for the mesh of a file and for refinements with its edges halved."""
     settings = []
     for level in range(3):
         words = "contact.mesh as it is"
@@ -88,12 +88,12 @@ def _split_meshes(model: Model) -> list:
     return settings
 
 
-def with_tolerance(model: Model) -> list:
+def list_tolerances(model: Model) -> list:
     """Return settings for several values of accuracy.tolerance, from large to small.
 
-    The tolerance of the scene is one of them.
+    The values include the tolerance of the scene.
     """
-    models = {value: with_setting(model, "tolerance", value) for value in SCENE_TOLERANCES}
+    models = {value: with_accuracy_key(model, "tolerance", value) for value in SCENE_TOLERANCES}
     models[model.accuracy.tolerance] = model
     settings = []
     for value in sorted(models, reverse=True):
@@ -101,8 +101,8 @@ def with_tolerance(model: Model) -> list:
     return settings
 
 
-def with_setting(model: Model, key: str, value: float) -> Model:
-    """Return a model with another value of a key of [accuracy].
+def with_accuracy_key(model: Model, key: str, value: float) -> Model:
+    """Return a model with another value of a key of the table [accuracy].
 
     Parameters
     ----------
@@ -119,15 +119,15 @@ def with_setting(model: Model, key: str, value: float) -> Model:
 
 
 def _list_tolerance_meshes(model: Model) -> list:
-    """Return settings with the meshes that are chosen for several tolerances."""
+    """Return settings with the automatic meshes for several tolerances."""
     scene_tolerance = model.accuracy.tolerance
     settings = []
     for value in sorted({*TOLERANCES, scene_tolerance}, reverse=True):
         words = "element size set by the tolerance"
         if value != scene_tolerance:
             words += f" {value:g}"
-        meshed = replace(model, patch=model.patch.with_mesh(tolerance=value))
-        settings.append(Setting(f"tolerance {value:g}", value, words, meshed))
+        meshed_model = replace(model, patch=model.patch.with_mesh(tolerance=value))
+        settings.append(Setting(f"tolerance {value:g}", value, words, meshed_model))
     return settings
 
 
@@ -135,62 +135,66 @@ def _list_uniform_meshes(model: Model) -> list:
     """Return settings for uniform meshes, and for the automatic mesh of a static patch."""
     length = model.patch.pieces.length
     settings = []
-    middle = round(length / model.patch.uniform_element_size)
+    middle_count = round(length / model.patch.uniform_element_size)
     for power in range(-3, N_VALUES - 3):
-        cells = round(middle * 2.0**power)
+        cells = round(middle_count * 2.0**power)
         if 8 <= cells <= MAX_CELLS or not power:
             label = f"{1e6 * length / cells:.4g} um"
             size = length / cells
-            meshed = replace(model, patch=model.patch.with_element_size(size)) if power else model
-            settings.append(Setting(label, size, f"element size {label}", meshed))
+            meshed_model = (
+                replace(model, patch=model.patch.with_element_size(size)) if power else model
+            )
+            settings.append(Setting(label, size, f"element size {label}", meshed_model))
     if model.kind == "patch":
-        chosen = replace(model, patch=model.patch.with_element_size(None))
-        settings.append(Setting("by tolerance", None, "element size set by the tolerance", chosen))
+        automatic_model = replace(model, patch=model.patch.with_element_size(None))
+        settings.append(
+            Setting("by tolerance", None, "element size set by the tolerance", automatic_model)
+        )
     return settings
 
 
-def _list_integer_values(model: Model, knob: str) -> list:
+def _list_integer_values(model: Model, setting_name: str) -> list:
     """Return settings for integer values around the value of the scene.
 
-    A small value of the scene has fewer coarser values, because a quarter and a half of 1 are no
-    numbers of shear modes.
+    There are fewer coarse values if the value of the scene is small, because values less than 1 are
+    excluded.
     """
-    pinned = _scene_value(model, knob)
-    has_steps = knob == "steps_per_cycle"
-    middle = _middle_value(model, knob)
-    unit = knob.replace("_", " ")
+    is_set_in_scene = _find_scene_value(model, setting_name)
+    is_step_count = setting_name == "steps_per_cycle"
+    middle = _find_middle_value(model, setting_name)
+    unit = setting_name.replace("_", " ")
     models = {}
     for power in range(-2, N_VALUES - 2):
         value = max(1, round(middle * 2.0**power))
-        is_scene_value = not power and (pinned or has_steps)
+        is_scene_value = not power and (is_set_in_scene or is_step_count)
         if is_scene_value:
             models[value] = model
-        elif not has_steps or 4 <= value <= MAX_STEPS:
-            models[value] = _with_integer(model, knob, value)
+        elif not is_step_count or 4 <= value <= MAX_STEPS:
+            models[value] = _with_integer_setting(model, setting_name, value)
     settings = []
     for value, changed in models.items():
         settings.append(Setting(str(value), float(value), f"{value} {unit}", changed))
-    if not pinned and not has_steps:
+    if not is_set_in_scene and not is_step_count:
         settings.append(Setting("by tolerance", None, f"{unit} set by the tolerance", model))
     return settings
 
 
-def _scene_value(model: Model, knob: str) -> int | None:
-    """Return the value of a numerical setting in the scene; None if it does not set one."""
-    return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
+def _find_scene_value(model: Model, setting_name: str) -> int | None:
+    """Return the value of a numerical setting in the scene; None if the scene does not set it."""
+    return model.wear.jumps if setting_name == "jumps" else getattr(model.accuracy, setting_name)
 
 
-def _middle_value(model: Model, knob: str) -> int:
-    """Return the middle of the values of a numerical setting."""
-    if knob != "steps_per_cycle":
-        return _scene_value(model, knob) or DEFAULT_SETTING_VALUES[knob]
+def _find_middle_value(model: Model, setting_name: str) -> int:
+    """Return the middle one of the values of a numerical setting."""
+    if setting_name != "steps_per_cycle":
+        return _find_scene_value(model, setting_name) or DEFAULT_SETTING_VALUES[setting_name]
     if model.kind == "bench":
         return engine.steps_per_cycle(model)
     return numerics.choose_numerics(model).steps
 
 
-def _with_integer(model: Model, knob: str, value: int) -> Model:
+def _with_integer_setting(model: Model, setting_name: str, value: int) -> Model:
     """Return a model with another value of an integer setting."""
-    if knob == "jumps":
+    if setting_name == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))
-    return with_setting(model, knob, value)
+    return with_accuracy_key(model, setting_name, value)

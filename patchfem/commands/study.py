@@ -64,12 +64,12 @@ def cost(
         )
     knobs = [over or cost_curves.TOLERANCE]
     if verbose and not over:
-        knobs += numerical_settings.applicable_settings(scene_model)
+        knobs += numerical_settings.find_applicable_settings(scene_model)
     target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
     curves = {}
     data = {}
     for knob in knobs:
-        runs = curves[knob] = cost_curves.setting_curve(
+        runs = curves[knob] = cost_curves.compute_setting_costs(
             scene_model, knob, None if quiet else print_message
         )
         table = cost_files.write(target, curves)

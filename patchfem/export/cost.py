@@ -8,10 +8,10 @@ import numpy as np
 from ..campaigns.cost import (
     TOLERANCE,
     Cost,
-    changed_measures,
-    cost_sentence,
-    fastest_by_measure,
-    measures_with_error,
+    describe_fastest_setting,
+    find_affected_measures,
+    find_fastest_settings,
+    find_measures_with_error,
     worst_error,
     worst_run_error,
 )
@@ -69,9 +69,9 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     list of str
     """
     if knob != TOLERANCE:
-        names = measures_with_error(runs)
+        names = find_measures_with_error(runs)
         rows = [(run, worst_error(run, names, tolerance), "") for run in runs]
-        last = [cost_sentence(runs, tolerance)]
+        last = [describe_fastest_setting(runs, tolerance)]
     else:
         groups = _by_tolerance(runs)
         rows = [(group[0], worst_run_error(group[0]), _format_outcome(group)) for group in groups]
@@ -135,7 +135,7 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
     list of str
     """
     names = detailed_measures(runs, tolerance)
-    has_wall_times = any(run.has_waited() for run in runs)
+    has_wall_times = any(run.needs_elapsed_time() for run in runs)
     width = max(len(knob), *(len(run.label) for run in runs))
     head = [
         f"{knob:<{width}}",
@@ -161,7 +161,7 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
                 cells + [_format_shares(run, name).rjust(max(17, len(name))) for name in names]
             )
         )
-    return [*out, cost_sentence(runs, tolerance)]
+    return [*out, describe_fastest_setting(runs, tolerance)]
 
 
 def _format_shares(run: Cost, name: str) -> str:
@@ -189,8 +189,8 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     They are those of MAIN that the setting changes, and the worst measure of each run; if there are
     none of these, all measures that it changes.
     """
-    changed = changed_measures(runs) or measures_with_error(runs)
-    names = measures_with_error(runs)
+    changed = find_affected_measures(runs) or find_measures_with_error(runs)
+    names = find_measures_with_error(runs)
     worst = {worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances}
     ordered_names = (*MAIN_MEASURES, *sorted(worst.difference(MAIN_MEASURES)))
     return [name for name in ordered_names if name in changed] or changed
@@ -309,8 +309,8 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
     alone = knob != TOLERANCE
     return {
         "runs": out,
-        "cheapest": fastest_by_measure(runs, tolerance) if alone else None,
-        "sentence": cost_sentence(runs, tolerance) if alone else None,
+        "cheapest": find_fastest_settings(runs, tolerance) if alone else None,
+        "sentence": describe_fastest_setting(runs, tolerance) if alone else None,
     }
 
 
@@ -328,7 +328,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     tolerance : float
         That of the scene, drawn as a dashed line.
     """
-    names = measures_with_error(runs)
+    names = find_measures_with_error(runs)
     worst = [
         worst_run_error(run) if knob == TOLERANCE else worst_error(run, names, tolerance)
         for run in runs

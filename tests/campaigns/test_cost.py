@@ -14,13 +14,13 @@ from patchfem import build
 from patchfem.campaigns import (
     TOLERANCE,
     Cost,
+    compute_setting_costs,
     cost,
-    cost_sentence,
-    fastest_by_measure,
+    describe_fastest_setting,
+    find_fastest_settings,
     numerical_settings,
-    setting_curve,
 )
-from patchfem.campaigns.cost import fastest_run
+from patchfem.campaigns.cost import find_fastest_run
 from patchfem.core import NotConverged, PatchfemError
 from patchfem.export import format_cost
 from patchfem.runs.run import run
@@ -90,7 +90,7 @@ def test_exact_error_at_setting_of_scene_agrees_with_run(keys, own, monkeypatch)
     monkeypatch.setattr(numerical_settings, "TOLERANCES", (1e-1, 1e-2))
     patch = build_model(keys, 0.03)
     # The label of a row lists all settings with equal runs.
-    row = next(one for one in setting_curve(patch, "element_size") if own in one.label)
+    row = next(one for one in compute_setting_costs(patch, "element_size") if own in one.label)
     measures = run(patch, fresh=True).measures
     assert row.errors == pytest.approx({name: m.error for name, m in measures.items()}, rel=1e-9)
     assert row.values == pytest.approx({name: m.value for name, m in measures.items()}, rel=1e-9)
@@ -135,29 +135,29 @@ def test_exact_fastest_run_is_confirmed_by_finer_runs():
         make_cost("good", 3, 1e-3, 1e-3),
         make_cost("best", 9, 1e-5),
     ]
-    assert fastest_by_measure(runs, 1e-2) == {"a": "good"} and fastest_by_measure(runs, 1e-6) == {
-        "a": None
-    }
-    assert fastest_by_measure(runs, 0.2) == {"a": "lucky"}
+    assert find_fastest_settings(runs, 1e-2) == {"a": "good"} and find_fastest_settings(
+        runs, 1e-6
+    ) == {"a": None}
+    assert find_fastest_settings(runs, 0.2) == {"a": "lucky"}
 
 
 def test_exact_summary_states_fastest_run_or_worst_measure():
     """The summary states the fastest run within the tolerance, or else the measure with the largest error."""
     runs = [make_cost("2", 1, 4e-2, 3e-2), make_cost("4", 2, 8e-3, 6e-3), make_cost("8", 5, 2e-3)]
     within = "a knob at 4: 2 CPU s per run, with every measure within the tolerance 0.01"
-    assert cost_sentence(runs, 1e-2) == within
-    assert cost_sentence(runs, 1e-3) == (
+    assert describe_fastest_setting(runs, 1e-2) == within
+    assert describe_fastest_setting(runs, 1e-3) == (
         "no setting meets the tolerance 0.001: the best run, with a knob at 8, has an error of 0.002 in a and takes 5 "
         "CPU s"
     )
     constant = [make_cost("2", 1, 2.22), make_cost("4", 2, 2.22), make_cost("8", 5, 2.22)]
     assert (
-        cost_sentence(constant, 1e-2)
+        describe_fastest_setting(constant, 1e-2)
         == "no setting meets the tolerance 0.01: with every setting the error of a is 2.2"
     )
     # The stated error of the first run is below its distance from the best run.
     optimistic = [make_cost("2", 1, 1e-3, 3e-2), *runs[1:]]
-    assert cost_sentence(optimistic, 1e-2) == within
+    assert describe_fastest_setting(optimistic, 1e-2) == within
 
 
 def test_exact_smallest_of_equally_fast_settings_is_proposed():
@@ -168,7 +168,9 @@ def test_exact_smallest_of_equally_fast_settings_is_proposed():
     """
     seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
     equal = [make_cost(label, each, 1e-3, 0.0) for label, each in seconds.items()]
-    assert fastest_run(equal, 1e-2).label == "100" and cost_sentence(equal, 1e-2) == (
+    assert find_fastest_run(equal, 1e-2).label == "100" and describe_fastest_setting(
+        equal, 1e-2
+    ) == (
         "this setting changes no result by more than the tolerance 0.01; fastest in these timings: a knob at 100, 0.04 "
         "CPU s per run"
     )
@@ -177,11 +179,11 @@ def test_exact_smallest_of_equally_fast_settings_is_proposed():
         make_cost("4", 0.96, 2e-3, 1e-3),
         make_cost("8", 1.2, 1e-3),
     ]
-    assert fastest_run(slow, 1e-2).label == "2" and fastest_run(slow, 5e-3).label == "4"
-    assert cost_sentence(slow, 1e-2).endswith(
+    assert find_fastest_run(slow, 1e-2).label == "2" and find_fastest_run(slow, 5e-3).label == "4"
+    assert describe_fastest_setting(slow, 1e-2).endswith(
         "fastest in these timings: a knob at 2, 1 CPU s per run"
     )
-    assert cost_sentence(slow, 5e-3).endswith("within the tolerance 0.005")
+    assert describe_fastest_setting(slow, 5e-3).endswith("within the tolerance 0.005")
 
 
 def test_exact_missed_tolerance_is_stated_with_sufficient_steps():
@@ -271,8 +273,8 @@ def test_exact_steps_are_the_only_setting_of_a_point_scene():
     """The steps per cycle are the only setting of a single point, for a law with and without memory."""
     for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
         found = build(text)
-        assert numerical_settings.applicable_settings(found) == ["steps_per_cycle"]
-    assert len(setting_curve(found, "steps_per_cycle")) > 2
+        assert numerical_settings.find_applicable_settings(found) == ["steps_per_cycle"]
+    assert len(compute_setting_costs(found, "steps_per_cycle")) > 2
 
 
 def test_always_each_value_of_a_setting_runs_once(monkeypatch):
@@ -281,9 +283,9 @@ def test_always_each_value_of_a_setting_runs_once(monkeypatch):
     A quarter and a half of a jump both give a single jump.
     """
     worn = build(WORN)
-    labels = [one.label for one in numerical_settings.list_settings(worn, "jumps")]
+    labels = [one.label for one in numerical_settings.make_setting_values(worn, "jumps")]
     assert labels == ["1", "2", "4"]
-    assert [one.label for one in setting_curve(worn, "jumps")] == labels
+    assert [one.label for one in compute_setting_costs(worn, "jumps")] == labels
     run_plan = cost.run_plan
 
     def run_one_jump(planned, **options):
@@ -293,4 +295,4 @@ def test_always_each_value_of_a_setting_runs_once(monkeypatch):
 
     monkeypatch.setattr(cost, "run_plan", run_one_jump)
     with pytest.raises(PatchfemError, match="fewer than three values"):
-        setting_curve(worn, "jumps")
+        compute_setting_costs(worn, "jumps")

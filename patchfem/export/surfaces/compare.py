@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import __version__
 from ...campaigns.compare import SurfaceRuns
-from ...campaigns.compare import surface_runs_data as pressed_data
+from ...campaigns.compare import surface_runs_to_dict as pressed_data
 from ...disk.atomic_write import write_text
 from ...formatting import format_length
 from ...surface.areal import level_plane
@@ -176,7 +176,7 @@ def format_comparison(
     if surface_runs is not None:
         out += ["", f"{surface_runs.title}, pressed with each surface"]
         rows = []
-        for name, words, first, second in surface_runs.rows():
+        for name, words, first, second in surface_runs.measure_rows():
             rows.append((words, _format_measure(name, first), _format_measure(name, second)))
         out += sides_lines(rows)
         out += [f"  {text}" for text in (*surface_runs.failed, *surface_runs.lacking)]
@@ -626,7 +626,7 @@ def _pressed_html(surface_runs: SurfaceRuns) -> str:
             )
         )
         rows = []
-        for name, words, first, second in surface_runs.rows():
+        for name, words, first, second in surface_runs.measure_rows():
             texts = (
                 words,
                 _format_measure(name, first),
