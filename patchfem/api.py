@@ -784,7 +784,7 @@ def run_many(
         models = [models]
     return batches.solve_models(
         meshes.with_shared_meshes([build(model) for model in models]),
-        say=_print_to_stderr if say is None else say,
+        report=_print_to_stderr if say is None else say,
     )
 
 

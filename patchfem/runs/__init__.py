@@ -36,7 +36,7 @@ PUBLIC = {
         "SharedMeshes",
         "with_shared_meshes",
     ),
-    "batch.watched": ("MotionObserver",),
+    "batch.motion_observer": ("MotionObserver",),
     "bench.engine": (
         "choose_smooth_bond_summation",
         "steps_per_cycle",

@@ -184,7 +184,7 @@ def test_exact_case_with_negative_damping_runs_alone():
     )
     scenes = [pf.load(driven.replace("-0.02", damping)) for damping in ("-0.02", "0.02")]
     gains, loses = (pf.build(scene) for scene in scenes)
-    assert "gain energy" in lumped.refuses(gains) and not lumped.refuses(loses)
+    assert "gain energy" in lumped.refusal_reason(gains) and not lumped.refusal_reason(loses)
     results = batches.solve_models([gains, loses])
     single = pf.run(scenes[0])
     assert results.outcome[0] == single.outcome

@@ -105,7 +105,7 @@ def draw_points(law: str, seed: int, count: int) -> list:
             law, r, sets["normal.load"], push / (2 * np.pi * sets["drive.frequency"])
         )
         model = pf.build(base.override(format_assignments(sets)))
-        if not lanes.refuses(model):
+        if not lanes.refusal_reason(model):
             out.append(model)
     return out
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
-from ...runs.batch.watched import MotionObserver
+from ...runs.batch.motion_observer import MotionObserver
 from ..fits.problem import solve_contact
 from .condition_models import GAIN_KEYS, ConditionModels
 
@@ -68,7 +68,7 @@ class ModelReadings:
             self.observer = observer
             for k in conditions:
                 self.n_motions += 1
-                if not observer.by:
+                if not observer.method:
                     model_at_k = self.models.with_condition_drive(model, k)
                     observer = MotionObserver(model_at_k, patch, self.say, needs_cycle)
                 drive = self.models.sine_drive(k)
@@ -77,7 +77,7 @@ class ModelReadings:
                     self.last_motions.pop(k, None)
                     readings[k] = np.inf, np.inf
                     continue
-                self.last_motions[k] = motion.near
+                self.last_motions[k] = motion.initial_guess
                 readings[k] = self._read_accelerometer(motion, drive), motion.displacement
         return readings
 

@@ -94,14 +94,14 @@ def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
     batch_starts = []
     groups = set()
     for case_plan, batch, seconds in zip(plans, batches, single_seconds):
-        key = None if batch is None else batch.group(case_plan.model)
+        key = None if batch is None else batch.group_key(case_plan.model)
         if key is None:
             case_seconds.append(seconds)
             continue
-        batched_seconds = max(BATCHED_CASE_SECONDS, batch.share * seconds)
+        batched_seconds = max(BATCHED_CASE_SECONDS, batch.cost_fraction * seconds)
         case_seconds.append(batched_seconds)
         batch_starts.append(seconds - batched_seconds)
-        groups.add((batch.name, key if batch.share else ()))
+        groups.add((batch.name, key if batch.cost_fraction else ()))
     if groups:
         # The first case of each group takes as long as a single run.
         n_groups = float(len(groups))

@@ -223,7 +223,7 @@ def _find_min_chunk_size(work: Work) -> int:
         batch = batches.choose_batch(_build_case_model(work, 0), len(work.cases))
     except Exception:  # The run of the case reports its error.
         return 1
-    return batch.together if work.keep is None and batch is not None else 1
+    return batch.min_chunk_cases if work.keep is None and batch is not None else 1
 
 
 class ChunkQueue:

@@ -1,6 +1,6 @@
-"""Computation of many models at once, with the results of single runs and shared work.
+"""Computation of many models at once, with the same results as single runs at lower cost.
 
-In: a sequence of `Model`, or of the error that refused one. Out: `CaseResults`, one column per
-measure. A `Batch` of `batches.BATCHES` takes the models that it does not refuse, in groups;
-`one_by_one` takes all others. Read `batches` first.
+In: a sequence of `Model`, or of the error that occurred in place of a model. Out: `CaseResults`,
+one column per measure. Each `Batch` of `batches.BATCHES` computes groups of models that it
+supports; `one_by_one` computes all others. Read `batches` first.
 """

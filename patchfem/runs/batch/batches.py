@@ -1,7 +1,7 @@
-"""Case results of many models, each computed by the first batch that does not refuse it.
+"""Assignment of models to batches, and the results of all cases.
 
-In: a sequence of models. Out: `CaseResults`. Models that can share work are computed together,
-in groups.
+In: a sequence of models. Out: `CaseResults`. Each model is computed by the first batch that
+supports it, together with the other models of its group.
 """
 
 from __future__ import annotations
@@ -27,94 +27,115 @@ from .case_results import CaseResults
 class Batch:
     """Method that computes many models together, implemented by a module of this folder.
 
-    The module is imported when it is first needed. Its functions are the methods of this class.
+    The module is imported lazily. Its functions implement the methods of this class.
 
     - name: name of the module.
-    - kind: kind of the models that it takes.
-    - share: seconds of a case over those of a single run; 0 if negligible.
-    - compile: CPU seconds of compiling for the first group.
-    - least: smallest number of cases of a study that it takes; such a batch has its own error
-      estimates, which do not depend on what else is in the group.
-    - reads_columns: whether it reads the numbers of similar models as columns.
-    - together: smallest number of cases in a chunk of a sweep for which the shared work pays.
+    - kind: kind of scene that the batch computes.
+    - cost_fraction: computing time of a case relative to that of a single run; 0 if negligible.
+    - compile_seconds: CPU time to compile the kernels for the first group [s].
+    - min_cases: smallest number of cases for which the batch is used. A batch with such a limit has
+      its own error estimates, which do not depend on the other cases of the group.
+    - takes_columns: whether the batch accepts similar models as columns of numbers.
+    - min_chunk_cases: smallest number of cases in a chunk of a sweep for which batching pays.
     """
 
     name: str
     kind: str
-    share: float = 0.0
-    compile: float = 0.0
-    least: int = 0
-    reads_columns: bool = False
-    together: int = 1
+    cost_fraction: float = 0.0
+    compile_seconds: float = 0.0
+    min_cases: int = 0
+    takes_columns: bool = False
+    min_chunk_cases: int = 1
 
     @property
-    def _module(self):
-        """Module that implements the batch."""
+    def _implementation(self):
+        """Module with the functions of the batch."""
         return import_module(f"patchfem.runs.batch.{self.name}")
 
-    def refuses(self, model: Model) -> str:
+    def refusal_reason(self, model: Model) -> str:
         """Return the reason why the batch cannot compute a model, or ""."""
         if model.kind != self.kind:
             return f"it is a {model.kind}"
-        return _why_run_singly(self.kind) or self._module.refuses(model)
+        return _reason_for_single_runs(self.kind) or self._implementation.refusal_reason(model)
 
-    def group(self, model: Model) -> Hashable:
-        """Return a hashable key that is equal for models that are computed together."""
-        return self._module.group(model)
+    def group_key(self, model: Model) -> Hashable:
+        """Return a hashable key; models with equal keys are computed together."""
+        return self._implementation.group_key(model)
 
-    def solve(self, models: Sequence[Model], say: Callable | None) -> CaseResults:
-        """Compute the case results of a group of models that are computed together.
+    def solve(self, models: Sequence[Model], report: Callable | None) -> CaseResults:
+        """Compute the case results of models with equal group keys.
 
-        They equal those of single runs to 1e-12, errors included, whatever else is in the group.
+        Values and errors equal those of single runs to 1e-12, independently of the rest of the group.
         """
-        return self._module.solve(models, say)
+        return self._implementation.solve(models, report)
 
-    def parts(self, models: Sequence) -> dict:
-        """Group the indices of models whose numbers the batch reads as columns of arrays."""
+    def group_models(self, models: Sequence) -> dict:
+        """Return the indices of the models whose numbers the batch takes as columns, by group key."""
         candidates = [models.first] if isinstance(models, SimilarModels) else models
-        if not self.reads_columns or _why_run_singly(self.kind):
+        if not self.takes_columns or _reason_for_single_runs(self.kind):
             return {}
         if not any(getattr(model, "kind", "") == self.kind for model in candidates):
             return {}
-        return self._module.parts(models)
+        return self._implementation.group_models(models)
 
 
 @cache
-def _why_run_singly(kind: str) -> str:
-    """Return the reason why no batch computes cases of a kind of scene, or "".
+def _reason_for_single_runs(kind: str) -> str:
+    """Return why cases of a kind of scene cannot be computed in a batch, or "".
 
-    A measure that only single runs compute excludes all batches.
+    No batch is used if a measure is requested that only single runs compute.
     """
     rows = import_module("patchfem.response.rows").SINGLE_RUN_ROWS if kind == "rig" else ()
     return f"the measure {rows[0].name} is computed only by single runs" if rows else ""
 
 
-# beginning of the note on a case whose batch failed
-BATCH_FAILED = (
+# Beginning of the note on a case whose batch failed.
+BATCH_FAILURE_NOTE = (
     "this case was run by itself, because computing it together with other cases failed with an "
     "internal fault; its results are not affected, but please report it"
 )
-# batches in the order in which they are tried: the first that does not refuse a model computes it
+# Batches in order of preference: the first one that supports a model computes it.
 BATCHES: tuple[Batch, ...] = (
-    Batch("patches", "patch", compile=6.0, reads_columns=True, together=2048),
-    Batch("benches", "bench", share=0.4, together=64),
-    Batch("lumped.lanes", "rig", compile=6.0, least=64, reads_columns=True, together=1024),
-    Batch("lumped.lumped", "rig", compile=12.0),
-    Batch("lumped.tabled", "rig", share=0.2, compile=18.0, least=64, together=512),
-    Batch("lumped.sheared", "rig", share=0.4, compile=12.0, together=64),
-    Batch("gathered", "rig", share=0.05, compile=10.0, least=32, together=128),
+    Batch("patches", "patch", compile_seconds=6.0, takes_columns=True, min_chunk_cases=2048),
+    Batch("benches", "bench", cost_fraction=0.4, min_chunk_cases=64),
+    Batch(
+        "lumped.lanes",
+        "rig",
+        compile_seconds=6.0,
+        min_cases=64,
+        takes_columns=True,
+        min_chunk_cases=1024,
+    ),
+    Batch("lumped.lumped", "rig", compile_seconds=12.0),
+    Batch(
+        "lumped.tabled",
+        "rig",
+        cost_fraction=0.2,
+        compile_seconds=18.0,
+        min_cases=64,
+        min_chunk_cases=512,
+    ),
+    Batch("lumped.sheared", "rig", cost_fraction=0.4, compile_seconds=12.0, min_chunk_cases=64),
+    Batch(
+        "gathered",
+        "rig",
+        cost_fraction=0.05,
+        compile_seconds=10.0,
+        min_cases=32,
+        min_chunk_cases=128,
+    ),
 )
 
 
 def batch_compile_seconds(batch: Batch, model: Model) -> float:
-    """Return the CPU time [s] to compile the batch for a model; 0 if its code is in the cache."""
-    if batch.compile and not compiled.has_run(_compiled_kind(batch, model)):
-        return batch.compile
+    """Return the CPU time to compile the kernels of a batch for a model [s]; 0 if they are cached."""
+    if batch.compile_seconds and not compiled.has_run(_kernel_label(batch, model)):
+        return batch.compile_seconds
     return 0.0
 
 
-def _compiled_kind(batch: Batch, model: Model) -> str:
-    """Return a text that identifies the compiled code that a batch needs for a model."""
+def _kernel_label(batch: Batch, model: Model) -> str:
+    """Return a label of the compiled kernels that a batch needs for a model."""
     rig = model.rig
     if rig is None:
         return batch.name
@@ -122,19 +143,19 @@ def _compiled_kind(batch: Batch, model: Model) -> str:
     return " ".join([batch.name, rig.drive.waveform.name, *laws, str(bool(model.partial_slip))])
 
 
-def choose_batch(model: Model, study: int = 1) -> Batch | None:
-    """Return the first batch that can compute a model, or None if the model needs a single run."""
+def choose_batch(model: Model, n_study_cases: int = 1) -> Batch | None:
+    """Return the first batch that supports a model, or None if the model needs a single run."""
     for batch in BATCHES:
-        if study >= batch.least and not batch.refuses(model):
+        if n_study_cases >= batch.min_cases and not batch.refusal_reason(model):
             return batch
     return None
 
 
 class Assignment(NamedTuple):
-    """Assignment of a model to a batch and a group, or to a single run.
+    """Batch and group of a model, or a single run.
 
-    - batch, group: None if the model is run by itself.
-    - failure: the batch and its error, if it failed to assign the model; else "".
+    - batch, group: batch and group key; None for a single run.
+    - failure: description of the error, if the assignment failed; else "".
     """
 
     batch: Batch | None = None
@@ -144,56 +165,58 @@ class Assignment(NamedTuple):
 
 def solve_models(
     models: Sequence[Model | PatchfemError],
-    keep: Callable | None = None,
-    say: Callable | None = None,
+    on_result: Callable | None = None,
+    report: Callable | None = None,
     estimate: bool = True,
-    study: int = 0,
+    n_study_cases: int = 0,
 ) -> CaseResults:
-    """Compute the case results of many models, in the order of the models.
+    """Compute the case results of a sequence of models.
 
-    If a batch fails, its cases are run one by one. A note of each of them names the batch and the
-    error, unless the error is that of a case (`one_by_one.CASE_ERRORS`).
+    If a batch fails, its cases are computed one by one, and a note of each case names the batch and
+    the error. Errors of single cases (`one_by_one.CASE_ERRORS`) cause no note.
 
     Parameters
     ----------
     models : sequence of Model or PatchfemError
-        An error in place of a model is the message of its failed case.
-    keep : callable, optional
-        Called with case and Result after each run. A batch has no Result, so that all cases are
-        then run one by one.
-    say : callable, optional
-        Callback for a line of text when code has to be compiled.
+        An error in place of a model becomes the message of a failed case.
+    on_result : callable, optional
+        Called with the case index and the Result after each run. Batches create no Result, so all
+        cases are then computed one by one.
+    report : callable, optional
+        Callback for progress messages, e.g. before a compilation.
     estimate : bool
-        If False, the models that are run one by one have no coarse runs and no errors (a batch has
-        its errors from the same work).
-    study : int
-        Number of cases of which these are a part; 0 if they are all.
+        If False, single runs omit the coarse runs and the error estimates. Batches always estimate
+        errors.
+    n_study_cases : int
+        Number of cases of the whole study, if the models are a part of it; 0 for len(models).
     """
     if not isinstance(models, SimilarModels):
         models = [_model_without_joint(model) for model in models]
     results = CaseResults.blank(len(models))
-    study = study or len(models)
+    n_study_cases = n_study_cases or len(models)
     groups = {}
     remaining = np.arange(len(models))
-    if keep is None:
-        remaining, groups = _assign_columns(models, study)
+    if on_result is None:
+        remaining, groups = _assign_similar_models(models, n_study_cases)
     for case in remaining.tolist():
         model = models[case]
         if isinstance(model, PatchfemError):
             results.fail(case, str(model))
             continue
-        assignment = _assign_model(model, study) if keep is None else Assignment()
+        assignment = _assign_model(model, n_study_cases) if on_result is None else Assignment()
         groups.setdefault(assignment, []).append(case)
     for assignment, cases in groups.items():
-        keep_case = keep and partial(_report_case, keep, cases)
-        run_singly = partial(one_by_one.solve, say=say, keep=keep_case, estimate=estimate)
-        part = _solve_group(assignment, select_models(models, cases), run_singly, say)
+        forward = on_result and partial(_forward_result, on_result, cases)
+        solve_one_by_one = partial(
+            one_by_one.solve, report=report, on_result=forward, estimate=estimate
+        )
+        part = _solve_group(assignment, select_models(models, cases), solve_one_by_one, report)
         results.insert(cases, part)
     return results
 
 
 def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
-    """Remove the joint from the measured modes of a model; return an error if that fails."""
+    """Return a model without the joint of its measured modes, or the error of its removal."""
     if (
         isinstance(model, PatchfemError)
         or model.rig is None
@@ -206,19 +229,19 @@ def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
         return error
 
 
-def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
-    """Assign models that differ in plain numbers to batches that read these numbers as columns.
+def _assign_similar_models(models: Sequence, n_study_cases: int) -> tuple[np.ndarray, dict]:
+    """Assign models that differ only in numbers to batches that take the numbers as columns.
 
-    Returns the indices of the models that are not assigned, and a dict with those of all others by
-    Assignment.
+    Returns the indices of the models that are not assigned, and the indices of the others as a dict
+    by Assignment.
     """
     groups = {}
     remaining = np.arange(len(models))
     for batch in BATCHES:
-        if study < batch.least or not remaining.size:
+        if n_study_cases < batch.min_cases or not remaining.size:
             continue
         try:
-            parts = batch.parts(select_models(models, remaining))
+            parts = batch.group_models(select_models(models, remaining))
         except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             continue
         except Exception as error:
@@ -232,12 +255,12 @@ def _assign_columns(models: Sequence, study: int) -> tuple[np.ndarray, dict]:
     return remaining, groups
 
 
-def _assign_model(model: Model, study: int) -> Assignment:
-    """Assign a model of a study to a batch and a group."""
+def _assign_model(model: Model, n_study_cases: int) -> Assignment:
+    """Return the batch and the group key of a model."""
     batch = None
     try:
-        batch = choose_batch(model, study)
-        return Assignment() if batch is None else Assignment(batch, batch.group(model))
+        batch = choose_batch(model, n_study_cases)
+        return Assignment() if batch is None else Assignment(batch, batch.group_key(model))
     except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
         return Assignment()
     except Exception as error:
@@ -245,37 +268,43 @@ def _assign_model(model: Model, study: int) -> Assignment:
 
 
 def _describe_failure(batch: Batch | None, error: Exception) -> str:
-    """Describe the error of a batch, with the name of the batch if it is known."""
+    """Return the text of an error in a batch, preceded by the name of the batch if it is known."""
     name = "" if batch is None else f"{batch.name}: "
     return f"{name}{type(error).__name__}: {error}"
 
 
-def _report_case(keep: Callable, cases: list, index: int, result) -> None:
-    """Pass the index of a case and its Result to the callback of the caller."""
-    keep(cases[index], result)
+def _forward_result(on_result: Callable, case_indices: list, index: int, result) -> None:
+    """Call `on_result` with the index of a case in the whole study."""
+    on_result(case_indices[index], result)
 
 
 def _solve_group(
-    assignment: Assignment, models: Sequence[Model], run_singly: Callable, say: Callable | None
+    assignment: Assignment,
+    models: Sequence[Model],
+    solve_one_by_one: Callable,
+    report: Callable | None,
 ) -> CaseResults:
     """Compute the results of a group in its batch, or by single runs if the batch fails."""
     batch, _, failure = assignment
     if batch is not None:
         try:
-            results = batch.solve(models, say)
-            if batch.compile and batch_compile_seconds(batch, models[0]):
-                compiled.record_run(_compiled_kind(batch, models[0]))
+            results = batch.solve(models, report)
+            if batch.compile_seconds and batch_compile_seconds(batch, models[0]):
+                compiled.record_run(_kernel_label(batch, models[0]))
             return results
         except one_by_one.CASE_ERRORS:  # a single run of the case reports its error
             pass
         except Exception as error:
             failure = _describe_failure(batch, error)
-    if failure and say is not None:
-        say(
+    if failure and report is not None:
+        report(
             f"{len(models)} cases are run one by one, because running them together failed: {failure}"
         )
-    results = run_singly(models)
+    results = solve_one_by_one(models)
     if failure:
         for case in range(len(models)):
-            results.notes[case] = [*results.notes.get(case, ()), f"{BATCH_FAILED} ({failure})"]
+            results.notes[case] = [
+                *results.notes.get(case, ()),
+                f"{BATCH_FAILURE_NOTE} ({failure})",
+            ]
     return results

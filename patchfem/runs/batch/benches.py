@@ -1,4 +1,4 @@
-"""Batch of benches with patches, which are pressed together; each bench slides by itself.
+"""Batch of benches: their patches are solved together, their slides one by one.
 
 In: models of a group. Out: `CaseResults`.
 """
@@ -10,11 +10,11 @@ from ..patch import static_batch
 from . import one_by_one, patches
 from .case_results import CaseResults
 
-MAX_CASES_PER_CALL = 256  # largest number of patches that are solved in one call
+MAX_CASES_PER_CALL = 256  # largest number of patches in one call
 
 
-def refuses(model: Model) -> str:
-    """Return the reason why the patch of a bench cannot be solved in a batch with others, or ""."""
+def refusal_reason(model: Model) -> str:
+    """Return why the patch of a bench cannot be solved together with others, or ""."""
     if (
         model.patch is None
         or model.load_varies
@@ -25,13 +25,13 @@ def refuses(model: Model) -> str:
     return static_batch.reason_not_batched(model.patch)
 
 
-def group(model: Model) -> Hashable:
-    """Return a hashable key that is equal for models whose patches can be solved in one batch."""
-    return patches.group(model)
+def group_key(model: Model) -> Hashable:
+    """Return a hashable key; patches of models with equal keys can be solved together."""
+    return patches.group_key(model)
 
 
-def solve(models: Sequence[Model], say=None) -> CaseResults:
+def solve(models: Sequence[Model], report=None) -> CaseResults:
     """Compute the case results of a group of benches."""
-    return patches.press_and_solve(
-        models, MAX_CASES_PER_CALL, lambda part: one_by_one.solve(part, say)
+    return patches.solve_patches_then_motions(
+        models, MAX_CASES_PER_CALL, lambda part: one_by_one.solve(part, report)
     )

@@ -1,4 +1,4 @@
-"""Results of many runs: a column per measure over the cases, in the order of the models.
+"""Results of many cases, with one column per measure.
 
 In: measures, outcomes and messages of cases. Out: `CaseResults`, whose columns may be on disk.
 """
@@ -18,25 +18,30 @@ from ...core import Measure
 from ...inputs import measured
 from ...model.model import Model
 
-# Number of cases above which columns may be on disk: the columns of a rig have 25 kB per 1000 cases and
-# measure.
+# Smallest number of cases whose columns may be stored on disk: a measure takes 25 kB per 1000 cases.
 MIN_CASES_ON_DISK = 50_000
-FAILED_OUTCOME = "failed"  # outcome of a case that was refused or did not finish
+FAILED_OUTCOME = "failed"  # outcome of a case that was rejected or ended with an error
 
 
 class ArrayOnDisk:
-    """Array of floats in a temporary file, which occupies memory only while it is accessed.
+    """Array of floats in a temporary file, which uses memory only during an access.
 
-    An access maps the file into memory, and releases the map with the result.
+    Parameters
+    ----------
+    file
+        Temporary file.
+    shape : tuple
+    base : ArrayOnDisk, optional
+        Array that owns the file, for a reshaped view.
     """
 
-    def __init__(self, file, shape: tuple, whole: ArrayOnDisk | None = None):
-        # the original array is kept, because its file is closed together with it
+    def __init__(self, file, shape: tuple, base: ArrayOnDisk | None = None):
+        # the file is closed when its owner is deleted, so that a view must refer to the owner
         self.file = file
         self.shape = shape
-        self.whole = whole
+        self.base = base
         self.file.truncate(8 * self.size)
-        if whole is None:
+        if base is None:
             finalize(self, file.close)
 
     @property
@@ -51,32 +56,31 @@ class ArrayOnDisk:
         array = np.memmap(self.file, float, "r+", shape=self.shape).view(np.ndarray)
         return array if dtype in (None, array.dtype) and not copy else array.astype(dtype or float)
 
-    def __getitem__(self, at) -> np.ndarray:
-        return np.array(np.asarray(self)[at])
+    def __getitem__(self, index) -> np.ndarray:
+        return np.array(np.asarray(self)[index])
 
-    def __setitem__(self, at, values) -> None:
-        np.asarray(self)[at] = values
+    def __setitem__(self, index, values) -> None:
+        np.asarray(self)[index] = values
 
     def reshape(self, shape: tuple) -> ArrayOnDisk:
-        """Return an array that shares the file and has another shape."""
+        """Return a view of the array with another shape."""
         return ArrayOnDisk(self.file, tuple(shape), self)
 
 
 @dataclass(eq=False, slots=True)
 class CaseResults:
-    """Measures, errors, outcomes and messages of n cases, stored as columns in SI units.
+    """Measures, errors, outcomes and messages of n cases, as columns in SI units.
 
-    - outcome (n,): names of `Outcome`, or FAILED_OUTCOME.
-    - values, errors, floors: columns (n,) by measure. NaN means that a case does not have the
-      measure, and in `errors` that the error is not estimated.
+    - outcome (n,): values of `Outcome`, or FAILED_OUTCOME.
+    - values, errors, floors: columns (n,) by measure. NaN means that the measure does not exist for
+      a case, or that its error is not estimated.
     - units: unit by measure.
-    - reasons: {case: reason} by measure for cases with the measure but without a value; "" for an
-      unknown reason.
-    - messages: {case: text} of the failed cases.
-    - warnings, notes: {case: [sentence]}.
+    - reasons: by measure, {case: reason} for measures without a value; "" for an unknown reason.
+    - messages: {case: error message} of the failed cases.
+    - warnings, notes: {case: list of sentences}.
     - numerics: {case: dict} with the numerical settings; cases may share a dict.
-    - seconds (n,): CPU seconds; those of a batch are divided equally.
-    - room: folder for columns on disk, or None (see `blank`).
+    - seconds (n,): computing time [s]; the time of a batch is divided equally among its cases.
+    - disk_folder: folder for columns on disk, or None (see `blank`).
     """
 
     outcome: np.ndarray
@@ -90,7 +94,7 @@ class CaseResults:
     notes: dict = field(default_factory=dict)
     numerics: dict = field(default_factory=dict)
     seconds: np.ndarray = None
-    room: Path | None = None
+    disk_folder: Path | None = None
 
     def __post_init__(self) -> None:
         if self.seconds is None:
@@ -100,34 +104,37 @@ class CaseResults:
         return len(self.outcome)
 
     @classmethod
-    def blank(cls, count: int, room: Path | None = None) -> CaseResults:
-        """Return the results of `count` cases that have no outcomes or measures yet.
+    def blank(cls, count: int, disk_folder: Path | None = None) -> CaseResults:
+        """Return the results of `count` cases without outcomes and measures.
 
-        room: folder on whose disk the columns of many cases are kept instead of in memory.
+        disk_folder: folder in which the columns are stored if there are many cases; None: in memory.
         """
-        return cls(np.full(count, "", object), room=room if count > MIN_CASES_ON_DISK else None)
+        return cls(
+            np.full(count, "", object),
+            disk_folder=disk_folder if count > MIN_CASES_ON_DISK else None,
+        )
 
-    def measure(self, name: str, unit: str) -> None:
-        """Add columns of NaN (value, error, floor) for a measure that has no columns yet."""
+    def add_measure(self, name: str, unit: str) -> None:
+        """Add columns for a measure, filled with NaN, unless they exist."""
         if name not in self.values:
             self.units[name] = unit
-            for columns in self._columns:
-                columns[name] = self._column()
+            for columns in self._result_columns:
+                columns[name] = self._empty_column()
                 columns[name][:] = np.nan
 
-    def _column(self) -> np.ndarray | ArrayOnDisk:
+    def _empty_column(self) -> np.ndarray | ArrayOnDisk:
         """Return an uninitialized column (n,), in memory or on disk."""
-        if self.room is None:
+        if self.disk_folder is None:
             return np.empty(len(self))
-        return ArrayOnDisk(TemporaryFile(dir=self.room), (len(self),))
+        return ArrayOnDisk(TemporaryFile(dir=self.disk_folder), (len(self),))
 
     def fail(self, case: int, message: str) -> None:
-        """Mark a case as failed, with its error message."""
+        """Mark a case as failed and store its error message."""
         self.outcome[case] = FAILED_OUTCOME
         self.messages[case] = message
 
     def put(self, case: int, outcome: str, measures: dict, seconds: float) -> None:
-        """Store the outcome, the measures and the CPU time of one case.
+        """Store outcome, measures and computing time of a case.
 
         Parameters
         ----------
@@ -136,19 +143,19 @@ class CaseResults:
         measures : dict
             core.Measure by name.
         seconds : float
-            CPU seconds.
+            Computing time [s].
         """
         self.outcome[case] = str(outcome)
         self.seconds[case] = seconds
         self.fill(case, measures)
 
     def fill(self, case: int, measures: dict) -> None:
-        """Store measures of one case, overwriting earlier values.
+        """Store measures of a case; existing values are replaced.
 
         measures: core.Measure by name.
         """
         for name, measure in measures.items():
-            self.measure(name, measure.unit)
+            self.add_measure(name, measure.unit)
             if measure.value is None:
                 self.reasons.setdefault(name, {})[case] = measure.reason
             self.values[name][case] = np.nan if measure.value is None else measure.value
@@ -156,33 +163,33 @@ class CaseResults:
             self.floors[name][case] = measure.floor
 
     @property
-    def _columns(self) -> tuple[dict, ...]:
-        """Dicts of values, of errors and of floors, with the name of the measure as key."""
+    def _result_columns(self) -> tuple[dict, ...]:
+        """Dicts of values, errors and floors, with measures as keys."""
         return self.values, self.errors, self.floors
 
     @property
-    def _texts(self) -> tuple[dict, ...]:
-        """Dicts of messages, warnings, notes and settings, with the index of the case as key."""
+    def _result_texts(self) -> tuple[dict, ...]:
+        """Dicts of messages, warnings, notes and settings, with case indices as keys."""
         return self.messages, self.warnings, self.notes, self.numerics
 
     def insert(self, cases: Sequence[int], part: CaseResults) -> None:
-        """Insert the results of some cases, taken from another record of case results."""
+        """Insert the results of a subset of the cases."""
         indices = np.asarray(cases, int)
         self.outcome[indices] = part.outcome
         self.seconds[indices] = part.seconds
         for name, unit in part.units.items():
-            self.measure(name, unit)
-            for columns, part_columns in zip(self._columns, part._columns):
+            self.add_measure(name, unit)
+            for columns, part_columns in zip(self._result_columns, part._result_columns):
                 columns[name][indices] = part_columns.get(name, np.nan)
-        numbers = dict(enumerate(indices.tolist()))
+        new_indices = dict(enumerate(indices.tolist()))
         for name, reasons in part.reasons.items():
-            self.reasons.setdefault(name, {}).update(_renumber(reasons, numbers))
-        for texts, part_texts in zip(self._texts, part._texts):
-            texts.update(_renumber(part_texts, numbers))
+            self.reasons.setdefault(name, {}).update(_renumber(reasons, new_indices))
+        for texts, part_texts in zip(self._result_texts, part._result_texts):
+            texts.update(_renumber(part_texts, new_indices))
 
     def remove(self, cases: Sequence[int]) -> None:
-        """Remove the results of some cases, and the measures that no remaining case has."""
-        for columns in self._columns:
+        """Remove the results of selected cases, and measures that no other case has."""
+        for columns in self._result_columns:
             for column in columns.values():
                 column[cases] = np.nan
         for case in cases:
@@ -190,22 +197,22 @@ class CaseResults:
                 texts.pop(case, None)
         for name, column in list(self.values.items()):
             if np.isnan(column).all() and not self.reasons.get(name):
-                for columns in (*self._columns, self.units):
+                for columns in (*self._result_columns, self.units):
                     columns.pop(name)
 
     def select(self, cases: np.ndarray) -> CaseResults:
-        """Select measures, outcomes and messages of some cases, in the form that `insert` takes."""
+        """Return measures, outcomes and messages of selected cases, in a form for `insert`."""
         results = CaseResults(self.outcome[cases], units=self.units, seconds=self.seconds[cases])
-        for columns, all_columns in zip(results._columns, self._columns):
+        for columns, all_columns in zip(results._result_columns, self._result_columns):
             columns.update({name: column[cases] for name, column in all_columns.items()})
-        numbers = {case: index for index, case in enumerate(np.asarray(cases).tolist())}
+        new_indices = {case: index for index, case in enumerate(np.asarray(cases).tolist())}
         for name, reasons in self.reasons.items():
-            results.reasons[name] = _renumber(reasons, numbers)
-        results.messages.update(_renumber(self.messages, numbers))
+            results.reasons[name] = _renumber(reasons, new_indices)
+        results.messages.update(_renumber(self.messages, new_indices))
         return results
 
-    def known_measures(self, case: int) -> dict:
-        """Return the measures of one case whose errors are known."""
+    def measures_with_errors(self, case: int) -> dict:
+        """Return the measures of a case that have an error estimate."""
         measures = {}
         for name, errors in self.errors.items():
             if not np.isnan(errors[case]):
@@ -215,28 +222,30 @@ class CaseResults:
         return measures
 
     def has(self, name: str, case: int) -> bool:
-        """Return whether a case has a value of a measure, or a reason why the value is missing."""
+        """Return whether a case has a value of a measure or a reason for its absence."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
-def _renumber(texts: dict, numbers: dict) -> dict:
-    """Replace the case indices that are the keys of a dict; drop cases without a new index."""
-    return {numbers[case]: text for case, text in texts.items() if case in numbers}
+def _renumber(values_by_case: dict, new_indices: dict) -> dict:
+    """Return a dict by case with new case indices, without the cases that have none."""
+    return {
+        new_indices[case]: value for case, value in values_by_case.items() if case in new_indices
+    }
 
 
 def join_case_results(
     count: int, parts: Iterable[tuple[Sequence[int], CaseResults]]
 ) -> CaseResults:
-    """Join the case results of parts of a study, given the case indices of each part."""
+    """Combine the results of parts of a study, given the case indices of each part."""
     results = CaseResults.blank(count)
     for cases, part in parts:
         results.insert(cases, part)
     return results
 
 
-def has_unreadable_table(model: Model) -> bool:
-    """Return whether the table of measured responses that a model names cannot be read.
+def has_unreadable_measurements(model: Model) -> bool:
+    """Return whether a model refers to a table of measured responses that cannot be read.
 
-    Its single run reports the error; a readable table does not change the results.
+    The single run reports the error. A readable table does not affect the results.
     """
     return model.measured is not None and not measured.is_readable(model.measured.path)

@@ -1,15 +1,16 @@
-"""Batch of patches with bonds and shear: pressed together, each reduced to a few points.
+"""Batch of elastic patches with bonds, each reduced to a few contact points.
 
-In: models of a group, whose fields and histories nobody reads. Out: `CaseResults`.
+In: models of a group. Out: `CaseResults`, without fields and histories.
 
-Cases with one or two modes under a sine march side by side (`dynamics.march.lanes`), with N_POINTS
-points and N_PIECE_MODES modes of the pieces, whose error in the backbone is below REDUCTION_TOL_FRACTION of the
-tolerance; this error is part of the stated errors. Their coarse runs are those of a single run: half and a
-quarter of the steps, and the coarser mesh. A case that sticks, may ring during stick, or needs
-more modes runs by itself, and its earlier cycles are evaluated during the run
-(`dynamics.march.passing_kernels`); there, points and modes each have an error of a thousandth
-of the tolerance (`rig.interface.REDUCTION_TOL_FRACTION`), so that no further run estimates the error of the
-modes.
+Cases with one or two modes under sinusoidal drive are integrated in parallel lanes of a kernel
+(`dynamics.march.lanes`). Each patch is reduced to N_POINTS contact points and N_PIECE_MODES shear modes
+of the pieces. The error of this reduction in the backbone curve is at most REDUCTION_TOL_FRACTION of the
+tolerance and is included in the error estimates. As in a single run, the coarse runs have half and a quarter
+of the steps, and a coarser mesh.
+
+A case that sticks, may ring during stick or needs more modes is computed by a single run. There,
+the error of the reduction is a thousandth of the tolerance (`rig.interface.REDUCTION_TOL_FRACTION`) and
+needs no estimate.
 """
 
 from collections.abc import Hashable, Sequence
@@ -38,31 +39,31 @@ from ..rig.bond_lists import choose_bond_summation
 from ..rig.costs import MAX_MARCH_STEPS
 from ..rig.engines import MARCH, choose_engine
 from ..rig.interface import reduce_to_few_points
-from . import pressed
-from .case_results import CaseResults, has_unreadable_table
+from . import solved_patches
+from .case_results import CaseResults, has_unreadable_measurements
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
 from .lumped.pieces import select_known_values
-from .samples import Samples, find_peaks
+from .samples import Samples, find_interpolated_peaks
 
-MAX_CASES_PER_CALL = 256  # largest number of patches that are solved in one call
-# largest number of kept samples of all cases in one call, which need 200 MB with their evaluation
+MAX_CASES_PER_CALL = 256  # largest number of patches in one call
+# Largest number of stored samples of all cases in one call; their evaluation needs 200 MB.
 MAX_SAMPLES = 1_200_000
-MAX_TOTAL_STEPS = 1e7  # largest number of time steps of a run to which the steps are doubled
-# largest error of the backbone curve over the tolerance, for the reduction to few modes and for that to
-# few points
+MAX_TOTAL_STEPS = 1e7  # largest number of time steps of a run after a refinement
+# Largest ratio of the error of the backbone curve to the tolerance, for the reduction to few modes and for
+# the reduction to few points.
 REDUCTION_TOL_FRACTION = 3e-2
-# ratio of the error of a friction loop to the error of the backbone curve, of which a loop has two branches
+# Ratio of the error of a friction loop to that of the backbone curve: a loop has two branches.
 LOOP_ERROR_FACTOR = 2.0
-MAX_STICKING_SLIP = 1e-3  # slip amplitude in bond lengths, up to which a case sticks
+MAX_STICKING_SLIP = 1e-3  # largest slip amplitude of a sticking case, in bond lengths
 RING_MEASURES = "ring_frequency", "ring_damping"
-# kinds of errors: time steps, mesh, few modes and points, and errors that the march itself states
+# Sources of error: time steps, mesh, reduction to few modes and points, and peak sampling or ringing fit.
 ERROR_KINDS = ("steps", "mesh", "modes", "own")
 
 
-def refuses(model: Model) -> str:
-    """Return the reason why this batch (elastic patches with bonds) refuses a model, or "".
+def refusal_reason(model: Model) -> str:
+    """Return why a model is not an elastic patch with bonds that is integrated in time, or "".
 
-    The batch takes elastic patches with bonds under a constant load that are integrated in time.
+    The normal load must be constant.
     """
     if (
         model.patch is None
@@ -82,9 +83,9 @@ def refuses(model: Model) -> str:
     return "" if choose_engine(model) is MARCH else "the case is not integrated in time"
 
 
-def group(model: Model) -> Hashable:
-    """Return a hashable key that is equal for models that can be integrated in one batch."""
-    if why_no_lanes(model):
+def group_key(model: Model) -> Hashable:
+    """Return a hashable key; models with equal keys can be integrated together, None: none."""
+    if reason_not_in_lanes(model):
         return None
     modes = model.rig.modes
     arrays = modes.omega, modes.zeta, modes.slide, modes.base, modes.output
@@ -94,8 +95,8 @@ def group(model: Model) -> Hashable:
     return tuple(key)
 
 
-def why_no_lanes(model: Model) -> str:
-    """Return the reason why a model cannot be integrated in one batch with others, or ""."""
+def reason_not_in_lanes(model: Model) -> str:
+    """Return why a model cannot be integrated in lanes together with others, or ""."""
     rig = model.rig
     law = model.bonds
     if (
@@ -129,7 +130,7 @@ def why_no_lanes(model: Model) -> str:
     if (
         model.heat is not None
         or model.accuracy.shear_modes is not None
-        or has_unreadable_table(model)
+        or has_unreadable_measurements(model)
     ):
         return (
             "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses "
@@ -138,27 +139,31 @@ def why_no_lanes(model: Model) -> str:
     return "" if lanes.can_march(rig.modes) else "the case has too many modes"
 
 
-def solve(models: Sequence[Model], say=None) -> CaseResults:
+def solve(models: Sequence[Model], report=None) -> CaseResults:
     """Compute the case results of a group of elastic patches with bonds."""
-    few = [replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models]
-    batch = pressed.PatchBatch(MARCH.name, _gather_points, _compute_motions, MAX_CASES_PER_CALL)
-    return pressed.solve(few, batch, say)
+    reducible_models = [
+        replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models
+    ]
+    batch = solved_patches.PatchBatch(
+        MARCH.name, _reduce_patch, _compute_motions, MAX_CASES_PER_CALL
+    )
+    return solved_patches.solve(reducible_models, batch, report)
 
 
-class _GatheredPoints(NamedTuple):
-    """Few contact points that represent a patch, with the error of this reduction.
+class _ReducedPatch(NamedTuple):
+    """Few contact points that represent a patch, and the error of this reduction.
 
-    - case: as lanes march it.
-    - error: error of this reduction as a fraction of the friction limit.
+    - case: input of the lane kernel.
+    - error: error of the reduction relative to the friction limit.
     """
 
     case: lanes.PointsCase
     error: float
 
 
-def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
-    """Reduce a pressed patch to a few contact points; None if the case is run by itself."""
-    if why_no_lanes(model) or numerics.steps % 4:
+def _reduce_patch(model: Model, numerics, patch) -> _ReducedPatch | None:
+    """Reduce a solved patch to a few contact points; return None if the case needs a single run."""
+    if reason_not_in_lanes(model) or numerics.steps % 4:
         return None
     if choose_bond_summation(model, numerics).engine != "recursion":
         return None
@@ -174,87 +179,87 @@ def _gather_points(model: Model, numerics, patch) -> _GatheredPoints | None:
         model.bonds.length,
         model.rig.drive.signal.acceleration,
     )
-    return _GatheredPoints(case, error)
+    return _ReducedPatch(case, error)
 
 
-def _compute_motions(models: list, cases: list, say) -> tuple[CaseResults, np.ndarray]:
-    """Compute the motions of solved patches, and the mask (n,) of cases that need a single run."""
+def _compute_motions(models: list, cases: list, report) -> tuple[CaseResults, np.ndarray]:
+    """Compute the motions of solved cases; return the results and a mask of needed single runs."""
     results = CaseResults.blank(len(models))
-    runs_singly = np.zeros(len(models), bool)
+    needs_single_run = np.zeros(len(models), bool)
     all_steps = np.array([case.numerics.steps for case in cases])
     for steps in np.unique(all_steps).tolist():
         indices = np.flatnonzero(all_steps == steps)
-        part, runs_singly[indices] = _march_side_by_side(
+        part, needs_single_run[indices] = _march_in_lanes(
             [models[k] for k in indices], [cases[k] for k in indices], steps
         )
         results.insert(indices, part)
-    return results, runs_singly
+    return results, needs_single_run
 
 
-def _march_side_by_side(models: list, cases: list, steps: int) -> tuple[CaseResults, np.ndarray]:
-    """Compute the results of cases with solved patches by time integration in one batch.
+def _march_in_lanes(models: list, cases: list, steps: int) -> tuple[CaseResults, np.ndarray]:
+    """Compute the results of cases with solved patches by time integration in lanes.
 
-    The cases march with `steps` per cycle, or with twice as many if the displacement needs them and the
-    scene does not fix them. Cases with similar slides are neighbours. Returns also which cases (n,) must
-    be run by themselves.
+    The number of steps per cycle is doubled for cases whose displacement error exceeds the tolerance,
+    unless the scene fixes it. Cases with similar slides are computed in neighbouring lanes. Returns also a
+    mask (n,) of the cases that need a single run.
     """
     results = CaseResults.blank(len(models))
-    runs_singly = np.zeros(len(models), bool)
+    needs_single_run = np.zeros(len(models), bool)
     relative_drives = [case.fine.case.amplitude / case.fine.case.limit.sum() for case in cases]
     order = np.argsort(relative_drives, kind="stable")
     size = max(1, MAX_SAMPLES // (steps * cases[0].numerics.window * LANES)) * LANES
     for first in range(0, len(models), size):
         indices = order[first : first + size]
         marched = _march_cases([models[k] for k in indices], [cases[k] for k in indices], steps)
-        runs_singly[indices] = marched.runs_singly
+        needs_single_run[indices] = marched.needs_single_run
         results.insert(indices, marched.results)
         finer = indices[marched.needs_more_steps]
         if finer.size:
-            part, runs_singly[finer] = _march_side_by_side(
+            part, needs_single_run[finer] = _march_in_lanes(
                 [models[k] for k in finer], [cases[k] for k in finer], 2 * steps
             )
             results.remove(finer.tolist())
             results.insert(finer, part)
-    return results, runs_singly
+    return results, needs_single_run
 
 
 class _MarchedCases(NamedTuple):
-    """Results of n cases that were integrated in one batch with the same time steps.
+    """Results of n cases that were integrated together with the same number of steps.
 
     - results: CaseResults.
-    - runs_singly: which cases (n,) must be run by themselves.
-    - needs_more_steps: which (n,) need twice the steps.
+    - needs_single_run: mask (n,) of the cases that need a single run.
+    - needs_more_steps: mask (n,) of the cases that need twice the steps.
     """
 
     results: CaseResults
-    runs_singly: np.ndarray
+    needs_single_run: np.ndarray
     needs_more_steps: np.ndarray
 
 
 def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
-    """Integrate cases with solved patches in one batch, with coarse runs for their errors."""
+    """Integrate cases with the same steps, and estimate their errors by coarse runs."""
     rig = models[0].rig
     numerics = cases[0].numerics
     window = numerics.window
     cycles = int(rig.drive.cycles)
 
-    def march(divisor: int, points: list, searched=None) -> _EvaluatedMarch:
-        """Integrate and evaluate the cases with a given fraction of the time steps.
+    def march(divisor: int, points: list, searches_ringing=None) -> _EvaluatedMarch:
+        """Integrate the cases with fewer steps and evaluate them.
 
         Parameters
         ----------
         divisor : int
-            Fraction of the time steps, as 1/divisor.
+            Divisor of the number of steps per cycle.
         points : list
-            Contact points of the cases, on the mesh of the run or on the coarser one.
-        searched : (n,) of bool, optional
-            Cases that are searched for ringing; None: all.
+            Reduced patches of the cases, on the fine or on the coarser mesh.
+        searches_ringing : (n,) of bool, optional
+            Mask of the cases in which ringing is sought; None: all.
         """
         lane_cases = [gathered.case for gathered in points]
         marched = lanes.march(
             rig.modes, rig.drive.signal, lane_cases, cycles, steps // divisor, window
         )
-        return _evaluate_march(models, cases, marched, steps // divisor, searched)
+        return _evaluate_march(models, cases, marched, steps // divisor, searches_ringing)
 
     fine_points = [case.fine for case in cases]
     fine = march(1, fine_points)
@@ -264,27 +269,27 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     coarse = march(4, [case.coarse for case in cases], rings)
     runs, causes = _estimate_run_errors(models, cases, (fine, half, quarter, coarse), steps)
     settings = {"engine": MARCH.name, "steps_per_cycle": steps, "window_cycles": window}
-    results, runs_singly, _ = assemble_results(models, runs, settings)
-    runs_singly |= runs.stuck | runs.lost
-    allowed = (
+    results, needs_single_run, _ = assemble_results(models, runs, settings)
+    needs_single_run |= runs.is_stuck | runs.needs_single_run
+    allowed_error = (
         models[0].accuracy.tolerance * np.abs(results.values[MAIN_MEASURE])
         + results.floors[MAIN_MEASURE]
     )
-    needs_more_steps = ~runs_singly & (results.errors[MAIN_MEASURE] > allowed)
+    needs_more_steps = ~needs_single_run & (results.errors[MAIN_MEASURE] > allowed_error)
     if (
         2 * steps > MAX_MARCH_STEPS
         or 2 * steps * cycles > MAX_TOTAL_STEPS
         or "steps_per_cycle" in numerics.pinned
     ):
         needs_more_steps[:] = False
-    for index in np.flatnonzero(~runs_singly & ~needs_more_steps).tolist():
+    for index in np.flatnonzero(~needs_single_run & ~needs_more_steps).tolist():
         case = cases[index]
         results.numerics[index] = results.numerics[index] | {
             "shear_modes": int(case.fine.case.stiffness.size),
             "quadrature": "recursion",
             "interface_nodes": int(case.patch.x.size),
         }
-        pressed.add_patch_results(
+        solved_patches.add_patch_results(
             results,
             index,
             models[index],
@@ -293,45 +298,45 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
             extra=results.numerics[index] | {"cycles": rig.drive.cycles},
             causes=causes[index],
         )
-    return _MarchedCases(results, runs_singly, needs_more_steps)
+    return _MarchedCases(results, needs_single_run, needs_more_steps)
 
 
 class _EvaluatedMarch(NamedTuple):
-    """Measures, energies and stated errors of n cases that were integrated in one batch.
+    """Measures, energies and error estimates of n cases that were integrated together.
 
     - values: measures (n,) by name.
-    - energies: (n,) by name [J].
-    - marched: extremes and phasors of the cycles.
-    - stated_errors: errors by name that each case states itself.
-    - is_lost (n,): whether the case must be run by itself.
+    - energies: energies (n,) by name [J].
+    - marched: motion, extremes and phasors of the cycles.
+    - error_estimates: errors of peak sampling and of the ringing fit by name, a dict per case.
+    - needs_single_run: mask (n,) of the cases that need a single run.
     """
 
     values: dict
     energies: dict
     marched: lanes.MarchedCases
-    stated_errors: list
-    is_lost: np.ndarray
+    error_estimates: list
+    needs_single_run: np.ndarray
 
     @property
     def reach(self) -> np.ndarray:
-        """Largest relative displacement (n,) [m] of each case."""
+        """Largest absolute relative displacement of each case (n,) [m]."""
         return self.marched.reach
 
 
 def _evaluate_march(
-    models: list, cases: list, marched: lanes.MarchedCases, steps: int, searched=None
+    models: list, cases: list, marched: lanes.MarchedCases, steps: int, searches_ringing=None
 ) -> _EvaluatedMarch:
-    """Compute measures, energies and ringing of the cases of a batch from their last cycles.
+    """Compute measures, energies and ringing of n cases from their last cycles.
 
     Parameters
     ----------
     models : list of Model
-    cases : list of pressed.PressedCase
+    cases : list of solved_patches.SolvedCase
     marched : lanes.MarchedCases
     steps : int
         Steps per cycle.
-    searched : (n,) of bool, optional
-        Cases that are searched for ringing; None: all.
+    searches_ringing : (n,) of bool, optional
+        Cases that are searches_ringing for ringing; None: all.
     """
     rig = models[0].rig
     modes = rig.modes
@@ -345,20 +350,20 @@ def _evaluate_march(
     with np.errstate(all="ignore"):
         stiffness = np.array([model.rig.first_mode.stiffness for model in models])
         values = samples.values(energies, stiffness * ~_has_other_modes(models[0], marched), load)
-        # this upper bound of the natural frequencies [rad/s] of the rig takes the bonds as springs
+        # upper bound of the natural frequencies [rad/s] of the rig with all bonds sticking
         contact_stiffness = np.array([case.limit.sum() / case.length for case in points])
         fastest = np.sqrt(
             (modes.omega**2).max() + (modes.slide**2).sum() / modes.mass * contact_stiffness
         )
         min_phase = 2 * np.pi * MIN_REFINED_FRACTION * MIN_PERIODS
-        may_ring = samples.longest_stick(STICK_SPEED_RATIO) * fastest >= min_phase
-        if searched is not None:
-            may_ring &= searched
+        may_ring = samples.longest_stick_duration(STICK_SPEED_RATIO) * fastest >= min_phase
+        if searches_ringing is not None:
+            may_ring &= searches_ringing
         accelerations = samples.acceleration()
-        peak_errors = find_peaks(np.abs(accelerations))[1]
+        peak_errors = find_interpolated_peaks(np.abs(accelerations))[1]
     for name in RING_MEASURES:
         values[name] = np.full(len(models), np.nan)
-    stated_errors = [{"absolute_acceleration_peak": float(error)} for error in peak_errors]
+    error_estimates = [{"absolute_acceleration_peak": float(error)} for error in peak_errors]
     for case in np.flatnonzero(may_ring).tolist():
         window = samples.response(case, accelerations[:, case])
         with np.errstate(all="ignore"):
@@ -367,13 +372,13 @@ def _evaluate_march(
             )
         for name, value in rings.items():
             values[name][case] = value
-        stated_errors[case] |= errors
-    is_lost = (marched.bad > 0) | ~np.isfinite(marched.book["work_in"])
-    return _EvaluatedMarch(values, energies, marched, stated_errors, is_lost)
+        error_estimates[case] |= errors
+    needs_single_run = (marched.bad > 0) | ~np.isfinite(marched.book["work_in"])
+    return _EvaluatedMarch(values, energies, marched, error_estimates, needs_single_run)
 
 
 def _has_other_modes(model: Model, marched: lanes.MarchedCases) -> np.ndarray:
-    """Return a mask (n,) of the cases whose slide contains modes other than the first."""
+    """Return a mask (n,) of the cases in which modes other than the first carry the slide."""
     fraction = model.rig.first_mode.fraction_of_other_modes
     motions = np.moveaxis(marched.z, 2, 0)
     return np.array([fraction(motion) > MAX_OTHER_MODES_FRACTION for motion in motions])
@@ -382,14 +387,14 @@ def _has_other_modes(model: Model, marched: lanes.MarchedCases) -> np.ndarray:
 def _estimate_run_errors(
     models: list, cases: list, evaluated: tuple, steps: int
 ) -> tuple[Runs, list]:
-    """Estimate the errors of the cases from coarse runs, in total and by kind of coarse run.
+    """Estimate the errors of the cases from coarse runs, in total and by source.
 
     Parameters
     ----------
     models : list of Model
-    cases : list of pressed.PressedCase
+    cases : list of solved_patches.SolvedCase
     evaluated : tuple of _EvaluatedMarch
-        Runs with all, half and a quarter of the steps, and with a quarter on the coarser mesh.
+        Runs with all, half and a quarter of the steps, and one with a quarter on the coarser mesh.
     steps : int
         Steps per cycle.
     """
@@ -404,13 +409,13 @@ def _estimate_run_errors(
         columns.append(run.values | others)
     errors = {name: np.zeros(len(models)) for name in columns[0]}
     causes = []
-    for case, (model, pressed_case) in enumerate(zip(models, cases)):
+    for case, (model, solved_case) in enumerate(zip(models, cases)):
         values, half, quarter, coarse = (select_known_values(run, case) for run in columns)
         kinds = (
             step_errors(values, half, quarter, steps=steps),
             coarser_errors(quarter, coarse, order=2.0),
-            _reduction_errors(values, pressed_case.fine, model, fine.energies["passed"][case]),
-            dict.fromkeys(values, 0.0) | fine.stated_errors[case],
+            _reduction_errors(values, solved_case.fine, model, fine.energies["passed"][case]),
+            dict.fromkeys(values, 0.0) | fine.error_estimates[case],
         )
         kind_errors = zip(ERROR_KINDS, kinds, strict=True)
         causes.append(split_errors(values, list(kind_errors), (values, half, quarter)))
@@ -426,29 +431,31 @@ def _estimate_run_errors(
         fine.marched.extremes,
         fine.marched.phasors[:, ends],
         fine.values["slip_amplitude"] <= max_slip,
-        fine.is_lost,
+        fine.needs_single_run,
         errors,
         MARCH.min_relative_error,
         MARCH.max_balance_error,
-        again=False,
+        refines_steps=False,
     )
     return runs, causes
 
 
-def _reduction_errors(values: dict, points: _GatheredPoints, model: Model, work: float) -> dict:
-    """Estimate the errors due to few shear modes and few contact points.
+def _reduction_errors(
+    values: dict, reduced_patch: _ReducedPatch, model: Model, work: float
+) -> dict:
+    """Estimate the errors due to the reduction to few shear modes and contact points.
 
     Parameters
     ----------
     values : dict
         Measures by name.
-    points : _GatheredPoints
+    reduced_patch : _ReducedPatch
     model : Model
     work : float
-        Work that friction exchanged [J].
+        Sum of the absolute work of the friction force [J].
     """
-    length = points.case.length
-    limit = points.case.limit.sum()
+    length = reduced_patch.case.length
+    limit = reduced_patch.case.limit.sum()
     cycle_work = 4 * limit * (values["slip_amplitude"] + length)
     scale = FrictionScale(model.friction.static, limit, length, work, cycle_work)
-    return friction_errors(values, LOOP_ERROR_FACTOR * points.error, scale)
+    return friction_errors(values, LOOP_ERROR_FACTOR * reduced_patch.error, scale)

@@ -1,6 +1,6 @@
-"""Common mesh of all cases of a sweep whose patches have one geometry.
+"""Common meshes for cases of a sweep with the same patch geometry.
 
-In: the models of the cases. Out: models with shared meshes, chosen by the hardest case.
+In: the models of the cases. Out: models with common meshes, fine enough for the most demanding case.
 """
 
 from __future__ import annotations
@@ -14,10 +14,16 @@ from ..patch import sweep_meshes
 
 
 class SharedMeshes:
-    """Meshes that the cases of a sweep share, by geometry of the patch and tolerance.
+    """Common meshes of the cases of a sweep, by patch geometry and tolerance.
 
-    They depend on all models that choose them, but not on their order. Therefore a sweep makes them
-    once from its cases, before these are divided into chunks. `all_`: there are no other cases.
+    The meshes depend on all models, but not on their order. A sweep therefore creates them once,
+    before its cases are divided into chunks.
+
+    Parameters
+    ----------
+    models : iterable of Model or PatchfemError
+    all_ : bool
+        Whether the models are all cases of the sweep.
     """
 
     def __init__(self, models: Iterable[Model | PatchfemError], all_: bool = True):
@@ -32,11 +38,11 @@ class SharedMeshes:
 
             try:
                 self.meshes[key] = sweep_meshes.shared_meshes(patches, key[1], all_)
-            except PatchfemError:  # each case is run by itself, and reports its own error
+            except PatchfemError:  # the single run of each case reports its error
                 continue
 
     def with_shared_meshes(self, model: Model | PatchfemError) -> Model | PatchfemError:
-        """Return a model with the shared meshes of its geometry, if there are any."""
+        """Return a model with the common meshes of its geometry, or unchanged if there are none."""
         meshes = (
             self.meshes.get(_mesh_key(model)) if self.meshes and _may_share_meshes(model) else None
         )
@@ -46,19 +52,19 @@ class SharedMeshes:
 
 
 def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
-    """Choose common meshes for models with patches of the same geometry.
+    """Return the models with common meshes for patches of the same geometry.
 
-    A single patch of a geometry keeps the mesh that its own run chooses.
+    A patch whose geometry occurs only once keeps the mesh of its single run.
     """
-    shared = SharedMeshes(models)
-    return [shared.with_shared_meshes(model) for model in models]
+    common_meshes = SharedMeshes(models)
+    return [common_meshes.with_shared_meshes(model) for model in models]
 
 
 def _may_share_meshes(model: Model | PatchfemError) -> bool:
-    """Return whether a model may use a mesh that is chosen for several models."""
+    """Return whether a model has a patch without a common mesh."""
     return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
 
 
 def _mesh_key(model: Model) -> tuple:
-    """Return a hashable key of the patch geometry and the tolerance of a model."""
+    """Return the hashable key of a model's common mesh: patch geometry and tolerance."""
     return sweep_meshes.geometry_key(model.patch), model.accuracy.tolerance

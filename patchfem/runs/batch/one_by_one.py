@@ -1,4 +1,4 @@
-"""Cases run one after the other, as single runs: the reference of all batches.
+"""Computation of cases one after the other by single runs, the reference for all batches.
 
 In: models. Out: `CaseResults`.
 """
@@ -18,40 +18,40 @@ from ..results.result import collect_used_settings
 from ..run import run
 from .case_results import CaseResults
 
-CASE_ERRORS = (PatchfemError, MemoryError)  # errors of a case, as opposed to faults of the program
+CASE_ERRORS = (PatchfemError, MemoryError)  # errors caused by a case, not by a fault of the program
 NO_MEMORY_MESSAGE = "not enough memory; make contact.element_size larger, or make the run shorter"
 
 
 def solve(
     models: Sequence[Model],
-    say: Callable | None = None,
-    keep: Callable | None = None,
+    report: Callable | None = None,
+    on_result: Callable | None = None,
     estimate: bool = True,
 ) -> CaseResults:
-    """Compute case results by single runs, one after the other.
+    """Compute the case results of models by single runs, one after the other.
 
-    An error of one case becomes its message and does not stop the others.
+    An error of one case is stored as its message and does not stop the other cases.
 
     Parameters
     ----------
     models : sequence of Model
-    say : callable, optional
-        Callback for a line of text.
-    keep : callable, optional
-        Called with case and Result after each run.
+    report : callable, optional
+        Callback for progress messages.
+    on_result : callable, optional
+        Called with the case index and the Result after each run.
     estimate : bool
-        If False, coarse runs and errors are omitted.
+        If False, coarse runs and error estimates are omitted.
     """
     results = CaseResults.blank(len(models))
     for case, model in enumerate(models):
         begin = perf_counter()
         try:
-            result = run(plan(model), say, estimate=estimate)
-            if keep is not None:
-                keep(case, result)
+            result = run(plan(model), report, estimate=estimate)
+            if on_result is not None:
+                on_result(case, result)
         except CASE_ERRORS as error:
             results.fail(case, str(error) or NO_MEMORY_MESSAGE)
-        # a fault of the program in one case must not lose the results of a thousand others
+        # a program fault in one case must not discard the results of the other cases
         except Exception as error:
             results.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:
@@ -65,22 +65,22 @@ def solve(
     return results
 
 
-def solve_singly(
-    results: CaseResults, models: Sequence[Model], cases: np.ndarray, say: Callable | None = None
+def replace_by_single_runs(
+    results: CaseResults, models: Sequence[Model], cases: np.ndarray, report: Callable | None = None
 ) -> None:
-    """Replace the results of some cases of a batch by those of single runs.
+    """Replace the results of selected cases by those of single runs.
 
     Parameters
     ----------
     results : CaseResults
-        Results of the models, which are changed.
+        Results of all models; changed in place.
     models : sequence of Model
     cases : (n,) of bool
-        Cases that are run singly.
-    say : callable, optional
-        Callback for a line of text.
+        Mask of the cases to be replaced.
+    report : callable, optional
+        Callback for progress messages.
     """
     indices = np.flatnonzero(cases)
     if indices.size:
         results.remove(indices.tolist())
-        results.insert(indices, solve(select_models(models, indices), say))
+        results.insert(indices, solve(select_models(models, indices), report))

@@ -1,6 +1,6 @@
-"""Batch of static patches that share their pieces, pressed together on each mesh.
+"""Batch of static patches with equal pieces, which are solved together on each mesh.
 
-In: models of a group. Out: `CaseResults`, or models whose patches are solved.
+In: models of a group. Out: `CaseResults`, or models with solved patches.
 """
 
 from __future__ import annotations
@@ -26,162 +26,168 @@ from ..results.result import file_name_shortener, shorten_file_names
 from . import one_by_one
 from .case_results import CaseResults
 
-# Largest number of cases whose nodal forces are in memory at the same time.
+# Largest number of cases whose nodal forces are held in memory at the same time.
 MAX_CASES_PER_CALL = 2048
-# Absolute error that is always allowed, so that a value of 0 meets the tolerance.
+# Absolute error that is always accepted, so that a value of 0 meets the tolerance.
 MIN_ALLOWED_ERROR = 1e-300
 
 
 class _NodePositions(NamedTuple):
-    """Positions of interface nodes [m], which replace a Patch in the text of a warning."""
+    """Node positions [m], the only data of a Patch that the accuracy warnings need."""
 
     x: np.ndarray
 
 
-def refuses(model: Model) -> str:
-    """Return the reason why a static patch cannot be solved in a batch with others, or ""."""
+def refusal_reason(model: Model) -> str:
+    """Return why a static patch cannot be solved together with others, or ""."""
     if model.kind != "patch":
         return "the case is no static patch"
     return static_batch.reason_not_batched(model.patch)
 
 
-def group(model: Model) -> Hashable:
-    """Return a hashable key that is equal for models whose patches can be solved in one batch."""
+def group_key(model: Model) -> Hashable:
+    """Return a hashable key; patches of models with equal keys can be solved together."""
     return geometry_key(model.patch), static_batch.batch_key(model.patch), model.accuracy.tolerance
 
 
-def parts(models: Sequence[Model]) -> dict:
-    """Group the indices of models whose patches differ in plain numbers only."""
-    alike = (
+def group_models(models: Sequence[Model]) -> dict:
+    """Return the indices of models whose patches differ only in numbers, by group key."""
+    is_supported = (
         isinstance(models, SimilarModels)
         and models.first.kind == "patch"
-        and not refuses(models.first)
+        and not refusal_reason(models.first)
     )
-    return {group(models.first): range(len(models))} if alike else {}
+    return {group_key(models.first): range(len(models))} if is_supported else {}
 
 
-def press_together(models: Sequence[Model]) -> list[Model]:
-    """Return the models with the solutions of their patches, which are solved in batches.
+def attach_solved_patches(models: Sequence[Model]) -> list[Model]:
+    """Solve the patches of models in batches, and return the models with the solved patches.
 
-    Of patches that are equal, e.g. for several drive levels or friction laws, one is pressed for
-    all, so that they share its shear modes.
+    Equal patches, e.g. for several drive levels or friction laws, are solved once and share their
+    shear modes.
     """
-    out = list(models)
+    solved_models = list(models)
     groups = {}
     for case, model in enumerate(models):
         if not static_batch.reason_not_batched(model.patch):
-            content = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
-            groups.setdefault(group(model), {}).setdefault(content, []).append(case)
-    for alike in groups.values():
-        first = [models[cases[0]] for cases in alike.values()]
+            key = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
+            groups.setdefault(group_key(model), {}).setdefault(key, []).append(case)
+    for cases_by_content in groups.values():
+        first = [models[cases[0]] for cases in cases_by_content.values()]
         solutions = static_batch.solve_alike_patches(
             [model.patch for model in first], first[0].accuracy.tolerance
         )
-        for cases, one in zip(alike.values(), solutions):
-            for case in cases if one is not None else ():
-                out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
-    return out
+        for cases, solved in zip(cases_by_content.values(), solutions):
+            for case in cases if solved is not None else ():
+                solved_models[case] = replace(
+                    models[case], patch=replace(models[case].patch, solved=solved)
+                )
+    return solved_models
 
 
-def press_and_solve(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
-    """Solve the patches of models in one batch, then compute the motions of the models.
+def solve_patches_then_motions(
+    models: Sequence[Model], cases_per_call: int, solve: Callable
+) -> CaseResults:
+    """Solve the patches of models in batches, then compute the motions in chunks.
 
     Parameters
     ----------
     models : sequence of Model
-    together : int
-        Number of cases per call.
+    cases_per_call : int
+        Number of cases per call of `solve`.
     solve : callable
-        Function of a part of the models that returns its CaseResults.
+        Function that returns the CaseResults of models with solved patches.
     """
-    out = CaseResults.blank(len(models))
-    for first in range(0, len(models), together):
-        # in these small systems, BLAS threads wait longer for each other than the solution takes
+    results = CaseResults.blank(len(models))
+    for first in range(0, len(models), cases_per_call):
+        # for such small systems, the synchronization of BLAS threads takes longer than the solution
         with one_thread():
-            part = press_together(models[first : first + together])
-            out.insert(range(first, first + len(part)), solve(part))
-    return out
+            part = attach_solved_patches(models[first : first + cases_per_call])
+            results.insert(range(first, first + len(part)), solve(part))
+    return results
 
 
-def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
+def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResults:
     """Compute the case results of a group of static patches."""
-    out = CaseResults.blank(len(models))
+    results = CaseResults.blank(len(models))
     for start in range(0, len(models), MAX_CASES_PER_CALL):
         cases = range(start, min(start + MAX_CASES_PER_CALL, len(models)))
-        out.insert(cases, _solve_cases(select_models(models, cases), say))
-    return out
+        results.insert(cases, _solve_cases(select_models(models, cases), report))
+    return results
 
 
-def _solve_cases(models: Sequence[Model], say: Callable | None) -> CaseResults:
-    """Compute the case results of static patches that fit in memory together."""
+def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResults:
+    """Compute the case results of static patches in one batch."""
     begin = perf_counter()
     first = models[0]
-    alike = isinstance(models, SimilarModels)
-    asked = (
+    is_columns = isinstance(models, SimilarModels)
+    loads = (
         static_batch.loads_from_columns(models.columns().patch, len(models))
-        if alike
+        if is_columns
         else static_batch.collect_loads([model.patch for model in models])
     )
-    found = static_batch.solve_batch(asked, first.accuracy.tolerance)
-    out = CaseResults.blank(len(models))
-    good = found.is_solved
-    wide = ~good
+    solution = static_batch.solve_batch(loads, first.accuracy.tolerance)
+    results = CaseResults.blank(len(models))
+    is_solved = solution.is_solved
+    is_wide = ~is_solved
     tolerance = first.accuracy.tolerance
-    values_by_name = {name: estimate.value for name, estimate in found.estimates.items()}
-    decisive = [found.estimates[name] for name in POSITIVE_MESH_MEASURES]
-    unknown = np.any([estimate.error >= estimate.value for estimate in decisive], axis=0)
+    values_by_name = {name: estimate.value for name, estimate in solution.estimates.items()}
+    decisive_estimates = [solution.estimates[name] for name in POSITIVE_MESH_MEASURES]
+    is_unresolved = np.any(
+        [estimate.error >= estimate.value for estimate in decisive_estimates], axis=0
+    )
     floors = {
-        name: np.broadcast_to(least, good.shape)
+        name: np.broadcast_to(least, is_solved.shape)
         for name, least in of_patch.measure_floors(first.patch, tolerance, values_by_name).items()
     }
-    for name, estimate in found.estimates.items():
-        out.measure(name, TABLE[name].unit)
-        for columns, given in (
-            (out.values, estimate.value),
-            (out.errors, estimate.error),
-            (out.floors, floors[name]),
+    for name, estimate in solution.estimates.items():
+        results.add_measure(name, TABLE[name].unit)
+        for columns, column in (
+            (results.values, estimate.value),
+            (results.errors, estimate.error),
+            (results.floors, floors[name]),
         ):
-            columns[name][:] = np.where(good, given, np.nan)
-        wide = wide | (
+            columns[name][:] = np.where(is_solved, column, np.nan)
+        is_wide = is_wide | (
             estimate.error
             > np.maximum(
                 compute_allowed_error(tolerance, estimate.value, floors[name]), MIN_ALLOWED_ERROR
             )
         )
-    out.outcome[good] = str(Outcome.DONE)
-    out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)
-    nodes = {"interface_nodes": found.levels[0].x.size}
-    out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
-    largest_pressure = found.largest_pressure
-    strained = of_patch.exceeds_small_strains(first.patch, largest_pressure, found.approach)
+    results.outcome[is_solved] = str(Outcome.DONE)
+    results.outcome[is_solved & is_unresolved] = str(Outcome.NOT_CONVERGED)
+    nodes = {"interface_nodes": solution.levels[0].x.size}
+    results.numerics.update(dict.fromkeys(np.flatnonzero(is_solved).tolist(), nodes))
+    largest_pressure = solution.largest_pressure
+    is_strained = of_patch.exceeds_small_strains(first.patch, largest_pressure, solution.approach)
     pieces = first.patch.pieces
-    mean = values_by_name["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
-    peak = found.estimates["pressure_peak"]
-    least_peak = peak.value - peak.error
-    always = bool(first.source.remarks) or not alike
-    told = file_name_shortener(first.source.path)
-    for case in np.flatnonzero(good & (wide | strained | always)).tolist():
+    mean_pressure = values_by_name["normal_load"] / (pieces.length * pieces.width * pieces.pairs)
+    peak = solution.estimates["pressure_peak"]
+    min_peak = peak.value - peak.error
+    has_remarks = bool(first.source.remarks) or not is_columns
+    shorten = file_name_shortener(first.source.path)
+    for case in np.flatnonzero(is_solved & (is_wide | is_strained | has_remarks)).tolist():
         model = models[case]
-        measures = found.measures(case, floors)
-        warned = [
+        measures = solution.measures(case, floors)
+        warnings = [
             *model.source.remarks,
             *of_patch.strain_warnings(
-                model.patch, float(largest_pressure[case]), float(found.approach[case])
+                model.patch, float(largest_pressure[case]), float(solution.approach[case])
             ),
-            *tolerance_warnings(Finding(model, measures, _NodePositions(found.levels[0].x))),
+            *tolerance_warnings(Finding(model, measures, _NodePositions(solution.levels[0].x))),
         ]
-        if warned:
-            out.warnings[case] = shorten_file_names(warned, model.source.path)
-    for case in np.flatnonzero(good).tolist():
+        if warnings:
+            results.warnings[case] = shorten_file_names(warnings, model.source.path)
+    for case in np.flatnonzero(is_solved).tolist():
         notes = [
-            *of_patch.notes_on_tall_pieces(first.patch, mean[case]),
-            *found.plane_sentences(first.patch, case),
-            *yielding_faces(first.patch, least_peak[case]).values(),
+            *of_patch.notes_on_tall_pieces(first.patch, mean_pressure[case]),
+            *solution.plane_sentences(first.patch, case),
+            *yielding_faces(first.patch, min_peak[case]).values(),
         ]
         if notes:
-            out.notes[case] = told(notes)
-    single = np.flatnonzero(~good)
-    out.seconds[:] = (perf_counter() - begin) / len(models)
-    if single.size:
-        out.insert(single, one_by_one.solve(select_models(models, single), say))
-    return out
+            results.notes[case] = shorten(notes)
+    unsolved = np.flatnonzero(~is_solved)
+    results.seconds[:] = (perf_counter() - begin) / len(models)
+    if unsolved.size:
+        results.insert(unsolved, one_by_one.solve(select_models(models, unsolved), report))
+    return results

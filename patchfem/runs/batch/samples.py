@@ -1,7 +1,7 @@
-"""Measures of many marches under a sine from the samples of their last cycles, as columns.
+"""Vectorized measures of n runs under sinusoidal drive, from samples of the last cycles.
 
 In: samples (s, n) of n runs, equally spaced over whole cycles. Out: the measures that
-`response.rows` computes from the samples of a single run, (n,) each.
+`response.rows` computes for a single run, (n,) each.
 """
 
 from types import SimpleNamespace
@@ -26,23 +26,23 @@ class Samples:
 
     Parameters
     ----------
-    found
-        Motion z and rate (s, m, n) of the modes of a rig, force [N] and slip [m] (s, n), and
-        friction work of these cycles `worked` (n,) [J].
+    motion
+        Record with modal coordinates `z` and their rates `rate` (s, m, n), friction force `force` [N]
+        and slip `slip` [m] (s, n), and friction work `worked` (n,) [J] of these cycles.
     modes
         Modal basis of the rig.
     omega : float
         Angular frequency of the drive [rad/s].
     amplitude : (n,)
-        Acceleration of the base [m s-2].
+        Base acceleration, zero to peak [m s-2].
     steps : int
         Steps per cycle.
     window : int
         Number of cycles.
     """
 
-    def __init__(self, found, modes, omega: float, amplitude, steps: int, window: int):
-        self.found = found
+    def __init__(self, motion, modes, omega: float, amplitude, steps: int, window: int):
+        self.motion = motion
         self.modes = modes
         self.omega = omega
         self.amplitude = amplitude
@@ -52,210 +52,232 @@ class Samples:
         self.dt = self.period / steps
         self.angle = 2 * np.pi * np.arange(steps * window + 1) / steps
         self.slide, self.speed = (
-            _project_motion(modes.slide, one) for one in (found.z, found.rate)
+            _project_motion(modes.slide, modal_motion) for modal_motion in (motion.z, motion.rate)
         )
         self.span = window * self.period
 
     def acceleration(self) -> np.ndarray:
-        """Compute the absolute acceleration at the sensor (s, n) [m s-2] from the modal motion."""
+        """Compute the absolute acceleration at the sensor (s, n) [m s-2] from the equations of motion."""
         modes = self.modes
-        found = self.found
-        out = np.multiply.outer(
+        motion = self.motion
+        acceleration = np.multiply.outer(
             (1 - modes.base @ modes.output) * np.sin(self.angle), self.amplitude
         )
-        for k, rate in enumerate(2 * modes.zeta * modes.omega):
-            out -= modes.output[k] * (rate * found.rate[:, k] + modes.omega[k] ** 2 * found.z[:, k])
-        return out - modes.output @ modes.slide / modes.mass * found.force
+        for k, damping_rate in enumerate(2 * modes.zeta * modes.omega):
+            acceleration -= modes.output[k] * (
+                damping_rate * motion.rate[:, k] + modes.omega[k] ** 2 * motion.z[:, k]
+            )
+        return acceleration - modes.output @ modes.slide / modes.mass * motion.force
 
-    def values(self, book: dict, stiffness, load) -> dict:
+    def values(self, energies: dict, stiffness, load) -> dict:
         """Compute the measures of n runs from their samples, as a dict of columns (n,).
 
         Parameters
         ----------
-        book : dict
-            Energies of the runs as in `energy_balance`, and `sampled`, `booked` and `passed`
-            friction work [J].
+        energies : dict
+            Energies of the runs as in `energy_balance`, and the friction work [J] from samples
+            (`sampled`), from the energy balance (`booked`) and in absolute value (`passed`).
         stiffness : (n,)
-            K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to it.
+            Stiffness of the first mode at the contact [N/m]; 0 if the damping ratio is not computed.
         load : (n,)
             Normal load [N].
         """
-        first, third = (self.harmonic(number) for number in (1, 3))
-        out = {
-            "absolute_acceleration_peak": find_peaks(np.abs(self.acceleration()))[0],
-            "friction_force_peak": np.abs(self.found.force).max(axis=0),
+        fundamental, third_harmonic = (self.modal_harmonic(number) for number in (1, 3))
+        measures = {
+            "absolute_acceleration_peak": find_interpolated_peaks(np.abs(self.acceleration()))[0],
+            "friction_force_peak": np.abs(self.motion.force).max(axis=0),
             "normal_load": load,
-            "drift_per_cycle": self.drift(),
-            "friction_work": book["booked"],
-            "energy_dissipated": book["gone"],
-            "energy_created": book["created"],
+            "drift_per_cycle": self.drift_per_cycle(),
+            "friction_work": energies["booked"],
+            "energy_dissipated": energies["gone"],
+            "energy_created": energies["created"],
             "work_check": relative_gap(
-                book["sampled"],
-                book["booked"],
-                book["passed"],
-                energy=book["power"] + book["peak_stored"],
+                energies["sampled"],
+                energies["booked"],
+                energies["passed"],
+                energy=energies["power"] + energies["peak_stored"],
             ),
         }
-        waves = [
+        acceleration_harmonics = [
             np.abs(
-                self.gain(self.modes.output, one, number)
+                self.acceleration_harmonic(self.modes.output, coefficients, number)
                 - (1j * self.amplitude if number == 1 else 0.0)
             )
-            for number, one in ((1, first), (3, third))
+            for number, coefficients in ((1, fundamental), (3, third_harmonic))
         ]
-        out |= {
-            "absolute_acceleration_fundamental": waves[0],
-            "acceleration_distortion": distortion_ratio(*waves, 0.0),
+        measures |= {
+            "absolute_acceleration_fundamental": acceleration_harmonics[0],
+            "acceleration_distortion": distortion_ratio(*acceleration_harmonics, 0.0),
         }
-        return out | self.slips() | self.loops(first, stiffness)
+        return measures | self.slip_measures() | self.loop_measures(fundamental, stiffness)
 
-    def harmonic(self, number: int) -> np.ndarray:
-        """Compute the Fourier coefficients (m, n) [m] of the modal motions at a drive harmonic.
+    def modal_harmonic(self, number: int) -> np.ndarray:
+        """Compute the Fourier coefficients (m, n) [m] of the modal motions at a multiple of the drive.
 
-        They are those of cubics, as in `spectrum.motion_harmonic`.
+        The motion is interpolated by cubics as in `spectrum.motion_harmonic`.
         """
         h = self.dt
         n = number
         s = GAUSS_POINTS
-        found = self.found
-        wave = np.exp(-1j * n * self.angle[:-1])
-        part = GAUSS_WEIGHTS * h * np.exp(-1j * n * self.omega * h * s)
-        left = part @ (1 - 3 * s**2 + 2 * s**3)
-        right = part @ (3 * s**2 - 2 * s**3)
-        leaves = h * (part @ (s - 2 * s**2 + s**3))
-        comes = h * (part @ (s**3 - s**2))
-        at = np.append(left * wave, 0.0) + np.append(0.0, right * wave)
-        of_rate = np.append(leaves * wave, 0.0) + np.append(0.0, comes * wave)
-        shape = found.z.shape[1:]
-        flat = [one.reshape(len(at), -1) for one in (found.z, found.rate)]
+        motion = self.motion
+        phase_factor = np.exp(-1j * n * self.angle[:-1])
+        weights = GAUSS_WEIGHTS * h * np.exp(-1j * n * self.omega * h * s)
+        left = weights @ (1 - 3 * s**2 + 2 * s**3)
+        right = weights @ (3 * s**2 - 2 * s**3)
+        left_slope = h * (weights @ (s - 2 * s**2 + s**3))
+        right_slope = h * (weights @ (s**3 - s**2))
+        value_weights = np.append(left * phase_factor, 0.0) + np.append(0.0, right * phase_factor)
+        rate_weights = np.append(left_slope * phase_factor, 0.0) + np.append(
+            0.0, right_slope * phase_factor
+        )
+        shape = motion.z.shape[1:]
+        flat_motions = [part.reshape(len(value_weights), -1) for part in (motion.z, motion.rate)]
         return (
             2
             / self.span
             * sum(
-                weight.real @ one + 1j * (weight.imag @ one)
-                for weight, one in zip((at, of_rate), flat)
+                weight.real @ samples + 1j * (weight.imag @ samples)
+                for weight, samples in zip((value_weights, rate_weights), flat_motions)
             ).reshape(shape)
         )
 
-    def ends(self) -> tuple:
-        """Return the net changes of modal displacement and velocity (m, n) over the window."""
-        return self.found.z[-1] - self.found.z[0], self.found.rate[-1] - self.found.rate[0]
+    def net_changes(self) -> tuple:
+        """Return the changes of modal coordinates and rates (m, n) over the window."""
+        return self.motion.z[-1] - self.motion.z[0], self.motion.rate[-1] - self.motion.rate[0]
 
-    def gain(self, row, first, number: int) -> np.ndarray:
-        """Compute the Fourier coefficient (n,) of an acceleration from that of the modal motions.
+    def acceleration_harmonic(self, participations, coefficients, number: int) -> np.ndarray:
+        """Compute the Fourier coefficient (n,) of an acceleration from those of the modal motions.
 
         Parameters
         ----------
-        row : (m,)
-            Participations.
-        first : (m, n)
-            Fourier coefficients of the modes.
+        participations : (m,)
+        coefficients : (m, n)
+            Fourier coefficients of the modal motions.
         number : int
             Multiple of the drive frequency.
         """
         omega = number * self.omega
-        moved, faster = self.ends()
-        return row @ (2 / self.span * (faster + 1j * omega * moved) - omega**2 * first)
+        displacement_change, velocity_change = self.net_changes()
+        return participations @ (
+            2 / self.span * (velocity_change + 1j * omega * displacement_change)
+            - omega**2 * coefficients
+        )
 
-    def loops(self, first, stiffness) -> dict:
+    def loop_measures(self, fundamental, stiffness) -> dict:
         """Compute the measures of the friction loops of n runs.
 
         Parameters
         ----------
-        first : (m, n)
-            Fourier coefficients of the modes [m].
+        fundamental : (m, n)
+            Fourier coefficients of the modal motions at the drive frequency [m].
         stiffness : (n,)
             See `values`.
         """
         modes = self.modes
-        rates = 2 / self.span * self.ends()[0] + 1j * self.omega * first
-        rest = np.array(
+        rates = 2 / self.span * self.net_changes()[0] + 1j * self.omega * fundamental
+        inertia_residual = np.array(
             [
-                -base * (-1j * self.amplitude) - self.gain(unit, first, 1)
+                -base * (-1j * self.amplitude) - self.acceleration_harmonic(unit, fundamental, 1)
                 for base, unit in zip(modes.base, np.eye(len(modes.base)))
             ]
         )
-        rest -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[:, None] * first
-        pull = modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide)
-        turns = self.turns()
-        moves = np.ptp(self.slide, axis=0) > MIN_SLIDE_RANGE
-        half = np.array([mean_half_range(one) for one in turns]) * moves
-        secants = [secant_stiffness(one) for one in turns]
-        secant = np.where(moves, [np.nan if one is None else one for one in secants], np.nan)
+        inertia_residual -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[
+            :, None
+        ] * fundamental
+        friction_fundamental = (
+            modes.mass * (modes.slide @ inertia_residual) / (modes.slide @ modes.slide)
+        )
+        reversals = self.reversals()
+        is_moving = np.ptp(self.slide, axis=0) > MIN_SLIDE_RANGE
+        half_ranges = (
+            np.array([mean_half_range(run_reversals) for run_reversals in reversals]) * is_moving
+        )
+        secants = [secant_stiffness(run_reversals) for run_reversals in reversals]
+        secant = np.where(
+            is_moving, [np.nan if value is None else value for value in secants], np.nan
+        )
         return interface_loops(
-            half, modes.slide @ first, pull, self.found.worked * self.period / self.span, stiffness
+            half_ranges,
+            modes.slide @ fundamental,
+            friction_fundamental,
+            self.motion.worked * self.period / self.span,
+            stiffness,
         ) | {"secant_stiffness": secant}
 
-    def turns(self) -> list:
-        """Find the extreme slides of each run and the friction forces there."""
+    def reversals(self) -> list:
+        """Return the extreme slides in each cycle of each run, with the friction forces there."""
         steps = self.steps
-        size = self.slide.shape[1]
-        rows = np.arange(size)
-        out = np.empty((2, 2, self.window, size))
-        for number in range(self.window):
-            part = slice(number * steps, (number + 1) * steps + 1)
-            slide = self.slide[part]
-            speed = self.speed[part]
-            force = self.found.force[part]
-            for k, way in enumerate((-1, 1)):
-                out[k, :, number] = _largest_slides(
-                    way * slide, way * speed, force, rows, self.dt
-                ) * np.array([[way], [1]])
+        n_runs = self.slide.shape[1]
+        rows = np.arange(n_runs)
+        extremes = np.empty((2, 2, self.window, n_runs))
+        for cycle in range(self.window):
+            cycle_samples = slice(cycle * steps, (cycle + 1) * steps + 1)
+            slide = self.slide[cycle_samples]
+            speed = self.speed[cycle_samples]
+            force = self.motion.force[cycle_samples]
+            for k, direction in enumerate((-1, 1)):
+                extremes[k, :, cycle] = _find_largest_slide(
+                    direction * slide, direction * speed, force, rows, self.dt
+                ) * np.array([[direction], [1]])
         time = self.angle / self.omega
-        turn = [
+        reversals = [
             [
                 tuple(
-                    SimpleNamespace(slide=out[k, 0, c, run], force=out[k, 1, c, run])
+                    SimpleNamespace(slide=extremes[k, 0, c, run], force=extremes[k, 1, c, run])
                     for k in range(2)
                 )
                 for c in range(self.window)
             ]
-            for run in range(size)
+            for run in range(n_runs)
         ]
         for run in np.flatnonzero(
-            np.isnan(out[:, 1]).any(axis=(0, 1))
-        ):  # runs with a reversal at an end of a cycle are evaluated one by one
-            turn[run] = find_reversals(
+            np.isnan(extremes[:, 1]).any(axis=(0, 1))
+        ):  # a run with a reversal at the end of a cycle is evaluated separately
+            reversals[run] = find_reversals(
                 time,
                 self.slide[:, run],
                 self.speed[:, run],
-                self.found.force[:, run],
+                self.motion.force[:, run],
                 self.period,
                 "slide",
             )
-        return turn
+        return reversals
 
-    def drift(self) -> np.ndarray:
+    def drift_per_cycle(self) -> np.ndarray:
         """Return the drift of the mean slide per cycle (n,) [m]."""
         means = []
         h = self.dt
         for first in (0, (self.window - 1) * self.steps):
-            y, v = (one[first : first + self.steps + 1] for one in (self.slide, self.speed))
-            inside = (y[1:-1] - y[0]).sum(axis=0) + (y[-1] - y[0]) / 2
-            means.append(y[0] + (h * inside + h * h / 12 * (v[0] - v[-1])) / self.period)
+            y, v = (samples[first : first + self.steps + 1] for samples in (self.slide, self.speed))
+            inner_sum = (y[1:-1] - y[0]).sum(axis=0) + (y[-1] - y[0]) / 2
+            means.append(y[0] + (h * inner_sum + h * h / 12 * (v[0] - v[-1])) / self.period)
         return (means[1] - means[0]) / max(self.window - 1, 1)
 
-    def slips(self) -> dict:
-        """Compute slip amplitude, stick fraction and start of slip of runs that slip."""
-        slip = self.found.slip
+    def slip_measures(self) -> dict:
+        """Compute slip amplitude, stick fraction and phase of slip onset."""
+        slip = self.motion.slip
         steps = np.abs(np.diff(self.slide, axis=0))
-        still = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
-        above = (
-            np.where(still, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(still, 1.0, steps))
+        is_at_rest = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
+        excess = (
+            np.where(
+                is_at_rest, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(is_at_rest, 1.0, steps)
+            )
             - SLIP_FRACTION
         )
-        before = above[:-1]
-        after = above[1:]
+        before = excess[:-1]
+        after = excess[1:]
         rise = np.abs(after - before)
         low = np.minimum(before, after)
         high = np.maximum(before, after)
         below = np.where(
             high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0))
         )
-        at, run = np.nonzero((before < 0) & (after >= 0))
-        phase = self.angle[at] + 2 * np.pi / self.steps * (0.5 - before[at, run] / rise[at, run])
+        step, run = np.nonzero((before < 0) & (after >= 0))
+        phase = self.angle[step] + 2 * np.pi / self.steps * (
+            0.5 - before[step, run] / rise[step, run]
+        )
         count = np.bincount(run, minlength=slip.shape[1])
-        sums = [np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)]
+        sums = [np.bincount(run, trig(2 * phase), slip.shape[1]) for trig in (np.cos, np.sin)]
         return {
             "slip_amplitude": np.ptp(slip, axis=0) / 2,
             "stick_fraction": below.mean(axis=0),
@@ -263,12 +285,12 @@ class Samples:
         }
 
     def response(self, run: int, acceleration) -> Response:
-        """Return the samples of one run as a Response, in which ringing is searched.
+        """Return the samples of one run as a Response, for the detection of ringing.
 
-        acceleration: (s,) [m s-2].
+        acceleration: absolute acceleration (s,) [m s-2].
         """
-        z = self.found.z[:, :, run]
-        rate = self.found.rate[:, :, run]
+        z = self.motion.z[:, :, run]
+        rate = self.motion.rate[:, :, run]
         return Response(
             self.angle / self.omega,
             z,
@@ -279,37 +301,37 @@ class Samples:
             rate @ self.modes.output,
             acceleration,
             0 * acceleration,
-            self.found.force[:, run],
-            self.found.slip[:, run],
+            self.motion.force[:, run],
+            self.motion.slip[:, run],
         )
 
-    def longest_stick(self, share: float) -> np.ndarray:
-        """Return the longest time (n,) [s] during which the slip speed is low.
+    def longest_stick_duration(self, fraction: float) -> np.ndarray:
+        """Return the longest duration of stick in each run (n,) [s].
 
-        Slow means below the fraction `share` of the largest slip rate in the same cycle.
+        A run sticks while its slip rate is below `fraction` times the largest slip rate of the cycle.
         """
-        rate = np.abs(np.diff(self.found.slip, axis=0)).reshape(self.window, self.steps, -1)
-        slow = (rate < share * rate.max(axis=1, keepdims=True)).reshape(
+        rate = np.abs(np.diff(self.motion.slip, axis=0)).reshape(self.window, self.steps, -1)
+        is_slow = (rate < fraction * rate.max(axis=1, keepdims=True)).reshape(
             self.window * self.steps, -1
         )
-        row = np.arange(len(slow))[:, None]
-        last = np.maximum.accumulate(np.where(slow, -1, row), axis=0)
-        return ((row - last).max(axis=0, initial=0) + 2) * self.dt
+        rows = np.arange(len(is_slow))[:, None]
+        last_fast_row = np.maximum.accumulate(np.where(is_slow, -1, rows), axis=0)
+        return ((rows - last_fast_row).max(axis=0, initial=0) + 2) * self.dt
 
 
 def _project_motion(row, motion) -> np.ndarray:
-    """Return the weighted sum (s, n) of modal motions (s, m, n) with participations (m,)."""
+    """Return the motion (s, n) of a point with given participations (m,) in modal motions (s, m, n)."""
     out = row[0] * motion[:, 0]
     for k in range(1, len(row)):
         out += row[k] * motion[:, k]
     return out
 
 
-def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
-    """Return the largest slide [m] of a cycle and the friction force there [N], (2, n).
+def _find_largest_slide(slide, speed, force, rows, h: float) -> np.ndarray:
+    """Return the largest slide in a cycle [m] and the friction force there [N], (2, n).
 
-    The method is that of `loops.find_reversals` with "slide"; the force is NaN if the slide is largest
-    at an end of the cycle.
+    The method is that of `loops.find_reversals` with "slide". The force is NaN if the maximum is at an
+    end of the cycle.
     """
     peak_index = slide.argmax(axis=0)
     largest_slide = slide[peak_index, rows]
@@ -345,23 +367,23 @@ def _largest_slides(slide, speed, force, rows, h: float) -> np.ndarray:
     return np.array([largest_slide, np.where(ends, np.nan, largest_force)])
 
 
-def find_peaks(magnitude) -> tuple:
-    """Return the largest |value| (n,) of samples (s, n), and bounds on the missed peaks.
+def find_interpolated_peaks(magnitude) -> tuple:
+    """Return the interpolated peaks (n,) of samples (s, n), and bounds on their sampling errors.
 
-    The method is that of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
+    The methods are those of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
     """
     rows = np.arange(magnitude.shape[1])
     peak_index = magnitude.argmax(axis=0)
     inside = (peak_index > 0) & (peak_index < len(magnitude) - 1)
-    near = np.clip(peak_index + np.arange(-2, 3)[:, None], 0, len(magnitude) - 1)
-    neighbourhood = magnitude[near, rows]
-    bends = -(neighbourhood[2:] - 2 * neighbourhood[1:-1] + neighbourhood[:-2])
-    bends[0] = np.where(peak_index >= 2, bends[0], bends[1])
-    bends[2] = np.where(peak_index <= len(magnitude) - 3, bends[2], bends[1])
-    smooth = bends.min(axis=0) * MAX_SMOOTH_RATIO >= bends.max(axis=0)
+    neighbours = np.clip(peak_index + np.arange(-2, 3)[:, None], 0, len(magnitude) - 1)
+    neighbourhood = magnitude[neighbours, rows]
+    curvatures = -(neighbourhood[2:] - 2 * neighbourhood[1:-1] + neighbourhood[:-2])
+    curvatures[0] = np.where(peak_index >= 2, curvatures[0], curvatures[1])
+    curvatures[2] = np.where(peak_index <= len(magnitude) - 3, curvatures[2], curvatures[1])
+    smooth = curvatures.min(axis=0) * MAX_SMOOTH_RATIO >= curvatures.max(axis=0)
     left, mid, right = neighbourhood[1:4]
-    bend = -bends[1]
+    curvature = -curvatures[1]
     with np.errstate(all="ignore"):
-        rise = np.where(bend < 0, -((right - left) ** 2) / (8 * bend), 0.0)
+        rise = np.where(curvature < 0, -((right - left) ** 2) / (8 * curvature), 0.0)
     value = np.where(inside & smooth & (rise < 0.01 * mid), mid + rise, mid)
     return value, np.where(inside & ~smooth, mid - np.maximum(left, right), 0.0)

@@ -233,7 +233,7 @@ def collect_contact_numbers(model) -> tuple:
 
 def collect_stretch_numbers(model) -> list:
     """Return the numbers of a law whose force follows from a single stretch."""
-    law = lane_numbers.collect_law_numbers(model)
+    law = lane_numbers.stretch_law_parameters(model)
     return [*law.numbers, law.length]
 
 
@@ -266,7 +266,7 @@ def test_exact_columns_of_similar_models_agree_with_each_model(name):
                 collect_columns(models, collect), collect_columns(single_models, collect)
             )
         for scales, single_scales in zip(
-            columns.collect_scales(models), columns.collect_scales(single_models)
+            columns.collect_case_scales(models), columns.collect_case_scales(single_models)
         ):
             np.testing.assert_array_equal(scales, single_scales)
         selected = collect_columns(models.select([4, 2]), collect_contact_numbers)

@@ -44,7 +44,7 @@ def random_results(count: int, seed: int) -> CaseResults:
     results = CaseResults.blank(count)
     results.outcome[:] = rng.choice(np.array(["steady", "stuck"], object), count)
     for name, unit in (("loop_area", "J"), ("onset_level", "m s-2")):
-        results.measure(name, unit)
+        results.add_measure(name, unit)
         for part in (results.values, results.errors, results.floors):
             part[name][:] = np.where(
                 rng.random(count) < 0.2, np.nan, 10 ** rng.uniform(-12, 3, count)
@@ -232,7 +232,7 @@ def test_exact_columns_on_disk_give_equal_tables(swept_folder, scene_file, tmp_p
         assert (folder / name).read_bytes() == (swept_folder / name).read_bytes()
     assert 7 <= len(list((folder / "chunks").iterdir())) <= 14
     total = CaseResults.blank(11, tmp_path)
-    total.measure("loop_area", "J")
+    total.add_measure("loop_area", "J")
     assert isinstance(total.values["loop_area"], kept.ArrayOnDisk)
     total.values["loop_area"][[3, 5]] = 1.5, 2.5
     assert total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5]

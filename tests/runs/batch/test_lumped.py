@@ -59,8 +59,8 @@ def solve_by_group(cases) -> CaseResults:
     results = CaseResults.blank(len(cases))
     groups = {}
     for case, model in enumerate(cases):
-        assert lumped.refuses(model) == ""
-        groups.setdefault(lumped.group(model), []).append(case)
+        assert lumped.refusal_reason(model) == ""
+        groups.setdefault(lumped.group_key(model), []).append(case)
     for places in groups.values():
         results.insert(places, lumped.solve([cases[case] for case in places]))
     return results

@@ -103,7 +103,7 @@ def assert_equal_to_single_run(model):
     """Solve a model as a batch and alone; assert equal texts and numbers that agree within 1e-10,
     and return the batch."""
     messages = []
-    batch = batches.solve_models([model], say=messages.append)
+    batch = batches.solve_models([model], report=messages.append)
     single = one_by_one.solve([model])
     assert [line for line in messages if "one by one" in line] == []
     assert batch.outcome.tolist() == single.outcome.tolist() and batch.messages == single.messages

@@ -17,7 +17,7 @@ class StubBatch(batches.Batch):
 
     def __init__(self, name, refuses, group, solve):
         super().__init__(name, "")
-        for key, function in (("refuses", refuses), ("group", group), ("solve", solve)):
+        for key, function in (("refusal_reason", refuses), ("group_key", group), ("solve", solve)):
             object.__setattr__(self, key, function)
 
 
@@ -85,7 +85,7 @@ def test_always_batch_fault_falls_back_to_single_runs(refuses, group, solve, fai
     )
     texts = (BENCH, RIG, BENCH, BENCH)
     messages = []
-    results = batches.solve_models([pf.build(text) for text in texts], say=messages.append)
+    results = batches.solve_models([pf.build(text) for text in texts], report=messages.append)
     for case, text in enumerate(texts):
         assert_equal_to_run(results, case, pf.run(text))
         has_note = any(failure in note for note in results.notes.get(case, ()))
@@ -114,7 +114,7 @@ def test_exact_groups_of_batch_return_in_case_order(set_batch):
     def solve(models, say):
         groups.append([model.point.load for model in models])
         results = CaseResults(np.full(len(models), "done", object))
-        results.measure("load", "N")
+        results.add_measure("load", "N")
         results.values["load"][:] = groups[-1]
         return results
 

@@ -89,7 +89,7 @@ def test_always_batch_solves_its_cases_together(name, single_runs):
     models = MODELS[name]()
     assert batches.choose_batch(models[0], len(models)).name == name
     messages = []
-    results = batches.solve_models(models, say=messages.append)
+    results = batches.solve_models(models, report=messages.append)
     assert not [line for line in messages if "one by one" in line]
     if name == "benches":
         assert all(plan.model.patch.solved is not None for plan in single_runs)

@@ -48,7 +48,7 @@ def assert_equal_to_single_runs(models, solve_together=None):
     """
     if solve_together is None:
         messages = []
-        results = batches.solve_models(models, say=messages.append)
+        results = batches.solve_models(models, report=messages.append)
         assert not any("run one by one" in message for message in messages), messages
     else:
         results = solve_together(models)
@@ -89,7 +89,7 @@ def assert_equal_to_single_runs(models, solve_together=None):
 def test_exact_patches_pressed_together_agree_with_single_runs(tables, values):
     """Patches with different tilts, skins, load lines or holders that are pressed together agree with single runs."""
     models = build_family(tables, *values)
-    assert all(patches.refuses(model) == "" for model in models)
+    assert all(patches.refusal_reason(model) == "" for model in models)
     assert all(
         patch is not None
         for patch in patches.static_batch.solve_alike_patches(
@@ -149,7 +149,7 @@ def test_exact_pressed_patches_agree_with_separate_solutions(tables):
     """Pressure, gap, compliance and the remaining fields of patches that are pressed together agree
     with separate solutions; motions start from these fields."""
     models = build_family(tables, -1e-4, 1e-5, 3e-4)
-    for model, pressed in zip(models, patches.press_together(models)):
+    for model, pressed in zip(models, patches.attach_solved_patches(models)):
         assert model.patch.solved is None and pressed.patch.solved is not None
         for together, separate in zip(
             pressed.patch.solved.patches, solve_with_coarser(model.patch, 1e-2)
@@ -211,16 +211,16 @@ def test_refuses_measured_profile_in_patch_batch(tmp_path):
     models = with_shared_meshes(
         [build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)]
     )
-    assert "profile" in patches.refuses(models[0])
+    assert "profile" in patches.refusal_reason(models[0])
 
 
 def test_refuses_own_mesh_or_hertz_skin_in_patch_batch():
     """A patch with a mesh of its own, or with a nonlinear skin, is not pressed together with
     others."""
     own_mesh = build(scene.loads(TEXT.format("", 100.0, TILT.format(1e-4))))
-    assert "its own" in patches.refuses(own_mesh)
+    assert "its own" in patches.refusal_reason(own_mesh)
     assert (
-        patches.refuses(
+        patches.refusal_reason(
             build_family(
                 TILT
                 + SKIN.replace("linear", "hertz").replace(

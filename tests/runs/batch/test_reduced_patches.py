@@ -112,12 +112,14 @@ def test_always_measured_table_prevents_batch_only_if_unreadable(tmp_path):
     table = tmp_path / "rows.csv"
     table.write_text("frequency [Hz],input [g],displacement [mil],flag\n143,5,0.4,\n")
     with_table = pf.build(SCENE + f'[measured]\nfile = "{table}"\n')
-    assert gathered.why_no_lanes(with_table) == ""
+    assert gathered.reason_not_in_lanes(with_table) == ""
     without_table = replace(
         with_table, measured=with_table.measured._replace(path=tmp_path / "none.csv")
     )
-    assert "table of measured responses cannot be read" in gathered.why_no_lanes(without_table)
-    results = batches.solve_models([without_table], study=32)
+    assert "table of measured responses cannot be read" in gathered.reason_not_in_lanes(
+        without_table
+    )
+    results = batches.solve_models([without_table], n_study_cases=32)
     assert "none.csv" in results.messages[0]
 
 
@@ -126,7 +128,7 @@ def test_always_stuck_or_unfilled_bonds_agree_with_single_runs():
     and measures of single runs."""
     stuck = pf.build(SCENE, **{"drive.acceleration": 1e-4})
     half_bonds = pf.build(SCENE, **{"friction.initial_bonds": 0.5})
-    assert gathered.group(half_bonds) is None and gathered.group(stuck) is not None
+    assert gathered.group_key(half_bonds) is None and gathered.group_key(stuck) is not None
     for model in (stuck, half_bonds):
         cases = with_shared_meshes([model, model])[:1]
         batch = gathered.solve(cases)

@@ -64,7 +64,7 @@ def count_deviations(kind: str, seed: int, count: int) -> tuple:
     outcomes."""
     cases = draw_models(kind, seed, count)
     assert all(batches.choose_batch(model, 64).name == BATCHES[kind] for model in cases)
-    batch = batches.solve_models(cases, study=max(count, 64))
+    batch = batches.solve_models(cases, n_study_cases=max(count, 64))
     single = one_by_one.solve(cases)
     assert not batch.messages and not single.messages
     assert list(batch.outcome) == list(single.outcome)

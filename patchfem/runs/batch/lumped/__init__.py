@@ -1,9 +1,12 @@
-"""Batches of cases with one mode and one interface under a constant load and a sine.
+"""Batches of cases with one mode and one interface under constant load and sinusoidal drive.
 
-In: models of one group. Out: their `CaseResults`, as single runs compute them, by one compiled
-call for all. `columns` has measures and errors as columns, outcomes and reasons; `pieces` runs
-friction that is linear between events, for a point (`lumped`) and for patches that slip in part
-(`sheared`); `lanes` marches many points side by side, and `tabled` many patches, both with
-their own error estimates. A case that a batch cannot finish as a single run would (stops,
-warnings with a remedy) is run by itself.
+In: models of one group. Out: `CaseResults` equal to those of single runs, from one compiled call.
+
+- `columns`: measures, errors, outcomes and reasons of n runs as columns.
+- `pieces`: event-driven runs of piecewise linear friction, for single points (`lumped`) and for
+  patches with partial slip (`sheared`).
+- `lanes`, `tabled`: time integration of many points or patches in parallel lanes, with separate
+  error estimates.
+
+A case that a batch cannot complete is computed by a single run.
 """

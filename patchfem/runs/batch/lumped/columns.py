@@ -1,7 +1,7 @@
-"""Measures of many runs as columns, with errors, outcomes and reasons.
+"""Conversion of the runs of a batch to case results with errors, outcomes and warnings.
 
-In: `Runs` of a batch. Out: `CaseResults` equal to what `runs.rig.rig` makes of a single
-Solution, and which cases must be run by themselves.
+In: `Runs` of a batch. Out: `CaseResults` equal to those that `runs.rig.rig` computes from a single
+Solution, and a mask of the cases that need a single run.
 """
 
 from collections.abc import Callable
@@ -47,20 +47,20 @@ from ...rig.engines import describe_unused_settings
 from ...rig.motion_warnings import law_warnings
 from ..case_results import CaseResults
 
-# Number of last windows from which the steady motion is extrapolated (response.settling).
+# Number of windows from which the steady motion is extrapolated (response.settling).
 N_FINAL_WINDOWS = 5
 MAIN_MEASURE = "relative_displacement_amplitude"
 PHASE_MEASURE = "slip_start_phase"
 
 
 class CaseScales(NamedTuple):
-    """Tolerances and reference motions (displacement, period, decay rate) of n models.
+    """Tolerances and reference quantities of n models, (n,) each.
 
     - tolerance: relative tolerance [1].
-    - displacement: expected displacement [m].
+    - displacement: displacement scale of the rig [m].
     - acceleration: largest acceleration of the drive [m s-2].
     - period: period of the drive [s].
-    - decay: smallest decay rate of a mode [1/s].
+    - decay: smallest decay rate of all modes [1/s].
     """
 
     tolerance: np.ndarray
@@ -70,8 +70,8 @@ class CaseScales(NamedTuple):
     decay: np.ndarray
 
 
-def collect_scales(models) -> CaseScales:
-    """Collect the tolerances and reference motions of models as columns (n,)."""
+def collect_case_scales(models) -> CaseScales:
+    """Return the tolerances and reference quantities of models as columns."""
     return CaseScales(
         *collect_columns(
             models,
@@ -88,68 +88,69 @@ def collect_scales(models) -> CaseScales:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Runs:
-    """Output of an engine for n runs, as columns.
+    """Results of an engine for n runs, as columns.
 
-    - values: measures (n,) by name; NaN for a run without the measure.
-    - book: energies of the run (n,) by name [J].
-    - extremes (n, c, 2): smallest and largest output of each cycle [m].
-    - phasors (n, w): of the output in the last cycle of the last N_FINAL_WINDOWS windows, or of all [m].
-    - stuck (n,): whether nothing slipped.
-    - lost (n,): whether the case must be run by itself.
-    - errors: (n,) by name, in addition to `min_relative_error` times the value.
-    - max_balance_error: error of the energy balance above which a run has not converged.
-    - loads (n,): whether the friction force of a stuck run still increases.
-    - steady: amplitude and error (n,) [m] of the motion to which a run is known to settle; NaN if
-      unknown.
-    - chosen: further settings of each run.
-    - again: whether a single run would be repeated with finer steps if its amplitude misses the
+    - cycles, window: number of cycles of the run, and number of evaluated last cycles.
+    - values: measures (n,) by name; NaN if a run does not have the measure.
+    - energies: energies (n,) of the runs by name [J].
+    - extremes (n, c, 2): smallest and largest output in each cycle [m].
+    - phasors (n, w): phasors of the output [m] in the last cycle of each of the last N_FINAL_WINDOWS
+      windows, or of all windows.
+    - is_stuck (n,): whether the interface sticks in all evaluated cycles.
+    - needs_single_run (n,): whether the case must be computed by a single run.
+    - errors: errors (n,) by name, in addition to `min_relative_error` times the value.
+    - max_balance_error: largest energy balance error of a converged run.
+    - is_loading (n,): whether the friction force of a stuck run still increases.
+    - steady: amplitude of the known steady state and its error, (n,) each [m]; NaN if unknown.
+    - case_settings: additional settings of each run.
+    - refines_steps: whether a single run would refine its steps if its amplitude error exceeded the
       tolerance.
 
-    Extremes and phasors are bitwise those of a single run, because far extrapolation amplifies
-    differences.
+    Extremes and phasors are bitwise equal to those of a single run, because the extrapolation
+    amplifies differences.
     """
 
     cycles: int
     window: int
     values: dict
-    book: dict
+    energies: dict
     extremes: np.ndarray
     phasors: np.ndarray
-    stuck: np.ndarray
-    lost: np.ndarray
+    is_stuck: np.ndarray
+    needs_single_run: np.ndarray
     errors: dict
     min_relative_error: float
     max_balance_error: float
-    loads: np.ndarray | bool = False
+    is_loading: np.ndarray | bool = False
     steady: tuple | None = None
-    chosen: tuple = ()
-    again: bool = True
+    case_settings: tuple = ()
+    refines_steps: bool = True
 
     @property
     def amplitudes(self) -> np.ndarray:
-        """Amplitude of the output in the last cycles (n,) [m], half its range."""
+        """Amplitude of the output in the evaluated cycles (n,) [m], half peak-to-peak."""
         last = self.extremes[:, -self.window :]
         return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
 class AssembledRuns(NamedTuple):
-    """Case results of n runs, with a mask of the cases that must be computed again.
+    """Case results of n runs, with masks of cases that must be computed again.
 
     - results: CaseResults.
-    - runs_singly: which cases (n,) must be run by themselves.
-    - is_resolved: which (n,) have all errors, except that of the steady estimate, within the
-      tolerance.
+    - needs_single_run: mask (n,) of the cases that need a single run.
+    - is_resolved: mask (n,) of the cases whose errors meet the tolerance; the error of the steady
+      estimate is not considered.
     """
 
     results: CaseResults
-    runs_singly: np.ndarray
+    needs_single_run: np.ndarray
     is_resolved: np.ndarray
 
 
 def assemble_results(
     models, runs: Runs, numerics: dict, is_repeated: Callable | None = None
 ) -> AssembledRuns:
-    """Convert the runs of models to case results with errors, outcomes and warnings.
+    """Compute case results with errors, outcomes and warnings from the runs of models.
 
     Parameters
     ----------
@@ -158,48 +159,52 @@ def assemble_results(
     numerics : dict
         Settings as in `results.result.collect_used_settings`.
     is_repeated : callable, optional
-        Function of the results that returns which cases (n,) are computed again; these have no
-        warnings of large errors.
+        Function of the results that returns a mask (n,) of the cases that will be computed again;
+        accuracy warnings are omitted for these.
     """
     n = len(models)
-    sizes = collect_scales(models)
+    scales = collect_case_scales(models)
     values, errors = _compute_values_and_errors(runs)
     outcomes, steady, steady_error = _judge_outcomes(
-        sizes,
+        scales,
         runs,
         is_drifting(
             values["drift_per_cycle"],
             errors["drift_per_cycle"],
             values[MAIN_MEASURE],
-            sizes.tolerance,
-            error_floor("drift_per_cycle", sizes.displacement),
+            scales.tolerance,
+            error_floor("drift_per_cycle", scales.displacement),
         ),
     )
     results = CaseResults.blank(n)
     results.outcome[:] = [str(outcome) for outcome in outcomes]
-    runs_singly = (
-        runs.lost
+    needs_single_run = (
+        runs.needs_single_run
         | (values["energy_balance"] > runs.max_balance_error)
         | (values["work_check"] > MAX_WORK_CHECK)
     )
     is_transient = np.array([outcome is Outcome.TRANSIENT for outcome in outcomes])
     with np.errstate(invalid="ignore"):
-        changes = np.array([outcome is Outcome.STEADY for outcome in outcomes])
-        changes &= is_still_changing(steady, steady_error, values[MAIN_MEASURE], sizes.tolerance)
-    has_estimate = (changes | is_transient) & ~np.isnan(steady) & ~runs.stuck
+        is_changing = np.array([outcome is Outcome.STEADY for outcome in outcomes])
+        is_changing &= is_still_changing(
+            steady, steady_error, values[MAIN_MEASURE], scales.tolerance
+        )
+    has_estimate = (is_changing | is_transient) & ~np.isnan(steady) & ~runs.is_stuck
     values[STEADY_AMPLITUDE] = np.where(has_estimate, steady, np.nan)
     errors[STEADY_AMPLITUDE] = steady_estimate_error(
         steady, steady_error, values[MAIN_MEASURE], errors[MAIN_MEASURE]
     )
-    is_resolved, is_wide = _insert_measures(results, values, errors, sizes)
-    if runs.again:
-        main_floor = error_floor(MAIN_MEASURE, sizes.displacement)
-        allowed = sizes.tolerance * np.abs(values[MAIN_MEASURE]) + main_floor
-        runs_singly |= (errors[MAIN_MEASURE] > allowed) & (results.outcome != str(Outcome.GROWS))
-    _insert_reasons(models, sizes, runs, results)
+    is_resolved, is_wide = _insert_measures(results, values, errors, scales)
+    if runs.refines_steps:
+        main_floor = error_floor(MAIN_MEASURE, scales.displacement)
+        allowed = scales.tolerance * np.abs(values[MAIN_MEASURE]) + main_floor
+        needs_single_run |= (errors[MAIN_MEASURE] > allowed) & (
+            results.outcome != str(Outcome.GROWS)
+        )
+    _insert_reasons(models, scales, runs, results)
     is_unknown = np.isnan(values[STEADY_AMPLITUDE]) & is_transient
     if is_unknown.any():
-        results.measure(STEADY_AMPLITUDE, TABLE[STEADY_AMPLITUDE].unit)
+        results.add_measure(STEADY_AMPLITUDE, TABLE[STEADY_AMPLITUDE].unit)
         results.floors[STEADY_AMPLITUDE][is_unknown] = TABLE[STEADY_AMPLITUDE].floor
         results.reasons.setdefault(STEADY_AMPLITUDE, {}).update(
             dict.fromkeys(np.flatnonzero(is_unknown).tolist(), CHANGE_NOT_RESOLVED_REASON)
@@ -209,33 +214,35 @@ def assemble_results(
     ):
         _remove_secant_of_rigid_stick(results)
     for case in range(n):
-        results.numerics[case] = numerics | runs.chosen[case] if runs.chosen else numerics
+        results.numerics[case] = (
+            numerics | runs.case_settings[case] if runs.case_settings else numerics
+        )
     if is_repeated is not None:
         is_wide &= ~is_repeated(results)
-    rings = _warn_of_ringing(sizes, runs, outcomes, values[MAIN_MEASURE])
-    _insert_warnings(models, results, outcomes, is_wide, rings)
-    return AssembledRuns(results, runs_singly, is_resolved)
+    ringing_warnings = _ringing_warnings(scales, runs, outcomes, values[MAIN_MEASURE])
+    _insert_warnings(models, results, outcomes, is_wide, ringing_warnings)
+    return AssembledRuns(results, needs_single_run, is_resolved)
 
 
 def _compute_values_and_errors(runs: Runs) -> tuple[dict, dict]:
-    """Return the measures of n runs and their errors, as dicts of columns (n,)."""
+    """Return the measures of n runs and their total errors, as dicts of columns (n,)."""
     values = dict(runs.values)
     values.setdefault(MAIN_MEASURE, runs.amplitudes)
-    values["energy_balance"] = energy_balance(runs.book)
+    values["energy_balance"] = energy_balance(runs.energies)
     errors = {}
     for name, value in values.items():
-        parts = [runs.errors.get(name, np.zeros(len(runs.stuck)))]
+        parts = [runs.errors.get(name, np.zeros(len(runs.is_stuck)))]
         errors[name] = total_error(
             name, value, parts, runs.min_relative_error, values[MAIN_MEASURE]
         )
     return values, errors
 
 
-def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: CaseScales) -> tuple:
-    """Insert measures with their errors in case results.
+def _insert_measures(results: CaseResults, values: dict, errors: dict, scales: CaseScales) -> tuple:
+    """Store measures and their errors in case results.
 
-    Returns which cases (n,) have all errors, except that of the steady estimate, within the tolerance,
-    and which have an error that a warning states.
+    Returns a mask (n,) of the cases whose errors meet the tolerance, without the steady estimate, and a
+    mask of the cases that need an accuracy warning.
     """
     grows = results.outcome == str(Outcome.GROWS)
     is_resolved = np.ones(len(grows), bool)
@@ -244,11 +251,11 @@ def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Ca
         is_known = ~np.isnan(value)
         if not is_known.any():
             continue
-        floor = error_floor(name, sizes.displacement)
-        allowed = sizes.tolerance * np.abs(value)
+        floor = error_floor(name, scales.displacement)
+        allowed = scales.tolerance * np.abs(value)
         if not name.endswith("_steady"):
             is_resolved &= ~(is_known & (errors[name] > allowed + floor))
-        final_floor = np.fmax(floor, sizes.tolerance * larger_term(name, values))
+        final_floor = np.fmax(floor, scales.tolerance * larger_term(name, values))
         is_wide = is_known & (errors[name] > allowed + final_floor)
         has_wide_error |= is_wide & ~grows
         results.units[name] = TABLE[name].unit
@@ -259,9 +266,9 @@ def _insert_measures(results: CaseResults, values: dict, errors: dict, sizes: Ca
 
 
 def _insert_warnings(
-    models, results: CaseResults, outcomes: list, is_wide: np.ndarray, rings: dict
+    models, results: CaseResults, outcomes: list, is_wide: np.ndarray, ringing_warnings: dict
 ) -> None:
-    """Insert the same warnings in case results as single runs would give.
+    """Store the warnings in case results that single runs would give.
 
     Parameters
     ----------
@@ -269,8 +276,8 @@ def _insert_warnings(
     results : CaseResults
     outcomes : list of Outcome
     is_wide : (n,) of bool
-        Cases with an error above the tolerance.
-    rings : dict
+        Mask of the cases with an error above the tolerance.
+    ringing_warnings : dict
         Warnings of `warn_of_ringing` by case.
     """
     engine = results.numerics[0]["engine"]
@@ -281,25 +288,25 @@ def _insert_warnings(
         cases = range(len(models))
     else:
         is_warned = is_wide | _may_need_law_warnings(models, results)
-        is_warned[list(rings)] = True
+        is_warned[list(ringing_warnings)] = True
         cases = np.flatnonzero(is_warned).tolist()
     for case in cases:
         model = models[case]
         warnings = _list_model_warnings(model, engine)
         if is_wide[case] or law_has_trait(model.friction.law, "bonds"):
-            measures = results.known_measures(case)
+            measures = results.measures_with_errors(case)
             drift = {name: measures[name] for name in ("drift_per_cycle",) if name in measures}
             warnings += law_warnings(model, outcomes[case], drift, 0.0)
-            warnings += rings.get(case, ())
+            warnings += ringing_warnings.get(case, ())
             warnings += tolerance_warnings(Finding(model, measures))
         else:
-            warnings += rings.get(case, ())
+            warnings += ringing_warnings.get(case, ())
         if warnings:
             results.warnings[case] = shorten_file_names(warnings, model.source.path)
 
 
 def _list_model_warnings(model, engine: str) -> list:
-    """Return the warnings that follow from the model of a case without its motion."""
+    """Return the warnings that follow from a model alone."""
     return [
         *model.source.remarks,
         *describe_unused_settings(model, engine),
@@ -315,15 +322,15 @@ class _SteadyOutcomes(NamedTuple):
     error: np.ndarray
 
 
-def _judge_outcomes(sizes: CaseScales, runs: Runs, drifts) -> _SteadyOutcomes:
-    """Judge the outcomes of runs, and estimate their steady amplitudes.
+def _judge_outcomes(scales: CaseScales, runs: Runs, is_drifting_motion) -> _SteadyOutcomes:
+    """Classify the motions of n runs, and estimate their steady amplitudes.
 
-    drifts: which motions (n,) have a midpoint that drifts, so that they are not steady.
+    is_drifting_motion: mask (n,) of the motions whose midpoint drifts and which are therefore not steady.
     """
     last_cycles = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
     amplitudes = (runs.extremes[:, last_cycles, 1] - runs.extremes[:, last_cycles, 0]) / 2
-    floor = AMPLITUDE_ROUND_OFF * (sizes.acceleration / (2 * np.pi / sizes.period) ** 2)
-    decay = sizes.decay * runs.window * sizes.period
+    floor = AMPLITUDE_ROUND_OFF * (scales.acceleration / (2 * np.pi / scales.period) ** 2)
+    decay_per_window = scales.decay * runs.window * scales.period
     with np.errstate(all="ignore"):
         steady = extrapolate_steady_amplitudes(
             amplitudes[:, -N_FINAL_WINDOWS:], runs.phasors[:, -N_FINAL_WINDOWS:]
@@ -337,38 +344,38 @@ def _judge_outcomes(sizes: CaseScales, runs: Runs, drifts) -> _SteadyOutcomes:
             runs.extremes,
             runs.window,
             steady,
-            (sizes.tolerance, floor, decay),
+            (scales.tolerance, floor, decay_per_window),
             is_bounded,
         )
-    numbers = np.where((numbers == STEADY_CLASS) & drifts, 0, numbers)
-    loads = np.broadcast_to(runs.loads, len(numbers))
+    numbers = np.where((numbers == STEADY_CLASS) & is_drifting_motion, 0, numbers)
+    is_loading_run = np.broadcast_to(runs.is_loading, len(numbers))
     outcomes = []
-    for number, is_stuck, is_loading in zip(numbers, runs.stuck, loads):
+    for number, is_stuck, is_loading in zip(numbers, runs.is_stuck, is_loading_run):
         outcome = Outcome.STUCK if is_stuck else CLASSES[number]
         outcomes.append(Outcome.TRANSIENT if is_loading else outcome)
     return _SteadyOutcomes(outcomes, *steady)
 
 
-def _warn_of_ringing(sizes: CaseScales, runs: Runs, outcomes: list, amplitude) -> dict:
-    """Return the warnings on cases whose interface sticks while the structure still vibrates."""
+def _ringing_warnings(scales: CaseScales, runs: Runs, outcomes: list, amplitude) -> dict:
+    """Return warnings by case for stuck interfaces whose structure still vibrates."""
     n = len(amplitude)
-    floor = np.broadcast_to(error_floor(MAIN_MEASURE, sizes.displacement), n)
-    decay = np.broadcast_to(sizes.decay * sizes.period, n)
+    floor = np.broadcast_to(error_floor(MAIN_MEASURE, scales.displacement), n)
+    decay = np.broadcast_to(scales.decay * scales.period, n)
     is_stuck = np.array([outcome is Outcome.STUCK for outcome in outcomes], bool)
     cases = np.flatnonzero(is_stuck & (amplitude != 0))
     ringing = remaining_ringing(runs.extremes[cases], runs.window, decay[cases])
     warnings = {}
     for case, amplitude_left in zip(cases.tolist(), ringing.tolist()):
-        ends = float(amplitude[case]), float(floor[case])
-        limits = [float(sizes.tolerance[case]), float(decay[case])]
-        warning = warn_of_ringing(amplitude_left, ends, limits, runs.cycles)
+        amplitude_and_floor = float(amplitude[case]), float(floor[case])
+        limits = [float(scales.tolerance[case]), float(decay[case])]
+        warning = warn_of_ringing(amplitude_left, amplitude_and_floor, limits, runs.cycles)
         if warning:
             warnings[case] = warning
     return warnings
 
 
 def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
-    """Remove the secant stiffness of rigid friction that sticks at the largest slide.
+    """Replace the secant stiffness by a reason where rigid friction sticks at the largest slide.
 
     See `response.reasons.find_missing_secant`.
     """
@@ -388,16 +395,16 @@ def _remove_secant_of_rigid_stick(results: CaseResults) -> None:
         )
 
 
-def _insert_reasons(models, sizes: CaseScales, runs: Runs, results: CaseResults) -> None:
-    """Insert in case results the reason for each measure that has no value."""
+def _insert_reasons(models, scales: CaseScales, runs: Runs, results: CaseResults) -> None:
+    """Store the reason for each measure without a value in case results."""
     names = [*CYCLE_MEASURES, PHASE_MEASURE]
     for name in names:
-        results.measure(name, TABLE[name].unit)
+        results.add_measure(name, TABLE[name].unit)
     is_missing = np.array([np.isnan(results.values[name]) for name in names])
     stick_fraction = results.values.get("stick_fraction", np.zeros(len(models)))
-    # under sinusoidal drive, a reason depends on these properties only
+    # under sinusoidal drive, the reason depends only on these properties
     properties = np.array(
-        [*is_missing, stick_fraction == 1, stick_fraction > 0, sizes.acceleration != 0]
+        [*is_missing, stick_fraction == 1, stick_fraction > 0, scales.acceleration != 0]
     )
     patterns, pattern_of_case = np.unique(properties, axis=1, return_inverse=True)
     for pattern in np.flatnonzero(patterns[: len(names)].any(axis=0)).tolist():
@@ -414,14 +421,14 @@ def _insert_reasons(models, sizes: CaseScales, runs: Runs, results: CaseResults)
 def _may_need_law_warnings(models: SimilarModels, results: CaseResults) -> np.ndarray:
     """Return a mask (n,) of the cases that may need a warning on their friction law.
 
-    These cases have bonds that grow, have an infinite traction or creep.
+    These are cases with bonds that grow, creep or have an infinite traction.
     """
     first = models.first
     if not law_has_trait(first.friction.law, "bonds"):
         return np.zeros(len(models), bool)
     if first.bonds.has_growth or first.bonds.order < 0 or first.bonds.reading != "stretch":
         return np.ones(len(models), bool)
-    if "drift_per_cycle" not in results.values:  # runs that are shorter than a cycle have no drift
+    if "drift_per_cycle" not in results.values:  # runs shorter than a cycle have no drift
         return np.zeros(len(models), bool)
     drift = results.values["drift_per_cycle"]
     error = results.errors["drift_per_cycle"]

@@ -1,8 +1,7 @@
-"""Check of the cases that march in lanes: a few are compared with the exact engine.
+"""Comparison of some cases in lanes with the exact engine.
 
-In: `LaneCases` of models, and a function that computes cases exactly. Out: `CheckedCases`. If a
-case differs, more are checked; if more than a few differ, all are computed exactly, else those
-that differ.
+In: `LaneCases` of models, and a function that computes cases exactly. Out: `CheckedCases`. If a case
+differs, more cases are checked. If only a few differ, these are computed exactly, else all.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,25 +17,25 @@ from ....model.similar_models import select_models
 from ..case_results import CaseResults
 from .columns import PHASE_MEASURE
 from .lane_numbers import LaneCases, find_lane_law, select_rows
-from .lane_refinement import march_side_by_side
+from .lane_refinement import march_with_refinement
 from .lane_steps import STRETCH_STEPS
 
-CHECK_INTERVAL = 200  # number of cases per case that is checked with the exact engine
-MIN_CHECKED = 2  # smallest number of checked cases of a batch
-N_MORE_CHECKED = 70  # number of further cases that are checked if a checked case differs
-# Fraction of differing checked cases, above which all are computed exactly.
+CHECK_INTERVAL = 200  # mean number of cases per checked case
+MIN_CHECKED = 2  # smallest number of checked cases in a batch
+N_MORE_CHECKED = 70  # number of additional cases to check if a checked case differs
+# Largest fraction of differing checked cases for which the other cases keep their results.
 MAX_WRONG_FRACTION = 0.03
-# Factor on the errors of a single run of the Iwan law in a check: 1 of 590 random cases differed by more
-# than its error, by 1.9 times as much.
-IWAN_ERROR_FACTOR = 2.0
+# Factor on the exact engine's errors for the Iwan law: in 1 of 590 random cases, the difference was 1.9 times
+# the error.
+EXACT_IWAN_ERROR_FACTOR = 2.0
 
 
 class CheckedCases(NamedTuple):
-    """Results of n cases from a vectorized march, some of them compared with the exact engine.
+    """Results of n cases in lanes, some of them compared with the exact engine.
 
     - results: CaseResults.
-    - is_exact: which cases (n,) were not computed by lanes.
-    - reach: largest output (n,) [m].
+    - is_exact: mask (n,) of the cases that were computed by the exact engine.
+    - reach: largest absolute output (n,) [m].
     """
 
     results: CaseResults
@@ -47,10 +46,11 @@ class CheckedCases(NamedTuple):
 def solve_and_check(
     models: Sequence[Model], cases: LaneCases, steps, solve_exactly: Callable
 ) -> CheckedCases:
-    """Compute cases by a vectorized march, and compare some of them with the exact engine.
+    """Compute cases in lanes, and compare some of them with the exact engine.
 
-    If checked cases differ, those of a stretch law are marched with twice the steps, and more cases are
-    checked; if more than a few still differ, all cases are computed exactly.
+    If checked cases of a stretch law differ, all cases are integrated again with twice the steps. If
+    cases still differ, more are checked. If more than MAX_WRONG_FRACTION of them differ, all cases are
+    computed exactly.
 
     Parameters
     ----------
@@ -59,35 +59,37 @@ def solve_and_check(
     steps : (n,)
         Steps per cycle.
     solve_exactly : callable
-        Function (indices, is_check) that returns the exact results of some cases.
+        Function (indices, is_check) that returns the exact results of selected cases.
     """
     begin = perf_counter()
     law = find_lane_law(models[0])
-    results, is_exact, steps, reach = march_side_by_side(models, cases, steps)
+    results, is_exact, steps, reach = march_with_refinement(models, cases, steps)
     results.seconds[:] = (perf_counter() - begin) / len(models)
     numbers = np.column_stack(cases.cases)
-    factor = IWAN_ERROR_FACTOR if law == "masing" else 1.0
+    exact_error_factor = EXACT_IWAN_ERROR_FACTOR if law == "masing" else 1.0
     checked = select_checked_cases(numbers, ~is_exact)
     exact_results = solve_exactly(checked, True) if checked else None
-    wrong = _find_differences(results, exact_results, checked, is_exact, factor)
+    differing = _find_differences(results, exact_results, checked, is_exact, exact_error_factor)
     finer = np.flatnonzero(~is_exact & (2 * steps <= STRETCH_STEPS[-1]))
-    if wrong and finer.size and march.has_one_stretch(law):
-        refined = march_side_by_side(
+    if differing and finer.size and march.has_one_stretch(law):
+        refined = march_with_refinement(
             select_models(models, finer), select_rows(cases, finer), 2 * steps[finer]
         )
-        is_exact[finer] = refined.is_exact
+        is_exact[finer] = refined.needs_exact
         results.remove(finer)
         results.insert(finer, refined.results)
-        wrong = _find_differences(results, exact_results, checked, is_exact, factor)
-    if wrong:  # more checked cases show whether the differing ones are exceptions
+        differing = _find_differences(results, exact_results, checked, is_exact, exact_error_factor)
+    if differing:  # check more cases to see whether the differing ones are exceptions
         is_free = ~is_exact
         is_free[checked] = False
-        more = select_checked_cases(numbers, is_free, N_MORE_CHECKED)
-        exact_results = solve_exactly(more, True) if more else None
-        wrong |= _find_differences(results, exact_results, more, is_exact, factor)
-        checked = [*checked, *more]
-    all_exact = len(wrong) > MAX_WRONG_FRACTION * len(checked)
-    is_exact[list(wrong)] = True
+        more_checked = select_checked_cases(numbers, is_free, N_MORE_CHECKED)
+        exact_results = solve_exactly(more_checked, True) if more_checked else None
+        differing |= _find_differences(
+            results, exact_results, more_checked, is_exact, exact_error_factor
+        )
+        checked = [*checked, *more_checked]
+    all_exact = len(differing) > MAX_WRONG_FRACTION * len(checked)
+    is_exact[list(differing)] = True
     is_exact |= all_exact
     exact_cases = np.flatnonzero(is_exact).tolist()
     if exact_cases:
@@ -95,62 +97,66 @@ def solve_and_check(
         results.insert(exact_cases, solve_exactly(exact_cases, False))
     counts = (
         f"in {len(checked)} cases the fast engine was checked against the exact engine and differed "
-        f"from it in {len(wrong)}, in "
+        f"from it in {len(differing)}, in "
     )
     if all_exact:
-        example = next(iter(wrong.values()))
+        example = next(iter(differing.values()))
         sentence = f"{example} for example, so all cases were computed by the exact engine"
         sentences = dict.fromkeys(exact_cases, sentence)
     else:
         sentences = {
-            case: f"{name} of this case, so this case was computed by the exact engine"
-            for case, name in wrong.items()
+            case: f"{measure} of this case, so this case was computed by the exact engine"
+            for case, measure in differing.items()
         }
     for case, sentence in sentences.items():
         results.notes[case] = [*results.notes.get(case, ()), counts + sentence]
     return CheckedCases(results, is_exact, reach)
 
 
-def select_checked_cases(numbers, is_free, min_count: int = MIN_CHECKED) -> list:
-    """Select by a hash of their numbers the cases that are compared with the exact engine.
+def select_checked_cases(parameters, is_free, min_count: int = MIN_CHECKED) -> list:
+    """Select the cases for the check by a hash of their parameters.
 
-    The hash makes the choice of a case independent of other cases.
+    With a hash, the choice of a case does not depend on the other cases.
 
     Parameters
     ----------
-    numbers : (n, k)
-        Numbers that identify each case.
+    parameters : (n, k)
+        Parameters of the cases.
     is_free : (n,) of bool
-        Cases that may be checked.
+        Mask of the cases that may be checked.
     min_count : int
-        Smallest number of cases, if there are so many.
+        Smallest number of checked cases, if enough cases are free.
     """
-    hashes = np.array([crc32(row.tobytes()) for row in numbers])
+    hashes = np.array([crc32(row.tobytes()) for row in parameters])
     order = [case for case in np.argsort(hashes, kind="stable").tolist() if is_free[case]]
     count = sum(hashes[case] < 2**32 // CHECK_INTERVAL for case in order)
     return order[: max(count, min_count)]
 
 
 def _find_differences(
-    results: CaseResults, exact_results: CaseResults | None, checked: list, is_exact, factor: float
+    results: CaseResults,
+    exact_results: CaseResults | None,
+    checked: list,
+    is_exact,
+    exact_error_factor: float,
 ) -> dict[int, str]:
-    """Return for each differing case the first measure that deviates from the exact engine.
+    """Return the first deviating measure of each case that differs from the exact engine.
 
-    A measure differs if the difference exceeds the sum of both errors and the floor.
+    A measure deviates if the difference exceeds the sum of both errors and the floor.
 
     Parameters
     ----------
     results : CaseResults
     exact_results : CaseResults or None
-        Exact results of some cases.
+        Exact results of the checked cases.
     checked : list
-        Indices of these cases.
+        Indices of the checked cases.
     is_exact : (n,) of bool
-        Cases that lanes did not compute.
-    factor : float
-        Factor on the exact errors.
+        Mask of the cases that were not computed in lanes.
+    exact_error_factor : float
+        Factor on the errors of the exact results.
     """
-    wrong: dict[int, str] = {}
+    differing: dict[int, str] = {}
     for index, case in enumerate(checked):
         for name, values in results.values.items():
             if is_exact[case] or name not in exact_results.values:
@@ -163,6 +169,6 @@ def _find_differences(
             error, exact_error = np.nan_to_num(
                 [results.errors[name][case], exact_results.errors[name][index]]
             )
-            if change > error + factor * exact_error + results.floors[name][case]:
-                wrong.setdefault(case, name)
-    return wrong
+            if change > error + exact_error_factor * exact_error + results.floors[name][case]:
+                differing.setdefault(case, name)
+    return differing

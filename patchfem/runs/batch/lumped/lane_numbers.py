@@ -1,7 +1,7 @@
-"""Numbers of the cases that march in lanes, in units of the drive.
+"""Dimensionless parameters of the cases in lanes.
 
-In: models of one friction law. Out: `Cases` of `dynamics.lanes`, and the `Scales` that turn their
-results into SI units.
+In: models of one friction law. Out: `Cases` of `dynamics.lanes`, and the `Scales` that convert
+results to SI units.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ from ....model.model import Model
 from ....model.similar_models import collect_columns
 from ....structure.drive_sizes import find_max_acceleration
 
-# name of the friction law in `dynamics.lanes`, by the law of the scene
+# Name of the law in `dynamics.lanes`, by friction law of the scene.
 LANE_LAWS = {
     "coulomb": "rigid",
     "elastic-plastic": "yielding",
@@ -26,18 +26,18 @@ LANE_LAWS = {
     "lugre": "friction.laws.lugre_kernels",
     "nonlocal": "friction.laws.stretch_kernels",
 }
-# Ratio of slip to the stretch at the friction limit, below which an interface sticks.
+# Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit.
 MAX_STICK_SLIP_FRACTION = 1e-3
 
 
 class Scales(NamedTuple):
-    """Scale factors and reference quantities that convert n dimensionless cases to SI units.
+    """Scale factors and reference quantities of n dimensionless cases, (n,) each.
 
-    - omega: of the drive [rad/s].
-    - energy: unit of the energies, over the squared unit of the slide [J m-2].
-    - ratio: output over slide [1].
-    - held: slip in a cycle below which a case sticks [m].
-    - stiffness: of the first mode as seen by the contact [N/m].
+    - omega: angular frequency of the drive [rad/s].
+    - energy: energy per squared slide [J m-2].
+    - ratio: ratio of output to slide [1].
+    - max_stick_slip: largest slip amplitude of a sticking interface [m].
+    - stiffness: stiffness of the first mode at the contact [N/m].
     - load: normal load [N].
     - acceleration: largest acceleration of the drive [m s-2].
     """
@@ -45,17 +45,17 @@ class Scales(NamedTuple):
     omega: np.ndarray
     energy: np.ndarray
     ratio: np.ndarray
-    held: np.ndarray
+    max_stick_slip: np.ndarray
     stiffness: np.ndarray
     load: np.ndarray
     acceleration: np.ndarray
 
 
 class LaneCases(NamedTuple):
-    """Cases with the same friction law, which are integrated in parallel lanes of a kernel.
+    """Dimensionless cases with the same friction law, on the fine and on a coarser mesh.
 
-    - cases, scales: of the cases.
-    - coarse: (cases, scales) on a coarser mesh; None without a mesh.
+    - cases, scales: cases and their scales on the fine mesh.
+    - coarse: (cases, scales) on the coarser mesh; None without a mesh.
     """
 
     cases: march.Cases
@@ -64,7 +64,7 @@ class LaneCases(NamedTuple):
 
 
 def select_rows(values, indices):
-    """Select the entries of some cases from the arrays of a dict or a tuple."""
+    """Return selected rows of all arrays in a dict or a (named) tuple."""
     if isinstance(values, dict):
         return {name: select_rows(value, indices) for name, value in values.items()}
     if isinstance(values, tuple):
@@ -74,28 +74,28 @@ def select_rows(values, indices):
 
 
 def count_evaluated_cycles(cycles: int) -> int:
-    """Return the number of last cycles of a run from which measures are computed."""
+    """Return the number of evaluated cycles at the end of a run."""
     return min(10, cycles // 10)
 
 
 def find_lane_law(model: Model) -> str:
-    """Return the name by which `dynamics.lanes` knows the friction law of a model."""
+    """Return the name of a model's friction law in `dynamics.lanes`."""
     return LANE_LAWS[model.friction.law] if model.patch is None else "table"
 
 
 class StretchLaw(NamedTuple):
-    """Parameters of a friction law whose force follows from one elastic stretch.
+    """Parameters of a stretch law, in which one elastic stretch determines the friction force.
 
-    - numbers: parameters of its `rate_equation`.
-    - length: stretch at the friction limit [m]; 0 for a law without one.
+    - numbers: parameters of the `rate_equation` of the law.
+    - length: stretch at the friction limit [m]; 0 if there is none.
     """
 
     numbers: tuple
     length: float
 
 
-def collect_law_numbers(model: Model) -> StretchLaw:
-    """Return the parameters of a stretch law."""
+def stretch_law_parameters(model: Model) -> StretchLaw:
+    """Return the parameters of the stretch law of a model."""
     friction = model.friction
     load = model.point.load
     limit = model.friction_limits(load)[0]
@@ -108,7 +108,7 @@ def collect_law_numbers(model: Model) -> StretchLaw:
     if friction.law == "bouc-wen":
         return StretchLaw((limit, length, friction.exponent, friction.shape), length)
     kinetic = friction.static if friction.kinetic is None else friction.kinetic
-    numbers = (
+    parameters = (
         friction.stiffness,
         kinetic * load,
         limit,
@@ -116,15 +116,15 @@ def collect_law_numbers(model: Model) -> StretchLaw:
         friction.micro_damping,
         friction.viscous,
     )
-    return StretchLaw(numbers, length)
+    return StretchLaw(parameters, length)
 
 
-class ContactNumbers(NamedTuple):
-    """Parameters of a contact with a single point: stick stiffness, stretch and law constants.
+class ContactParameters(NamedTuple):
+    """Parameters of a single contact point.
 
-    - stiffness: in stick [N/m].
+    - stiffness: stiffness during stick [N/m].
     - length: stretch at the friction limit [m].
-    - others: further numbers of its law (see `Cases`).
+    - others: further parameters of the law (see `Cases`).
     """
 
     stiffness: float
@@ -132,48 +132,50 @@ class ContactNumbers(NamedTuple):
     others: tuple = ()
 
 
-def make_point_contact(model: Model) -> ContactNumbers:
+def point_contact_parameters(model: Model) -> ContactParameters:
     """Return the contact parameters of a model with a single point."""
     friction = model.friction
     static = model.friction_limits(model.point.load)[0]
     if friction.law == "iwan":
         chi = friction.chi
         fraction = 1 / (1 + friction.beta)
-        # this fraction of the friction limit slips before the last slider does
+        # fraction of the friction limit that slips before the last slider
         early_slip = fraction * (chi + 1) / (chi + 2 - fraction)
-        half = np.minimum(1.0, (0.5 / early_slip) ** (1 / (chi + 2)))
+        half_stretch_ratio = np.minimum(1.0, (0.5 / early_slip) ** (1 / (chi + 2)))
         length = max_yield_displacement(static, friction.stiffness, chi, friction.beta)
-        return ContactNumbers(friction.stiffness, length, (chi + 1, fraction, half))
+        return ContactParameters(
+            friction.stiffness, length, (chi + 1, fraction, half_stretch_ratio)
+        )
     if march.has_one_stretch(LANE_LAWS[friction.law]):
-        law = collect_law_numbers(model)
+        law = stretch_law_parameters(model)
         stiffness = 0.0 if friction.law == "tanh" else static / law.length
-        return ContactNumbers(stiffness, law.length, law.numbers)
+        return ContactParameters(stiffness, law.length, law.numbers)
     if friction.law == "elastic-plastic":
-        return ContactNumbers(static / friction.bond_length, friction.bond_length)
-    return ContactNumbers(0.0, 0.0)
+        return ContactParameters(static / friction.bond_length, friction.bond_length)
+    return ContactParameters(0.0, 0.0)
 
 
 def may_create_energy(model: Model):
-    """Return whether a stretch law may create energy, or its bonds differ in their stretch."""
+    """Return whether a stretch law may create energy, or the stretches of its bonds differ."""
     friction = model.friction
     if law_has_trait(friction.law, "bonds"):
         return np.not_equal(friction.breakaway or 0.0, 0.0) | np.not_equal(
             friction.initial_bonds, 1.0
         )
-    if friction.law == "lugre":  # with more damping, the power of the friction may be negative
-        sliding_force = collect_law_numbers(model).numbers[1]
-        return np.greater(friction.micro_damping * model.rig.speed_scale, 4 * sliding_force)
+    if friction.law == "lugre":  # for larger damping, the friction power may become negative
+        kinetic_limit = stretch_law_parameters(model).numbers[1]
+        return np.greater(friction.micro_damping * model.rig.speed_scale, 4 * kinetic_limit)
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
 def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Scales]:
-    """Return models as dimensionless cases, and the scales that convert them to SI units.
+    """Return models as dimensionless cases, and the scales for the conversion to SI units.
 
-    contacts: numbers (m, n) of the contacts as from `_collect_contact_numbers`; None: those of single points.
+    contacts: contact parameters (m, n) as in `_contact_parameters`; None: those of single points.
     """
-    rig = _RigNumbers(*collect_columns(models, _collect_rig_numbers))
+    rig = _RigParameters(*collect_columns(models, _rig_parameters))
     if contacts is None:
-        contacts = collect_columns(models, _collect_contact_numbers)
+        contacts = collect_columns(models, _contact_parameters)
     static, kinetic, load, spring, length, *others = contacts
     law = find_lane_law(models[0])
     omega = rig.drive_omega
@@ -202,7 +204,8 @@ def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Sca
         omega=omega,
         energy=rig.mass * (omega / slide) ** 2,
         ratio=rig.output / slide,
-        held=MAX_STICK_SLIP_FRACTION * np.divide(static, spring, out=0 * omega, where=spring > 0),
+        max_stick_slip=MAX_STICK_SLIP_FRACTION
+        * np.divide(static, spring, out=0 * omega, where=spring > 0),
         stiffness=rig.stiffness,
         load=load,
         acceleration=rig.max_acceleration,
@@ -210,15 +213,15 @@ def make_cases(models: Sequence[Model], contacts=None) -> tuple[march.Cases, Sca
     return cases, scales
 
 
-class _RigNumbers(NamedTuple):
+class _RigParameters(NamedTuple):
     """Parameters of a rig with one mode under sinusoidal drive, in SI units.
 
-    - mode_omega, damping: natural frequency and damping rate of its mode [rad/s].
-    - slide, base, output, mass: participations of the mode, and its mass [kg].
-    - acceleration, drive_omega, moving: of the sine (`core.SineDrive`).
+    - mode_omega, damping: natural frequency and damping rate of the mode [rad/s].
+    - slide, base, output, mass: participations of the mode, and its modal mass [kg].
+    - acceleration, drive_omega, moving: attributes of the drive (`core.SineDrive`).
     - start, start_speed: modal coordinate and its rate at t = 0.
-    - stiffness: of the first mode as seen by the contact [N/m].
-    - max_acceleration: of the drive [m s-2].
+    - stiffness: stiffness of the first mode at the contact [N/m].
+    - max_acceleration: largest acceleration of the drive [m s-2].
     """
 
     mode_omega: np.ndarray
@@ -236,12 +239,12 @@ class _RigNumbers(NamedTuple):
     max_acceleration: np.ndarray
 
 
-def _collect_rig_numbers(model: Model) -> _RigNumbers:
+def _rig_parameters(model: Model) -> _RigParameters:
     """Return the parameters of the single mode and the drive of a model."""
     modes = model.rig.modes
     drive = model.rig.drive.signal
     start = model.rig.start
-    return _RigNumbers(
+    return _RigParameters(
         modes.omega[0],
         modes.damping_matrix[0, 0],
         modes.slide[0],
@@ -258,13 +261,13 @@ def _collect_rig_numbers(model: Model) -> _RigNumbers:
     )
 
 
-def _collect_contact_numbers(model: Model) -> list:
-    """Return the friction limits, the load and the contact parameters of a model.
+def _contact_parameters(model: Model) -> list:
+    """Return the friction limits, the load and the contact parameters of a model as a list.
 
-    They are static and kinetic friction [N], load [N], and those of its ContactNumbers.
+    The list contains static and kinetic friction limit [N], load [N], and the ContactParameters.
     """
     static, kinetic = model.friction_limits(model.point.load)
     if find_lane_law(model) != "rigid" or model.friction.kinetic is None:
         kinetic = static
-    contact = make_point_contact(model)
+    contact = point_contact_parameters(model)
     return [static, kinetic, model.point.load, contact.stiffness, contact.length, *contact.others]

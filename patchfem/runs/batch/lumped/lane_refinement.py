@@ -1,6 +1,6 @@
-"""Cases that march side by side in lanes, with more steps until their errors meet the tolerance.
+"""Refinement of the steps of cases in lanes until their errors meet the tolerance.
 
-In: `LaneCases` of models with the first steps per cycle of each. Out: `RefinedCases`.
+In: `LaneCases` of models, and the initial steps per cycle of each case. Out: `RefinedCases`.
 """
 
 from collections.abc import Sequence
@@ -22,49 +22,49 @@ from .lane_runs import MeasuredMarch, march_and_measure
 from .lane_settling import SETTLING_LAWS
 from .lane_steps import POINT_STEPS, STRETCH_STEPS
 
-# ratio of loop area to (largest force times slide), below which a case sticks
+# Smallest ratio of loop area to (peak force x slide amplitude) of a slipping case.
 MIN_LOOP_AREA = 1e-6
-# Largest relative error of each measure due to the mesh, above which the mesh error is computed again with
-# more steps; the loop of a small slip may be completely uncertain.
+# Largest relative mesh error of each measure that is not computed again with more steps. The loop area of a
+# small slip may be completely uncertain.
 MAX_MESH_CHANGES = ((MAIN_MEASURE, 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0))
 
 
 class RefinedCases(NamedTuple):
-    """Results of n cases from a vectorized march, with the number of steps that each needed.
+    """Results of n cases in lanes, with the steps per cycle that each case needed.
 
     - results: CaseResults.
-    - is_exact: which cases (n,) must be computed by the exact engine.
-    - steps: steps per cycle (n,).
-    - reach: largest output (n,) [m].
+    - needs_exact: mask (n,) of the cases that need the exact engine.
+    - steps: final steps per cycle (n,).
+    - reach: largest absolute output (n,) [m].
     """
 
     results: CaseResults
-    is_exact: np.ndarray
+    needs_exact: np.ndarray
     steps: np.ndarray
     reach: np.ndarray
 
 
-def march_side_by_side(models: Sequence[Model], cases: LaneCases, steps) -> RefinedCases:
-    """Integrate models in one batch, and refine their steps until the errors meet the tolerance.
+def march_with_refinement(models: Sequence[Model], cases: LaneCases, steps) -> RefinedCases:
+    """Integrate models in lanes, and refine the steps until the errors meet the tolerance.
 
-    All cases with the same steps march together, including those whose errors need these steps. If
-    the difference from half the steps is too large with a stretch law, a quarter of them shows how
-    the errors fall. The difference from a coarser mesh is computed with the fewest steps. More are
-    used if this difference exceeds MAX_MESH_CHANGES, or if the case sticks, because what then
-    remains of the third harmonic depends on both.
+    All cases with the same number of steps are integrated together, including coarse runs for error
+    estimates. With a stretch law, an error that is too large is estimated again from a quarter of the
+    steps, which shows the order of convergence. The mesh error is computed with the fewest steps. It is
+    computed again with more steps if it exceeds MAX_MESH_CHANGES or if the case sticks, because the
+    remaining third harmonic then depends on both steps and mesh.
 
     Parameters
     ----------
     models : sequence of Model
     cases : LaneCases
     steps : (n,)
-        First number of steps per cycle.
+        Initial steps per cycle.
     """
     return _Refinement(models, cases, steps).refine()
 
 
 class _Refinement:
-    """Cases of a batch, with the measures from marches with increasing numbers of steps."""
+    """Step refinement of a batch: measures of n cases for increasing numbers of steps."""
 
     def __init__(self, models: Sequence[Model], cases: LaneCases, steps):
         n = len(models)
@@ -76,21 +76,21 @@ class _Refinement:
         self.cycles = int(models[0].rig.drive.cycles)
         self.has_one_stretch = march.has_one_stretch(self.law)
         self.results = CaseResults.blank(n)
-        self.is_exact = np.zeros(n, bool)
+        self.needs_exact = np.zeros(n, bool)
         self.reach = np.zeros(n)
         self.mesh_errors = {}
         self.values = {}  # measures (n,) by steps per cycle and name
 
     def refine(self) -> RefinedCases:
-        """Repeat the march with more steps until the errors of all cases are small enough."""
+        """Repeat the march with twice the steps until the errors of all cases are small enough."""
         steps = int(self.min_steps.min())
         while (self.steps >= steps).any():
             self._march(steps)
             steps *= 2
-        return RefinedCases(self.results, self.is_exact, self.steps, self.reach)
+        return RefinedCases(self.results, self.needs_exact, self.steps, self.reach)
 
     def _march(self, steps: int) -> None:
-        """March those cases that need a given number of steps per cycle."""
+        """Integrate the cases that need a given number of steps per cycle."""
         marching = np.flatnonzero((self.min_steps <= steps) & (self.steps >= steps))
         if not marching.size:
             return
@@ -110,7 +110,7 @@ class _Refinement:
             self._judge(final, final_measured)
 
     def _measure(self, indices, steps: int) -> MeasuredMarch:
-        """March some cases with a given number of steps, and store their measures."""
+        """Integrate selected cases with a given number of steps, and store their measures."""
         cases = select_rows(self.cases[:2], indices)
         measured = march_and_measure(self.law, *cases, self.cycles, steps)
         columns = self.values.setdefault(steps, {})
@@ -119,9 +119,9 @@ class _Refinement:
         return measured
 
     def _needs_mesh_errors(self, indices, values: dict) -> np.ndarray:
-        """Return a mask of the cases whose mesh error must be computed again with more steps.
+        """Return a mask of the cases whose mesh error must be computed again.
 
-        values: their measures, (n,) by name.
+        values: measures of the cases, (n,) by name.
         """
         max_area = values["friction_force_peak"] * np.abs(values[MAIN_MEASURE])
         is_needed = ~(np.abs(values["loop_area"]) > MIN_LOOP_AREA * max_area)
@@ -132,9 +132,9 @@ class _Refinement:
         return is_needed
 
     def _compute_mesh_errors(self, indices, values: dict, steps: int) -> None:
-        """Compute the mesh errors of some cases by a march on a coarser mesh.
+        """Compute the mesh errors of selected cases by a march on the coarser mesh.
 
-        The error of a measure that the coarser mesh does not have is its absolute value.
+        The error of a measure that does not exist on the coarser mesh is its absolute value.
         """
         cases = select_rows(self.cases.coarse, indices)
         coarse = march_and_measure(self.law, *cases, self.cycles, steps).values
@@ -145,7 +145,7 @@ class _Refinement:
             column[indices] = np.where(np.isnan(error), np.abs(values[name]), error)
 
     def _judge(self, indices, measured: MeasuredMarch) -> None:
-        """Store the results of some cases, and select the cases that need more steps."""
+        """Store the results of selected cases, and double the steps where errors are too large."""
         steps = measured.steps
         is_wide = self._evaluate(indices, measured, [steps // 2])
         if self.has_one_stretch and is_wide.any():
@@ -158,26 +158,26 @@ class _Refinement:
             )
         is_smooth = self.has_one_stretch or self.law in march.MASING_LAWS
         max_steps = STRETCH_STEPS[-1] if is_smooth else POINT_STEPS[-1][-1]
-        is_refined = is_wide & (2 * steps <= max_steps) & (is_smooth | ~self.is_exact[indices])
+        is_refined = is_wide & (2 * steps <= max_steps) & (is_smooth | ~self.needs_exact[indices])
         self.steps[indices[is_refined]] = 2 * steps
-        self.is_exact[indices[is_wide]] = ~is_refined[is_wide]
+        self.needs_exact[indices[is_wide]] = ~is_refined[is_wide]
 
     def _evaluate(self, indices, measured: MeasuredMarch, coarser_steps: list) -> np.ndarray:
-        """Store the results of some cases, and return a mask of those with too large errors.
+        """Store the results of selected cases, and return a mask of those with too large errors.
 
-        coarser_steps: steps per cycle of the marches that show the errors.
+        coarser_steps: steps per cycle of the coarser marches for the error estimate.
         """
         models = select_models(self.models, indices)
         mesh_errors = select_rows(self.mesh_errors, indices)
         cases = select_rows(self.cases[:2], indices)
         coarser = [select_rows(self.values[steps], indices) for steps in coarser_steps]
-        runs, is_exact, needs_more_steps = lane_runs.collect_runs(
+        runs, needs_exact, needs_more_steps = lane_runs.collect_runs(
             models, cases, measured, coarser, mesh_errors
         )
 
         def is_wide(results: CaseResults) -> np.ndarray:
-            """Return a mask of the cases with an error of a given measure above the tolerance."""
-            return has_large_error(models, results, mesh_errors)
+            """Return a mask of the cases with an error above the tolerance."""
+            return has_excessive_error(models, results, mesh_errors)
 
         numerics = {"engine": "exact", "window_cycles": measured.window}
         assembled = assemble_results(models, runs, numerics, is_wide)
@@ -188,38 +188,38 @@ class _Refinement:
             "window_cycles": measured.window,
         }
         results.numerics.update(dict.fromkeys(range(len(models)), lane_numerics))
-        self.is_exact[indices] = is_exact | (results.outcome == "grows")
-        self.results.remove(indices)  # the results with fewer steps per cycle are replaced
+        self.needs_exact[indices] = needs_exact | (results.outcome == "grows")
+        self.results.remove(indices)  # replace the results with fewer steps
         self.results.insert(indices, results)
-        return is_wide(results) | needs_more_steps | assembled.runs_singly
+        return is_wide(results) | needs_more_steps | assembled.needs_single_run
 
 
-def has_large_error(
+def has_excessive_error(
     models: Sequence[Model], results: CaseResults, mesh_errors: dict | None = None
 ) -> np.ndarray:
     """Return a mask (n,) of the cases with an error above the tolerance of the case.
 
-    The tolerance applies to a measure or to the larger terms of which it is the difference. The
-    errors due to the mesh are not counted, because no other engine reduces them.
+    The tolerance is relative to the measure, or to the larger terms whose difference it is. Mesh errors
+    are not counted, because no other engine reduces them.
 
     Parameters
     ----------
     models : sequence of Model
     results : CaseResults
     mesh_errors : dict, optional
-        Errors due to the mesh, (n,) by name.
+        Mesh errors (n,) by name.
     """
     tolerance = collect_columns(models, lambda model: (model.accuracy.tolerance,))[0]
     is_large = np.zeros(len(models), bool)
     for name, values in results.values.items():
-        if name in RINGING_MEASURES:  # a fit of the ringing in a single run is no more accurate
+        if name in RINGING_MEASURES:  # the ringing fit of a single run is no more accurate
             continue
         if name.endswith("_steady") and find_lane_law(models[0]) not in SETTLING_LAWS:
-            # an extrapolation has the same error with finer steps, and with the exact engine
+            # neither finer steps nor the exact engine reduce the error of an extrapolation
             continue
         mesh_error = (mesh_errors or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(results.floors[name], tolerance * larger_term(name, results.values))
-        # the equivalent damping is the loop area over an energy, and not more accurate than the area
+        # the equivalent damping is proportional to the loop area and not more accurate
         if name == "equivalent_damping" and "loop_area" in results.values:
             floors = np.fmax(floors, results.floors["loop_area"] * _damping_per_area(results))
         is_large |= results.errors[name] - mesh_error > tolerance * np.abs(values) + floors
@@ -227,7 +227,7 @@ def has_large_error(
 
 
 def _damping_per_area(results: CaseResults) -> np.ndarray:
-    """Return the ratio (n,) [1/J] of equivalent damping to loop area; 0 without a loop."""
+    """Return the ratio (n,) [1/J] of equivalent damping to loop area; 0 for an area of 0."""
     area = np.abs(results.values["loop_area"])
     damping = np.abs(results.values["equivalent_damping"])
     return np.divide(damping, area, out=0 * area, where=area != 0)

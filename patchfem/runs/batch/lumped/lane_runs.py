@@ -1,7 +1,7 @@
-"""March of cases in lanes, their measures, and the errors of these.
+"""Time integration of cases in lanes, with measures and errors.
 
-In: `Cases` of one friction law, with steps per cycle. Out: `LaneRuns`. The errors follow from
-marches with half and, if it is known, a quarter of the steps (`response.errors`).
+In: `Cases` of one friction law, and their steps per cycle. Out: `LaneRuns`. Errors are estimated
+from marches with half and, if available, a quarter of the steps (`response.errors`).
 """
 
 from collections.abc import Sequence
@@ -24,22 +24,22 @@ from .lane_numbers import Scales, count_evaluated_cycles, find_lane_law
 from .lane_ringing import find_ringing
 from .lane_settling import SETTLING_LAWS, march_until_settled
 
-# smallest relative error of a measure, a hundredth of the smallest tolerance, because both marches may
-# miss the same event
+# Smallest relative error of a measure, a hundredth of the smallest tolerance: the difference of two marches
+# does not show an event that both miss.
 MIN_RELATIVE_ERROR = 1e-6
-# largest relative size of a loop that the limited memory of a lane has dropped; larger ones need an exact run
+# Largest relative size of a friction loop that the limited memory of a lane may drop.
 DROPPED_LOOP_RATIO = 1e-2
 
 
 class MeasuredMarch(NamedTuple):
-    """Vectorized march of n cases with equal time steps, and its measures.
+    """Time integration of n cases in lanes with equal steps per cycle, and its measures.
 
-    - steps, cycles, window: steps per cycle, cycles, and those at the end that are evaluated.
+    - steps, cycles, window: steps per cycle, number of cycles, and number of evaluated last cycles.
     - values: measures (n,) by name.
-    - energies: of the run by name, (n,) each [J].
+    - energies: energies of the run (n,) by name [J].
     - marched: result of `dynamics.lanes`.
-    - extremes: of the output in each cycle (n, c, 2) [m].
-    - force_rise: increase of the friction force (n,) [N].
+    - extremes: smallest and largest output of each cycle (n, c, 2) [m].
+    - force_rise: increase of the friction force in the evaluated cycles (n,) [N].
     """
 
     steps: int
@@ -53,29 +53,29 @@ class MeasuredMarch(NamedTuple):
 
 
 class LaneRuns(NamedTuple):
-    """Runs of n cases from a vectorized march, with a mask of cases that need another run.
+    """Runs of n cases in lanes, with masks of cases that need another run.
 
-    - runs: Runs with their errors.
-    - is_exact: which cases (n,) must be computed by the exact engine.
-    - needs_more_steps: which cases (n,) need more steps.
+    - runs: Runs with error estimates.
+    - needs_exact: mask (n,) of the cases that need the exact engine.
+    - needs_more_steps: mask (n,) of the cases that need more steps.
     """
 
     runs: Runs
-    is_exact: np.ndarray
+    needs_exact: np.ndarray
     needs_more_steps: np.ndarray
 
 
 def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) -> MeasuredMarch:
-    """March cases in parallel lanes of a kernel, and evaluate their last cycles.
+    """Integrate cases in lanes, and compute the measures of their last cycles.
 
     Parameters
     ----------
     law : str
-        Law of `dynamics.lanes`.
+        Name of the law in `dynamics.lanes`.
     cases : Cases
     scales : Scales
     cycles, steps : int
-        Cycles, and steps per cycle.
+        Number of cycles, and steps per cycle.
     """
     window = count_evaluated_cycles(cycles)
     marched = march.march(law, cases, cycles, window, steps)
@@ -108,14 +108,14 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
 
 
 def step_errors(values: dict, coarser: list) -> dict:
-    """Estimate the error (n,) of each measure from marches with half and a quarter of the steps.
+    """Estimate the error (n,) of each measure from marches with fewer steps.
 
     Parameters
     ----------
     values : dict
         Measures by name, (n,) each.
     coarser : list of dict
-        The same at half the steps and, if it is known, at a quarter of them.
+        Measures with half and, if available, a quarter of the steps.
     """
     errors = {}
     with np.errstate(over="ignore", invalid="ignore"):  # a march with half the steps may diverge
@@ -133,7 +133,7 @@ def collect_runs(
     coarser: list,
     mesh_errors: dict,
 ) -> LaneRuns:
-    """Combine the marches of a group of models with different steps to runs with errors.
+    """Combine a march with its coarser marches to runs with error estimates.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def collect_runs(
         Cases and Scales of the models.
     measured : MeasuredMarch
     coarser : list of dict
-        Measures with half, and perhaps a quarter, of the steps.
+        Measures with half and, if available, a quarter of the steps.
     mesh_errors : dict
         Errors due to the mesh, (n,) by name.
     """
@@ -153,24 +153,24 @@ def collect_runs(
     errors = step_errors(values, coarser)
     for name in errors.keys() & mesh_errors.keys():
         errors[name] = errors[name] + mesh_errors[name]
-    slips = marched.reading("MAX_SLIP") - marched.reading("MIN_SLIP")
+    slip_ranges = marched.reading("MAX_SLIP") - marched.reading("MIN_SLIP")
     round_off = SUM_ROUND_OFF * np.abs(marched.history[:, :, :2]).max(axis=(1, 2))
-    is_stuck = slips / 2 <= np.maximum(scales.held, round_off)
+    is_stuck = slip_ranges / 2 <= np.maximum(scales.max_stick_slip, round_off)
     is_stuck &= (cases.spring > 0) | (law == "rigid")
-    # a case is computed exactly if only one of both marches has a measure
+    # a case needs the exact engine if a measure exists in only one of the two marches
     has_other_measures = [np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values]
-    is_exact = np.any(has_other_measures, axis=0)
+    needs_exact = np.any(has_other_measures, axis=0)
     ringing = find_ringing(law, cases, scales, measured, is_stuck)
-    is_exact |= ringing.needs_single_run
+    needs_exact |= ringing.needs_single_run
     steady = None
     if law in SETTLING_LAWS:
         amplitudes = window_amplitude_means(measured.extremes, measured.window)[0]
-        settled = march_until_settled(law, cases, measured, amplitudes, ~is_stuck)
+        steady_ranges = march_until_settled(law, cases, measured, amplitudes, ~is_stuck)
         ratio = np.abs(scales.ratio)
-        steady = ratio * settled.value, ratio * settled.error
-        is_exact |= settled.is_open
+        steady = ratio * steady_ranges.value, ratio * steady_ranges.error
+        needs_exact |= steady_ranges.is_open
     if law in march.MASING_LAWS:
-        is_exact |= march.law_state(law, marched.motion, "MAX_DROPPED_GAP") > DROPPED_LOOP_RATIO
+        needs_exact |= march.law_state(law, marched.motion, "MAX_DROPPED_GAP") > DROPPED_LOOP_RATIO
     phasors = (marched.history[:, :, 2:] @ [1, 1j]) * scales.ratio[:, None]
     ends = np.arange(measured.cycles - 1, -1, -measured.window)[::-1][-N_FINAL_WINDOWS:]
     (tolerance,) = collect_columns(models, lambda model: (model.accuracy.tolerance,))
@@ -182,13 +182,13 @@ def collect_runs(
         measured.extremes,
         phasors[:, ends],
         is_stuck,
-        np.zeros(len(models), bool),  # lost cases are returned in needs_more_steps
+        np.zeros(len(models), bool),  # LaneRuns has the masks of cases that need another run
         errors | ringing.errors,
         MIN_RELATIVE_ERROR,
         np.inf,
         is_stuck & (measured.force_rise > tolerance * values["friction_force_peak"]),
         steady,
-        again=False,
+        refines_steps=False,
     )
     is_finite = np.isfinite(marched.motion[:, Row.SLIDE] + coarser[0]["friction_work"])
-    return LaneRuns(runs, is_exact, ringing.needs_more_steps | ~is_finite)
+    return LaneRuns(runs, needs_exact, ringing.needs_more_steps | ~is_finite)

@@ -1,6 +1,6 @@
-"""Runs from event to event of Coulomb friction and elastic-plastic elements, many at once.
+"""Event-driven runs of many cases with Coulomb friction or elastic-plastic elements.
 
-In: models with one mode under a sine. Out: `Runs` with the measures of all cases as arrays,
+In: models with one mode under sinusoidal drive. Out: `Runs`, the measures of all cases as columns,
 without histories.
 """
 
@@ -30,33 +30,33 @@ from ...rig.event_driven import (
     may_still_change,
 )
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
-from .threads import run_in_threads
+from .threads import apply_in_threads
 
-# Number of cycles that contain every stick interval of a periodic motion completely.
+# Number of cycles that contain each stick interval of a periodic motion as a whole.
 N_STICK_CYCLES = 3
 MIN_CYCLES = 20  # smallest number of cycles of a run
-MAX_CYCLES = 4000  # largest number of cycles of a run, whose extremes are all kept
-# relative error of the drift of rigid elements, which is the round-off of two means
+MAX_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
+# Relative error of the drift of rigid elements: the round-off of two mean values.
 DRIFT_ROUND_OFF = 1e-14
 
 
 class Case(NamedTuple):
     """One case of an event-driven batch: its model, friction elements and load.
 
-    - model: its Model.
-    - groups: Elements of its interface.
-    - held: slip in a cycle [m] below which it sticks.
+    - model: Model.
+    - groups: Elements of the interface.
+    - max_stick_slip: largest slip amplitude of a sticking interface [m].
     - load: normal load [N].
     """
 
     model: object
     groups: tuple
-    held: float
+    max_stick_slip: float
     load: float
 
 
-def refuses(model) -> str:
-    """Return the reason why law, cycles or engine of a model exclude this batch, or ""."""
+def refusal_reason(model) -> str:
+    """Return why law, cycles or engine of a model exclude the event-driven batch, or ""."""
     friction = model.friction
     is_rigid = is_rigid_law(model)
     if (
@@ -75,18 +75,18 @@ def refuses(model) -> str:
 
 
 def is_rigid_law(model) -> bool:
-    """Return whether the friction law of a model is Coulomb's, without elastic stick."""
+    """Return whether the friction law of a model is Coulomb friction without elastic stick."""
     law = model.friction.law
     return law_has_trait(law, "set-valued") and not law_has_trait(law, "averaged")
 
 
-def count_first_merges(model) -> int:
-    """Return how often neighbouring slider cells are merged in pairs for the first run."""
+def count_initial_merges(model) -> int:
+    """Return the number of pairwise merges of slider cells for the first run."""
     return 0 if is_rigid_law(model) else count_merges(model)
 
 
 def make_case(model, n_merges: int = 0) -> Case:
-    """Return the event-driven case of a model with a single point."""
+    """Return a model with a single point as a case of the event-driven batch."""
     if is_rigid_law(model):
         return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
     element = make_law(model.friction, model.point.load).element(model.point.load)
@@ -96,21 +96,21 @@ def make_case(model, n_merges: int = 0) -> Case:
     return Case(model, (group,), 1e-3 * element.length, model.point.load)
 
 
-def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) -> Runs:
-    """Run models from event to event, with coarse runs for the error of their cells.
+def simulate_models(models, cycles: int, window: int, report=None, n_merges: int = 0) -> Runs:
+    """Simulate models from event to event, with coarse runs for the error of their cells.
 
     Parameters
     ----------
     models : sequence of Model
     cycles, window : int
-        Cycles of the run, and at its end those that are evaluated.
-    say : callable, optional
-        Callback for a line of text.
+        Number of cycles of the run, and of evaluated cycles at its end.
+    report : callable, optional
+        Callback for progress messages.
     n_merges : int
-        How often neighbouring cells are merged in pairs.
+        Number of times that neighbouring cells are merged in pairs.
     """
     cases = [make_case(model, n_merges) for model in models]
-    fine = run_cases(cases, cycles, window, say)
+    fine = simulate_cases(cases, cycles, window, report)
     if not law_has_trait(models[0].friction.law, "cells"):
         return fine
     coarse_runs = []
@@ -119,28 +119,33 @@ def run_pieces(models, cycles: int, window: int, say=None, n_merges: int = 0) ->
         for case in cases:
             groups = tuple(merge_elements(group, *merge) for group in case.groups)
             coarse_cases.append(case._replace(groups=groups))
-        coarse_runs.append(run_cases(coarse_cases, cycles, window, say, steady=False))
+        coarse_runs.append(simulate_cases(coarse_cases, cycles, window, report, steady=False))
     return add_coarser_errors(fine, coarse_runs, merged_cell_errors)
 
 
-def run_cases(
-    cases: list, cycles: int, window: int, say=None, least: int = 0, steady: bool = True
+def simulate_cases(
+    cases: list,
+    cycles: int,
+    window: int,
+    report=None,
+    min_cases_per_thread: int = 0,
+    steady: bool = True,
 ) -> Runs:
-    """Run cases from event to event without storing their histories.
+    """Simulate cases from event to event without storing histories.
 
     Parameters
     ----------
     cases : list of Case
     cycles, window : int
-        Cycles of the run, and at its end those that are evaluated.
-    say : callable, optional
-        Callback for a line of text.
-    least : int
-        Cases of a thread (see `run_in_threads`).
+        Number of cycles of the run, and of evaluated cycles at its end.
+    report : callable, optional
+        Callback for progress messages.
+    min_cases_per_thread : int
+        Smallest number of cases per thread (see `apply_in_threads`).
     steady : bool
-        Whether the steady motion and the ringing are computed; a coarse run does not need them.
+        Whether the steady state and the ringing are computed; coarse runs do not need them.
     """
-    histories.load_event_kernels(say)
+    histories.load_event_kernels(report)
     rig = cases[0].model.rig
     histories.announce_runs(
         rig.modes, rig.drive.signal, cases[0].groups, cycles, window, len(cases)
@@ -148,7 +153,7 @@ def run_cases(
     finished = [None] * len(cases)
 
     def simulate(part: slice) -> None:
-        """Run a slice of the cases, and store the finished runs."""
+        """Simulate a slice of the cases and store the finished runs."""
         rigs = [(case.model.rig, case.groups) for case in cases[part]]
         finished[part] = histories.simulate_batch(
             ((rig.modes, rig.drive.signal, groups, rig.start) for rig, groups in rigs),
@@ -156,15 +161,15 @@ def run_cases(
             window,
         )
 
-    run_in_threads(simulate, len(cases), least)
-    return _read_runs(cases, finished, cycles, window, steady)
+    apply_in_threads(simulate, len(cases), min_cases_per_thread)
+    return _evaluate_runs(cases, finished, cycles, window, steady)
 
 
-def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bool) -> Runs:
-    """Evaluate finished event-driven runs, and return their measures as columns.
+def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady: bool) -> Runs:
+    """Return the measures of finished event-driven runs as columns.
 
-    Work on rigid elements is all dissipated. They keep a single mode at rest during stick, so that
-    nothing rings, and their drift has the round-off of two means.
+    Rigid elements dissipate all work of the friction force. During stick they hold the single mode at
+    rest, so that there is no ringing.
     """
     reading = join_readings([run.reading for run in finished])
     models = [case.model for case in cases]
@@ -174,16 +179,16 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
     loop = reading.loop()
     is_rigid = cases[0].groups[0].static > 0
     is_stuck = loop.slip_range / 2 <= np.maximum(
-        [case.held for case in cases],
+        [case.max_stick_slip for case in cases],
         COORDINATE_ROUND_OFF * reading.run[:, RunMeasure.MAX_COORDINATE],
     )
-    is_lost = np.zeros(len(finished), bool)
+    needs_single_run = np.zeros(len(finished), bool)
     rings = {name: np.full(len(finished), np.nan) for name in ("ring_frequency", "ring_damping")}
     steady_motions = np.full((2, len(finished)), np.nan)
     for k, (case, run) in enumerate(zip(cases, finished)):
-        ring = {} if is_rigid else _find_ringing(case, run, steady)
-        is_lost[k] = ring is None
-        for name, value in (ring or {}).items():
+        ringing = {} if is_rigid else _find_ringing(case, run, steady)
+        needs_single_run[k] = ringing is None
+        for name, value in (ringing or {}).items():
             rings[name][k] = value
         rig = case.model.rig
         decay = find_min_decay_rate(rig.modes) * rig.drive.signal.period
@@ -194,7 +199,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
             and may_still_change(run.amplitudes, window, tolerance[k], decay)
         ):
             motion = find_steady_motion(rig.modes, rig.drive.signal, case.groups, run)
-            is_lost[k] |= motion is None
+            needs_single_run[k] |= motion is None
             if motion is not None:
                 steady_motions[:, k] = motion
     stiffness = np.array([model.rig.first_mode.stiffness for model in models])
@@ -230,7 +235,7 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
         np.array([run.amplitudes for run in finished]),
         np.array([run.phasors[ends] for run in finished]),
         is_stuck,
-        is_lost,
+        needs_single_run,
         errors,
         PIECES.min_relative_error,
         PIECES.max_balance_error,
@@ -240,27 +245,29 @@ def _read_runs(cases: list, finished: list, cycles: int, window: int, steady: bo
 
 
 def _find_ringing(case: Case, run, steady: bool) -> dict | None:
-    """Find the ringing of a run: {} for none, None if a single run is needed.
+    """Return the ringing measures of a run; {} without ringing, None if a single run is needed.
 
-    The ringing is that of the run itself or, if `steady`, of a few more cycles with samples.
+    The ringing is taken from the run or, if `steady`, from a continuation of a few cycles with samples.
     """
     if run.ring is not None:
         return make_ringing_measures(*run.ring, run.acceleration)
-    if not steady or not run.slips:  # an interface that never slips as a whole excites no ringing
+    if not steady or not run.slips:  # ringing is excited only when the whole interface slips
         return {}
     modes = case.model.rig.modes
     drive = case.model.rig.drive.signal
     is_stuck = run.reading.loop().stuck_time >= run.reading.span * (1 - 1e-12)
-    if run.repeats and is_stuck:  # in a periodic motion that always sticks, the ringing has decayed
+    if run.repeats and is_stuck:  # the ringing of a periodic motion in permanent stick has decayed
         return {}
     if not run.repeats:
         return None
     start, memory = run.end
-    more = histories.simulate(
+    continuation = histories.simulate(
         modes, drive, case.groups, N_STICK_CYCLES, N_STICK_CYCLES, start=start, memory=memory
     )
-    rings = run_events.measure_ringing_in_sticks(more.window, modes, drive, more.log, repeats=True)
-    return {} if rings == ({}, {}) else None
+    ringing = run_events.measure_ringing_in_sticks(
+        continuation.window, modes, drive, continuation.log, repeats=True
+    )
+    return {} if ringing == ({}, {}) else None
 
 
 def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Runs:
@@ -269,16 +276,16 @@ def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Run
     Parameters
     ----------
     fine : Runs
-        Runs whose errors are set.
+        Runs whose errors are changed in place.
     coarse_runs : list of Runs
     estimate : callable
-        Function (fine, *coarse) of values by name that returns errors by name.
+        Function (fine, *coarse) of dicts of values that returns a dict of errors.
     """
     columns = []
     for runs in (fine, *coarse_runs):
-        others = {MAIN_MEASURE: runs.amplitudes, "energy_balance": energy_balance(runs.book)}
+        others = {MAIN_MEASURE: runs.amplitudes, "energy_balance": energy_balance(runs.energies)}
         columns.append(runs.values | others)
-    n = len(fine.stuck)
+    n = len(fine.is_stuck)
     for case in range(n):
         values, *coarse = (select_known_values(measures, case) for measures in columns)
         errors = estimate(values, *coarse)
@@ -289,6 +296,6 @@ def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Run
 
 
 def select_known_values(measures: dict, case: int) -> dict:
-    """Select the finite values of one case from a dict of columns."""
+    """Return the finite values of one case from a dict of columns."""
     values = {name: float(column[case]) for name, column in measures.items()}
     return {name: value for name, value in values.items() if not np.isnan(value)}

@@ -1,9 +1,9 @@
-"""Batch of patches that slip in part, with one mode under a sine, marched in lanes.
+"""Batch of patches with partial slip and one mode, integrated in lanes with tabulated curves.
 
-In: models of a group. Out: `CaseResults`. Under a constant load such a patch is a set of
-Jenkins elements, whose force follows from one curve by Masing's rule. The curves of each case
-and of its coarser mesh are marched as tables (`lane_check.solve_and_check`). Cases that lanes
-cannot finish go to `sheared`.
+In: models of a group. Out: `CaseResults`. Under constant load, such a patch is a set of Jenkins
+elements, whose force follows from its backbone curve by Masing's rules. The backbone curves on the
+fine and the coarser mesh are tabulated (`lane_check.solve_and_check`). Cases that cannot be
+completed in lanes are computed by `sheared`.
 """
 
 from collections.abc import Sequence
@@ -15,68 +15,70 @@ from ....dynamics.lanes import run as march
 from ....model.model import Model
 from ...rig.engines import PIECES
 from ...rig.event_driven import YieldingElements
-from .. import one_by_one, pressed
+from .. import one_by_one, solved_patches
 from ..case_results import CaseResults
 from . import lane_check, lane_numbers, lane_steps, lanes, sheared
 
-# Largest number of cases in one compiled call, whose tables are in memory together.
+# Largest number of cases in one compiled call, limited by the memory of the tables.
 MAX_CASES_PER_CALL = 512
 
 
-def refuses(model: Model) -> str:
-    """Return the reason why a patch with partial slip cannot be integrated in lanes, or ""."""
-    return sheared.refuses(model) or lanes.needs_other_accuracy(model)
+def refusal_reason(model: Model) -> str:
+    """Return why a patch with partial slip cannot be integrated in lanes, or ""."""
+    return sheared.refusal_reason(model) or lanes.reason_in_accuracy_settings(model)
 
 
-def group(model: Model) -> tuple:
-    """Return a hashable key that is equal for models that one kernel call can compute."""
-    return sheared.group(model)
+def group_key(model: Model) -> tuple:
+    """Return a hashable key; models with equal keys can be computed in one kernel call."""
+    return sheared.group_key(model)
 
 
-def solve(models: Sequence[Model], say=None) -> CaseResults:
-    """Compute the case results of a group of patches with partial slip by a vectorized march."""
-    batch = pressed.PatchBatch(PIECES.name, YieldingElements, compute_motions, MAX_CASES_PER_CALL)
-    return pressed.solve(models, batch, say)
+def solve(models: Sequence[Model], report=None) -> CaseResults:
+    """Compute the case results of a group of patches with partial slip in lanes."""
+    batch = solved_patches.PatchBatch(
+        PIECES.name, YieldingElements, compute_motions, MAX_CASES_PER_CALL
+    )
+    return solved_patches.solve(models, batch, report)
 
 
 def compute_motions(
-    models: Sequence[Model], pressed_cases: list, say=None
+    models: Sequence[Model], solved_cases: list, report=None
 ) -> tuple[CaseResults, np.ndarray]:
-    """Compute the motions of solved patches in lanes, and find cases that need a single run.
+    """Compute the motions of solved cases in lanes; return the results and a mask of single runs.
 
     Parameters
     ----------
-    models, pressed_cases, say
+    models, solved_cases, report
         See `sheared.compute_motions`.
     """
-    fine = [case.fine.groups[0] for case in pressed_cases]
-    coarse = [case.coarse.groups[0] for case in pressed_cases]
+    fine = [case.fine.groups[0] for case in solved_cases]
+    coarse = [case.coarse.groups[0] for case in solved_cases]
     rates = [
-        lane_steps.fastest_rate(model, elements.stiffness.sum())
+        lane_steps.relative_stick_rate(model, elements.stiffness.sum())
         for model, elements in zip(models, fine)
     ]
-    steps = lane_steps.select_steps_for_rates(rates, lane_steps.PATCH_STEPS)
+    steps = lane_steps.steps_for_rates(rates, lane_steps.PATCH_STEPS)
     max_size = load(f"{march.LANES_PACKAGE}.rows_kernels").N_YIELDS - 1
     sizes = [max(a.stiffness.size, b.stiffness.size) for a, b in zip(fine, coarse)]
     fits = (steps > 0) & (np.array(sizes) < max_size)
     results = CaseResults.blank(len(models))
 
     def solve_exactly(cases: list, is_check: bool = False) -> CaseResults:
-        """Compute some cases by the event-driven batch or by single runs."""
+        """Compute selected cases by the event-driven batch or by single runs."""
         some_models = [models[case] for case in cases]
-        part, runs_singly = sheared.compute_motions(
-            some_models, [pressed_cases[case] for case in cases], say
+        part, needs_single_run = sheared.compute_motions(
+            some_models, [solved_cases[case] for case in cases], report
         )
-        one_by_one.solve_singly(part, some_models, runs_singly, say)
+        one_by_one.replace_by_single_runs(part, some_models, needs_single_run, report)
         return part
 
     if exact_cases := np.flatnonzero(~fits).tolist():
         results.insert(exact_cases, solve_exactly(exact_cases))
     if lane_cases := np.flatnonzero(fits).tolist():
         lane_models = [models[case] for case in lane_cases]
-        lane_pressed = [pressed_cases[case] for case in lane_cases]
+        lane_pressed = [solved_cases[case] for case in lane_cases]
         contacts = [
-            _contact_numbers([elements[case] for case in lane_cases], lane_pressed)
+            _patch_contact_parameters([elements[case] for case in lane_cases], lane_pressed)
             for elements in (fine, coarse)
         ]
         checked = lane_check.solve_and_check(
@@ -90,7 +92,7 @@ def compute_motions(
         )
         for index in np.flatnonzero(~checked.is_exact).tolist():
             numerics = checked.results.numerics[index]
-            sizes = sheared.describe_sizes(lane_pressed[index])
+            sizes = sheared.size_settings(lane_pressed[index])
             checked.results.numerics[index] = numerics | sizes
             sheared.add_patch_results(
                 checked.results,
@@ -103,19 +105,19 @@ def compute_motions(
     return results, np.zeros(len(models), bool)
 
 
-def _contact_numbers(elements: list, pressed_cases: list) -> np.ndarray:
-    """Return the contact parameters (m, n) of n patches with tables of their friction elements."""
+def _patch_contact_parameters(element_groups: list, solved_cases: list) -> np.ndarray:
+    """Return the contact parameters (m, n) of n patches, with tables of their backbone curves."""
     rows = [
         (
-            group.limit,
-            group.limit,
+            elements.limit,
+            elements.limit,
             case.patch.pressure.load,
-            group.stiffness.sum(),
-            group.yield_displacement[-1],
+            elements.stiffness.sum(),
+            elements.yield_displacement[-1],
         )
-        for group, case in zip(elements, pressed_cases)
+        for elements, case in zip(element_groups, solved_cases)
     ]
     tables = march.make_curve_tables(
-        [(group.stiffness, group.yield_displacement) for group in elements]
+        [(elements.stiffness, elements.yield_displacement) for elements in element_groups]
     )
     return np.column_stack([rows, tables]).T

@@ -1,8 +1,9 @@
-"""Cases whose patches are pressed together, and whose interfaces then move together.
+"""Batches in two stages: the static contact problems of the patches, then the motions.
 
-In: models of a group, and the functions of a batch that make contacts of patches and move them.
-Out: `CaseResults`. Patches that share their pieces are pressed together (`runs.patch.static_batch`),
-others as in single runs. A case that a batch cannot finish is run by itself.
+In: models of a group, and the functions of a batch that build the contact models and compute the
+motions. Out: `CaseResults`. Patches with equal pieces are solved together
+(`runs.patch.static_batch`), others as in single runs. A case that the batch cannot complete is
+computed by a single run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -26,16 +27,16 @@ from ..rig.numerics import choose_numerics
 from . import one_by_one, patches
 from .case_results import CaseResults
 
-NONE: Mapping = MappingProxyType({})  # no settings, and no causes of errors
+NONE: Mapping = MappingProxyType({})  # no settings or error sources to report
 
 
-class PressedCase(NamedTuple):
-    """Case of a batch whose patch is solved and whose motion is not computed yet.
+class SolvedCase(NamedTuple):
+    """Case of a batch with a solved patch, ready for the computation of its motion.
 
-    - fine, coarse: contact model of the batch on the mesh of the patch and on the coarser one.
-    - measures, warnings, notes: of its patch.
-    - patch: the pressed Patch.
-    - numerics: Numerics of its single run.
+    - fine, coarse: contact models on the mesh of the patch and on the coarser mesh.
+    - measures, warnings, notes: static measures and messages of the patch.
+    - patch: solved Patch.
+    - numerics: Numerics of a single run of the case.
     """
 
     fine: Any
@@ -51,57 +52,59 @@ class PatchBatch(NamedTuple):
     """Functions of a batch that computes the motions of cases with solved patches.
 
     - engine: name of the engine of a single run.
-    - make_contact: function (model, numerics, patch) -> contact model of the batch, or None if the
-      case is run by itself.
-    - move: function (models, pressed cases, say) -> CaseResults, and which (n,) cases are run by
-      themselves.
-    - cases_per_call: number of cases that are in memory together.
+    - make_contact: function (model, numerics, patch) that returns the contact model of the batch, or
+      None if the case needs a single run.
+    - compute_motions: function (models, solved cases, report) that returns CaseResults and a mask
+      (n,) of the cases that need a single run.
+    - cases_per_call: number of cases that are held in memory at the same time.
     """
 
     engine: str
     make_contact: Callable
-    move: Callable
+    compute_motions: Callable
     cases_per_call: int
 
 
-def solve(models: Sequence[Model], batch: PatchBatch, say: Callable | None = None) -> CaseResults:
-    """Solve the patches of a group of models, and compute their motions in one batch.
+def solve(
+    models: Sequence[Model], batch: PatchBatch, report: Callable | None = None
+) -> CaseResults:
+    """Solve the patches of a group of models, then compute their motions in one batch.
 
     Parameters
     ----------
     models : sequence of Model
     batch : PatchBatch
-    say : callable, optional
-        Callback for a line of text.
+    report : callable, optional
+        Callback for progress messages.
     """
-    return patches.press_and_solve(
-        models, batch.cases_per_call, lambda part: _solve_cases(part, batch, say)
+    return patches.solve_patches_then_motions(
+        models, batch.cases_per_call, lambda part: _solve_cases(part, batch, report)
     )
 
 
-def _solve_cases(models: list, batch: PatchBatch, say: Callable | None) -> CaseResults:
-    """Compute the case results of models whose patches are solved."""
+def _solve_cases(models: list, batch: PatchBatch, report: Callable | None) -> CaseResults:
+    """Compute the motions of models whose patches are already solved."""
     begin = perf_counter()
     results = CaseResults.blank(len(models))
-    pressed_cases = {}
+    solved_cases = {}
     for case, model in enumerate(models):
-        pressed = _press_case(model, batch)
+        pressed = _solve_patch_of_case(model, batch)
         if pressed is not None:
-            pressed_cases[case] = pressed
-    runs_singly = np.ones(len(models), bool)
-    if pressed_cases:
-        cases = list(pressed_cases)
-        part, runs_singly[cases] = batch.move(
-            [models[case] for case in cases], list(pressed_cases.values()), say
+            solved_cases[case] = pressed
+    needs_single_run = np.ones(len(models), bool)
+    if solved_cases:
+        cases = list(solved_cases)
+        part, needs_single_run[cases] = batch.compute_motions(
+            [models[case] for case in cases], list(solved_cases.values()), report
         )
         part.seconds[:] = (perf_counter() - begin) / len(models)
         results.insert(cases, part)
-    one_by_one.solve_singly(results, models, runs_singly, say)
+    one_by_one.replace_by_single_runs(results, models, needs_single_run, report)
     return results
 
 
-def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
-    """Solve the patch of a case and make its contact models; None if a single run is needed."""
+def _solve_patch_of_case(model: Model, batch: PatchBatch) -> SolvedCase | None:
+    """Return a case with its solved patch and contact models, or None if it needs a single run."""
     try:
         with locate_errors(model.source):
             patch, *coarse = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)
@@ -118,7 +121,7 @@ def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
                 *describe_unused_settings(model, batch.engine),
                 *patch_result.warn_of_strains(model.patch, patch),
             ]
-            return PressedCase(
+            return SolvedCase(
                 *contacts,
                 patch_result.static_measures(model, patch, coarse),
                 warnings,
@@ -126,7 +129,7 @@ def _press_case(model: Model, batch: PatchBatch) -> PressedCase | None:
                 patch,
                 numerics,
             )
-    except one_by_one.CASE_ERRORS:  # a single run of the case reports the error
+    except one_by_one.CASE_ERRORS:  # the single run of the case reports its error
         return None
 
 
@@ -134,32 +137,32 @@ def add_patch_results(
     results: CaseResults,
     case: int,
     model: Model,
-    pressed: PressedCase,
+    pressed: SolvedCase,
     slide: float,
     *,
     extra: Mapping = NONE,
     causes: Mapping = NONE,
 ) -> None:
-    """Add the static measures and the notes of the solved patch to a case, as a single run does.
+    """Add the static measures, warnings and notes of the patch to the results of a case.
 
     Parameters
     ----------
     results : CaseResults
-        With the measures of the motion.
+        Results that already contain the measures of the motion.
     case : int
     model : Model
-    pressed : PressedCase
+    pressed : SolvedCase
     slide : float
-        Largest slide [m].
+        Largest relative displacement of the interface [m].
     extra : Mapping
-        Details of the run for the warnings of large errors (`accuracy_warnings.Finding`).
+        Settings of the run that the accuracy warnings mention (`accuracy_warnings.Finding`).
     causes : Mapping
-        ErrorCauses of the measures of the motion by name.
+        ErrorCauses of the motion measures by name.
     """
     slides = np.array([slide])
     motion = {
         name: replace(measure, causes=causes.get(name))
-        for name, measure in results.known_measures(case).items()
+        for name, measure in results.measures_with_errors(case).items()
     }
     outcome = judge_outcome_on_piece(
         Outcome(results.outcome[case]), model.patch, pressed.patch, slides
