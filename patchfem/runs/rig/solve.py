@@ -34,7 +34,7 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
     elif numerics.engine == "march":
         run = march.march_in_time
     else:
-        run = steady.run_steady
+        run = steady.solve_steady_motion
     solution = run(model, numerics, patch, frames, say, progress)
     if model.rig.modes.gauge is None:
         return solution

@@ -1,7 +1,7 @@
 """Steady motion of laws with memory and of nonlinear springs, by harmonic balance.
 
-In: a Model, its Numerics and its pressed patch. Out: the Solution of a sine, and the curve over
-frequency through its folds (`dynamics.harmonic`).
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the response curve over
+frequency with its folds (`dynamics.harmonic`).
 """
 
 from dataclasses import replace
@@ -30,20 +30,20 @@ from ..interface import make_single_contact
 from ..solution import Solution, compute_sampled_loop
 from .curves import COLUMN_MEASURES, HARMONIC_ROUND_OFF, CurvePoint, describe_instability
 
-# Number of samples of a cycle from which the measures of a steady motion are computed.
+# Number of samples per cycle from which the measures of a steady motion are computed.
 SAMPLES_PER_CYCLE = 4096
 
 
-class BalanceReader(RunEvaluator):
+class BalanceEvaluator(RunEvaluator):
     """Evaluation of one cycle of a motion from harmonic balance.
 
-    turns: reversals of this cycle, see `SteadyMotion.turns`.
+    `turns` are the reversals of the cycle, see `SteadyMotion.turns`.
     """
 
     turns: tuple = ()
 
     def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
-        """Return the check of the friction work, and peaks and reversals.
+        """Return the check of the friction work, and the measures that depend on reversals.
 
         A periodic motion has no drift.
 
@@ -67,11 +67,11 @@ class BalanceReader(RunEvaluator):
         return IntegratedMeasures(values, reversals=(tuple(turn[:2] for turn in self.turns),))
 
     def find_friction_loops(self, run, drive) -> tuple:
-        """Return (), because the loop of a balance is evaluated from samples."""
+        """Return an empty tuple, because the friction loop is computed from samples."""
         return ()
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
-        """Return the friction loop for the evaluation.
+        """Return the friction loop of the cycle.
 
         Parameters
         ----------
@@ -95,10 +95,10 @@ class CycleMeasures(NamedTuple):
 
 
 class StableMotion(NamedTuple):
-    """Steady motion that is reported, with its stability and notes on other motions.
+    """Reported steady motion, with its stability and notes on coexisting motions.
 
-    - motion, stability: SteadyMotion without and with its multipliers.
-    - notes: sentences on other motions at the same drive.
+    - motion, stability: SteadyMotion without and with its Floquet multipliers.
+    - notes: sentences on other motions under the same drive.
     """
 
     motion: object
@@ -107,9 +107,9 @@ class StableMotion(NamedTuple):
 
 
 class BalanceFinder:
-    """Search for steady motions by harmonic balance, for laws with memory or nonlinear springs.
+    """Steady motions of laws with memory or nonlinear springs, by harmonic balance.
 
-    It starts near the point of a curve that it gets, if there are several motions.
+    If several motions exist, the iteration starts from a given point of the response curve.
     """
 
     tries_another = False
@@ -134,23 +134,23 @@ class BalanceFinder:
         self.tolerance = model.accuracy.tolerance
 
     def point(self, drive, near=None) -> tuple:
-        """Find the steady motion under sinusoidal drive, with errors.
+        """Compute the steady motion under sinusoidal drive, with error estimates.
 
-        The errors come from twice as many harmonics and from twice as many samples.
+        The errors are estimated with twice as many harmonics and twice as many samples.
 
         Parameters
         ----------
         drive : SineDrive
         near : SteadyMotion, optional
-            Point of a curve from which the solution starts, if there are several motions.
+            Initial guess from the response curve, for use if several motions exist.
         """
         begin = perf_counter()
         motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        motion, stability, notes = self._find_stable(drive, motion)
+        motion, stability, notes = self._find_stable_motion(drive, motion)
         values, response, book = self._compute_measures(motion, drive)
-        errors = self._errors(
+        errors = self._estimate_errors(
             values,
             motion,
             drive,
@@ -191,10 +191,10 @@ class BalanceFinder:
             notes=notes,
         ), motion
 
-    def _errors(self, values: dict, motion, drive, read) -> dict:
-        """Estimate the errors of the measures of a steady motion by adding harmonics.
+    def _estimate_errors(self, values: dict, motion, drive, read) -> dict:
+        """Estimate the errors of the measures of a steady motion from a solution with more harmonics.
 
-        If no motion with more harmonics converges, the errors are those that the balance states.
+        If that solution does not converge, the error estimate of the balance itself is used.
 
         Parameters
         ----------
@@ -216,10 +216,10 @@ class BalanceFinder:
             errors[name] = error + abs(values[name]) * residual
         return errors
 
-    def _find_stable(self, drive, motion) -> StableMotion:
-        """Return a steady motion if it is stable, else the smallest stable one under the same drive.
+    def _find_stable_motion(self, drive, motion) -> StableMotion:
+        """Return a steady motion if it is stable, otherwise the smallest stable one.
 
-        If none of the motions is stable, the given motion is returned.
+        If no motion under this drive is stable, the given motion is returned.
         """
         stability = add_stability(motion, self.modes)
         if stability.stable:
@@ -245,20 +245,20 @@ class BalanceFinder:
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find the steady motion at one point of a curve, without errors."""
+        """Compute one point of a response curve, without error estimates."""
         motion = periodic_point(
             self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
         )
-        return self._curve_point(add_stability(motion, self.modes))
+        return self._make_curve_point(add_stability(motion, self.modes))
 
-    def _curve_point(self, motion) -> CurvePoint:
-        """Convert a steady motion with known stability to a point of a curve."""
+    def _make_curve_point(self, motion) -> CurvePoint:
+        """Convert a steady motion with known stability to a point of a response curve."""
         kind = balanced_regime(motion)[0]
         stable = bool(motion.stable)
         drive = SineDrive(motion.level, motion.omega, self.model.rig.drive.signal.moving)
         return CurvePoint(
             drive,
-            self._read(motion, drive),
+            self._compute_curve_measures(motion, drive),
             {},
             kind if stable else f"{kind}, unstable",
             float(np.abs(motion.multipliers).max(initial=0.0)),
@@ -267,8 +267,8 @@ class BalanceFinder:
             motion,
         )
 
-    def _read(self, motion, drive) -> dict:
-        """Return the measures of one point of a curve of steady motions."""
+    def _compute_curve_measures(self, motion, drive) -> dict:
+        """Return the measures of a point of a response curve by name."""
         response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
@@ -294,12 +294,12 @@ class BalanceFinder:
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         run = EngineResult(response, response, extremes, np.zeros(1), book)
-        reader = BalanceReader(self.model, self.numerics, self.patch, steps=samples)
+        reader = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
         reader.turns = motion.find_reversals()
         return CycleMeasures(reader.evaluate_measures(run, drive), response, book)
 
     def curve(self, drive) -> tuple:
-        """Trace the steady motions over frequency, continued through folds."""
+        """Compute the response curve over frequency by continuation through its folds."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.trace_over_frequency(
             self.modes,
@@ -310,43 +310,47 @@ class BalanceFinder:
             harmonics=self.harmonics,
             tolerance=self.tolerance,
         )
-        return [self._point_of_branch(point, first) for point in branch.points], branch.folds
+        return [self._convert_branch_point(point, first) for point in branch.points], branch.folds
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Return the arc length between two points of a frequency curve.
+        """Return the arc length between two points of a response curve.
 
-        The frequency is scaled by the swept range.
+        The frequency is scaled by the width of the sweep.
         """
-        return branches.measure_distance(one.near, other.near, self._range)
+        return branches.measure_distance(one.near, other.near, self._sweep_width)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Find the steady motion at a fraction of the arc length between two curve points.
+        """Compute the curve point at a fraction of the arc length between two points.
 
-        The balance is solved in the plane normal to the line between these points.
+        The balance is solved in the hyperplane normal to the line between these points.
 
         Parameters
         ----------
         one, other : CurvePoint
         share : float
-            Fraction of the arc length from the first to the second.
+            Fraction of the arc length between the points, from the first one.
         """
         drive = replace(one.drive, omega=one.near.omega)
         motion = branches.find_point_between(
-            self.modes, drive, one.near, other.near, share, self._range
+            self.modes, drive, one.near, other.near, share, self._sweep_width
         )
-        return self._point_of_branch(motion, drive)
+        return self._convert_branch_point(motion, drive)
 
     @property
-    def _range(self) -> float:
+    def _sweep_width(self) -> float:
         """Width of the swept frequency range [rad/s]."""
         drive = self.model.rig.drive.signal
         return 2 * np.pi * abs(drive.high - drive.low)
 
-    def _point_of_branch(self, motion, drive) -> CurvePoint:
-        """Convert a steady motion on a branch to a curve point with errors."""
+    def _convert_branch_point(self, motion, drive) -> CurvePoint:
+        """Convert a steady motion on a branch to a curve point with error estimates."""
         motion = add_stability(motion, self.modes) if motion.stable is None else motion
-        point = self._curve_point(motion)._replace(regime="stable" if motion.stable else "unstable")
-        errors = self._errors(point.values, point.near, point.drive, self._read)
+        point = self._make_curve_point(motion)._replace(
+            regime="stable" if motion.stable else "unstable"
+        )
+        errors = self._estimate_errors(
+            point.values, point.near, point.drive, self._compute_curve_measures
+        )
         for name in errors:
             errors[name] += HARMONIC_ROUND_OFF * abs(point.values[name])
         if "acceleration_distortion" in errors:

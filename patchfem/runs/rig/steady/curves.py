@@ -1,7 +1,7 @@
-"""Curves of steady motions: points, columns, levels, and refinement over frequency.
+"""Response curves of steady motions over frequency, and drives in levels.
 
-In: points from a finder. Out: columns of a curve, and the Solution of a drive in levels with
-the same table as a march.
+In: curve points from a finder. Out: columns of a response curve, and the Solution of a drive in
+levels.
 """
 
 from dataclasses import replace
@@ -14,38 +14,39 @@ from ....dynamics.curve_points import sample_adaptively
 from ....response.levels import LEVEL_MEASURES, Level
 from ..solution import replace_output_by_gauge
 
-# name of the measure in each column of a curve of steady motions
+# Name of the measure in each column of a response curve.
 COLUMN_MEASURES = {
     "amplitude": "relative_displacement_amplitude",
     "acceleration_peak": "absolute_acceleration_peak",
     "acceleration_fundamental": "absolute_acceleration_fundamental",
     "acceleration_distortion": "acceleration_distortion",
 }
-# relative error of the measures of an event-driven motion from a given state, which has round-off only
+# Relative error of the measures of an event-driven motion, which has round-off only.
 EXACT_RELATIVE_ERROR = 1e-9
-# Round-off of the third harmonic of the acceleration relative to the first.
+# Round-off of the third harmonic of the acceleration relative to the first one.
 HARMONIC_ROUND_OFF = 1e-12
-N_SWEEP_POINTS = 121  # number of points of a curve over frequency before its refinement
-# The neighbourhood of a peak ends where the curve falls below this fraction of the peak; no other peak may
-# exceed this fraction.
+N_SWEEP_POINTS = 121  # Number of points of a response curve before its refinement.
+# Fraction of a peak at which its neighbourhood ends; outside it, no other peak may exceed this
+# fraction.
 PEAK_END_RATIO = 0.8
-# Largest ratio of the width of a neighbourhood to that of the sweep; a wider one is not used.
+# Largest ratio of the width of the neighbourhood to that of the sweep at which a narrow sweep is
+# used.
 MAX_PEAK_FRACTION = 0.75
-N_START_POINTS = 7  # number of points of the curve in a neighbourhood before its refinement
-# Largest relative error of the linear interpolation between the points of a curve.
+N_START_POINTS = 7  # Number of points of a narrow sweep before its refinement.
+# Largest relative error of linear interpolation between the points of a response curve.
 INTERPOLATION_TOL = 0.01
 
 
 class CurvePoint(NamedTuple):
-    """One point of a curve of steady motions over frequency.
+    """Point of a response curve of steady motions.
 
-    - drive: sinusoidal drive of the motion.
-    - values, errors: measures and their errors by name; {} if there is no bounded motion.
-    - regime: kind of the motion.
-    - multiplier: largest |Floquet multiplier|.
-    - stable: whether a disturbance decays.
-    - outcome: how the motion was judged.
-    - near: initial guess for a motion nearby.
+    - drive: sinusoidal drive.
+    - values, errors: measures and their errors by name; {} if no bounded motion exists.
+    - regime: name of the motion, such as "stick-slip".
+    - multiplier: largest magnitude of the Floquet multipliers.
+    - stable: whether the motion is stable.
+    - outcome: Outcome of the motion.
+    - near: initial guess for the motion at a neighbouring drive.
     """
 
     drive: SineDrive
@@ -59,7 +60,7 @@ class CurvePoint(NamedTuple):
 
     @property
     def level(self) -> Level:
-        """Steady motion of the point, in the form of a drive level; NaN if it is unbounded."""
+        """Drive level of the point with its measures; NaN if the motion is unbounded."""
         values = {COLUMN_MEASURES["amplitude"]: np.nan}
         if self.values:
             values = {name: self.values.get(name) for name in LEVEL_MEASURES}
@@ -75,7 +76,7 @@ class CurvePoint(NamedTuple):
 
 
 def estimate_exact_errors(values: dict, residual: float) -> dict:
-    """Estimate the errors of an event-driven steady motion from its mismatch after a period."""
+    """Estimate the errors of an event-driven steady motion from its residual over a period."""
     errors = {}
     for name, value in values.items():
         if value is not None:
@@ -85,10 +86,7 @@ def estimate_exact_errors(values: dict, residual: float) -> dict:
 
 
 def describe_instability(multipliers) -> str:
-    """Return the sentence that a steady motion is unstable.
-
-    multipliers: Floquet multipliers (m,).
-    """
+    """Return the message on an unstable steady motion with these Floquet multipliers (m,)."""
     size = np.abs(multipliers).max()
     return (
         f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; "
@@ -97,14 +95,14 @@ def describe_instability(multipliers) -> str:
 
 
 def make_curve_point(drive, raw, near=None) -> CurvePoint:
-    """Convert the Solution of a steady motion to a curve point.
+    """Convert the Solution of a steady motion to a point of a response curve.
 
     Parameters
     ----------
     drive : SineDrive
     raw : Solution
     near : optional
-        Initial guess for a motion nearby.
+        Initial guess for the motion at a neighbouring drive.
     """
     size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
     bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
@@ -121,57 +119,55 @@ def make_curve_point(drive, raw, near=None) -> CurvePoint:
 
 
 def make_missing_point(drive) -> CurvePoint:
-    """Return a curve point that states that no steady motion was found."""
+    """Return the curve point of a drive for which no steady motion was found."""
     return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 
 class TracedCurve:
-    """Base class of curves of steady motions over frequency; subclasses compute the points.
+    """Base class of finders whose response curve has no folds; subclasses compute its points.
 
-    leaves: see `peak.refine_peak`.
-
-    leaves: see `peak.refine_peak`.
+    `leaves` are tolerances, see `peak.refine_peak`.
     """
 
     leaves = 1e-2, 0.1
 
     def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
-        """Return the distance [rad/s] between two points of a frequency curve."""
+        """Return the distance [rad/s] between two points of a response curve."""
         return abs(other.drive.omega - one.drive.omega)
 
     def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
-        """Find the curve point at a fraction of the distance between two points.
+        """Compute the curve point at a fraction of the distance between two points.
 
         Parameters
         ----------
         one, other : CurvePoint
         share : float
-            Fraction of the distance from the first to the second.
+            Fraction of the distance between the points, from the first one.
         """
         omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
         return self.curve_point(replace(one.drive, omega=omega), one.near)
 
 
-def trace_curve(modes, drive, find) -> list:
-    """Compute the steady motions over a frequency sweep, with more points where the curve bends.
+def compute_response_curve(modes, drive, find_point) -> list:
+    """Compute the response curve of a frequency sweep, with more points where it bends.
 
-    The curve starts with N_SWEEP_POINTS frequencies and those of the modes, and is refined until linear
-    interpolation between its points has an error of at most INTERPOLATION_TOL.
+    The curve starts with N_SWEEP_POINTS frequencies and the natural frequencies. It is refined
+    until linear interpolation has an error of at most INTERPOLATION_TOL.
 
     Parameters
     ----------
     modes
         Modal basis.
     drive : SweepDrive
-    find : callable
-        Function (sine, near) that returns a CurvePoint; near: initial guess from the previous point, or
-        None.
+    find_point : callable
+        Function (sine, near) that returns a CurvePoint, where near is the initial guess from the
+        previous point or None.
     """
 
     def sample(frequency, before):
         """Return the amplitude [m] at a frequency [Hz], and the curve point."""
         sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
-        point = find(sine, before and before[1].near)
+        point = find_point(sine, before and before[1].near)
         return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
     samples = sample_adaptively(sample, choose_start_frequencies(modes, drive), INTERPOLATION_TOL)[
@@ -181,10 +177,10 @@ def trace_curve(modes, drive, find) -> list:
 
 
 def choose_start_frequencies(modes, drive) -> np.ndarray:
-    """Return the frequencies [Hz] from which the curve of a sweep is refined.
+    """Return the frequencies [Hz] of a response curve before its refinement.
 
-        These are N_SWEEP_POINTS frequencies over the range, and the frequencies of the modes in it, where a peak may
-    be narrower than the spacing.
+    They are N_SWEEP_POINTS frequencies over the range, and the natural frequencies in it, where a
+    peak may be narrower than the spacing.
     """
     space = np.geomspace if drive.logarithmic else np.linspace
     ends = sorted((drive.low, drive.high))
@@ -197,10 +193,10 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
 
 
 def sweep_around_peak(drive, curve: dict, at: float):
-    """Return a narrow sweep around the largest peak of a curve.
+    """Return a narrow sweep around the largest peak of a response curve.
 
-    The neighbourhood ends where the curve has fallen to PEAK_END_RATIO of the largest amplitude, plus a
-    quarter of its width on both sides.
+    The neighbourhood of the peak ends where the curve falls to PEAK_END_RATIO of the peak. The
+    sweep is wider than this by a quarter of the width on each side.
 
     Parameters
     ----------
@@ -213,7 +209,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
     Returns
     -------
     SweepDrive or None
-        None if another peak is nearly as high, or the neighbourhood is most of the curve.
+        None if another peak is nearly as high, or if the neighbourhood covers most of the sweep.
     """
     order = np.argsort(curve["frequency"], kind="stable")
     places = curve["frequency"][order]
@@ -237,21 +233,20 @@ def sweep_around_peak(drive, curve: dict, at: float):
 
 
 def find_largest_point(points) -> int:
-    """Return the index of the stable curve point with the largest amplitude.
+    """Return the index of the stable curve point of largest amplitude.
 
-    If no point is stable, all points count.
+    If no point is stable, all points are considered.
     """
     sizes = np.array([point.values.get(COLUMN_MEASURES["amplitude"], -1.0) for point in points])
-    lasting = np.array([point.stable for point in points])
-    return int(np.argmax(np.where(lasting | ~lasting.any(), sizes, -2.0)))
+    is_stable = np.array([point.stable for point in points])
+    return int(np.argmax(np.where(is_stable | ~is_stable.any(), sizes, -2.0)))
 
 
 def tabulate_curve(points, folds=()) -> dict:
-    """Return the columns of a curve of steady motions as a dict; NaN for unbounded motions.
+    """Return the columns of a response curve as a dict; NaN for unbounded motions.
 
-    The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES with
-    its error.
-    folds: frequencies [Hz] at which the curve turns back.
+    The columns are frequency [Hz], level [m s-2], regime, multiplier, and each of COLUMN_MEASURES
+    with its error. `folds` are the frequencies [Hz] at which the curve turns back.
     """
     columns = {
         "frequency": np.array([point.drive.omega / (2 * np.pi) for point in points]),
@@ -268,11 +263,12 @@ def tabulate_curve(points, folds=()) -> dict:
 
 
 def solve_levels(finder, drive):
-    """Find the steady motions at all levels of a drive; return that of the largest amplitude.
+    """Compute the steady motions at all drive levels; return that of the largest amplitude.
 
-    Each level starts from the motion at the previous one, as in a test. The Solution has the curve
-    of all levels, the Level of each, and a probe for `levels.find_onset`. A level without a steady
-    motion is kept as not converged with a note.
+    Each level starts from the motion at the previous one, as in a test with increasing level. The
+    Solution has the curve of all levels, the Level of each, and a function that computes another
+    level (`levels.find_onset`). A level without steady motion is stored as not converged, with a
+    note.
 
     Raises
     ------
@@ -298,15 +294,15 @@ def solve_levels(finder, drive):
             best = solution, sine
         failures += [solution.message] if solution.message else []
     if best is None:
-        raise failures[0]  # none of the drive levels has a steady motion
+        raise failures[0]  # No drive level has a steady motion.
 
     def probe(number: int, level: float) -> Level:
-        """Find the steady motion at a further level [m s-2], starting from a known one."""
+        """Compute the steady motion at another level [m s-2], starting from that of level `number`."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
         return finder.curve_point(sine, points[number].near if number >= 0 else None).level
 
-    lost_ones = f"no steady motion was found at {len(failures)} of {len(points)} drive levels; at the first of them: "
-    notes = tuple(f"{lost_ones}{one}" for one in failures[:1])
+    message = f"no steady motion was found at {len(failures)} of {len(points)} drive levels; at the first of them: "
+    notes = tuple(f"{message}{one}" for one in failures[:1])
     return replace(
         best[0],
         extra=best[0].extra | {"curve": tabulate_curve(points), "at": best[1]},

@@ -1,9 +1,9 @@
-"""Steady motion of a rig that is linear between events, by the map of a period.
+"""Steady motion of a rig that is linear between events, as fixed point of the map of a period.
 
-In: a Model, its Numerics and its pressed patch. Out: the Solution of a sine and the curve over
-frequency or level, for Coulomb interfaces or none (`EventFinder`) and for elastic-plastic
-elements (`YieldFinder`). The only errors are round-off and the stated residual of the period,
-because the interfaces are followed from event to event.
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the response curve over
+frequency or drive level. `EventFinder` is for Coulomb interfaces or none, `YieldFinder` for
+elastic-plastic elements. Errors are due to round-off and to the residual of the fixed point only,
+because the motion between events is exact.
 """
 
 from dataclasses import replace
@@ -26,21 +26,21 @@ from .curves import (
     COLUMN_MEASURES,
     CurvePoint,
     TracedCurve,
+    compute_response_curve,
     describe_instability,
     estimate_exact_errors,
-    trace_curve,
 )
 
 
 class PeriodicMotion(NamedTuple):
-    """Periodic motion that the map of one period found, with its stability.
+    """Fixed point of the map of a period, with its stability.
 
-    - start, memory: state and memory of the elements at phase 0 of the drive.
-    - near: initial guess for a motion nearby.
-    - regime: kind of the motion.
+    - start, memory: state of the rig and memory of its elements at phase 0 of the drive.
+    - near: initial guess for the motion at a neighbouring drive.
+    - regime: name of the motion, such as "stick-slip".
     - multipliers (m,): Floquet multipliers.
     - residual: relative change of the state over a period.
-    - error: relative error that follows from the residual.
+    - error: relative error due to the residual.
     - iterations: number of iterations.
     - bounded: whether a bounded motion exists.
     - lasting: whether the motion is stable.
@@ -58,22 +58,21 @@ class PeriodicMotion(NamedTuple):
     lasting: bool
 
     @property
-    def words(self) -> str:
-        """Type of the motion as text, which says whether it is unstable."""
+    def regime_text(self) -> str:
+        """Regime as text, which names an unstable motion as such."""
         return self.regime if self.lasting else f"{self.regime}, unstable"
 
     @property
-    def size(self) -> float:
+    def largest_multiplier(self) -> float:
         """Largest magnitude of the Floquet multipliers."""
         return float(np.abs(self.multipliers).max(initial=0.0))
 
 
 class MapFinder(TracedCurve):
-    """Search for steady motions by the map of one drive period.
+    """Base class for steady motions as fixed points of the map of a drive period.
 
-    `repeating` finds a motion; it starts from `near` if there are several.
-
-    `repeating` finds a motion; it starts from `near` if there are several.
+    Subclasses compute the fixed point in `find_periodic_motion`. If several motions exist, the search starts
+    from `near`.
     """
 
     name = ""
@@ -90,14 +89,14 @@ class MapFinder(TracedCurve):
         self.contact_elements = self.elements(model, numerics, patch)
         self.groups = self.contact_elements.groups
 
-    def repeating(self, drive, near) -> PeriodicMotion:
+    def find_periodic_motion(self, drive, near) -> PeriodicMotion:
         """Find the periodic motion under sinusoidal drive."""
         raise NotImplementedError
 
     def point(self, drive, near=None) -> tuple:
-        """Find the steady motion under sinusoidal drive, and an initial guess for motions nearby."""
+        """Compute the steady motion under sinusoidal drive, and a guess for neighbouring drives."""
         begin = perf_counter()
-        motion = self.repeating(drive, near)
+        motion = self.find_periodic_motion(drive, near)
         numerics = replace(self.numerics, cycles=2.0, window=1)
         reader = EventEvaluator(self.model, numerics, self.patch, self.contact_elements)
         run = histories.simulate(
@@ -110,7 +109,7 @@ class MapFinder(TracedCurve):
             self.frames,
             None,
             motion.start,
-            self.start_memory(motion.memory),
+            self.convert_memory(motion.memory),
         )
         run = reader.average_over_strips(run)
         raw = reader.make_solution(run, perf_counter() - begin, drive)
@@ -124,7 +123,7 @@ class MapFinder(TracedCurve):
             outcome = Outcome.NOT_CONVERGED
             message = describe_instability(motion.multipliers)
         extra = {
-            "regime": motion.words,
+            "regime": motion.regime_text,
             "multipliers": motion.multipliers,
             "residual": motion.residual,
             "map": self.name,
@@ -139,15 +138,17 @@ class MapFinder(TracedCurve):
             book=raw.book | {"iterations": float(motion.iterations)},
         ), motion.near
 
-    def start_memory(self, memory):
+    def convert_memory(self, memory):
         """Return the initial memory of the friction elements."""
         return memory
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find the steady motion at one point of a curve."""
-        motion = self.repeating(drive, near)
+        """Compute one point of a response curve."""
+        motion = self.find_periodic_motion(drive, near)
         if not motion.bounded:
-            return CurvePoint(drive, {}, {}, motion.words, motion.size, False, Outcome.GROWS)
+            return CurvePoint(
+                drive, {}, {}, motion.regime_text, motion.largest_multiplier, False, Outcome.GROWS
+            )
         run = histories.simulate(
             self.modes, drive, self.groups, 1, 1, start=motion.start, memory=motion.memory
         )
@@ -161,7 +162,7 @@ class MapFinder(TracedCurve):
         waves = harmonic_measures(
             *map(float, run.reading.acceleration_harmonics), find_max_acceleration(drive)
         )
-        values = _curve_measures(amplitude, run.acceleration, waves)
+        values = _collect_curve_measures(amplitude, run.acceleration, waves)
         is_stuck = EventEvaluator(
             self.model, self.numerics, self.patch, self.contact_elements
         ).is_stuck(run)
@@ -169,23 +170,23 @@ class MapFinder(TracedCurve):
             drive=drive,
             values=values,
             errors=estimate_exact_errors(values, motion.error),
-            regime=motion.words,
-            multiplier=motion.size,
+            regime=motion.regime_text,
+            multiplier=motion.largest_multiplier,
             stable=motion.lasting,
             outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
             near=motion.near,
         )
 
     def curve(self, drive) -> tuple:
-        """Trace the steady motions over frequency along a curve without folds.
+        """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return trace_curve(self.modes, drive, self.curve_point), ()
+        return compute_response_curve(self.modes, drive, self.curve_point), ()
 
 
-def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
-    """Return the measures of one point of a curve of steady motions."""
+def _collect_curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
+    """Return the measures of a point of a response curve by name, without missing ones."""
     values = {
         COLUMN_MEASURES["amplitude"]: amplitude,
         COLUMN_MEASURES["acceleration_peak"]: acceleration,
@@ -195,7 +196,7 @@ def _curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
 
 
 class YieldFinder(MapFinder):
-    """Search for steady motions of elastic-plastic elements by the map from yield to yield."""
+    """Steady motions of elastic-plastic elements, by the map from yield event to yield event."""
 
     name = "yields"
     elements = YieldingElements
@@ -204,11 +205,11 @@ class YieldFinder(MapFinder):
         super().__init__(model, *given)
         self.tries_another = len(model.rig.friction.interfaces) == 1
 
-    def start_memory(self, memory):
-        """Return the initial memory of the elements, with work and loss set to 0."""
+    def convert_memory(self, memory):
+        """Return the initial memory of the elements with zero work and dissipation."""
         return event_elements.reset_work(memory)
 
-    def repeating(self, drive, near) -> PeriodicMotion:
+    def find_periodic_motion(self, drive, near) -> PeriodicMotion:
         """Find the periodic motion of elastic-plastic elements under sinusoidal drive."""
         state = steady.solve_steady(self.modes, drive, self.groups, near)
         return PeriodicMotion(
@@ -226,24 +227,24 @@ class YieldFinder(MapFinder):
 
 
 class EventFinder(MapFinder):
-    """Search for steady motions with Coulomb friction, or none, by the event map."""
+    """Steady motions with Coulomb friction or without friction, by the map of stick-slip events."""
 
     name = "events"
     elements = RigidElements
 
     @cached_property
-    def forces(self) -> np.ndarray:
+    def friction_limits(self) -> np.ndarray:
         """Static and kinetic friction limits (2, i) [N] of the interfaces."""
         return np.array([(group.static, group.kinetic) for group in self.groups]).T
 
-    def repeating(self, drive, near) -> PeriodicMotion:
+    def find_periodic_motion(self, drive, near) -> PeriodicMotion:
         """Find the periodic motion of Coulomb interfaces under sinusoidal drive.
 
-        If friction falls with the first slip, several motions exist, and the search starts from the
-        state `near`. Multipliers of two simultaneous events hold for one order of these only, so
-        the search does not use them.
+        If static friction exceeds kinetic friction, several motions exist, and the search starts
+        from the state `near`. The multipliers of two simultaneous events depend on their order, so
+        they do not decide the stability.
         """
-        falls = bool(np.any(self.forces[0] > self.forces[1]))
+        falls = bool(np.any(self.friction_limits[0] > self.friction_limits[1]))
         start = near if falls else None
         state = stick_steady.solve_steady(self.modes, drive, self.groups, start=start)
         bounded = state.regime != "unbounded"
@@ -261,11 +262,11 @@ class EventFinder(MapFinder):
         )
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find the steady motion at one point of a curve, in closed form without friction.
+        """Compute one point of a response curve, which has a closed form without friction.
 
         An undamped resonance has no closed form.
         """
-        if self.forces.any():
+        if self.friction_limits.any():
             return super().curve_point(drive, near)
         modes = self.modes
         gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
@@ -276,20 +277,22 @@ class EventFinder(MapFinder):
         at_gauge, at_output = receptance[0, :, 0] * modes.mass
         acceleration = drive.acceleration * float(abs(drive.moving + drive.omega**2 * at_output))
         amplitude = drive.acceleration * float(abs(at_gauge))
-        values = _curve_measures(amplitude, acceleration, harmonic_measures(acceleration, 0.0))
+        values = _collect_curve_measures(
+            amplitude, acceleration, harmonic_measures(acceleration, 0.0)
+        )
         return CurvePoint(
             drive,
             values,
             estimate_exact_errors(values, 0.0),
             "sliding",
-            float(np.exp(self.decay * drive.period)),
+            float(np.exp(self.max_growth_rate * drive.period)),
             True,
             Outcome.STEADY,
         )
 
     @cached_property
-    def decay(self) -> float:
-        """Rate [1/s] of the slowest free motion without friction; < 0 if it decays."""
+    def max_growth_rate(self) -> float:
+        """Growth rate [1/s] of the slowest free motion without friction; negative if it decays."""
         n = self.modes.omega.size
         state = np.block(
             [

@@ -1,10 +1,11 @@
-"""Largest amplitude of a curve of steady motions, refined until its neighbours bound it.
+"""Peak of a response curve, which is refined until its neighbours bound it closely.
 
-In: points of a curve and a finder. Out: the Solution of the largest motion with the errors of
-its amplitude and frequency. Between two points, a curve that is concave lies below the lines
-through the points on either side, so that these lines bound its largest value. Each new point
-is added where this bound is largest. At a kink of a curve the lines meet; a smooth peak
-converges with the square of the spacing.
+In: points of a response curve and a finder. Out: the Solution of the largest motion, with the
+errors of its amplitude and frequency.
+
+Where a curve is concave, it lies below the extrapolated chords of the neighbouring intervals, so
+these bound its maximum. A new point is added where the bound is largest. The bound is sharp at a
+kink; at a smooth peak it converges with the square of the spacing.
 """
 
 from dataclasses import replace
@@ -19,27 +20,27 @@ from ..solution import Solution, replace_output_by_gauge
 from .curves import COLUMN_MEASURES, find_largest_point, tabulate_curve
 
 AMPLITUDE = COLUMN_MEASURES["amplitude"]
-MAX_ADDED_POINTS = 40  # largest number of points that refine a peak
-# Fraction of the largest amplitude above which a resonance curve is assumed concave; that of a single mode is
-# concave from 0.816 on.
+MAX_ADDED_POINTS = 40  # Largest number of points that are added to refine a peak.
+# Smallest fraction of the peak at which a resonance curve is assumed concave; that of a single mode
+# is concave above 0.816.
 MIN_CONCAVE_FRACTION = 0.8
-# Error of the position of a peak due to round-off, relative to the width of the peak.
+# Error of the position of a peak due to round-off, relative to its width.
 POSITION_TOL = 3e-4
-# Distance relative to the length of the curve, below which two points are identical.
+# Largest distance, relative to the length of the curve, at which two points count as identical.
 IDENTICAL_POINT_TOL = 1e-9
-WIDTH_HEIGHT_FRACTION = 0.9  # fraction of the height of a peak at which its width is measured
-# Ratio of the shift of a peak to (its width times the relative error of its height): the width is measured a tenth of
-# the height below the peak, so that an error of a tenth shifts the peak by its width.
+WIDTH_HEIGHT_FRACTION = 0.9  # Fraction of the height of a peak at which its width is measured.
+# Ratio of the shift of a peak to its width times the relative error of its height. The width is
+# measured a tenth below the peak, so that an error of a tenth shifts it by its width.
 ERROR_SHIFT_FACTOR = 10.0
 
 
 class RefinedPeak(NamedTuple):
-    """Curve of steady motions with points added around its largest amplitude.
+    """Response curve with points added around its peak.
 
-    - points: those of the curve and those added.
-    - best: index of the largest stable point.
-    - above: how far the largest amplitude may exceed it [m]; inf if a neighbour has no bounded
-      motion.
+    - points: points of the curve, including the added ones.
+    - best: index of the stable point of largest amplitude.
+    - above: largest amount by which the peak may exceed this point [m]; inf if a neighbour has no
+      bounded motion.
     """
 
     points: list
@@ -48,36 +49,36 @@ class RefinedPeak(NamedTuple):
 
 
 def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
-    """Add points to a curve of steady motions around its largest amplitude.
+    """Add points to a response curve around its peak.
 
     Parameters
     ----------
     points : list of CurvePoint
-        Points along the curve.
+        Points of the curve in order.
     finder
-        Has curve_distance(CurvePoint, CurvePoint), point_between(CurvePoint, CurvePoint, fraction) ->
-        CurvePoint, and `leaves`: fractions of the tolerance that may remain as the error of the
-        amplitude, and of its position over the width of the peak.
+        Has the methods curve_distance(a, b) and point_between(a, b, fraction) of CurvePoints, and
+        `leaves`, the ratios of the remaining errors of the peak to the tolerance: that of the
+        amplitude, and that of the position relative to the width.
     tolerance : float
 
     Returns
     -------
     RefinedPeak
-        At the latest after MAX_ADDED_POINTS points.
+        Refined curve with at most MAX_ADDED_POINTS added points.
     """
     points = list(points)
     for left in range(MAX_ADDED_POINTS, -1, -1):
         s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
-        y = _point_amplitudes(points)
-        lasting = np.array([point.stable for point in points])
+        y = _collect_amplitudes(points)
+        is_stable = np.array([point.stable for point in points])
         best = find_largest_point(points)
         reach, at = bound_concave_curve(s, y)
         if not y[best] > 0 or not reach.size:
             return RefinedPeak(points, best, 0.0)
-        if lasting.any():
-            reach[~(lasting[:-1] | lasting[1:])] = 0.0
-            at[lasting[:-1] != lasting[1:]] = (
-                0.5  # the limit of stability between two points is found by bisection
+        if is_stable.any():
+            reach[~(is_stable[:-1] | is_stable[1:])] = 0.0
+            at[is_stable[:-1] != is_stable[1:]] = (
+                0.5  # The limit of stability between two points is found by bisection.
             )
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
@@ -101,20 +102,21 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
             return RefinedPeak(points, best, above)
 
 
-def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
+def _choose_added_point(s, y, best: int, min_fraction: float) -> tuple | None:
     """Choose the position of a new point next to the largest point of a curve.
 
-    The result is None if both neighbours are closer than `share` times the width of the peak, or if the
-    largest value is at an end. The point is the vertex of the parabola through the three points, or a tenth
-    of the way to the farther neighbour.
+    The new point is the vertex of the parabola through the largest point and its neighbours, or a
+    tenth of the way to the farther neighbour if the vertex is close to the largest point. The
+    result is the index of the interval and the fraction of it. It is None if both neighbours are
+    closer than `min_fraction` times the width of the peak, or if the largest point is at an end.
 
-    Returns the index of the interval and the fraction of it. s, y: positions along the curve, and
-    values (n,).
+    The arguments s and y (n,) are the positions along the curve and its values.
     """
     if not 0 < best < len(s) - 1:
         return None
-    want = share * min(
-        _peak_width(y[best:], s[best:] - s[best]), _peak_width(y[best::-1], s[best] - s[best::-1])
+    want = min_fraction * min(
+        _measure_peak_width(y[best:], s[best:] - s[best]),
+        _measure_peak_width(y[best::-1], s[best] - s[best::-1]),
     )
     before = s[best] - s[best - 1]
     after = s[best + 1] - s[best]
@@ -129,16 +131,16 @@ def _choose_added_point(s, y, best: int, share: float) -> tuple | None:
     return (best, off / after) if off > 0 else (best - 1, 1 + off / before)
 
 
-def _peak_width(y, away) -> float:
-    """Return the distance from a peak at which a curve has fallen to a given fraction.
+def _measure_peak_width(y, away) -> float:
+    """Return the distance from a peak at which the curve has fallen to WIDTH_HEIGHT_FRACTION of it.
 
-    away: distances (k,) of the values y (k,).
+    `away` (k,) are the distances of the values y (k,) from the peak.
     """
     low = ~(y >= WIDTH_HEIGHT_FRACTION * y[0])
     return float(away[: (int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
 
 
-def _point_amplitudes(points) -> np.ndarray:
+def _collect_amplitudes(points) -> np.ndarray:
     """Return the amplitudes [m] of the points of a curve; NaN for unbounded motions."""
     return np.array([point.values.get(AMPLITUDE, np.nan) for point in points])
 
@@ -146,32 +148,33 @@ def _point_amplitudes(points) -> np.ndarray:
 def bound_concave_curve(s, y) -> tuple:
     """Return upper bounds of a concave curve between its points, by extrapolated chords.
 
-    A line from points below MIN_CONCAVE_FRACTION of the larger end is not used, because a curve may be convex there;
-    without any line, the bound is the larger end divided by MIN_CONCAVE_FRACTION.
+    A chord with a point below MIN_CONCAVE_FRACTION of the larger end of the interval is not used,
+    because the curve may be convex there. Without any chord, the bound is the larger end divided by
+    MIN_CONCAVE_FRACTION.
 
     Parameters
     ----------
     s : (n,)
         Positions along the curve.
     y : (n,)
-        Values; an interval next to NaN has the bound 0.
+        Values of the curve; an interval with NaN at an end has the bound 0.
 
     Returns
     -------
     tuple
-        Bounds and fractions, (n - 1,) each.
+        Bounds (n - 1,), and their positions (n - 1,) as fractions of the intervals.
     """
     h = np.diff(s)
     ends = np.maximum(y[:-1], y[1:])
     with np.errstate(all="ignore"):
         slope = np.diff(y) / h
-        # the lines through the two points on the left and on the right have these slopes
+        # Slopes of the chords to the left and to the right of each interval.
         rise, fall = np.full((2, h.size), np.nan)
         rise[1:] = np.where(y[:-2] >= MIN_CONCAVE_FRACTION * ends[1:], slope[:-1], np.nan)
         fall[:-1] = np.where(y[2:] >= MIN_CONCAVE_FRACTION * ends[:-1], slope[1:], np.nan)
         left = y[:-1] + rise * h
         right = y[1:] - fall * h
-        # both lines intersect at this fraction of the interval
+        # Both extrapolated chords intersect at this fraction of the interval.
         meet = (right - y[:-1]) / (rise - fall) / h
         inside = (meet > 0) & (meet < 1)
         reach = np.where(inside, y[:-1] + rise * meet * h, ends)
@@ -186,9 +189,9 @@ def bound_concave_curve(s, y) -> tuple:
 
 
 def solve_peak(points: list, folds, finder) -> Solution:
-    """Find the steady motion of largest amplitude on a curve, with the error of its position.
+    """Compute the steady motion at the peak of a response curve, with its error estimates.
 
-    Its errors include those by the position of the peak.
+    The errors include those due to the position of the peak.
 
     Parameters
     ----------
@@ -204,35 +207,37 @@ def solve_peak(points: list, folds, finder) -> Solution:
     errors = dict(raw.errors or {})
     extra = {"curve": tabulate_curve(points, folds), "at": top.drive}
     height = top.values.get(AMPLITUDE, 0.0)
-    y = _point_amplitudes(points)
+    y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in raw.values:
-        # the error None means that the curve has no peak
+        # The error None indicates that the curve has no peak.
         return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
-    # the point of the curve was computed with fewer samples, which adds this error
+    # The curve point was computed with fewer samples, which adds this error.
     missed = abs(replace_output_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     off = 0.0
-    open_ones = dict.fromkeys(raw.values, 0.0)
+    position_errors = dict.fromkeys(raw.values, 0.0)
     for direction in (-1, 1):
         heights = y[best::direction]
         away = np.abs(places[best::direction] - places[best])
         if heights.size < 2:
             continue
-        # at these points the curve is certainly below its largest amplitude
+        # At these points the curve is certainly below its maximum.
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(away[: number + 1].max())
         near = min(
-            far, float(away[1]) + ERROR_SHIFT_FACTOR * error / height * _peak_width(heights, away)
+            far,
+            float(away[1])
+            + ERROR_SHIFT_FACTOR * error / height * _measure_peak_width(heights, away),
         )
         off = max(off, near)
         for name, gap in _compute_neighbour_differences(
             finder, points[best + direction * number], raw
         ).items():
-            open_ones[name] = max(open_ones[name], gap * near / far if far else gap)
-    open_ones[AMPLITUDE] = min(above, raw.values[AMPLITUDE]) + missed
-    errors = {name: error + open_ones.get(name, 0.0) for name, error in errors.items()}
+            position_errors[name] = max(position_errors[name], gap * near / far if far else gap)
+    position_errors[AMPLITUDE] = min(above, raw.values[AMPLITUDE]) + missed
+    errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
     return replace(raw, errors=errors, extra=raw.extra | extra | {"at_error": float(off)})
 
 

@@ -1,7 +1,7 @@
-"""Steady motion over grooves: a march whose initial state is corrected until it repeats.
+"""Steady motion over grooves, by a march whose initial state is corrected to be periodic.
 
-In: a Model with grooves, its Numerics and its pressed patch. Out: the Solution of a sine, and
-the curve of such motions over frequency (`dynamics.harmonic.orbits`).
+In: a Model with grooves, its Numerics and its Patch. Out: the Solution under a sine, and the
+response curve over frequency (`dynamics.harmonic.orbits`).
 """
 
 from dataclasses import replace
@@ -19,27 +19,34 @@ from ....response.measures import peak_sampling_errors
 from ..interface import make_contact
 from ..march import MarchEvaluator
 from ..solution import Solution
-from .curves import CurvePoint, TracedCurve, describe_instability, make_curve_point, trace_curve
+from .curves import (
+    CurvePoint,
+    TracedCurve,
+    compute_response_curve,
+    describe_instability,
+    make_curve_point,
+)
 
-START_STEPS = 256  # steps per cycle of the first march of a law that is not set-valued
-MAX_STEPS = 4096  # largest number of steps per cycle to which a march is refined
-# Samples per cycle for a set-valued law, whose steps are chosen by their error.
+START_STEPS = 256  # Steps per cycle of the first march for a law that is not set-valued.
+MAX_STEPS = 4096  # Largest number of steps per cycle of a refined march.
+# Samples per cycle for a set-valued law, whose step size is controlled by its error.
 SET_VALUED_SAMPLES = 1024
-# Number of cycles from rest after which a lifted mass is assumed to stay in its grooves.
+# Number of cycles from rest within which a lifted mass leaves its grooves, if it leaves them at
+# all.
 N_CYCLES_IN_GROOVES = 30
-STEP_END_ERROR = 1e-9  # relative error of the measures due to round-off at the ends of steps
-# Largest change from cycle to cycle, relative to the amplitude, of a periodic motion.
+STEP_END_ERROR = 1e-9  # Relative error of the measures due to round-off at the ends of steps.
+# Largest change per cycle, relative to the amplitude, at which a motion counts as periodic.
 PERIODIC_TOL = 1e-6
-# Error of the Floquet multipliers due to the step length of a march; a motion is unstable only if a
+# Error of the Floquet multipliers due to the step size; a motion counts as unstable only if a
 # multiplier exceeds 1 by more.
 MULTIPLIER_TOL = 1e-2
 
 
-def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | None:
-    """Return the Solution of a motion that climbs out of its grooves; None if it stays inside.
+def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | None:
+    """Return the Solution of a motion that leaves its grooves, or None if it stays in them.
 
-    The mass must leave the grooves within N_CYCLES_IN_GROOVES cycles of a march from rest. The errors are the differences
-    from a march with half the steps.
+    A march from rest of N_CYCLES_IN_GROOVES cycles decides. The errors are the differences from a
+    march with half the steps.
 
     Parameters
     ----------
@@ -68,8 +75,8 @@ def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | 
         )
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
-        few = replace(numerics, cycles=N_CYCLES_IN_GROOVES, steps=steps, window=1)
-        reader = MarchEvaluator(replace(model, rig=rig), few, patch, contact)
+        few_cycles = replace(numerics, cycles=N_CYCLES_IN_GROOVES, steps=steps, window=1)
+        reader = MarchEvaluator(replace(model, rig=rig), few_cycles, patch, contact)
         solutions.append(reader.make_solution(done, perf_counter() - begin))
     fine, half = solutions
     errors = {}
@@ -79,11 +86,11 @@ def solve_leaving_grooves(model, numerics, patch, drive, contact) -> Solution | 
     return replace(fine, errors=errors, extra=extra)
 
 
-class CycleReading(NamedTuple):
+class CycleEvaluation(NamedTuple):
     """Measures and histories of one cycle of a periodic motion over grooves.
 
     - values: measures by name.
-    - mark: Mark at its end.
+    - mark: Mark at the end of the cycle.
     - snapshots: states of the interface.
     - is_stuck: whether the interface sticks.
     """
@@ -95,9 +102,10 @@ class CycleReading(NamedTuple):
 
 
 class MarchFinder(TracedCurve):
-    """Search for steady motions over grooves by marching and correcting the initial state."""
+    """Steady motions over grooves, by marching and correcting the initial state."""
 
-    # the points of the curve have errors as large as the tolerance, so that a refined peak cannot be better
+    # The points of the curve have errors of the size of the tolerance, so that a refined peak
+    # cannot have a smaller error.
     tries_another = True
     leaves = (0.3, 30.0)
 
@@ -113,7 +121,7 @@ class MarchFinder(TracedCurve):
         self.numerics = replace(numerics, cycles=1.0, window=1)
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
-    def _run(self, drive, near, steps: int):
+    def _march_to_periodic(self, drive, near, steps: int):
         """March until the motion is periodic; return the run and its remaining change per period."""
         run = engine.start_run(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
@@ -133,51 +141,53 @@ class MarchFinder(TracedCurve):
             )
         return run, left
 
-    def _read(self, run, steps: int, frames: int = 0) -> CycleReading:
+    def _evaluate_cycle(self, run, steps: int, frames: int = 0) -> CycleEvaluation:
         """Evaluate one cycle of a periodic march."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
         reader = MarchEvaluator(self.model, numerics, self.patch, self.contact)
         is_stuck = bool(np.ptp(mark.window.slip) <= reader.held) and not reader.creeps
         values = reader.evaluate_measures(mark, run.drive, stuck=is_stuck)
-        return CycleReading(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
+        return CycleEvaluation(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def point(self, drive, near=None) -> tuple:
-        """Find the steady motion under sinusoidal drive, and the run from which to continue.
+        """Compute the steady motion under sinusoidal drive, and the run from which to continue.
 
-        If there is no steady motion because the lifted mass leaves its grooves, the Solution of the
-        motion that does and None are returned.
+        If the lifted mass leaves its grooves, there is no steady motion. The Solution is then that
+        of the motion that leaves them, and the run is None.
         """
         try:
-            return self._point(drive, near)
+            return self._refine_point(drive, near)
         except NotConverged:
             if (
-                gone := solve_leaving_grooves(
+                gone := march_out_of_grooves(
                     self.model, self.numerics, self.patch, drive, self.contact
                 )
             ) is None:
                 raise
         return gone, None
 
-    def _point(self, drive, near) -> tuple:
-        """Find the steady motion with as many time steps as the tolerance needs.
+    def _refine_point(self, drive, near) -> tuple:
+        """Compute the steady motion with as many time steps as the tolerance requires.
 
-        The steps are doubled until the amplitude differs from that with half as many by less than
-        the tolerance. The error of a measure contains its difference from half of the steps.
+        The steps are doubled until the amplitude changes by less than the tolerance. The errors
+        include the difference from half the steps.
         """
         begin = perf_counter()
         name = "relative_displacement_amplitude"
-        run, left = self._run(drive, near, self.steps)
-        half = self._read(self._run(drive, run, self.steps // 2)[0], self.steps // 2).values
+        run, left = self._march_to_periodic(drive, near, self.steps)
+        half = self._evaluate_cycle(
+            self._march_to_periodic(drive, run, self.steps // 2)[0], self.steps // 2
+        ).values
         steps = self.steps
-        reading = self._read(run, self.steps, self.frames)
-        while self._rough(reading.values[name], half[name]) and run.outcome is None:
+        reading = self._evaluate_cycle(run, self.steps, self.frames)
+        while self._has_step_error(reading.values[name], half[name]) and run.outcome is None:
             if 2 * steps > MAX_STEPS or self.model.accuracy.steps_per_cycle is not None:
                 break
             steps = 2 * steps
             half = reading.values
-            run, left = self._run(drive, run, steps)
-            reading = self._read(run, steps, self.frames)
+            run, left = self._march_to_periodic(drive, run, steps)
+            reading = self._evaluate_cycle(run, steps, self.frames)
         values, mark, snapshots, is_stuck = reading
         peak_errors = peak_sampling_errors(mark.window, True)
         multipliers = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
@@ -223,12 +233,12 @@ class MarchFinder(TracedCurve):
             extra=extra,
         ), run
 
-    def _rough(self, value: float, half: float) -> bool:
+    def _has_step_error(self, value: float, half: float) -> bool:
         """Return whether half the steps change the amplitude by more than the tolerance."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def curve_point(self, drive, near=None) -> CurvePoint:
-        """Find the steady motion at one curve point, from a nearby motion or else from rest."""
+        """Compute one point of a response curve, from a neighbouring motion or else from rest."""
         try:
             return make_curve_point(drive, *self.point(drive, near))
         except NotConverged:
@@ -237,8 +247,8 @@ class MarchFinder(TracedCurve):
         return make_curve_point(drive, *self.point(drive))
 
     def curve(self, drive) -> tuple:
-        """Trace the steady motions over frequency along a curve without folds.
+        """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return trace_curve(self.model.rig.modes, drive, self.curve_point), ()
+        return compute_response_curve(self.model.rig.modes, drive, self.curve_point), ()

@@ -1,10 +1,9 @@
-"""Engine `harmonic`: steady motion of a scene, found directly, and its curve.
+"""Steady motion of a rig under a sine, and the largest one over a sweep or drive levels.
 
-In: a Model, its Numerics and its pressed patch. Out: the Solution of a motion that repeats with
-the drive, with its regime, multipliers and stability, under a sine, or the largest one over
-frequency or level. Coulomb interfaces and elastic-plastic elements are solved by shooting with
-the map of their events and yields (`maps`), grooves by a march (`periodic_march`), other laws by
-harmonic balance (`balance`).
+In: a Model, its Numerics and its Patch. Out: the Solution of the periodic motion with its regime,
+Floquet multipliers and stability. Coulomb interfaces and elastic-plastic elements are solved by
+shooting with the map of a period (`maps`), grooves by marching (`periodic_march`), and other laws
+by harmonic balance (`balance`).
 """
 
 from ....core import NotConverged, SineDrive
@@ -15,11 +14,13 @@ from .curves import solve_levels
 from .peak import solve_peak
 
 
-def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Find the steady motion under a sine, or the largest one over a sweep or drive levels.
+def solve_steady_motion(
+    model, numerics, patch, frames: int = 0, say=None, progress=None
+) -> Solution:
+    """Compute the steady motion under a sine, or the largest one over a sweep or drive levels.
 
-    The drive of the largest motion is extra["at"]. If the map of yields does not converge, harmonic
-    balance is tried.
+    The drive of the largest motion is extra["at"]. If the map of yield events does not converge,
+    harmonic balance is tried.
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def run_steady(model, numerics, patch, frames: int = 0, say=None, progress=None)
 
 
 def _solve_drive(finder, model) -> Solution:
-    """Find the steady motion, frequency curve or levels that the drive of a model requires."""
+    """Compute the steady motion, response curve or drive levels that the drive of a model requests."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
         return finder.point(drive)[0]
