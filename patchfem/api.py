@@ -4,9 +4,9 @@
     result = pf.run("scene.toml", **{"contact.tilt.angle": "1 mrad"})
     result.measures["loop_area"].value
 
-`new` returns a scene to start from, `load` and `build` read one. `plan`, `run`, `sweep`, `backbone`, `cost` and `fit`
-compute. `profile` and `compare` evaluate measured surfaces. `report`, `view`, `export`, `import_` and `mesh` read and
-write files. `run` returns a `Result`. The examples of the docstrings are run by a test.
+`new` returns a template scene; `load` and `build` read a scene. `plan`, `run`, `sweep`, `backbone`, `cost` and `fit`
+perform computations; `run` returns a `Result`. `profile` and `compare` evaluate measured surfaces. `report`, `view`,
+`export`, `import_` and `mesh` read and write files. A test executes the examples of the docstrings.
 """
 
 from __future__ import annotations
@@ -116,25 +116,25 @@ __all__ = [
     "sweep",
     "view",
 ]
-INLINE_SCENE_NAME = "<text>"  # name of a scene that was given as a string
-DICT_NAME = "<dict>"  # name of a scene that was given as a dict
-# prefix that locates a mistake in an option --set or in a scene text; Python callers wrote neither, so it is cut off
+INLINE_SCENE_NAME = "<text>"  # displayed file name of a scene that is given as a string
+DICT_NAME = "<dict>"  # displayed file name of a scene that is given as a dict
+# location prefix of an error in an option --set or in a scene text, which is meaningless to Python callers
 LOCATION_PATTERN = re.compile(rf"^(--set: |{DICT_NAME}(:\d+)?: )", re.MULTILINE)
 
 
 def _strip_file_and_line_from_errors(function: Callable) -> Callable:
-    """Decorate a function so that error messages for an input dict name only the key.
+    """Decorate a function so that its error messages name the key without file and line.
 
-    The messages then contain no file and line.
+    Callers who give the keys from Python have written no such file.
     """
 
     def strip_file_and_line(message: Any) -> Any:
-        """Remove the location at the start of the lines of a message."""
+        """Remove the location at the start of each line of a message."""
         return LOCATION_PATTERN.sub("", message) if isinstance(message, str) else message
 
     @wraps(function)
     def call_with_short_errors(*args: Any, **keywords: Any) -> Any:
-        """Call the function, and shorten the messages of its errors."""
+        """Call the function, and remove the locations from its error messages."""
         try:
             return function(*args, **keywords)
         except PatchfemError as error:
@@ -147,11 +147,11 @@ def _strip_file_and_line_from_errors(function: Callable) -> Callable:
 
 
 def _reject_removed_options(function: Callable) -> Callable:
-    """Decorate a function so that it rejects removed arguments with a one-line message."""
+    """Decorate a function so that removed options raise a PatchfemError with advice."""
 
     @wraps(function)
     def check_options_and_call(*args: Any, **keywords: Any) -> Any:
-        """Call the function unless one of the keywords is a removed option."""
+        """Call the function, unless a keyword is a removed option."""
         verb = function.__name__
         for name in keywords:
             if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):
@@ -169,21 +169,21 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
     ----------
     scene : path, str, dict or Scene
         A Path, or a str without newline and bracket, is the name of a file. Any other str is the text of a scene. A Scene
-        is returned with the sets applied.
+        is returned with the new values.
     **sets
-        Keys with new values, passed as ``**{"contact.load": "26 lbf"}``. A value is a text as in the scene, a number in
-        SI, or a list of these. A plain number for a length is refused if it exceeds the length of the patch or 1 m, because
-        it was probably meant in millimetres; texts and radii are not checked in this way.
+        Keys with new values, passed as ``**{"contact.load": "26 lbf"}``. A value is a string as in a scene file, a number
+        in SI units, or a list of these. A number for a length is rejected if it exceeds the length of the patch or 1 m,
+        because it was probably meant in millimetres; strings and radii are not checked in this way.
 
     Returns
     -------
     Scene
-        The scene with checked values in SI.
+        Scene with validated values in SI units.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes; it lists every mistake.
+        If the scene is invalid; it lists all errors.
 
     Examples
     --------
@@ -193,17 +193,17 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
     ('bench', 115.65)
     """
     if not isinstance(scene, Scene):
-        return _load_prepared(scene, None, sets)
+        return _load_and_prepare(scene, None, sets)
     assignments = format_assignments(sets)
     if not assignments:
         return scene
     return require_units(get_base_scene(scene).override(assignments), sets)
 
 
-def _load_prepared(scene, prepare: Callable | None, sets: dict) -> Scene:
-    """Read a scene whose plain values are changed by `prepare` before they are checked.
+def _load_and_prepare(scene, prepare: Callable | None, sets: dict) -> Scene:
+    """Read a scene, and let a function change its raw values before they are validated.
 
-    scene, sets: as for `load`.
+    `scene` and `sets` are as for `load`; `prepare` may be None.
     """
     assignments = format_assignments(sets)
     if isinstance(scene, Mapping):
@@ -221,14 +221,14 @@ def _load_prepared(scene, prepare: Callable | None, sets: dict) -> Scene:
 
 
 def _is_scene_text(scene: Any) -> bool:
-    """Return whether a scene was given as its text and not as the name of its file."""
+    """Return whether a scene is given as its text, rather than as a file name."""
     return isinstance(scene, str) and ("\n" in scene or "[" in scene)
 
 
 def get_base_scene(scene: Scene) -> BaseScene:
-    """Return the `BaseScene` of a scene, from which variants with changed keys are built.
+    """Return the `BaseScene` of a scene, from which variants with changed keys are derived.
 
-    The one of the last scene is cached.
+    The result for the last scene is cached.
     """
     for base_scene in _cached_base_scenes:
         if base_scene.scene is scene:
@@ -237,7 +237,7 @@ def get_base_scene(scene: Scene) -> BaseScene:
     return _cached_base_scenes[0]
 
 
-# the BaseScene of the last scene that was changed; empty before the first
+# cached BaseScene of the last scene, at most one
 _cached_base_scenes: list[BaseScene] = []
 
 
@@ -255,14 +255,14 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     Returns
     -------
     Model
-        What the scene means; `run_many` takes a list of them.
+        Model of the scene; `run_many` accepts a list of models.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes.
+        If the scene is invalid.
     PatchfemError
-        If a file of the scene cannot be used, or if sets are given with a Model.
+        If a file of the scene cannot be used, or if new values are given with a Model.
 
     Examples
     --------
@@ -272,14 +272,14 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     ('patch', 115.65)
     """
     if isinstance(scene, Model):
-        _reject_changed_keys(sets, "Model")
+        _reject_keys(sets, "Model")
         return scene
     return build_model(load(scene, **sets))
 
 
 @_strip_file_and_line_from_errors
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Plan the run of a scene, its engine, size and predicted cost, without solving it.
+    """Choose the engine of a run, and predict its size and cost, without solving anything.
 
     Parameters
     ----------
@@ -291,12 +291,12 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     Returns
     -------
     Plan
-        Printing it shows what `patchfem plan` prints; `run` takes it.
+        Its string is the output of `patchfem plan`; `run` accepts a Plan.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes.
+        If the scene is invalid.
     PatchfemError
         If the scene cannot be run.
 
@@ -326,23 +326,23 @@ def run(
     scene : path, str, dict, Scene, Model or Plan
         As for `load`, or the result of `build` or `plan`.
     say : callable, optional
-        Function that takes one line of text, called before steps that take long, such as compiling. Default: print to
-        stderr.
+        Function that is called with a line of text before slow steps such as compilation. Default: print to stderr.
     progress : callable, optional
-        Function that takes the completed fraction of the run, from 0 to 1.
+        Function that is called with the completed fraction of the run, from 0 to 1.
     **sets
         Keys with new values, as for `load`.
 
     Returns
     -------
     Result
+        Outcome, measures with numerical errors, and time histories.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes.
+        If the scene is invalid.
     PatchfemError
-        If the scene cannot be run. `NotConverged` and `Missing` are kinds of it.
+        If the scene cannot be run. `NotConverged` and `Missing` are subclasses.
 
     Examples
     --------
@@ -352,16 +352,16 @@ def run(
     ('done', 34.5)
     """
     if isinstance(scene, Plan):
-        _reject_changed_keys(sets, "Plan")
+        _reject_keys(sets, "Plan")
     scene_plan = scene if isinstance(scene, Plan) else plan(scene, **sets)
     result = run_plan(scene_plan, _print_to_stderr if say is None else say, progress)
-    # the result of the engines is wrapped in the public class, which adds plots, tables and attributes
+    # the public class adds plots and tables to the result, and attribute access to its measures
     values = {field.name: getattr(result, field.name) for field in fields(result)}
     return Result(**values | {"measures": Measures(result.measures)})
 
 
 def demo(**sets: Any) -> Result:
-    """Run the example scene of the program, the rig of the 1985 report at 143 Hz and 5 g.
+    """Run the bundled example scene, the rig of the 1985 report at 143 Hz and 5 g.
 
     Parameters
     ----------
@@ -388,7 +388,7 @@ def demo(**sets: Any) -> Result:
 
 
 def new(kind: str, /) -> str:
-    """Return the text of a template scene, for `load` and `run`.
+    """Return the text of a template scene, which `load` and `run` accept.
 
     Parameters
     ----------
@@ -402,7 +402,7 @@ def new(kind: str, /) -> str:
     Raises
     ------
     PatchfemError
-        If there is no such kind.
+        If there is no template of this kind.
 
     Examples
     --------
@@ -422,35 +422,36 @@ def cost(
     say: Callable[[str], None] | None = None,
     **sets: Any,
 ) -> dict[str, Any]:
-    """Measure the errors and CPU times of runs of a scene at several tolerances.
+    """Measure numerical error against CPU time for several tolerances, or for values of one setting.
 
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
         As for `build`.
     over : str, optional
-        One setting instead of the tolerance: "element_size", "steps_per_cycle", "shear_modes" or "jumps".
+        Setting to vary instead of the tolerance: "element_size", "steps_per_cycle", "shear_modes" or "jumps".
     out : path, optional
-        Folder for cost.csv and the picture.
+        Folder for cost.csv and the picture. Default: no files are written.
     say : callable, optional
-        Function that takes one line of text per run. Default: print to stderr.
+        Function that is called with a line of text for each run. Default: print to stderr.
     **sets
         Keys with new values, as for `load`.
 
     Returns
     -------
     dict
-        The dict of `patchfem cost --json`: an entry "tolerance", or that of the setting, with the list `runs`. Each run has
-        its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error (relative to what a
-        tolerance of 1 would allow), `meets_tolerance`, the `remedies` of its warnings, and by measure its `values` and its
-        stated `errors` in SI. Runs with a setting that was tried because a tolerance was missed have the same `tolerance`.
-        For one setting there are also `distances` from the best run, `cheapest` and `sentence`, and settings that gave
-        bit-identical runs are listed as one.
+        The output of `patchfem cost --json`: an entry "tolerance", or one with the name of the setting, with the list
+        `runs`. Each run has its `label`, `tolerance`, CPU `seconds`, `wall_seconds`, the `worst` measure with its error
+        (relative to the allowed error at a tolerance of 1), `meets_tolerance`, the advice from its warnings as `remedies`,
+        and for each measure its value in `values` and its error estimate in `errors`, in SI units. If a run misses its
+        tolerance, further runs with the same `tolerance` and a proposed setting may follow. For a setting, each run also
+        has `distances` from the best run, the entry has `cheapest` and `sentence`, and settings with bit-identical
+        results are listed once.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes.
+        If the scene is invalid.
     PatchfemError
         If the scene does not have the setting.
 
@@ -483,39 +484,40 @@ def backbone(
     modes: str | Iterable = "",
     **sets: Any,
 ) -> Dataset:
-    """Compute frequency and damping ratio of a mode against its amplitude at the output.
+    """Compute frequency and damping ratio of a mode as functions of its amplitude at the output.
 
-    Every value has a numerical error. The recommended curve has a band of what tests measure.
+    Every value has a numerical error estimate. The recommended curve has a band of values to expect in tests.
 
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
-        As for `build`. [slide] and [drive] are ignored.
+        As for `build`. The tables [slide] and [drive] are ignored.
     mode : str, optional
         Name of the mode, or its number for a rig of masses. Default: the first mode.
     amplitudes : float, str or list, optional
-        One or more amplitudes [m], or a text such as "1 um..1 mm:25". Default: around the amplitude at which the contact
-        slips.
+        One or more amplitudes [m], or a string such as "1 um..1 mm:25". Default: a range around the amplitude at which
+        the contact slips.
     method : str
-        "balance", "decay", "quasi-static" or "all". Default: "balance", with "quasi-static" beside it.
+        "balance", "decay", "quasi-static" or "all". Default: "balance" and "quasi-static".
     modes : str or list, optional
-        Modes that replace those of the scene, as "120 Hz:0.01, 170 Hz:0.02" (frequency of the bolted joint, damping
-        ratio, and optionally the slide), or a list of tuples such as ("120 Hz", 0.01).
+        Modes that replace those of the scene, such as "120 Hz:0.01, 170 Hz:0.02" (frequency with the bolted joint,
+        damping ratio, and optionally the participation `slide`), or a list of tuples such as ("120 Hz", 0.01).
     **sets
         Keys with new values, as for `load`.
 
     Returns
     -------
     xarray.Dataset
-        Each method has its own variables and amplitudes. Attributes are `free_frequency` and `stuck_frequency` [Hz], the
-        exponents of the energy dissipated per cycle `exponent_micro` and `exponent_gross`, and `flutter_amplitude` [m],
-        where they are known. `missing` says why a method gave no curve. The variables whose names begin with "band" limit
-        the curve by the method that the attribute `method` names; `advice` says which method holds where.
+        Variables and amplitudes of each method. Attributes are `free_frequency` and `stuck_frequency` [Hz], the exponents
+        `exponent_micro` and `exponent_gross` of the energy dissipated per cycle, and `flutter_amplitude` [m], where they
+        are known. The attribute `missing` gives the reason if a method has no curve. The variables with the prefix "band"
+        are limits of the curve of the recommended method, whose name is the attribute `method`; `advice` describes where
+        each method is valid.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes.
+        If the scene is invalid.
     PatchfemError
         If the scene has no rig or no friction, if the mode is unknown, or if the amplitudes are not positive lengths.
 
@@ -523,17 +525,17 @@ def backbone(
     --------
     >>> import patchfem as pf
     >>> law = {"friction.law": "elastic-plastic", "friction.bond_length": "1 um"}
-    >>> found = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
-    >>> found["quasi_static_frequency"].size
+    >>> curves = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
+    >>> curves["quasi_static_frequency"].size
     5
     """
     methods = backbones.choose_methods(_require_string(method, "backbone: method"))
 
     def build_with(tables: BackboneTables) -> Model:
-        """Build the model of the scene with the tables of a backbone."""
+        """Build the model of the scene with the changed tables that a backbone requires."""
         if isinstance(scene, Model):
             return build(scene, **sets)
-        return build_model(_load_prepared(scene, tables, sets))
+        return build_model(_load_and_prepare(scene, tables, sets))
 
     if not isinstance(modes, str) and isinstance(modes, Iterable):
         modes = list(modes)
@@ -574,31 +576,31 @@ def sweep(
     scene : path, str, dict or Scene
         As for `load`.
     over : dict, optional
-        Key -> list of values (texts as in a scene, or numbers in SI) or a range such as "1e-6 rad..1e-2 rad:9". Default:
-        the table [sweep] of the scene.
+        Values of each key: a list of values (strings as in a scene, or numbers in SI units) or a range such as
+        "1e-6 rad..1e-2 rad:9". Default: the table [sweep] of the scene.
     out : path, optional
-        Folder to write, as `patchfem sweep -o` does.
+        Output folder, as for `patchfem sweep -o`. Default: no files are written.
     draw : int
-        Number of cases to draw between the ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations. Drawn
-        cases are rows of one dimension `case`.
+        Number of random cases within ranges such as "1e-6 rad..1e-2 rad", instead of all combinations. The Dataset then
+        has a single dimension `case`.
     seed : int
-        Seed of the draw.
+        Seed of the random numbers.
     sobol : bool
-        Draw by Sobol's sequence instead of at random.
+        Whether the random cases form a Sobol sequence instead of independent samples.
     of : str
-        Measure that the printed answer states, such as "equivalent_damping".
+        Measure of the attribute `answer`, such as "equivalent_damping".
     jobs : int
         Number of processes.
     executor : str
-        "dask" or "dask:ADDRESS".
+        "dask" for a Dask cluster on this machine, or "dask:ADDRESS" for that of a scheduler.
     resume : bool
-        Continue the sweep in the folder `out`.
+        Whether to continue the sweep in the folder `out`.
 
     Returns
     -------
     xarray.Dataset
-        The Dataset of sweep.nc. The attribute `answer` states the main result in one sentence. A case that is refused or
-        fails has the outcome "failed" and its message.
+        Measures and their errors, as in sweep.nc. The attribute `answer` summarises the main result in one sentence. A
+        case that is invalid or fails has the outcome "failed" and an error message.
 
     Raises
     ------
@@ -610,8 +612,8 @@ def sweep(
     Examples
     --------
     >>> import patchfem as pf
-    >>> found = pf.sweep(pf.new("bench"), {"friction.static": [0.1, 0.2, 0.3]})
-    >>> found["friction_force_peak"].values.round(1).tolist()
+    >>> dataset = pf.sweep(pf.new("bench"), {"friction.static": [0.1, 0.2, 0.3]})
+    >>> dataset["friction_force_peak"].values.round(1).tolist()
     [11.5, 23.0, 34.5]
     """
     if over is not None and not isinstance(over, Mapping):
@@ -624,44 +626,46 @@ def sweep(
     if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
     sweep_scene = _read_sweep_scene(scene, of)
-    ranges = [f"{key}={_format_range(key, values)}" for key, values in values_by_key.items()]
+    ranges = [f"{key}={_format_swept_values(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed, of)
     cases = parse_request.read_cases(sweep_scene, request)
     pool = executors.make_executor(executor, jobs)
     if out is None:
         results = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
-        names = []
+        case_hashes = []
     else:
         target = sweep_run.SweepTarget(Path(out), resume)
         results = sweep_run.sweep_into(sweep_scene, cases, target, pool, _print_to_stderr)
-        names = [] if target.kept_files(len(cases)) == "none" else cases.compute_hashes(sweep_scene)
-    keys = [folder.case_folder_name(name) for name in names]
+        case_hashes = (
+            [] if target.kept_files(len(cases)) == "none" else cases.compute_hashes(sweep_scene)
+        )
+    keys = [folder.case_folder_name(name) for name in case_hashes]
     table = page.sweep_table(sweep_scene, cases, results, (), Path(out or ""))
     answer = headline.summarise_sweep(table).answer()
     return tables.table_contents(sweep_scene, cases, results, keys, answer).to_xarray()
 
 
 def _is_empty(values: Any) -> bool:
-    """Return whether the values of a key are an empty list or string."""
+    """Return whether the values of a swept key are an empty list or string."""
     return hasattr(values, "__len__") and not len(values)
 
 
-def _format_range(key: str, values: Any) -> str:
-    """Return the values of a key as a string for the option `patchfem sweep --over`."""
+def _format_swept_values(key: str, values: Any) -> str:
+    """Return the values of a swept key as a string for the option `patchfem sweep --over`."""
     return values if isinstance(values, str) else ",".join(format_values(key, values))
 
 
 class SweepPlots:
-    """Plots of sweeps and backbone curves as matplotlib Axes.
+    """Plots of sweeps and of backbone curves as matplotlib Axes.
 
     The instance `patchfem.plot` is used as in ``pf.plot.sweep(dataset, "loop_area")``.
     """
 
     @staticmethod
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
-        """Plot a measure of a sweep against the key that has most values, with numerical errors.
+        """Plot a measure of a sweep against the key with the most values, with error bars.
 
-        Hollow points exceed the tolerance. An axis is logarithmic if its values span more than two decades.
+        Hollow markers denote errors above the tolerance. An axis whose values span more than two decades is logarithmic.
 
         Parameters
         ----------
@@ -678,13 +682,13 @@ class SweepPlots:
         Raises
         ------
         PatchfemError
-            If the Dataset does not come from a sweep or does not contain the measure.
+            If the Dataset is not the result of a sweep or does not contain the measure.
 
         Examples
         --------
         >>> import patchfem as pf
-        >>> found = pf.sweep(pf.new("bench"), {"friction.static": [0.1, 0.2, 0.3]})
-        >>> axes = pf.plot.sweep(found, "loop_area")
+        >>> dataset = pf.sweep(pf.new("bench"), {"friction.static": [0.1, 0.2, 0.3]})
+        >>> axes = pf.plot.sweep(dataset, "loop_area")
         >>> axes.figure.savefig("loop_area.png")
         """
         is_dataset = hasattr(dataset, "coords")
@@ -699,16 +703,14 @@ class SweepPlots:
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
-        """Plot frequency and damping ratio of a mode against its amplitude, for each method.
-
-        The points have error bars.
+        """Plot frequency and damping ratio of a mode against its amplitude, with error bars, for each method.
 
         Parameters
         ----------
         dataset : xarray.Dataset
             Result of `pf.backbone`.
         ax : matplotlib.axes.Axes, optional
-            Axes to draw on; the damping ratio is left out. Default: a new figure.
+            Axes for the frequency; the damping ratio is then omitted. Default: a new figure with both.
 
         Returns
         -------
@@ -717,14 +719,14 @@ class SweepPlots:
         Raises
         ------
         PatchfemError
-            If the Dataset does not come from a backbone or has no curve.
+            If the Dataset is not the result of `pf.backbone` or contains no curve.
 
         Examples
         --------
         >>> import patchfem as pf
         >>> law = {"friction.law": "elastic-plastic", "friction.bond_length": "1 um"}
-        >>> found = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
-        >>> pf.plot.backbone(found).figure.savefig("backbone.png")
+        >>> curves = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
+        >>> pf.plot.backbone(curves).figure.savefig("backbone.png")
         """
         coordinates = getattr(dataset, "coords", ())
         curves = {}
@@ -750,28 +752,28 @@ plot = SweepPlots()
 def run_many(
     models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None
 ) -> CaseResults:
-    """Run several scenes or models, and return their measures as columns with a row per model.
+    """Run several scenes or models, and return their measures as arrays with one element per model.
 
-    Models that share work are computed together, with the same results as single runs. Patches of equal geometry share one
-    mesh, as in a sweep.
+    Similar models are computed together in batches, with the same results as single runs. Patches of equal geometry have
+    a common mesh, as in a sweep.
 
     Parameters
     ----------
     models : list of path, str, dict, Scene or Model
-        As for `build`. A single scene or model counts as a list of one.
+        As for `build`. A single scene or model is accepted as well.
     say : callable, optional
-        Function that takes one line of text, called before steps that take long. Default: print to stderr.
+        Function that is called with a line of text before slow steps. Default: print to stderr.
 
     Returns
     -------
     CaseResults
-        `values` and `errors` by measure, and `outcome` of each model. A model that cannot be run has the outcome "failed"
-        and its message.
+        `values` and `errors` of each measure, and the `outcome` of each model. A model that cannot be run has the outcome
+        "failed" and an error message.
 
     Raises
     ------
     SceneError
-        If a scene has a mistake.
+        If a scene is invalid.
 
     Examples
     --------
@@ -799,38 +801,39 @@ def fit(
     say: Callable[[str], None] | None = None,
     **keywords: Any,
 ) -> dict[str, Any]:
-    r"""Fit values of keys of a scene to measurements, with 95 % intervals.
+    r"""Fit parameters of a scene to measurements, with 95 % confidence intervals.
 
     Parameters
     ----------
     scene : path, str, dict or Scene
         As for `load`.
     data : path
-        File of the measurements: a friction loop for a bench; rows of responses, or frequency and damping against
-        amplitude, for a rig; a worn depth for a scene with [wear]. Left out with ``options.from_patch``.
+        File of the measurements: a friction loop for a bench; a table of responses, or frequency and damping against
+        amplitude, for a rig; a worn depth for a scene with [wear]. Not used with ``options.from_patch``.
     options : FitOptions, optional
-        Rows to hold or leave out, offsets of a loop, and settings of the search.
+        Validation rows, offsets of a loop, and settings of the search.
     free : dict
-        Key -> (low, high) or a text such as "0.1..0.6". Left out with ``options.from_patch``.
+        Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6". Not used with
+        ``options.from_patch``.
     out : path, optional
-        Folder to write, as `patchfem fit -o` does.
+        Output folder, as for `patchfem fit -o`. Default: no files are written.
     say : callable, optional
-        Function that takes a line of text before steps that take long. Default: print to stderr.
+        Function that is called with a line of text before slow steps. Default: print to stderr.
     **keywords
-        Keys with new values, as for `load`. A field of `FitOptions`, such as ``starts=4``, replaces that of `options`;
-        ``to`` is another name for `data`.
+        Keys with new values, as for `load`. A field of `FitOptions`, such as ``starts=4``, overrides that of `options`;
+        ``to`` is an alias of `data`.
 
     Returns
     -------
     dict
-        The dict of fit.json, in SI. `values` has for each key its `value` and the interval `low`, `high`.
+        The contents of fit.json, in SI units. `values` contains the `value` and the interval `low`, `high` of each key.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes or lacks a key of `free`.
+        If the scene is invalid, or if a key of `free` does not exist.
     PatchfemError
-        If the measurements cannot be read or do not suit the scene.
+        If the measurements cannot be read or are of the wrong kind for the scene.
 
     Examples
     --------
@@ -840,8 +843,8 @@ def fit(
     >>> rows = zip(run.time.tolist(), run.slide.tolist(), run.force.tolist())
     >>> lines = ["time [s],displacement [m],force [N]", *(f"{t},{x},{f}" for t, x, f in rows)]
     >>> _ = Path("loop.csv").write_text("\n".join(lines))
-    >>> found = pf.fit(pf.new("bench"), "loop.csv", free={"friction.static": (0.1, 0.6)})
-    >>> round(found["values"]["friction.static"]["value"], 6)
+    >>> fitted = pf.fit(pf.new("bench"), "loop.csv", free={"friction.static": (0.1, 0.6)})
+    >>> round(fitted["values"]["friction.static"]["value"], 6)
     0.3
     """
     names = {field.name for field in fields(FitOptions)}
@@ -855,17 +858,17 @@ def fit(
     ranges = [f"{key}={_format_bounds(key, ends)}" for key, ends in (free or {}).items()]
     options = _check_fit_options(FitOptions() if options is None else options, changes)
     data = keywords.get("to", data)
-    measured = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
+    data_path = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
     with TemporaryDirectory() as temporary_folder:
-        target = Path(temporary_folder) / "fit" if out is None else Path(out)
+        output_folder = Path(temporary_folder) / "fit" if out is None else Path(out)
         listener = fits.Listener(_print_to_stderr if say is None else say)
-        return fits.fit_into(loaded, measured, ranges, options, target, listener).answer
+        return fits.fit_into(loaded, data_path, ranges, options, output_folder, listener).answer
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:
-    """Return the options of a fit as command-line arguments, with some fields replaced.
+    """Return the options of a fit in the form of the command line, with some fields replaced.
 
-    `changes` holds the new values by the name of the field. Raises PatchfemError for values of another type.
+    `changes` maps field names to new values. Raises PatchfemError for values of the wrong type.
     """
     if not isinstance(options, FitOptions):
         raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
@@ -881,11 +884,9 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
 
 
 def _format_bounds(key: str, ends: Any) -> str:
-    """Return the lower and upper bound of a free key as a string "low..high".
+    """Return the lower and the upper bound of a free parameter as a string "low..high".
 
-    `ends` are two values, or a string that is returned unchanged.
-
-    Raises PatchfemError for anything else.
+    `ends` is a pair of values, or a string that is returned unchanged. Raises PatchfemError for anything else.
     """
     pair = [ends] if isinstance(ends, str) else format_values(key, ends)
     if not isinstance(ends, str) and len(pair) != 2:
@@ -914,17 +915,20 @@ def profile(
     Parameters
     ----------
     *files : path
+        Files of traces or scans.
     cutoff : float or str, optional
-        Wavelength that separates roughness from waviness, in m or as a text such as "0.25 mm".
+        Cutoff wavelength between roughness and waviness [m], or a string such as "0.25 mm".
     window : list, optional
-        First and last position, in m or as texts, or both in one text with a comma; for a scan those in x first.
+        First and last position [m] of the evaluated section, as numbers or strings, or as one string with a comma. For a
+        scan, the limits in x come before those in y.
     units : tuple of str, optional
-        Units of x and z for files that give none, such as ("mm", "um").
+        Units of x and z for files without units, such as ("mm", "um").
 
     Returns
     -------
     dict
-        The dict of `patchfem profile --json`, in SI: `profiles` with an entry per file, and `means` over all files.
+        The output of `patchfem profile --json`, in SI units: `profiles` with an entry for each file, and `means` over all
+        files.
 
     Raises
     ------
@@ -938,8 +942,8 @@ def profile(
     >>> x = np.arange(0.0, 8.0, 0.001)
     >>> z = np.random.default_rng(1).normal(size=x.size)
     >>> np.savetxt("trace.csv", np.c_[x, z], delimiter=",", header="x [mm],z [um]", comments="")
-    >>> found = pf.profile("trace.csv", cutoff="0.8 mm")
-    >>> len(found["profiles"])
+    >>> roughness = pf.profile("trace.csv", cutoff="0.8 mm")
+    >>> len(roughness["profiles"])
     1
     """
     length = _parse_length(cutoff, "profile: cutoff")
@@ -970,13 +974,14 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     Parameters
     ----------
     folders : path or list of path
+        Results folders.
     out : path, optional
-        The page. Default: report.html.
+        File of the page. Default: report.html.
 
     Returns
     -------
     Path
-        The page.
+        File of the page.
 
     Raises
     ------
@@ -1011,21 +1016,21 @@ def export(
     folder : path
         Results folder, or a scene file.
     out : path
-        File whose extension gives the format. Fields: .pvd, .vtu, .vtkhdf or .csv (the interface). Histories and loops:
-        .uff, .mat, or .csv with `histories` or if the folder has no fields. A script that plays the last cycle
-        (of a bench: the whole slide) in ParaView: .py. Matrices and friction elements of a scene: .mat for NLvib, .npz
-        for TMDSimPy and pyHarm.
+        Output file, whose extension determines the format. Fields: .pvd, .vtu, .vtkhdf or .csv (interface only). Time
+        histories and loops: .uff, .mat, or .csv with `histories` or if the folder has no fields. ParaView script that
+        animates the last cycle (the whole slide of a bench): .py. Matrices and friction elements of a scene: .mat for
+        NLvib, .npz for TMDSimPy and pyHarm.
     frame : int, optional
-        Number of the frame of a .vtu or .csv. Default: the last.
+        Index of the frame of a .vtu or .csv file. Default: the last frame.
     histories : bool
-        Write histories to a .csv, even if the folder has fields.
+        Whether to write time histories to a .csv file even if the folder has fields.
     of : str
-        Stress that a script shows, such as "sigma_yy".
+        Stress that a ParaView script shows, such as "sigma_yy".
 
     Returns
     -------
     Path
-        The file that was written.
+        Output file.
 
     Raises
     ------
@@ -1063,23 +1068,24 @@ def view(
     frame: int | None = None,
     magnify: float | None = None,
 ) -> None:
-    """Show the pieces of a results folder in a window, or write a picture or film of them.
+    """Show the pieces of a results folder in a window, or write an image or an animation of them.
 
     Parameters
     ----------
     folder : path
         Results folder of a scene with [contact].
     out : path, optional
-        A picture (.png), or the last cycle (of a bench: the whole slide) as .gif, .mp4 or .html. Default: a window.
+        Image file (.png), or animation of the last cycle (the whole slide of a bench) as .gif, .mp4 or .html. Default:
+        show a window.
     frame : int, optional
-        Number of the frame. Default: the last.
+        Index of the frame. Default: the last frame.
     magnify : float, optional
-        Factor of the drawn displacements.
+        Magnification of the displayed displacements.
 
     Raises
     ------
     PatchfemError
-        If the folder has no fields, or if the option does not suit the format.
+        If the folder has no fields, or if an option does not apply to the format.
 
     Examples
     --------
@@ -1106,21 +1112,23 @@ def import_(
     Parameters
     ----------
     file : path
+        Laboratory record.
     out : path
-        File whose extension gives the result: a table (.csv), modes for a scene (.toml) or a frequency response (.uff).
+        Output file, whose extension determines its contents: a table (.csv), modes for a scene (.toml) or a frequency
+        response (.uff).
     map : str or list of str
         Quantity of each channel, such as "force=Load cell [lbf]".
     zero : bool
-        Subtract the first row from time and displacement.
+        Whether to subtract the first row from time and displacement.
     decay : bool
-        The record is a free decay.
+        Whether the record is a free decay.
     **how
-        Options `segment`, `window`, `band` and `begin` as texts, such as segment="2 s".
+        Options `segment`, `window`, `band` and `begin` as strings, such as segment="2 s".
 
     Returns
     -------
     dict
-        The dict of `patchfem import --json`, in SI.
+        The output of `patchfem import --json`, in SI units.
 
     Raises
     ------
@@ -1151,26 +1159,26 @@ def import_(
 
 
 def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> Path:
-    """Write the finite-element mesh of the pieces of a scene, with tagged regions.
+    """Write the finite-element mesh of both pieces of a scene, with tagged regions.
 
     Parameters
     ----------
     scene : path, str, dict, Scene or Model
         As for `build`.
     out : path
-        File with the extension .msh or .vtu.
+        Output file with the extension .msh or .vtu.
     **sets
         Keys with new values, as for `load`.
 
     Returns
     -------
     Path
-        The file that was written.
+        Output file.
 
     Raises
     ------
     SceneError
-        If the scene has mistakes.
+        If the scene is invalid.
     PatchfemError
         If the scene has no [contact].
 
@@ -1205,40 +1213,40 @@ def compare(
     Parameters
     ----------
     *files : path
-        The surface before and the surface after wear, as two traces or two areal scans; optionally a second pair of traces
-        in the other direction. Or the results folders of two runs, the second with [wear].
+        Surface before and after wear, as two traces or two areal scans, optionally followed by a second pair of traces in
+        the other direction. Alternatively the results folders of two runs, the second one with [wear].
     direction : str
-        "x" or "y", along which the first two traces run.
+        Direction of the first two traces, "x" or "y".
     units : tuple of str, optional
-        Units of x and z for files that give none, such as ("mm", "um").
+        Units of x and z for files without units, such as ("mm", "um").
     shift : float or str, optional
-        Known shift of the second trace [m]; 0.0 if both start at the same mark.
+        Known shift of the second trace [m]; 0.0 if both start at the same mark. Default: the shift is estimated.
     keep_spikes : bool
-        Do not remove spikes, dropouts and dust.
+        Whether to keep spikes, dropouts and dust instead of removing them.
     pairs : path, optional
-        Table of pairs instead of files, with the columns before and after.
+        Table with the columns before and after that lists pairs of files; used instead of `files`.
     datum : str
         "straight" if the datum of the instrument is known to be straight, so that no bow is subtracted from traces.
     predicted : path, optional
-        Results folder of a run with [wear], whose worn depth is laid over that of the traces.
+        Results folder of a run with [wear], whose worn depth is compared with that of the traces.
     piece : str
-        "upper" or "lower", of which the traces are; it may be left out if both pieces wear alike.
+        Piece on which the traces were measured, "upper" or "lower". Not required if both pieces wear equally.
 
     Returns
     -------
     dict
-        The dict of compare.json, in SI. `verdict` and `sentences` are texts. `shift`, `worn_depth_mean`, `amplitude_ratio`
-        and others have `value`, `low`, `high`, `unit`, and a `reason` if the value is None. Two scans also have
-        `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With `pairs` the dict has
-        `pairs`, an entry per pair, and `means` with mean, interval and scatter; a pair that fails has its reason as
-        `message`. For two results folders it has the wear between the two runs over the whole patch, and the measures of
-        both runs under `runs`. With `predicted` it has the fitted wear `coefficient`, `difference_rms` and a `sentence`
-        under `predicted`.
+        The contents of compare.json, in SI units. `verdict` and `sentences` summarise the comparison. Measures such as
+        `shift`, `worn_depth_mean` and `amplitude_ratio` have `value`, `low`, `high`, `unit`, and a `reason` if the value is
+        None. Scans also have `worn_volume`, `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With
+        the option `pairs`, the entry `pairs` lists the comparisons, and `means` contains mean, interval and scatter; a
+        pair that fails has a `message`. For results folders, the dict contains the wear between the two runs over the
+        whole patch, and the measures of both runs in `runs`. With the option `predicted`, the entry `predicted` contains
+        the fitted wear `coefficient`, the `difference_rms` and a `sentence`.
 
     Raises
     ------
     PatchfemError
-        If the files do not fit together.
+        If the files cannot be compared.
 
     Examples
     --------
@@ -1248,8 +1256,8 @@ def compare(
     >>> before = np.convolve(np.random.default_rng(1).normal(size=x.size + 20), np.ones(21) / 21, "valid")
     >>> for name, z in (("before.csv", before), ("after.csv", np.minimum(before, 0.2))):
     ...     np.savetxt(name, np.c_[x, z], delimiter=",", header="x [mm],z [um]", comments="")
-    >>> found = pf.compare("before.csv", "after.csv", shift=0.0)
-    >>> found["amplitude_ratio"]["value"] < 1
+    >>> comparison = pf.compare("before.csv", "after.csv", shift=0.0)
+    >>> comparison["amplitude_ratio"]["value"] < 1
     True
     """
     settings = {
@@ -1273,18 +1281,18 @@ def compare(
             raise PatchfemError(
                 "compare: give two results folders alone, without other files or settings of traces"
             )
-        wear = worn_runs.compare_runs(*files)
-        return worn.wear_data(wear, worn.wear_verdict(wear))
+        wear_change = worn_runs.compare_runs(*files)
+        return worn.wear_data(wear_change, worn.wear_verdict(wear_change))
     if pairs is None:
-        judgement = verdict.judge_files(files, direction, **settings)
+        comparison = verdict.judge_files(files, direction, **settings)
         if predicted is None:
-            return compared_data.comparison_data(*judgement)
-        worn_prediction = predicted_wear.predict_wear(judgement.parts, predicted, piece)
-        sentences = compared_data.add_predicted_sentence(judgement.verdict, worn_prediction)
+            return compared_data.comparison_data(*comparison)
+        worn_prediction = predicted_wear.predict_wear(comparison.parts, predicted, piece)
+        sentences = compared_data.add_predicted_sentence(comparison.verdict, worn_prediction)
         return compared_data.comparison_data(
-            judgement.parts,
+            comparison.parts,
             sentences,
-            judgement.directions,
+            comparison.directions,
             compared_data.ComputedParts(predicted=worn_prediction),
         )
     if predicted is not None:
@@ -1296,9 +1304,9 @@ def compare(
 
 
 def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.SweepScene:
-    """Return the text of a scene for a sweep, without checking that the scene is valid.
+    """Return the scene text of a sweep without validating the scene.
 
-    `scene` is as for `load`, and `measure` is the measure that the answer of the sweep states.
+    `scene` is as for `load`; `measure` is the requested measure of the sweep.
     """
     sets: tuple = ()
     if isinstance(scene, Mapping):
@@ -1318,9 +1326,9 @@ def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.Sw
 
 
 def _require_path(value: Any, name: str) -> Path:
-    """Return the name of a file or folder as a Path.
+    """Return a file or folder name as a Path.
 
-    Raises PatchfemError for a value of another type.
+    Raises PatchfemError for other types.
     """
     if not isinstance(value, str | Path):
         needed = "a path, a text, a dict of tables or a Scene" if name == "a scene" else "a path"
@@ -1329,15 +1337,15 @@ def _require_path(value: Any, name: str) -> Path:
 
 
 def _require_paths(value: Any, name: str) -> list:
-    """Return one or several paths as a list."""
-    is_list = isinstance(value, Iterable) and not isinstance(value, str)
-    return [_require_path(path, name) for path in (value if is_list else [value])]
+    """Return one or several paths as a list of Path."""
+    is_collection = isinstance(value, Iterable) and not isinstance(value, str)
+    return [_require_path(path, name) for path in (value if is_collection else [value])]
 
 
 def _parse_length(value: Any, name: str) -> float | None:
     """Convert a number [m], or a string with a unit, to a length [m].
 
-    None is returned unchanged. Raises PatchfemError for anything else.
+    None is returned unchanged. Raises PatchfemError for other types and invalid strings.
     """
     if value is None:
         return None
@@ -1351,7 +1359,7 @@ def _parse_length(value: Any, name: str) -> float | None:
 
 
 def _require_string(value: Any, name: str) -> str:
-    """Return a value if it is a string; raise PatchfemError otherwise."""
+    """Return a value that is a string; raise PatchfemError for other types."""
     if not isinstance(value, str):
         raise PatchfemError(f"{name}: a text is needed, not {value!r:.60}")
     return value
@@ -1360,10 +1368,10 @@ def _require_string(value: Any, name: str) -> str:
 def _require_strings(value: str | Iterable[str], name: str) -> tuple:
     """Return one or several strings as a tuple.
 
-    Raises PatchfemError for values of another type.
+    Raises PatchfemError for other types.
     """
-    is_list = isinstance(value, Iterable) and not isinstance(value, str)
-    return tuple(_require_string(string, name) for string in (value if is_list else [value]))
+    is_collection = isinstance(value, Iterable) and not isinstance(value, str)
+    return tuple(_require_string(string, name) for string in (value if is_collection else [value]))
 
 
 def _print_to_stderr(line: str) -> None:
@@ -1371,10 +1379,10 @@ def _print_to_stderr(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-def _reject_changed_keys(sets: dict, kind: str) -> None:
-    """Raise PatchfemError if changed keys are given, because a Plan or Model cannot be changed.
+def _reject_keys(sets: dict, kind: str) -> None:
+    """Raise PatchfemError if keys are given for a Plan or a Model, which cannot be changed.
 
-    `kind` is the name of the class.
+    `kind` is the class name for the message.
     """
     if sets:
         raise PatchfemError(
@@ -1383,9 +1391,9 @@ def _reject_changed_keys(sets: dict, kind: str) -> None:
 
 
 class Measures(Mapping):
-    """Measures of a run, by name or as attributes, read-only.
+    """Read-only mapping of the measures of a run, which are also available as attributes.
 
-    A notebook shows them as a table.
+    A notebook displays the measures as a table.
 
     Examples
     --------
@@ -1434,10 +1442,10 @@ class Measures(Mapping):
 
 
 class Plots:
-    """Plots of a run, each returned as matplotlib Axes.
+    """Plots of a run as matplotlib Axes.
 
-    Every method takes `ax`, the Axes to draw on. Without it the method makes a new figure, which may have more Axes than
-    the method returns. It raises PatchfemError if the run lacks the data of the plot.
+    Each method draws on the Axes `ax`. If `ax` is None, it creates a new figure, which may have more Axes than the method
+    returns. It raises PatchfemError if the run does not contain the required data.
 
     Examples
     --------
@@ -1452,7 +1460,7 @@ class Plots:
     def pressure(self, ax: Axes | None = None) -> Axes:
         """Plot the normal stress along the interface, and the shear stress if there is any.
 
-        If interfaces have patches of their own, the normal stress on each is drawn. With `ax`, only the first of these
+        If the interfaces have separate patches, the normal stress on each is drawn. With `ax`, only the first of these
         charts is drawn.
         """
         has_patch = self._result.patch is not None or self._result.extra.get("faces")
@@ -1465,14 +1473,14 @@ class Plots:
         return self._draw_first_chart(ax, ("loop",), reason)
 
     def history(self, ax: Axes | None = None) -> Axes:
-        """Plot the displacement over the whole run, and the last cycles or the friction force.
+        """Plot the displacement against time, and the last cycles or the friction force.
 
         With `ax`, only the displacement is drawn.
         """
         return self._draw_first_chart(ax, ("history",), self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:
-        """Plot amplitude per level, or steady-state amplitude against level or frequency."""
+        """Plot the amplitude for each level, or the steady-state amplitude against level or frequency."""
         no_levels = (
             'the drive has no levels; use drive.waveform = "levels", or a sweep with '
             'accuracy.method = "harmonic"'
@@ -1482,7 +1490,7 @@ class Plots:
         )
 
     def accuracy(self, ax: Axes | None = None) -> Axes:
-        """Plot the worst error of the motion against CPU seconds, also of fewer and of more time steps."""
+        """Plot the largest error of the motion against CPU time, for different numbers of time steps."""
         no_steps = (
             "the number of time steps does not limit its accuracy; a rig takes time steps with "
             'accuracy.method = "march"'
@@ -1491,9 +1499,9 @@ class Plots:
         return self._draw_first_chart(ax, ("accuracy",), reason)
 
     def stress(self, ax: Axes | None = None) -> Axes:
-        """Plot the von Mises stress in both pieces under load, and an enlarged view of the contact.
+        """Plot the von Mises stress in both loaded pieces, and an enlarged view of the contact.
 
-        With `ax`, only the pieces are drawn.
+        With `ax`, the enlarged view is omitted.
         """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
@@ -1506,7 +1514,7 @@ class Plots:
         return self._draw_first_chart(ax, ("bodies",), reason, fields_of_bodies)
 
     def _explain_missing_motion(self) -> str:
-        """Return the reason why a run has no motion; "" if it has motion."""
+        """Return why a run has no motion; "" if it has motion."""
         if self._result.response is not None:
             return ""
         if self._result.plan.kind == "patch":
@@ -1518,7 +1526,7 @@ class Plots:
     ) -> Axes:
         """Plot the first of several named charts for which the run has data.
 
-        Raises PatchfemError with `reason` if the run has data for none of them. `bodies` holds the fields of the
+        Raises PatchfemError with `reason` if the run has no data for any of them. `bodies` contains the fields of the
         pieces.
         """
         if ax is not None and not hasattr(ax, "errorbar"):
@@ -1532,10 +1540,10 @@ class Plots:
 
 
 class Result(run_result.Result):
-    """Finished run with its outcome, measures, warnings and notes, and its time histories.
+    """Result of a run: outcome, measures, warnings, notes and time histories.
 
-    `outcome.sentence` says how the run ended. `measures[name]` has `value`, `error`, `unit` and `text`, in SI. `response`
-    holds the histories, and `seconds` the CPU seconds by part of the run.
+    `outcome.sentence` describes how the run ended. `measures[name]` has `value`, `error`, `unit` and `text`, in SI units.
+    `response` contains the time histories, and `seconds` the CPU time of each part of the run.
 
     Examples
     --------
@@ -1549,7 +1557,7 @@ class Result(run_result.Result):
     measures: Measures
 
     def _repr_html_(self) -> str:
-        """Return the HTML that a notebook displays: outcome, headline, measures and warnings."""
+        """Return the HTML representation for notebooks: outcome, headline, measures and warnings."""
         summary = summaries.summarise_run(self)
         return sentences.notebook_html(
             summary,
@@ -1560,7 +1568,7 @@ class Result(run_result.Result):
 
     @property
     def notes(self) -> list[str]:
-        """Sentences on effects that the model neglects."""
+        """Notes about effects that the model neglects."""
         return list(self.extra.get("notes", ()))
 
     @property
@@ -1569,12 +1577,12 @@ class Result(run_result.Result):
         return Plots(self)
 
     def table(self) -> Any:
-        """Return the measures of the run as a table of name, value, error and unit, in SI.
+        """Return the measures of the run as a table of name, value, error and unit, in SI units.
 
         Returns
         -------
         pandas.DataFrame or list of dict
-            A DataFrame if pandas is installed.
+            A DataFrame if pandas is installed, otherwise a list with a dict for each measure.
         """
         rows = []
         for name, measure in self.measures.items():
@@ -1587,28 +1595,28 @@ class Result(run_result.Result):
         return DataFrame(rows).set_index("measure")
 
     def to_xarray(self) -> Dataset:
-        """Return the histories and fields of the run, with units and the scene, as in result.nc."""
+        """Return the time histories and fields of the run with units and scene, as in result.nc."""
         return histories.result_contents(self).to_xarray()
 
     def to_pyvista(self, frame: int | None = -1) -> Any:
-        """Return both pieces and their interface as grids of PyVista, with the fields of fields.vtkhdf.
+        """Return both pieces and their interface as PyVista grids, with the fields of fields.vtkhdf.
 
-        The blocks are named `lower`, `upper` and `interface`, and `strips` for a patch that wears in strips. The
-        pieces have `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`;
-        the interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip`
-        and `status`. Stresses are in MPa, lengths in m; the field array `units` of every grid names the unit of each
-        array, `TimeValue` the time [s].
+        The blocks are `lower`, `upper` and `interface`, and also `strips` for a patch that wears in strips. The pieces
+        have the arrays `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`. The
+        interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip` and
+        `status`. Stresses are in MPa and lengths in m. The field array `units` of each grid lists the unit of each array,
+        and `TimeValue` is the time [s].
 
         Parameters
         ----------
         frame : int, optional
-            Number of the frame, which is that of a row of `fields`; negative numbers count from the end. Default: the
-            last frame. None: all frames.
+            Index of the frame in `fields`; negative indices count from the end. Default: the last frame. None: all
+            frames.
 
         Returns
         -------
         pyvista.MultiBlock or list of pyvista.MultiBlock
-            A list for `frame=None`. Each call computes all frames, so take a list for a film.
+            A list for ``frame=None``. Each call computes all frames, so use the list for an animation.
 
         Raises
         ------
@@ -1634,7 +1642,7 @@ class Result(run_result.Result):
         return multiblock.read_multiblocks(self, [frame])[0]
 
     def _explain_missing_pieces(self) -> str:
-        """Return the reason why a run has no single pair of pieces, and what to use instead."""
+        """Return why a run has no single pair of pieces, and what to use instead."""
         faces = self.extra.get("faces", ())
         if not faces:
             return "the scene has no [contact], so there are no pieces; see to_xarray()"
@@ -1644,23 +1652,24 @@ class Result(run_result.Result):
         )
 
     def save(self, folder: str | Path) -> Path:
-        """Write the results folder of the run, as `patchfem run -o` does.
+        """Write the results of the run to a folder, as `patchfem run -o` does.
 
-        An older results folder is replaced.
+        An existing results folder is replaced.
 
         Parameters
         ----------
         folder : path
+            Output folder.
 
         Returns
         -------
         Path
-            The folder.
+            Output folder.
 
         Raises
         ------
         PatchfemError
-            If the folder contains other files.
+            If the folder exists and contains other files.
 
         Examples
         --------
